@@ -1,4 +1,4 @@
-//! Whole binds: the published method, and the embedded one on one thread and on all.
+//! Whole binds by the published and the embedded method, on one thread and on all threads.
 #![allow(missing_docs, reason = "criterion's macros make public functions without documentation")]
 
 use std::hint::black_box;
@@ -17,7 +17,7 @@ fn bind(criterion: &mut Criterion) {
                 b.iter(|| black_box(input.bind(Method::Embedded, Solver::Multigrid, grid, threads)));
             });
         }
-        // Seconds a bind: the smallest number of samples that criterion takes, and the grid that ratios are told for.
+        // A bind takes seconds, so only the grid that the ratios refer to is measured.
         group.bench_function(BenchmarkId::new(format!("classic Jacobi, {name}"), 64), |b| {
             b.iter(|| black_box(input.bind(Method::Classic, Solver::Jacobi, 64, threads)));
         });

@@ -1,5 +1,5 @@
-//! Cages made for the samples and for the models that the command line names, at 24, 80 and 200 vertices: what was made,
-//! what the check says, how well it binds. A Markdown table, and an error if one of them is wrong.
+//! Generates cages of 24, 80 and 200 vertices for the samples and for the models on the command line, checks and binds them, and prints
+//! a Markdown table. Exits with an error if a cage is invalid or too inaccurate.
 //!
 //! `cargo bench -p cagework-benches --bench cages -- horse.glb cow.obj`
 
@@ -12,21 +12,21 @@ use cagework_core::mesh::TriMesh;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 
-/// Vertices asked for: few, the default, many.
+/// Target numbers of vertices; 80 is the default.
 const TARGETS: [u32; 3] = [24, 80, 200];
 
-/// Cells along the longest side of the bind.
+/// Cells along the longest side of the cage.
 const GRID: u32 = 64;
 
-/// What a rest pose may be off, of the cage's diagonal.
+/// Largest rest error relative to the cage's diagonal.
 const MAX_REST_ERROR: f64 = 5e-5;
 
-/// How often a cage is made, for the fastest time.
+/// Number of times that a cage is generated; the fastest time is printed.
 const TIMES: usize = 5;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    // `cargo test --benches` runs this program too, only to check that it compiles.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -40,8 +40,8 @@ fn main() {
         (name, read(file).tri_mesh())
     }));
     println!(
-        "| model | triangles | asked | vertices | mirror | clearance / diagonal | sound | model inside | \
-         largest rest error | made in ms |"
+        "| model | triangles | target | vertices | mirror | clearance / diagonal | valid | model inside | \
+        largest rest error | time, ms |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     let mut wrong = 0;
@@ -51,26 +51,26 @@ fn main() {
         }
     }
     if wrong > 0 {
-        eprintln!("{wrong} of {} cages are wrong", models.len() * TARGETS.len());
+        eprintln!("{wrong} of {} cages failed", models.len() * TARGETS.len());
         std::process::exit(1);
     }
 }
 
-/// Prints a row; whether the cage is right.
+/// Prints a row of the table. Returns whether the cage passed.
 fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
     let options = CageOptions { target, ..CageOptions::default() };
-    let make = || generate(&mesh.positions, &mesh.triangles, &options, &Silent);
-    let made = match make() {
-        Ok(made) => made,
+    let run = || generate(&mesh.positions, &mesh.triangles, &options, &Silent);
+    let generated = match run() {
+        Ok(generated) => generated,
         Err(error) => {
             println!("| {name} | {} | {target} | {error} |", mesh.triangles.len());
             return false;
         }
     };
-    let fastest = cagework_benches::fastest_ms(TIMES, || drop(make()));
-    let checked = check(&made.cage.to_polygon_mesh(), Some(&mesh.positions), None);
+    let fastest = cagework_benches::fastest_ms(TIMES, || drop(run()));
+    let checked = check(&generated.cage.to_polygon_mesh(), Some(&mesh.positions), None);
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    let bound = bind(&mesh.positions, &made.cage, &options, &Silent);
+    let bound = bind(&mesh.positions, &generated.cage, &options, &Silent);
     let (outside, rest) = match &bound {
         Ok(binding) => (binding.report.outside_vertices, binding.report.rest_error.max_rel),
         Err(_) => (mesh.positions.len() as u64, f64::INFINITY),
@@ -79,12 +79,12 @@ fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
     println!(
         "| {name} | {} | {target} | {}{} | {} | {:.3} | {} | {} | {rest:.1e} | {fastest:.0} |",
         mesh.triangles.len(),
-        made.report.vertices,
-        if made.report.target_met { "" } else { " (more are needed)" },
-        made.report.mirror.map_or("-".to_owned(), |mirror| format!("{mirror:?}").to_lowercase()),
-        f64::from(made.report.clearance) / made.cage.diagonal() as f64,
+        generated.report.vertices,
+        if generated.report.target_met { "" } else { " (needs more)" },
+        generated.report.mirror.map_or("-".to_owned(), |mirror| format!("{mirror:?}").to_lowercase()),
+        f64::from(generated.report.clearance) / generated.cage.diagonal() as f64,
         if checked.valid { "yes" } else { "**no**" },
-        if inside { "all" } else { "**not all**" },
+        if inside { "yes" } else { "**no**" },
     );
     checked.valid && inside && rest <= MAX_REST_ERROR
 }

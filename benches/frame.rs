@@ -1,8 +1,8 @@
-//! A frame: the cage moves, the mesh and its normals follow, and it is drawn. On whatever adapter there is; the
-//! environment's `CAGEWORK_ADAPTER` names another.
+//! Times a frame: the cage is posed, the mesh and its normals are deformed, and the picture is drawn. The environment variable
+//! `CAGEWORK_ADAPTER` selects the GPU.
 //!
-//! `pull` is what the processor solves for a frame of a pull; `deform` waits until positions and normals are there, `frame` until
-//! the picture is.
+//! `pull` is the solver's time per frame on the processor; `deform` ends when positions and normals are computed, `frame` when
+//! the picture has been read back.
 
 use std::slice;
 use std::time::Instant;
@@ -20,16 +20,16 @@ use cagework_tests::creature::{creature, creature_cage};
 use glam::{DVec3, Mat4, Quat, Vec3};
 use pollster::block_on;
 
-/// Frames that are timed.
+/// Number of timed frames.
 const FRAMES: usize = 100;
 
 /// Size of the picture, pixels.
 const SIZE: [u32; 2] = [1280, 800];
 
-/// Vertices of the mesh: more than most characters have.
+/// Vertices of the mesh.
 const VERTICES: usize = 50_000;
 
-/// The animal four times, each smaller than the one before, cut off at [`VERTICES`].
+/// Four copies of the animal, scaled by 1.0 to 0.94, truncated to [`VERTICES`] vertices.
 fn mesh() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let animal = creature();
     let center = animal.positions.iter().sum::<Vec3>() / animal.positions.len() as f32;
@@ -49,13 +49,13 @@ fn posed(cage: &Cage, frame: usize) -> Vec<Vec3> {
     cage.positions().iter().map(turn).collect()
 }
 
-/// Median and fastest of many, milliseconds.
+/// Median and minimum, milliseconds.
 fn summary(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     format!("median {:.2} ms, fastest {:.2} ms", times[times.len() / 2], times[0])
 }
 
-/// A grab made ready and frames of a pull: the animal's first vertex goes round.
+/// Times the start of a grab, and the frames of a pull that moves the animal's first vertex on a circle.
 fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindOptions) {
     let mesh = TriMesh { positions: positions.to_vec(), triangles: triangles.to_vec() };
     let weights = |points: &[Vec3]| bind(points, cage, options, &Silent).expect("it binds").weights;
@@ -84,8 +84,8 @@ fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindO
     println!("  a frame: {}", summary(frame.collect()));
 }
 
-/// What a frame of a clip costs the processor, not the GPU: the vertices of the mesh, 60 joints and 8 morph targets, as a page hands them over; and
-/// the humanoid's joints at a time.
+/// Times the processor's part of a clip's frame: uploading joint matrices and morph weights for a mesh of [`VERTICES`] vertices with
+/// 60 joints and 8 morph targets, and computing the humanoid's joint matrices.
 fn play(session: &mut Session) {
     const N: usize = VERTICES;
     let joints = (0..N as u32).flat_map(|v| (0..4).map(move |k| ((v + 15 * k) % 60, 0.25)));
@@ -99,12 +99,12 @@ fn play(session: &mut Session) {
     };
     block_on(session.start_playing(&skin, None)).expect("it fits");
     let palette = [Mat4::IDENTITY; 60];
-    let hand_over = (0..FRAMES).map(|frame| {
+    let upload = (0..FRAMES).map(|frame| {
         let began = Instant::now();
         session.play(&palette, &[frame as f32; 8]);
         began.elapsed().as_secs_f64() * 1e3
     });
-    println!("play, {N} vertices, handed over: {}", summary(hand_over.collect()));
+    println!("play, {N} vertices, upload: {}", summary(upload.collect()));
     session.stop_playing();
     let sample = samples::build("humanoid").expect("there is one");
     let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref());
@@ -119,7 +119,7 @@ fn play(session: &mut Session) {
 }
 
 fn main() {
-    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    // `cargo test --benches` runs this program too, only to check that it compiles.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

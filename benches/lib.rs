@@ -1,7 +1,7 @@
-//! What the benches measure with: a mesh in a cage, and the stages of a bind one by one.
+//! Input of the benches, and the stages of a bind one by one.
 //!
-//! The mesh and cage are the animal of `cagework_tests::creature`, or the files that the environment variables
-//! `CAGEWORK_BENCH_MESH` and `CAGEWORK_BENCH_CAGE` name (OBJ, glTF, GLB).
+//! Mesh and cage are the animal of `cagework_tests::creature`, or the files in the environment variables
+//! `CAGEWORK_BENCH_MESH` and `CAGEWORK_BENCH_CAGE` (OBJ, glTF, GLB).
 
 use std::time::Instant;
 
@@ -21,10 +21,10 @@ use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};
 use glam::Vec3;
 
-/// The grids that whole binds are measured on.
+/// Grids of whole binds.
 pub const GRIDS: [u32; 3] = [32, 64, 128];
 
-/// What is bound.
+/// A mesh in a cage.
 #[derive(Debug)]
 pub struct Input {
     /// Mesh vertices, object units.
@@ -34,10 +34,10 @@ pub struct Input {
 }
 
 impl Input {
-    /// The files that the environment names, or the generated animal.
+    /// Loads the files that the environment names, or generates the animal.
     ///
     /// # Panics
-    /// If only one file is named, or one cannot be read: there is nothing to measure.
+    /// If only one file is named, or one cannot be read.
     #[must_use]
     pub fn load() -> Self {
         let [mesh, cage] =
@@ -57,7 +57,7 @@ impl Input {
         input
     }
 
-    /// Binds at the default tau.
+    /// Binds with the default tau.
     ///
     /// # Panics
     /// If the input cannot be bound.
@@ -67,7 +67,7 @@ impl Input {
         bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
     }
 
-    /// The embedded levels, as a bind makes them.
+    /// The levels of the embedded method.
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
@@ -75,7 +75,7 @@ impl Input {
         Hierarchy::new(&embedding.boundaries((&self.cage).into()), self.cage.n_vertices())
     }
 
-    /// Sampling stencils of all vertices.
+    /// Stencils of all vertices.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
         let overlaps = Overlaps::default();
@@ -88,28 +88,28 @@ impl Input {
 /// Reads a model.
 ///
 /// # Panics
-/// If it cannot be read: there is nothing to measure.
+/// If it cannot be read.
 #[must_use]
 pub fn read(path: &str) -> Model {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
     Model::read(path, &bytes, &mut |_| None).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Solves one batch of columns as a bind does.
+/// Solves a batch of columns.
 pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
     let rule = BindOptions::default().stop_rule().of_batch(hierarchy.n_batches());
     let report = workspace.solve(hierarchy, batch, rule, &mut |_, _| true);
-    debug_assert!(report.is_some(), "nobody cancels");
+    debug_assert!(report.is_some(), "never cancelled");
 }
 
-/// Solves all columns, one batch after the other in one workspace.
+/// Solves all columns, batch by batch in one workspace.
 pub fn solve_all(workspace: &mut Workspace, hierarchy: &Hierarchy) {
     for batch in 0..hierarchy.n_batches() {
         solve_batch(workspace, hierarchy, batch);
     }
 }
 
-/// One workspace per batch, solved: so that a sweep over all columns meets every field in memory, not in the cache.
+/// Solves each batch in its own workspace, so that a sweep over all columns reads every field from memory, not from the cache.
 #[must_use]
 pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
     (0..hierarchy.n_batches())
@@ -121,8 +121,7 @@ pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
         .collect()
 }
 
-/// Fastest of `times` calls, milliseconds: what the work takes when nothing else runs, also on a machine where at times
-/// something does.
+/// Minimum time of several calls, milliseconds. Robust against other load on the machine.
 pub fn fastest_ms(times: usize, mut call: impl FnMut()) -> f64 {
     let measured = (0..times.max(1)).map(|_| {
         let begin = Instant::now();

@@ -1,19 +1,19 @@
-//! The ratios that bars are set on, each measured within one run: what a solve costs in sweeps, what a finer grid
-//! costs, and how much faster the embedded method is than the published one.
+//! Ratios of times measured in the same run: the cost of a solve in sweeps, the cost of a finer grid, and the speed-up of the
+//! embedded method over the published one.
 
 use cagework_benches::{GRIDS, Input, fastest_ms, resident_workspaces, solve_batch};
 use cagework_core::options::{Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::solve::multigrid::Workspace;
 
-/// How often a fast thing is measured.
+/// Number of repetitions.
 const TIMES: usize = 60;
 
-/// How often a bind of seconds is measured.
+/// Number of repetitions of binds that take seconds.
 const TIMES_SLOW: usize = 3;
 
-/// Sum over all batches of each one's fastest time, ms; round after round, so that every batch finds the caches as the
-/// one before it left them.
+/// Sum over all batches of the minimum time of each, ms. Batches are interleaved, so that each finds the caches as the previous batch
+/// left them.
 fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut fastest = vec![f64::INFINITY; n_batches];
     for _ in 0..TIMES {
@@ -25,7 +25,7 @@ fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
 }
 
 fn main() {
-    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    // `cargo test --benches` runs this program too, only to check that it compiles.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

@@ -1,4 +1,4 @@
-//! The stages of an embedded bind on one thread: voxelize, sweep, V-cycle, solve, sample.
+//! Stages of an embedded bind on one thread: voxelize, sweep, V-cycle, solve, sample.
 #![allow(missing_docs, reason = "criterion's macros make public functions without documentation")]
 
 use std::hint::black_box;
@@ -44,7 +44,7 @@ fn solve(criterion: &mut Criterion, input: &Input, grid: u32) {
     let mut workspace = Workspace::new(&hierarchy);
     solve_batch(&mut workspace, &hierarchy, 0);
     criterion.benchmark_group("sweep").bench_function(
-        BenchmarkId::new("one batch of 8 columns, again and again", grid),
+        BenchmarkId::new("one batch of 8 columns, repeated", grid),
         |b| {
             b.iter(|| workspace.sweep(&hierarchy));
         },

@@ -1,10 +1,10 @@
-//! Cages made for models by formula at four sizes, and how well they serve programs that cut quads another way, and bending.
-//! A Markdown table with a row for each cage and one for all of a size.
+//! Generates cages of four sizes for models defined by formulas, and measures their quality for other triangulations and for bending.
+//! Prints a Markdown table with a row per cage and a summary per size.
 //!
-//! Crossings (pairs of triangles), open (edges that do not belong to two triangles) and outside (model vertices) are the worst of four ways
-//! to cut quads into triangles: from the first corner, from the second, along the shorter diagonal, along the longer one. Fold: largest
-//! turn between triangles of a quad, cut either way, or across an edge. Off and over: the cage's vertices are bent by 1.2 rad along the
-//! longest side; how far the model is from where the bend takes it at most, over the diagonal, and triangles that turn over.
+//! Crossings (pairs of intersecting triangles), open (edges that do not belong to two triangles) and outside (model vertices) are the worst
+//! of four triangulations: diagonals from the first vertex, from the second, the shorter and the longer ones. Fold is the largest angle
+//! between the normals of adjacent triangles, for either diagonal of each quad. Off and over: the cage is bent by 1.2 rad along its longest
+//! side; off is the largest distance of the model from the exact bend relative to its diagonal, over the number of flipped triangles.
 //!
 //! `cargo bench -p cagework-benches --bench survey -- cup` measures the models whose names contain `cup`.
 
@@ -22,18 +22,19 @@ use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
 use cagework_tests::Random;
 use glam::{Quat, Vec3, Vec3Swizzles as _, vec3};
 
-/// Vertices asked for.
+/// Target numbers of vertices.
 const TARGETS: [u32; 4] = [40, 80, 120, 200];
 
-/// Cells along the longest side of the bind, and the angle of the bend.
+/// Cells along the longest side of the cage.
 const GRID: u32 = 32;
+/// Angle of the bend, radians.
 const BEND: f32 = 1.2;
 
-/// A model by parts: surfaces over the unit square.
+/// A model assembled from surface patches over the unit square.
 #[derive(Clone, Default)]
-struct Parts(TriMesh);
+struct Patches(TriMesh);
 
-impl Parts {
+impl Patches {
     fn patch(mut self, [nu, nv]: [u32; 2], at: impl Fn(f32, f32) -> Vec3) -> Self {
         let first = self.0.positions.len() as u32;
         for i in 0..(nu + 1) * (nv + 1) {
@@ -47,7 +48,7 @@ impl Parts {
         self
     }
 
-    /// A tube along a curve: its point and radius at each share of the way.
+    /// A tube along a curve from parameter 0 to 1 to (point, radius).
     fn tube(self, along: u32, curve: impl Fn(f32) -> (Vec3, f32)) -> Self {
         self.patch([along, 12], |u, v| {
             let way = (curve(u + 1e-3).0 - curve(u - 1e-3).0).normalize();
@@ -57,7 +58,7 @@ impl Parts {
         })
     }
 
-    /// A capsule.
+    /// A capsule between two points.
     fn limb(self, from: impl Into<Vec3>, to: impl Into<Vec3>, radius: f32) -> Self {
         let (from, to) = (from.into(), to.into());
         let way = (to - from).normalize_or(Vec3::Z);
@@ -85,7 +86,7 @@ impl Parts {
         self.limb(at, at, radius)
     }
 
-    /// A surface of revolution about z; its outline as (radius, height).
+    /// A surface of revolution about z. `outline`: (radius, height).
     fn revolved(self, outline: [[f32; 2]; 5]) -> Self {
         let outline = outline.map(|[r, z]| vec3(r, r, z));
         self.patch([40, 32], |u, v| {
@@ -94,7 +95,7 @@ impl Parts {
         })
     }
 
-    /// A block of 2 x 2 x 0.6 without its sides, around a round hole.
+    /// A block of 2 x 2 x 0.6 with a round hole, without its side faces.
     fn holed(self, x: f32, y: f32) -> Self {
         self.patch([3, 32], |u, v| {
             let round = on_circle(TAU * v);
@@ -104,33 +105,33 @@ impl Parts {
         })
     }
 
-    fn turned(mut self) -> Self {
+    fn rotated(mut self) -> Self {
         let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.4, 0.5, 0.7);
         self.0.positions.iter_mut().for_each(|p| *p = turn * *p);
         self
     }
 }
 
-/// A figure 2 high, symmetric about x = 0.
-fn figure() -> Parts {
-    let half = |parts: Parts, s: f32| {
+/// A human figure of height 2, symmetric about x = 0.
+fn figure() -> Patches {
+    let half = |parts: Patches, s: f32| {
         let leg = parts.limb([s * 0.13, 0.0, 0.95], [s * 0.16, 0.0, 0.1], 0.09);
         let foot = leg.limb([s * 0.16, 0.0, 0.06], [s * 0.16, -0.2, 0.05], 0.06);
         foot.limb([s * 0.2, 0.0, 1.5], [s * 0.8, 0.0, 1.4], 0.06)
     };
-    let halves = half(half(Parts::default(), -1.0), 1.0);
+    let halves = half(half(Patches::default(), -1.0), 1.0);
     halves.limb([0.0, 0.0, 1.0], [0.0, 0.0, 1.45], 0.2).limb([0.0, 0.0, 1.75], [0.0, 0.0, 1.8], 0.14)
 }
 
-/// `n` parts, each from its number.
-fn each(n: u32, add: impl Fn(Parts, f32) -> Parts) -> Parts {
-    (0..n).fold(Parts::default(), |parts, k| add(parts, k as f32))
+/// Adds `n` parts, each a function of its index.
+fn each(n: u32, add: impl Fn(Patches, f32) -> Patches) -> Patches {
+    (0..n).fold(Patches::default(), |parts, k| add(parts, k as f32))
 }
 
-/// `n` parts, each from random numbers.
-fn random(n: u32, add: impl Fn(Parts, &mut Random) -> Parts) -> Parts {
+/// Adds `n` parts, each a function of random numbers.
+fn random(n: u32, add: impl Fn(Patches, &mut Random) -> Patches) -> Patches {
     let mut random = Random::new(38);
-    (0..n).fold(Parts::default(), |parts, _| add(parts, &mut random))
+    (0..n).fold(Patches::default(), |parts, _| add(parts, &mut random))
 }
 
 fn point(random: &mut Random) -> Vec3 {
@@ -141,13 +142,13 @@ fn on_circle(angle: f32) -> Vec3 {
     vec3(angle.cos(), angle.sin(), 0.0)
 }
 
-fn models() -> Vec<(&'static str, Parts)> {
+fn models() -> Vec<(&'static str, Patches)> {
     let mut models = Vec::new();
     let mut add = |name, parts| models.push((name, parts));
-    let new = Parts::default;
+    let new = Patches::default;
     let brick = || new().block([-1.0, -0.6, -0.4], [1.0, 0.6, 0.4]);
     add("box", brick());
-    add("turned box", brick().turned());
+    add("rotated box", brick().rotated());
     add("sphere", new().ball(Vec3::ZERO, 1.0));
     add("limb", new().limb([-1.0, 0.1, 0.0], [1.0, 0.0, 0.3], 0.2));
     add("bent limb", new().tube(24, |t| (on_circle(2.2 * t), 0.15)));
@@ -157,20 +158,20 @@ fn models() -> Vec<(&'static str, Parts)> {
     add("octopus", each(8, |p, k| p.tube(16, move |t| arm(k, t))).ball(Vec3::ZERO, 0.5));
     add("figure", figure());
     add("figure with a sword", figure().block([0.8, -1.2, 1.37], [0.86, 0.3, 1.43]));
-    let finger = |p: Parts, y: f32| p.limb([0.4, y, 0.0], [1.2 - 0.8 * y * y, 1.3 * y, 0.0], 0.09);
+    let finger = |p: Patches, y: f32| p.limb([0.4, y, 0.0], [1.2 - 0.8 * y * y, 1.3 * y, 0.0], 0.09);
     let palm = each(4, |p, k| finger(p, 0.24 * k - 0.36)).block([-0.4, -0.42, -0.12], [0.45, 0.42, 0.12]);
     add("hand", palm.limb([-0.2, 0.4, 0.0], [0.4, 0.9, 0.1], 0.1));
-    add("animal", Parts(cagework_tests::creature::creature()));
+    add("animal", Patches(cagework_tests::creature::creature()));
     let plate = |z: f32| new().block([-1.0, -0.7, z], [1.0, 0.7, z + 0.05]);
     add("crossed plates", plate(0.0).block([-0.03, -1.0, -1.0], [0.03, 1.0, 1.0]));
     add("stacked plates", plate(0.0).block([-1.0, -0.7, 0.5], [1.0, 0.7, 0.55]));
-    add("turned plate", plate(0.0).turned());
+    add("rotated plate", plate(0.0).rotated());
     add(
         "saddle",
         new().patch([24, 24], |u, v| vec3(u, v, 2.0 * (u - 0.5).powi(2) - 2.0 * (v - 0.5).powi(2))),
     );
     let card =
-        |p: Parts, turn: Quat| p.patch([8, 2], |u, v| turn * vec3(0.1 * (v - 0.5), 1.0 - 0.4 * u * u, u));
+        |p: Patches, turn: Quat| p.patch([8, 2], |u, v| turn * vec3(0.1 * (v - 0.5), 1.0 - 0.4 * u * u, u));
     add("hair cards", random(60, |p, random| card(p, random.rotation())));
     add("wires", random(20, |p, random| p.limb(point(random), point(random), 0.01)));
     add("coil", new().tube(120, |t| (0.5 * on_circle(5.0 * TAU * t) + Vec3::Z * 2.0 * t, 0.05)));
@@ -188,7 +189,7 @@ fn models() -> Vec<(&'static str, Parts)> {
     add("bowl", cup(0.95, 0.5));
     let handle = |t: f32| (vec3(1.0, 0.0, 1.0) + 0.5 * on_circle(PI * (t - 0.5)).xzy(), 0.1);
     add("mug", cup(0.88, 2.0).tube(16, handle));
-    let side = |p: Parts, x: f32| p.limb([x, 0.0, 0.0], [x, -1.5, 0.0], 0.2);
+    let side = |p: Patches, x: f32| p.limb([x, 0.0, 0.0], [x, -1.5, 0.0], 0.2);
     add("U", side(side(new().tube(24, |t| (on_circle(PI * t), 0.2)), -1.0), 1.0));
     add("S", new().tube(48, |t| (vec3((TAU * t).sin(), 3.0 * t, 0.0), 0.2)));
     let ring = |radius| new().tube(48, move |t| (on_circle(TAU * t), radius));
@@ -198,12 +199,12 @@ fn models() -> Vec<(&'static str, Parts)> {
     add("block with holes", holes(6));
     add("bracket", holes(2).block([-1.0, -1.0, 0.3], [-0.6, 1.0, 2.5]));
     add("washer", new().revolved([[0.4, 0.3], [1.0, 0.3], [1.0, -0.3], [0.4, -0.3], [0.4, 0.3]]));
-    let leg = |p: Parts, at: Vec3, r| p.limb(at, at + 1.4 * Vec3::Z, r);
+    let leg = |p: Patches, at: Vec3, r| p.limb(at, at + 1.4 * Vec3::Z, r);
     let legs = |r| each(4, |p, k| leg(p, 1.4 * on_circle(TAU * (k + 0.5) / 4.0), r));
     add("table", legs(0.06).block([-1.2, -1.2, 1.4], [1.2, 1.2, 1.5]));
     let seat = legs(0.18).block([-1.2, -1.2, 1.2], [1.2, 1.2, 1.5]);
     add("chair", seat.block([-1.2, 1.0, 1.5], [1.2, 1.2, 3.5]));
-    let spoke = |p: Parts, k: f32| p.limb([0.0; 3], on_circle(TAU * k / 6.0), 0.06);
+    let spoke = |p: Patches, k: f32| p.limb([0.0; 3], on_circle(TAU * k / 6.0), 0.06);
     add("wheel", (0..6).fold(ring(0.1), |p, k| spoke(p, k as f32)));
     let hull =
         new().limb([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], 0.15).block([-0.2, -1.2, -0.02], [0.2, 1.2, 0.02]);
@@ -211,10 +212,10 @@ fn models() -> Vec<(&'static str, Parts)> {
     models
 }
 
-/// Makes one figure of those of many cages.
+/// Summarises a column over all cages of a size.
 type Total = fn(&[f64]) -> f64;
 
-/// What is measured of a cage.
+/// Measured quantities.
 const COLUMNS: [(&str, Total); 12] = [
     ("vertices", |of| of.iter().sum()),
     ("quads / faces", |of| of.iter().sum::<f64>() / of.len() as f64),
@@ -230,7 +231,7 @@ const COLUMNS: [(&str, Total); 12] = [
     ("ms", largest),
 ];
 
-/// How many are not zero.
+/// Number of positive values.
 fn count(of: &[f64]) -> f64 {
     of.iter().filter(|&&x| x > 0.0).count() as f64
 }
@@ -241,7 +242,7 @@ fn largest(of: &[f64]) -> f64 {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    // `cargo test --benches` runs this program too, only to check that it compiles.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -250,11 +251,11 @@ fn main() {
         .into_iter()
         .filter(|model| names.is_empty() || names.iter().any(|name| model.0.contains(name.as_str())))
         .collect();
-    println!("| model | asked | {} |", COLUMNS.map(|column| column.0).join(" | "));
+    println!("| model | target | {} |", COLUMNS.map(|column| column.0).join(" | "));
     println!("|---|---|{}", "---|".repeat(COLUMNS.len()));
     for target in TARGETS {
         let mut rows = Vec::new();
-        for (name, Parts(mesh)) in &models {
+        for (name, Patches(mesh)) in &models {
             rows.push(row(mesh, target));
             print_row(name, target, rows[rows.len() - 1]);
         }
@@ -316,7 +317,7 @@ fn row(model: &TriMesh, target: u32) -> [f64; COLUMNS.len()] {
     ]
 }
 
-/// Turns across all edges, the largest of those that ways to cut the faces beside it make, and across diagonals; degrees.
+/// Angles between normals across edges and diagonals, degrees; across edges the largest one of all triangulations of both faces.
 fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     let normal = |[a, b, c]: [u32; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.positions[v as usize].as_dvec3());
@@ -341,7 +342,7 @@ fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     folds
 }
 
-/// How far the model is off, over its diagonal, when the cage is bent, and triangles that turn over.
+/// Largest distance of the model from the exact bend, relative to its diagonal, and the number of flipped triangles.
 fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
     let bounds = Bounds::of(&model.positions).expect("there are vertices");
     let extent = bounds.extent();

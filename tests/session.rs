@@ -1,4 +1,4 @@
-//! The session on the GPU: equal to the CPU, cancelled, out of memory, lost and recovered.
+//! A session on the GPU: agreement with the CPU, cancellation, memory errors, recovery of a lost device.
 
 use std::ops::ControlFlow;
 
@@ -17,13 +17,13 @@ use cagework_tests::{assert_close, dense};
 use glam::{Quat, Vec3};
 use pollster::block_on;
 
-/// The bar for weights, GPU against CPU.
+/// Largest difference between GPU and CPU weights.
 const WEIGHT_TOLERANCE: f32 = 1e-4;
 
-/// The bar for positions, over the cage's diagonal.
+/// Largest difference between GPU and CPU positions, relative to the cage's diagonal.
 const POSITION_TOLERANCE: f32 = 1e-4;
 
-/// No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
+/// A GPU context. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
 fn context(options: &ContextOptions) -> GpuContext {
     match block_on(GpuContext::new(options)) {
         Ok(context) => context,
@@ -31,7 +31,7 @@ fn context(options: &ContextOptions) -> GpuContext {
     }
 }
 
-/// Every third vertex of the animal, so that tests are quick, and its cage.
+/// Every third vertex of the animal, for speed, and its cage.
 fn input() -> (Vec<Vec3>, Cage) {
     (creature().positions.into_iter().step_by(3).collect(), cage(&creature_cage()))
 }
@@ -101,18 +101,18 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     session.pose(&pose);
     let positions = block_on(session.read_positions()).expect("they come back");
     let expected = deform_bound(&cpu.weights, &cpu.frames, &pose);
-    // The same weights on both sides: f32 sums of dozens of products of size 10 are all that differs.
+    // With equal weights only the rounding of f32 sums differs: dozens of products of size 10.
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
-/// In pose after pose, with kernels and without; set before the weights and after them, and on another device.
+/// In compute and draw-only sessions, with parts set before and after the weights, and after recovery on another device.
 #[test]
-fn parts_are_held_as_an_export_holds_them() {
+fn parts_are_restored_as_in_an_export() {
     let (rest, cage) = input();
     let cpu = on_cpu(&options(Method::Embedded, Solver::Multigrid));
     let pose = posed(cage.positions());
     let n = rest.len() as u32;
-    // One vertex in five stays, whole or by half; two pieces keep their shape.
+    // One vertex in five stays in place, and one in five stays by half; two pieces are rigid.
     let stays = (0..n).map(|v| [0.0, 1.0, 0.0, 0.5, 0.0][v as usize % 5]).collect();
     let parts = Parts { stays, rigid: vec![(0..n / 4).collect(), (n / 2..n / 2 + 9).collect()] };
     let expected = parts.hold(&rest, &deform_bound(&cpu.weights, &cpu.frames, &pose));
@@ -139,12 +139,12 @@ fn parts_are_held_as_an_export_holds_them() {
     }
 }
 
-/// Columns are the cage's vertices and its triangles, whose controls follow from the pose.
+/// The columns of Green weights are the cage's vertices and triangles. The controls of triangles are computed from the pose.
 #[test]
 fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let (positions, _) = input();
     let bounds = Bounds::of(&positions).expect("there are some");
-    // Green coordinates are defined inside alone.
+    // Green coordinates are defined inside the cage only.
     let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
     let green = green_weights(&positions, &cage, u64::MAX, &Silent).expect("all are inside");
     let pose = posed(cage.positions());
@@ -161,7 +161,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     }
 }
 
-/// As in a browser without WebGPU: the processor binds and deforms, and a lost device comes back.
+/// As in a browser without WebGPU: the processor binds and deforms, and a lost device is recovered.
 #[test]
 fn session_that_only_draws_equals_the_cpu() {
     let only = ContextOptions { draws_only: true, ..ContextOptions::default() };
@@ -190,11 +190,11 @@ fn session_that_only_draws_equals_the_cpu() {
 
 #[test]
 fn several_batches_give_the_same_weights() {
-    // So fine that a field, not the table of samples, is what does not fit into one binding.
+    // At this grid a field exceeds the binding limit, while the table of samples does not.
     let options = BindOptions { grid: 48, ..options(Method::Embedded, Solver::Multigrid) };
     let mut whole = session();
     let report = block_on(whole.bind(&options, &Silent)).expect("it binds");
-    // 16 columns of the finest level at a time, of 112.
+    // 16 of 112 columns of the finest level per batch.
     let limit = (report.levels[0] + 2) * 4 * 16 + 100;
     let limited = ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() };
     let mut split = session_with(&limited);
@@ -203,7 +203,7 @@ fn several_batches_give_the_same_weights() {
 }
 
 #[test]
-fn what_does_not_fit_is_an_error_and_the_session_goes_on() {
+fn memory_error_leaves_the_session_usable() {
     let mut session = session();
     let small = BindOptions { memory_limit: 6 << 20, ..options(Method::Embedded, Solver::Jacobi) };
     let error = block_on(session.bind(&small, &Silent)).unwrap_err();
@@ -231,7 +231,7 @@ fn cancel_between_slices_keeps_the_old_weights() {
 }
 
 #[test]
-fn lost_device_is_an_error_and_everything_comes_back_on_another() {
+fn lost_device_is_an_error_and_recovery_restores_everything() {
     let mut session = session();
     block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
     let pose = posed(session.cage_positions());
@@ -251,7 +251,7 @@ fn lost_device_is_an_error_and_everything_comes_back_on_another() {
         assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
     }
 
-    // The first device that takes its place is lost, too: nothing is, and the next attempt succeeds.
+    // Recovery on a device that is lost as well fails, and a further attempt succeeds.
     let broken = context(&ContextOptions::default());
     broken.device.destroy();
     let error = block_on(session.recover(broken)).map(drop).unwrap_err();
@@ -263,7 +263,7 @@ fn lost_device_is_an_error_and_everything_comes_back_on_another() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_model_or_cage_is_named() {
     let mut session = Session::new(context(&ContextOptions::default()));
     let bind = |session: &mut Session| {
         block_on(session.bind(&BindOptions::default(), &Silent)).map(drop).unwrap_err().to_string()
@@ -275,7 +275,7 @@ fn what_is_missing_is_named() {
 }
 
 #[test]
-fn what_does_not_belong_together_is_named() {
+fn mismatched_inputs_are_named() {
     let mut session = session();
     let few = Weights::new(2, vec![0, 1], vec![0], vec![1.0]).expect("one row");
     let error = block_on(session.adopt(few, Frames::default())).unwrap_err().to_string();

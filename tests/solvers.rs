@@ -1,9 +1,9 @@
-//! What every solver of Laplace's equation in a cage must do, run for every back end.
+//! Properties of every solver of Laplace's equation in a cage, run for every back end.
 //!
-//! A property is a function of a [`suite::BackEnd`], written once; [`solver_suite!`] makes a module of tests for one
-//! back end. The classic method, which shows the paper's errors, is spared the properties that it does not have.
+//! A property is a function of a [`suite::BackEnd`]; [`solver_suite!`] generates a module of tests for one
+//! back end. The classic method has only the properties in `every`, because of its discretisation errors.
 
-// Always true here; it tells clippy that these are tests.
+// `cfg(test)` is always true here; it makes clippy treat these modules as tests.
 #[cfg(test)]
 mod suite;
 
@@ -16,14 +16,14 @@ use glam::Vec3;
 use pollster::block_on;
 use suite::BackEnd;
 
-/// One test per property of one back end.
+/// One test per property, for one back end.
 macro_rules! properties {
     ($back_end:expr; $($module:ident::$property:ident,)*) => {
         $(#[test] fn $property() { crate::suite::$module::$property(&$back_end); })*
     };
 }
 
-/// A module of tests: `every` for what both methods promise, `embedded` for all promises.
+/// A module of tests: `every` for the properties of both methods, `embedded` for all properties.
 macro_rules! solver_suite {
     ($name:ident, every, $back_end:expr) => {
         mod $name {
@@ -49,22 +49,22 @@ macro_rules! solver_suite {
             shapes::inside_out_cage_gives_the_same_weights,
             shapes::unused_cage_vertex_has_no_weight,
             shapes::components_do_not_feel_each_other,
-            shapes::sizes_of_the_unit_do_not_matter,
+            shapes::weights_are_independent_of_scale,
             rows::equal_positions_have_equal_rows,
             rows::limit_on_iterations_is_reported,
             rows::history_has_one_entry_per_iteration,
             rows::dropping_small_weights_keeps_sums_and_rest_pose,
             outside::vertices_near_the_cage_follow_affine_maps_and_far_ones_stay,
-            outside::model_that_pokes_out_moves_as_smoothly_as_the_cage,
+            outside::protruding_model_deforms_smoothly,
             outside::partial_cage_leaves_the_rest_of_the_model,
             outside::refusal_names_count_and_first_vertex,
-            outside::cage_around_nothing_is_refused,
+            outside::cage_that_contains_no_vertex_is_rejected,
             errors::options_out_of_range_are_named,
             errors::bad_meshes_are_named,
             errors::memory_limit_is_kept_and_named,
             progress::fraction_never_falls_and_ends_at_one,
             progress::break_cancels_in_every_stage,
-            progress::who_waits_is_asked_while_points_are_looked_up,
+            progress::cancellation_is_polled_while_points_are_located,
         }
     };
     (@embedded $back_end:expr) => {
@@ -94,7 +94,7 @@ fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
     }
 }
 
-/// A back end on the GPU; one device serves all tests.
+/// A back end on the GPU. All tests share one device.
 fn gpu(method: Method, solver: Solver) -> BackEnd {
     fn bind(
         positions: &[Vec3],
@@ -110,7 +110,7 @@ fn gpu(method: Method, solver: Solver) -> BackEnd {
         match block_on(bind_on(positions, cage, options, progress, context)) {
             Ok(binding) => Ok(binding),
             Err(GpuError::Bind(error)) => Err(error),
-            // The suite asks for the memory of the whole, wherever it is.
+            // The suite expects the same error whether memory on the GPU or the processor is insufficient.
             Err(GpuError::Plan(PlanError::Memory { needed, limit })) => {
                 Err(BindError::Memory { needed, limit })
             }
@@ -120,7 +120,7 @@ fn gpu(method: Method, solver: Solver) -> BackEnd {
     BackEnd { bind, options: BindOptions { method, solver, ..BindOptions::default() } }
 }
 
-// Not here: what `agreement` holds to one of these (classic Jacobi on the GPU, most solvers on all threads).
+// Other combinations (classic Jacobi on the GPU, most solvers on all threads) are compared with one of these in `agreement`.
 solver_suite!(embedded_multigrid_gpu, embedded, gpu(Method::Embedded, Solver::Multigrid));
 solver_suite!(embedded_jacobi_gpu, embedded, gpu(Method::Embedded, Solver::Jacobi));
 solver_suite!(classic_multigrid_gpu, every, gpu(Method::Classic, Solver::Multigrid));
@@ -133,34 +133,34 @@ solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jac
 solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
 solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));
 
-/// Preconditioned by a V-cycle.
+/// Conjugate gradients with a V-cycle as preconditioner.
 fn preconditioned_cg(method: Method) -> BackEnd {
     let mut back_end = cpu(method, Solver::ConjugateGradient, 0);
     back_end.options.preconditioner = Preconditioner::VCycle;
     back_end
 }
 
-/// Solvers whose tau bounds the error, not the latest change.
+/// Solvers whose tau bounds the error. For Jacobi it bounds the change per sweep.
 mod error_bounds {
     use super::*;
 
     #[test]
-    fn multigrid_leaves_less_than_tau_lets_expect() {
+    fn multigrid_error_is_below_tau() {
         let multigrid = cpu(Method::Embedded, Solver::Multigrid, 0);
-        suite::raw::tau_bounds_what_the_solver_leaves(&multigrid, &[32, 64, 128], 2e-6);
+        suite::raw::tau_bounds_the_solver_error(&multigrid, &[32, 64, 128], 2e-6);
         suite::raw::rounding_does_not_add_up_over_columns(&multigrid);
     }
 
     #[test]
-    fn conjugate_gradients_leave_less_than_tau_lets_expect() {
+    fn conjugate_gradient_error_is_below_tau() {
         let cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
-        // They end nearer to tau than V-cycles do, each of which leaves a tenth.
-        suite::raw::tau_bounds_what_the_solver_leaves(&cg, &[32], 1e-5);
-        suite::raw::tau_bounds_what_the_solver_leaves(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
+        // The limit is higher than for V-cycles, which reduce the error tenfold each and so end further below tau.
+        suite::raw::tau_bounds_the_solver_error(&cg, &[32], 1e-5);
+        suite::raw::tau_bounds_the_solver_error(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
     }
 }
 
-/// Multigrid only: what a V-cycle promises.
+/// Multigrid only: termination at the precision of f32.
 mod multigrid {
     use super::*;
 
@@ -172,22 +172,22 @@ mod multigrid {
     }
 }
 
-/// Cages on which weights were once wrong. All back ends read the same levels and stencils; one is enough.
+/// Difficult cages. All back ends use the same levels and stencils, so one of them suffices.
 mod any_cage {
     use super::*;
 
     properties! { cpu(Method::Embedded, Solver::Multigrid, 0);
-        any_cage::dropped_weights_are_not_missed,
+        any_cage::sparsify_changes_weights_and_poses_little,
         any_cage::parts_that_share_a_face_do_not_leak,
         any_cage::overlapping_parts_are_bound_as_one,
         any_cage::weights_do_not_jump_at_re_entrant_edges,
-        any_cage::weights_are_continuous_in_a_cages_corners,
-        any_cage::what_the_grid_cannot_resolve_is_said,
+        any_cage::weights_are_continuous_in_the_corners_of_a_cage,
+        any_cage::unresolved_parts_are_reported_with_a_sufficient_grid,
     }
 }
 
-/// Multigrid on every back end, and conjugate gradients preconditioned by it. Without, and by Jacobi, a solve takes many
-/// seconds at g = 64: [`agreement`] and the suite hold these to it.
+/// Multigrid on every back end, and conjugate gradients with it as preconditioner. The other solvers take seconds at g = 64;
+/// [`agreement`] compares them with multigrid.
 mod accuracy {
     use super::*;
 
@@ -243,7 +243,7 @@ mod agreement {
     fn one_thread_and_all_agree() {
         for method in METHODS {
             for solver in [Solver::Jacobi, Solver::Multigrid] {
-                // Three also where the machine has fewer: shares of columns are then uneven.
+                // With three threads the columns are divided unevenly.
                 for threads in [0, 2, 3] {
                     suite::agreement::threads_agree(&cpu(method, solver, 1), &cpu(method, solver, threads));
                 }

@@ -26,10 +26,10 @@ fn ball_in_sphere() -> ControlSet {
     ControlSet::new(&cage(&icosphere(3)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap()
 }
 
-/// Between concentric spheres the harmonic function that is 1 on the inner and 0 on the outer one is (1/r - 1) / (1/R - 1), with
-/// R = 1/4 the third of 1/r - 1.
+/// Between concentric spheres of radius R = 1/4 and 1, the harmonic function that is 1 on the inner sphere and 0 on the outer one
+/// is (1/r - 1) / (1/R - 1) = (1/r - 1) / 3.
 #[test]
-fn weight_of_a_ball_in_a_sphere_is_that_of_concentric_spheres() {
+fn weight_of_a_ball_in_a_sphere_matches_the_formula() {
     let set = ball_in_sphere();
     let radii = [0.35_f32, 0.5, 0.65, 0.8];
     let directions = scattered(40, Vec3::NEG_ONE, Vec3::ONE);
@@ -47,11 +47,11 @@ fn weight_of_a_ball_in_a_sphere_is_that_of_concentric_spheres() {
     }
 }
 
-/// Beside the ball each direction has that value, not only the mean: the ball is round enough. (The cage's polyhedron is, too: four
-/// steps of subdivision.) Linear interpolation within a cell of width h misses by `h^2 / 8` of the second derivatives' sizes at most,
-/// here `(2 + 1 + 1) / (3 r^3)`.
+/// Next to the ball the formula holds in each direction, not only on average. Linear interpolation in a cell of width h has an error of
+/// at most `h^2 / 8` times the sum of the second derivatives, here `(2 + 1 + 1) / (3 r^3)`. Four steps of subdivision make the cage
+/// round enough.
 #[test]
-fn weights_right_beside_a_ball_are_those_of_a_round_one() {
+fn weights_next_to_a_ball_match_the_formula_in_every_direction() {
     let set = ControlSet::new(&cage(&icosphere(4)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap();
     let ball = set.cage().n_vertices();
     let options = BindOptions { grid: 64, tau: 1e-7, ..BindOptions::default() };
@@ -67,10 +67,10 @@ fn weights_right_beside_a_ball_are_those_of_a_round_one() {
     }
 }
 
-/// A bone that is straight at rest, in a limb, is bent at its middle joint: what it holds turns by the same rotation in each direction
-/// of the bend, without rolling about its own axis, and is not torn at the joint.
+/// A straight bone in a limb is bent at its middle joint. The points around it rotate by the same rotation in each direction of the
+/// bend, without twist about the bone, and are not torn apart at the joint.
 #[test]
-fn bent_bone_turns_what_it_holds_by_its_own_rotation() {
+fn bent_bone_rotates_the_points_around_it_without_twist() {
     let joints = [-0.6_f32, 0.0, 0.6].map(|z| Vec3::new(0.0, 0.0, z));
     let inner = InnerControls {
         positions: joints.to_vec(),
@@ -92,7 +92,7 @@ fn bent_bone_turns_what_it_holds_by_its_own_rotation() {
             *controls.last_mut().unwrap() = turn * joints[2];
             let posed = deform_bound(&binding.weights, &binding.frames, &controls);
             for (v, p) in points.iter().enumerate().filter(|(_, p)| (0.18..0.32).contains(&p.z)) {
-                // To the other side of the bone, and along it.
+                // Offsets across the bone, and along it.
                 for other in [v - v % 8 + (v + 4) % 8, v + 80] {
                     let [rest, posed] = [points[other] - *p, posed[other] - posed[v]];
                     let off = (turn * rest).angle_between(posed).to_degrees();
@@ -109,9 +109,9 @@ fn bent_bone_turns_what_it_holds_by_its_own_rotation() {
     }
 }
 
-/// A sheet across two boxes, where they meet: what is on one side of it does not feel the vertices on the other.
+/// A sheet between two boxes: points on one side have no weight of cage vertices on the other.
 #[test]
-fn sheet_across_a_box_parts_its_halves() {
+fn sheet_across_a_box_separates_its_halves() {
     let corners = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]];
     let inner = InnerControls {
         positions: corners.map(Vec3::from).to_vec(),
@@ -130,14 +130,14 @@ fn sheet_across_a_box_parts_its_halves() {
         assert!(most < 1e-6, "{p}: {most}");
         let of_sheet: f32 =
             columns.iter().zip(weights).filter(|(c, _)| **c as usize >= at.len()).map(|(_, w)| w).sum();
-        // In the middle, next to it, it has nearly all; at the walls the cage has its own.
+        // Near the middle of the sheet its weights are close to 1; at the walls those of the cage are.
         let is_close = (p.x - 1.0).abs() < 0.05 && (p.yz() - 0.5).abs().max_element() < 0.3;
         assert!(of_sheet > 0.0 && (!is_close || of_sheet > 0.8), "{p}: {of_sheet}");
     }
     assert!(binding.outside.is_empty());
 }
 
-/// Values on a tube are those of the foot on its line.
+/// The weight at a point around a tube is linear in its projection onto the line.
 #[test]
 fn weights_are_linear_along_a_tube() {
     let (a, b, radius) = (Vec3::new(-0.6, 0.1, 0.0), Vec3::new(0.5, -0.2, 0.1), 0.1);
@@ -150,7 +150,7 @@ fn weights_are_linear_along_a_tube() {
     let way = (b - a).normalize();
     let side = way.any_orthonormal_vector();
     let shares: Vec<f32> = (1..20).map(|k| k as f32 / 20.0).collect();
-    // Around the line, inside of the tube and just off its surface.
+    // Inside the tube, and just outside its surface.
     for (distance, most) in [(0.5 * radius, 1e-4), (1.06 * radius, 0.02)] {
         let around = |s: f32| {
             (0..6).map(move |k| a.lerp(b, s) + Quat::from_axis_angle(way, k as f32) * (distance * side))
@@ -165,7 +165,7 @@ fn weights_are_linear_along_a_tube() {
     }
 }
 
-/// A cage with a ball, a bent bone and a sheet in it.
+/// A cage with a ball, a bent bone and a sheet inside.
 fn all_kinds() -> ControlSet {
     let inner = InnerControls {
         positions: [
@@ -189,7 +189,7 @@ fn all_kinds() -> ControlSet {
     ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap()
 }
 
-/// Points all over that cage: also inside of controls and next to them.
+/// Points in that cage, with extra points inside inner controls and next to them.
 fn everywhere() -> Vec<Vec3> {
     let mut points = scattered(1500, Vec3::splat(-0.99), Vec3::splat(0.99));
     for center in [Vec3::new(-0.5, 0.5, 0.2), Vec3::new(0.0, -0.4, 0.1)] {
@@ -198,7 +198,7 @@ fn everywhere() -> Vec<Vec3> {
     points
 }
 
-/// The radius is a length, not a number of cells: finer grids agree better and better.
+/// The radius is a length, not a number of cells, so weights converge under refinement.
 #[test]
 fn refinement_converges_with_the_radius_fixed() {
     let set = all_kinds();
@@ -215,9 +215,9 @@ fn refinement_converges_with_the_radius_fixed() {
     assert!(second < 0.6 * first && second < 5e-3, "{first}, then {second}");
 }
 
-/// As a whole the model is reproduced, also inside of controls and next to them, where offsets keep it.
+/// Affine maps of all controls are reproduced, also inside inner controls and next to them, where offsets are needed.
 #[test]
-fn rest_pose_and_affine_motions_of_all_controls_are_followed() {
+fn affine_maps_of_all_controls_are_reproduced() {
     let set = all_kinds();
     let points = everywhere();
     for method in [Method::Embedded, Method::Classic] {
@@ -226,7 +226,7 @@ fn rest_pose_and_affine_motions_of_all_controls_are_followed() {
         });
         let report = &binding.report;
         assert_eq!((report.outside_vertices, report.cage_vertices, report.inner_controls), (0, 8, 7));
-        // The classic method shows its errors.
+        // The classic method does not reproduce linear functions.
         if method == Method::Classic {
             continue;
         }
@@ -239,14 +239,14 @@ fn rest_pose_and_affine_motions_of_all_controls_are_followed() {
             let controls: Vec<Vec3> = Controls::from(&set).rest().iter().map(|&p| motion(p)).collect();
             let posed = deform_bound(&binding.weights, &binding.frames, &controls);
             for (p, at) in points.iter().zip(posed) {
-                // 1e-5 of a size of 2.
+                // 1e-5 relative to a size of 2.
                 assert!(at.distance(motion(*p)) < 2e-5, "{p}: {at}");
             }
         }
     }
 }
 
-/// What is inside of a ball goes where the ball goes, and does not turn.
+/// Points inside a ball are translated with it and do not rotate.
 #[test]
 fn points_inside_a_ball_follow_it() {
     let set = all_kinds();
@@ -262,9 +262,9 @@ fn points_inside_a_ball_follow_it() {
     }
 }
 
-/// The same weights on one thread and on all to the bit, on the GPU to 1e-4, by the classic method to a cell.
+/// Weights are identical for any number of threads, within 1e-4 on the GPU, and within a cell for the classic method.
 #[test]
-fn back_ends_and_methods_agree_about_controls_inside() {
+fn back_ends_and_methods_agree_on_inner_controls() {
     let set = all_kinds();
     let points = everywhere();
     let options = BindOptions { grid: 48, threads: 1, ..BindOptions::default() };
@@ -285,7 +285,7 @@ fn back_ends_and_methods_agree_about_controls_inside() {
             count += 1;
         }
     }
-    // Classic weights are constant in a cell: off by half a cell's change on average, of 15 columns.
+    // Classic weights are constant in a cell, so on average they are off by half of the change across a cell.
     let mean = sum / f64::from(count);
     assert!(mean < 0.01, "{mean}");
     let deformed = |b: &Binding| {
@@ -297,9 +297,8 @@ fn back_ends_and_methods_agree_about_controls_inside() {
     assert!(apart < 1e-4, "{apart}");
 }
 
-/// 64 balls on a grid whose coarse cells are larger than they are: V-cycles leave two thirds of the error or more (26 of them
-/// were needed; with more balls the error grew). Conjugate gradients take over, on the processor for a GPU as well. Expected
-/// values are those of conjugate gradients without V-cycles.
+/// 64 balls that are smaller than the cells of coarse levels. V-cycles alone converge slowly or diverge here, so the solver switches
+/// to conjugate gradients, on the processor even for a GPU. Expected values: conjugate gradients without a preconditioner.
 #[test]
 fn many_small_balls_do_not_stall_the_solve() {
     let places = [-0.787_f32, -0.254, 0.280, 0.813];
@@ -322,7 +321,7 @@ fn many_small_balls_do_not_stall_the_solve() {
         assert!(report.notices.iter().any(|n| n.contains("conjugate gradients")), "{:?}", report.notices);
         for c in 0..Controls::from(&set).n_controls() {
             for (w, expected) in column(&binding, c).iter().zip(column(&expected, c)) {
-                // Ten times tau in the worst place.
+                // Ten times tau.
                 assert!((w - expected).abs() < 1e-4, "control {c}: {w}, not {expected}");
             }
         }
@@ -331,8 +330,8 @@ fn many_small_balls_do_not_stall_the_solve() {
     }
 }
 
-/// Largest change of a weight between points 1/250 of a cell apart, beyond the changes before and after it, on lines that pass
-/// some corners at 0.1 to 1.5 cells.
+/// Largest jump of a weight on lines near some corners: the change between points 1/250 of a cell apart, minus the larger one of the
+/// changes before and after it. The lines pass the corners at a distance of 0.1 to 1.5 cells.
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;
     let mut random = Random::new(81);
@@ -341,7 +340,7 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
         let ends = [0, 1].map(|_| near + cell * random.point(Vec3::NEG_ONE, Vec3::ONE));
         let n = (ends[0].distance(ends[1]) / (0.004 * cell)).ceil() as usize;
         let line: Vec<Vec3> = (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect();
-        // At the corner itself the true field is as steep as can be.
+        // The exact field is arbitrarily steep at the corner itself.
         let is_clear = |p: &Vec3| corners.iter().all(|c| c.distance(*p) > 0.1 * cell);
         if line.iter().all(|p| is_clear(p) && is_inside(set.cage(), *p)) { line } else { Vec::new() }
     });
@@ -359,8 +358,8 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     largest
 }
 
-/// At the tip of a spike and at the corners of a sheet, where re-entrant edges end, weights are continuous to 8e-3, and the better
-/// the finer the grid. Rays just beyond an edge's end passed it unsplit: jumps of 0.03 to 0.07 and of 0.11 to 0.13.
+/// At the tip of a spike and at the corners of a sheet, where re-entrant edges end, jumps are at most 8e-3 and decrease under
+/// refinement. Rays that pass just beyond the end of an edge must be split there too.
 #[test]
 fn weights_do_not_jump_where_re_entrant_edges_end() {
     let tip = Vec3::new(0.05, 0.03, -0.3);

@@ -1,6 +1,6 @@
-//! Smooth cages and controls inside: what their weights must be, by formula or by another route.
+//! Weights of smooth cages and inner controls, compared with formulas or with an independent computation.
 
-// Always true here; it tells clippy that these are tests.
+// `cfg(test)` is always true here; it makes clippy treat these modules as tests.
 #[cfg(test)]
 mod inner;
 #[cfg(test)]

@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::support::{bound, samples, scattered};
 
-/// Catmull-Clark's rules for one number at each vertex, from faces' neighbourhoods found by search: slow and plain, not the
-/// route of the core. Vertices, then edges by their ends, then faces.
+/// One step of Catmull-Clark subdivision of a value per vertex, with a neighbour search that is independent of the core's. Returns
+/// the new values (vertices, edges sorted by their ends, faces) and the new quads.
 fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
@@ -52,7 +52,7 @@ fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     (new, quads)
 }
 
-/// A mesh refined `steps` times, and each vertex's row.
+/// A mesh subdivided `steps` times, and the row of each new vertex: its weights of the original vertices.
 fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) {
     let n = mesh.positions.len();
     let mut faces = Vec::new();
@@ -72,15 +72,15 @@ fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) 
     (PolygonMesh { positions: rows.iter().map(place).collect(), faces }, rows)
 }
 
-/// Rounding of f32 weights, of two binds that take the columns in other batches.
-const SAME: f64 = 1e-5;
+/// Rounding of f32 weights between two binds with different batches of columns.
+const ROUND_OFF: f64 = 1e-5;
 
-/// Boundary values of bent quads miss their place by up to 2 % of the bend. Rows are restored among controls here and among
-/// the refined cage's vertices there, which shares the miss out differently: weights differ by this many times it, at most.
-const OF_THE_MISS: f64 = 2.0;
+/// Boundary values on bent quads miss the rest position by up to 2 % of the bend. Restoring rows distributes this error among the
+/// controls in one bind, and among the vertices of the subdivided cage in the other. The weights differ by at most this multiple of it.
+const MAX_ERROR_RATIO: f64 = 2.0;
 
 #[test]
-fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
+fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in [(cuboid(Vec3::NEG_ONE, Vec3::ONE), 2), (l_shape(), 2), (l_shape(), 3)] {
         let cage = cage(&mesh);
         let set = ControlSet::new(&cage, steps, InnerControls::default()).unwrap();
@@ -99,7 +99,7 @@ fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
         for v in 0..points.len() {
             let mut expected = vec![0.0; cage.n_vertices()];
             let (columns, weights) = by_route.weights.row(v);
-            // Further columns are offsets.
+            // The remaining columns are offsets.
             for (&k, &w) in columns.iter().zip(weights).filter(|(k, _)| (**k as usize) < rows.len()) {
                 for (sum, share) in expected.iter_mut().zip(&rows[k as usize]) {
                     *sum += f64::from(w) * share;
@@ -114,14 +114,14 @@ fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
             }
         }
         let mean = sum / (points.len() * cage.n_vertices()) as f64;
-        let most = SAME + OF_THE_MISS * by_route.report.raw_error.point_rel.max;
+        let most = ROUND_OFF + MAX_ERROR_RATIO * by_route.report.raw_error.point_rel.max;
         assert!(mean < 1e-6 && worst < most, "mean {mean:e}, most {worst:e} of {most:e}");
     }
 }
 
-/// Before rows are restored, both are one linear map of the same fields: the same to 1e-5, however bent the quads are.
+/// Before rows are restored, both sides are the same linear map of the same fields, so they agree to 1e-5 for any bend of the quads.
 #[test]
-fn samples_of_a_smooth_cage_are_those_of_the_refined_cage_times_its_rows() {
+fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in
         [(cuboid(Vec3::NEG_ONE, Vec3::ONE), 2), (l_shape(), 1), (l_shape(), 2), (l_shape(), 3)]
     {
@@ -146,11 +146,11 @@ fn samples_of_a_smooth_cage_are_those_of_the_refined_cage_times_its_rows() {
                 worst = worst.max((f64::from(ours) - expected).abs());
             }
         }
-        assert!(worst < SAME, "{} vertices, {steps} steps: {worst:e}", mesh.positions.len());
+        assert!(worst < ROUND_OFF, "{} vertices, {steps} steps: {worst:e}", mesh.positions.len());
     }
 }
 
-/// Vertices just outside the smooth surface follow a rigid motion as the rest does; those further away do so in part.
+/// Vertices just outside the smooth surface follow a rigid motion fully; those further away follow it partially and are excluded.
 #[test]
 fn smooth_cage_keeps_the_rest_pose_and_rigid_motions() {
     let cage = cage(&l_shape());

@@ -1,4 +1,4 @@
-//! Binds and points that these tests share.
+//! Shared helpers.
 
 use cagework_core::bind::Watch;
 use cagework_core::bind::pipeline::{FieldsOn, Prepared};
@@ -7,28 +7,28 @@ use cagework_core::solve::rows::LANES;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, bind};
 use glam::Vec3;
 
-/// Binds points on the processor; `edit`ed options.
+/// Binds points on the processor, at tau = 1e-7 and otherwise default options, then `edit`ed.
 pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut BindOptions)) -> Binding {
     let mut options = BindOptions { tau: 1e-7, ..BindOptions::default() };
     edit(&mut options);
     bind(points, set, &options, &Silent).expect("points inside are bound")
 }
 
-/// Samples of one column after the other at different points inside, before rows are restored. `[n_controls][n_points]`
+/// Sampled weights before rows are restored. `[n_controls][n_points]`; all points must be different and inside.
 pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOptions) -> Vec<Vec<f32>> {
     let watch = Watch::new(&Silent);
     let mut prepared =
         Prepared::new(points, controls, options, FieldsOn::Host, &watch).expect("they are inside");
-    let blocks = prepared.solve_on_host(&watch).expect("nobody cancels").blocks;
+    let blocks = prepared.solve_on_host(&watch).expect("Silent never cancels").blocks;
     let lanes = blocks
         .iter()
         .flat_map(|block| (0..LANES).map(move |lane| block.iter().map(|row| row[lane]).collect()));
     lanes.take(controls.n_controls()).collect()
 }
 
-/// Points inside a box, on no plane of symmetry.
+/// Evenly distributed points in a box, none of them in a plane of symmetry.
 pub(crate) fn scattered(n: usize, low: Vec3, high: Vec3) -> Vec<Vec3> {
-    // The plastic number's powers fill a box evenly (Roberts 2018).
+    // Powers of the plastic number (Roberts 2018).
     const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_4];
     let share = |k: usize, axis: usize| ((k + 1) as f64 * STEPS[axis]).fract() as f32;
     (0..n).map(|k| low + (high - low) * Vec3::new(share(k, 0), share(k, 1), share(k, 2))).collect()

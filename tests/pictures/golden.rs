@@ -1,31 +1,31 @@
-//! Pictures against the ones that were looked at and found right, `tests/golden/NAME.png`.
+//! Compares pictures with reviewed reference pictures, `tests/golden/NAME.png`.
 //!
-//! `CAGEWORK_BLESS=1 cargo test -p cagework-tests --test pictures` writes them anew: look at every one before it is
-//! committed. A picture that differs is left in `target/pictures/NAME.png`.
+//! `CAGEWORK_BLESS=1 cargo test -p cagework-tests --test pictures` rewrites the references: review each one before
+//! committing it. A picture that differs is written to `target/pictures/NAME.png`.
 
 use std::path::{Path, PathBuf};
 
 use cagework_gpu::Session;
 use image::RgbaImage;
 
-/// Size of all pictures.
+/// Size of all pictures, pixels.
 pub(crate) const SIZE: [u32; 2] = [320, 240];
 
-/// Mean difference of a channel, in 255ths. The same adapter draws the same picture; another one rounds colours
-/// differently and places its samples elsewhere, which moves edges by a fraction of a pixel.
+/// Largest mean difference of a channel, in 255ths. Other adapters round colours differently and have other sample positions,
+/// which moves edges by a fraction of a pixel.
 const MEAN_TOLERANCE: f64 = 1.0;
 
-/// A pixel that differs more than this in some channel, in 255ths, is another pixel...
+/// A pixel counts as different if a channel differs by more than this, in 255ths.
 const PIXEL_TOLERANCE: u8 = 40;
 
-/// ...and at most this part of them may be: the rims of lines and points, which are half of a small picture's edges.
-const PIXELS_TOLERANCE: f64 = 0.01;
+/// Largest fraction of different pixels: half of a small picture's edges, where adapters rasterise lines and points differently.
+const MAX_DIFFERENT_FRACTION: f64 = 0.01;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Draws a session's picture and compares it.
+/// Draws a session's picture and compares it with the reference.
 #[track_caller]
 pub(crate) fn assert_picture(session: &mut Session, name: &str) {
     let rgba = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
@@ -39,7 +39,7 @@ pub(crate) fn assert_picture(session: &mut Session, name: &str) {
         .unwrap_or_else(|e| panic!("{}: {e}; CAGEWORK_BLESS=1 makes it", golden.display()))
         .into_rgba8();
     if let Some(difference) = difference(&picture, &expected) {
-        let actual = leave(&picture, name);
+        let actual = write_picture(&picture, name);
         panic!(
             "{name} differs from {}: {difference}\nthe picture is in {}",
             golden.display(),
@@ -48,8 +48,8 @@ pub(crate) fn assert_picture(session: &mut Session, name: &str) {
     }
 }
 
-/// Puts a picture where it can be looked at.
-fn leave(picture: &RgbaImage, name: &str) -> PathBuf {
+/// Writes a picture to `target/pictures`.
+fn write_picture(picture: &RgbaImage, name: &str) -> PathBuf {
     let folder = root().join("../target/pictures");
     std::fs::create_dir_all(&folder).expect("the folder is made");
     let path = folder.join(format!("{name}.png"));
@@ -57,7 +57,7 @@ fn leave(picture: &RgbaImage, name: &str) -> PathBuf {
     path
 }
 
-/// What differs too much, if something does.
+/// Describes the difference if it exceeds a tolerance.
 fn difference(a: &RgbaImage, b: &RgbaImage) -> Option<String> {
     if a.dimensions() != b.dimensions() {
         return Some(format!("{:?} pixels instead of {:?}", a.dimensions(), b.dimensions()));
@@ -66,19 +66,19 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> Option<String> {
         a.pixels().zip(b.pixels()).map(|(a, b)| std::array::from_fn(|k| a.0[k].abs_diff(b.0[k]))).collect();
     let mean =
         differences.iter().flatten().map(|&d| f64::from(d)).sum::<f64>() / (4 * differences.len()) as f64;
-    let other = differences.iter().filter(|d| d.iter().any(|&c| c > PIXEL_TOLERANCE)).count();
-    let part = other as f64 / differences.len() as f64;
-    (mean > MEAN_TOLERANCE || part > PIXELS_TOLERANCE).then(|| {
+    let different = differences.iter().filter(|d| d.iter().any(|&c| c > PIXEL_TOLERANCE)).count();
+    let fraction = different as f64 / differences.len() as f64;
+    (mean > MEAN_TOLERANCE || fraction > MAX_DIFFERENT_FRACTION).then(|| {
         format!(
-            "mean {mean:.2} of 255 (at most {MEAN_TOLERANCE}), {:.2} % other pixels (at most {} %)",
-            100.0 * part,
-            100.0 * PIXELS_TOLERANCE
+            "mean {mean:.2} of 255 (at most {MEAN_TOLERANCE}), {:.2} % of the pixels differ (at most {} %)",
+            100.0 * fraction,
+            100.0 * MAX_DIFFERENT_FRACTION
         )
     })
 }
 
 #[test]
-fn another_picture_is_told_apart() {
+fn differences_above_a_tolerance_are_detected() {
     let grey = |value| RgbaImage::from_pixel(100, 100, image::Rgba([value, value, value, 255]));
     assert_eq!(difference(&grey(100), &grey(101)), None);
     assert!(difference(&grey(100), &grey(102)).is_some_and(|d| d.starts_with("mean 1.5")));

@@ -1,6 +1,6 @@
-//! Pictures of everything that can be drawn, compared with golden ones.
+//! Pictures of everything that can be drawn, compared with references.
 
-// Always true here; it tells clippy that these are tests.
+// `cfg(test)` is always true here; it makes clippy treat these modules as tests.
 #[cfg(test)]
 mod golden;
 #[cfg(test)]
@@ -50,7 +50,7 @@ fn posed_with_selection() {
     }
 }
 
-/// The cage vertex above the neck, which moves much of head and body.
+/// The cage vertex above the neck, which influences much of head and body.
 fn near_the_head(session: &Session) -> u32 {
     let positions = session.cage().expect("there is one").positions();
     let distance = |p: &Vec3| p.distance(Vec3::new(5.0, 4.0, -1.0));
@@ -59,7 +59,7 @@ fn near_the_head(session: &Session) -> u32 {
     nearest.expect("a cage has vertices") as u32
 }
 
-/// The paper's figure 4: what the classic weights make of the rest pose, and the mesh as it was.
+/// The paper's figure 4: the rest pose reconstructed from classic weights, with the base mesh as a wireframe.
 #[test]
 fn base_wireframe_over_the_reconstruction() {
     let mut session = creature();
@@ -205,18 +205,18 @@ fn orthographic_from_above() {
     assert_picture(&mut session, "orthographic-top");
 }
 
-/// Drawn into a format without sRGB, as a browser's canvas may have, the colours are the same.
+/// Some canvas formats are not sRGB; colours must be the same in them.
 #[test]
 fn formats_without_srgb_look_the_same() {
     let mut session = creature();
-    // Nothing translucent: that is blended in sRGB there.
+    // Only opaque elements, because blending happens in sRGB there.
     let bare = SceneOptions { floor: false, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.set_scene(bare);
     let expected = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
     let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);
     let n = expected.len();
     let sum: f64 = expected.iter().zip(&actual).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
-    // Samples are averaged in sRGB there, too: edges are a little darker.
+    // Multisampling averages in sRGB there, so edges are slightly darker.
     assert!(sum / (n as f64) < 1.0, "{}", sum / n as f64);
 }
 
@@ -226,6 +226,6 @@ fn empty_session_is_a_background() {
     *session.camera_mut() = Camera::default();
     let rgba = pollster::block_on(session.picture([64, 48], 1.0)).expect("the picture is drawn");
     assert!(rgba.chunks(4).all(|p| p[3] == 255));
-    // Above lighter than below, in the dark theme.
+    // The dark theme's gradient is lighter at the top.
     assert!(rgba[0] > rgba[4 * 64 * 47]);
 }

@@ -1,4 +1,4 @@
-//! Sessions that pictures are made of.
+//! Sessions for the pictures.
 
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -13,12 +13,12 @@ use cagework_tests::creature;
 use glam::{Quat, Vec2, Vec3};
 use pollster::block_on;
 
-/// Devices that compute and devices that only draw, as in browsers without WebGPU: pictures are the same.
+/// A device that computes, and one that only draws as in browsers without WebGPU. Pictures must be the same on both.
 pub(crate) fn everywhere() -> [ContextOptions; 2] {
     [false, true].map(|draws_only| ContextOptions { draws_only, ..ContextOptions::default() })
 }
 
-/// A session without anything. No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
+/// An empty session. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
 pub(crate) fn empty(options: &ContextOptions) -> Session {
     match block_on(GpuContext::new(options)) {
         Ok(context) => Session::new(context),
@@ -26,7 +26,7 @@ pub(crate) fn empty(options: &ContextOptions) -> Session {
     }
 }
 
-/// The animal of the tests stands on four legs along z; here y is up.
+/// Rotates the animal so that y is up.
 fn upright(p: Vec3) -> Vec3 {
     let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.2, -0.35, 0.5).inverse();
     let p = turn * p;
@@ -38,7 +38,7 @@ pub(crate) fn creature() -> Session {
     creature_on(&ContextOptions::default())
 }
 
-/// [`creature`] on a device of some kind.
+/// [`creature`] on a device with these options.
 pub(crate) fn creature_on(options: &ContextOptions) -> Session {
     let mesh = creature::creature();
     let around: Cage = cage(&moved(&creature::creature_cage(), upright));
@@ -70,7 +70,7 @@ pub(crate) fn bind(session: &mut Session, options: &BindOptions) {
     assert!(report.converged);
 }
 
-/// The animal bows.
+/// Poses the cage so that the animal bows.
 pub(crate) fn bow(session: &mut Session) {
     let rest = session.cage().expect("there is one").positions().to_vec();
     let posed: Vec<Vec3> = rest
@@ -83,7 +83,7 @@ pub(crate) fn bow(session: &mut Session) {
     session.pose(&posed);
 }
 
-/// A ball with a texture, one with colours of its vertices, one of glass and one that is cut out, side by side.
+/// Four balls side by side: textured, with vertex colours, transparent, and with an alpha mask.
 pub(crate) fn textured(options: &ContextOptions) -> Session {
     let mut model = DrawModel::default();
     for k in 0..4u32 {
@@ -123,7 +123,7 @@ pub(crate) fn textured(options: &ContextOptions) -> Session {
     session
 }
 
-/// A ball of radius 1 whose texture coordinates meet in a seam.
+/// A ball of radius 1 with a texture seam.
 fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
     const RINGS: u32 = 24;
     const AROUND: u32 = 48;
@@ -134,7 +134,7 @@ fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
             let (u, v) = (step as f32 / AROUND as f32, ring as f32 / RINGS as f32);
             let (polar, around) = (PI * v, TAU * u);
             let out = Vec3::new(polar.sin() * around.sin(), polar.cos(), polar.sin() * around.cos());
-            // The last step is the first vertex again, with other texture coordinates.
+            // At the seam the position is shared, and the texture coordinates are not.
             if step < AROUND {
                 model.positions.push(center + out);
             }
@@ -161,7 +161,7 @@ fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
     }
 }
 
-/// A picture in another format, as a page's canvas has, read back.
+/// Draws a picture in another texture format and reads it back.
 pub(crate) fn picture_as(
     session: &mut Session,
     format: wgpu::TextureFormat,
@@ -192,7 +192,7 @@ pub(crate) fn picture_as(
     session.frame(&view, format, [width, height], 1.0).expect("the frame is drawn");
     let context = session.context();
     let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    // 320 pixels are 1,280 bytes: rows need no padding.
+    // Rows of 320 pixels are 1,280 bytes, a multiple of 256, so they need no padding.
     let layout =
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None };
     encoder.copy_texture_to_buffer(

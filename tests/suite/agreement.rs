@@ -1,11 +1,11 @@
-//! Back ends against each other.
+//! Comparison of two back ends.
 
 use cagework_tests::cages::{c_shape, cage, moved, triangulated};
 use cagework_tests::{Random, assert_close, dense, points};
 
-use super::{BackEnd, SOLVED};
+use super::{BackEnd, WEIGHT_TOLERANCE};
 
-/// The same equations, both solved far below their discretisation error.
+/// Both solve the same equations, to an error far below the discretisation error.
 pub(crate) fn solvers_agree(a: &BackEnd, b: &BackEnd) {
     let turn = Random::new(20).rotation();
     for mesh in [c_shape(), moved(&triangulated(&c_shape()), |p| turn * p)] {
@@ -13,17 +13,17 @@ pub(crate) fn solvers_agree(a: &BackEnd, b: &BackEnd) {
         let points = points::inside(&cage, 800, 20);
         let [x, y] = [a, b].map(|s| s.bind_with(&points, &cage, |o| o.grid = 24));
         assert!(x.report.converged && y.report.converged);
-        assert_close(&dense(&x.weights), &dense(&y.weights), SOLVED);
+        assert_close(&dense(&x.weights), &dense(&y.weights), WEIGHT_TOLERANCE);
         assert_eq!(x.report.cells, y.report.cells);
     }
 }
 
-/// The brief's bar is 1e-5; threads own whole columns, so that nothing but the number of sweeps could differ.
+/// Each thread owns whole columns, so only the number of iterations could depend on the number of threads.
 pub(crate) fn threads_agree(one: &BackEnd, many: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 1500, 21);
     let [x, y] = [one, many].map(|s| s.bind_with(&points, &cage, |o| o.tau = 1e-5));
-    assert_close(&dense(&x.weights), &dense(&y.weights), SOLVED);
+    assert_close(&dense(&x.weights), &dense(&y.weights), WEIGHT_TOLERANCE);
     assert_eq!(x.report.iterations, y.report.iterations);
     assert_eq!((x.report.threads, x.report.cells), (1, y.report.cells));
 }

@@ -1,5 +1,5 @@
-//! Cages on which weights were once wrong: thresholds, parts that share faces or overlap, re-entrant edges, bent quads,
-//! faces that the grid cannot resolve. Figures at g = 64, before and after, are in `docs/notes/any-cage.md`.
+//! Difficult cages: thresholds, parts that share faces or overlap, re-entrant edges, bent quads, and faces that the grid cannot
+//! resolve. Figures at g = 64 are in `docs/notes/any-cage.md`.
 
 use cagework_core::{Cage, PolygonMesh, Weights};
 use cagework_tests::cages::{cage, cuboid, icosphere, l_shape, moved, sphere, together};
@@ -14,15 +14,15 @@ fn largest_change(a: &Weights, b: &Weights) -> f32 {
     dense(a).iter().zip(dense(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// A smooth pose: each point turned around y by half a radian times its height over `size`.
+/// A smooth pose: each point rotated about y by `0.5 * p.y / size` radians.
 fn twisted(points: &[Vec3], size: f32) -> Vec<Vec3> {
     points.iter().map(|&p| Quat::from_rotation_y(0.5 * p.y / size) * p).collect()
 }
 
-/// What is dropped may not be missed: no row turns negative, no weight changes by more than 5 times the threshold, and a
-/// smooth pose by 1e-3 of the diagonal. Dropping each weight below 1e-3 changed weights by 0.5 on an icosphere of
-/// 642 vertices.
-pub(crate) fn dropped_weights_are_not_missed(back_end: &BackEnd) {
+/// Dropped weights are redistributed: no weight becomes negative or changes by more than 5 times the threshold, and a smooth pose
+/// changes by at most 1e-3 of the diagonal. (Dropping without redistribution changes weights by 0.5 on an icosphere of 642
+/// vertices.)
+pub(crate) fn sparsify_changes_weights_and_poses_little(back_end: &BackEnd) {
     let mut n_dropped = 0;
     for cage in principles::cages().into_iter().chain([2, 3].map(|times| cage(&icosphere(times)))) {
         let points = points::inside(&cage, 400, 71);
@@ -41,14 +41,14 @@ pub(crate) fn dropped_weights_are_not_missed(back_end: &BackEnd) {
     assert!(n_dropped > 1000, "{n_dropped} weights were dropped");
 }
 
-/// Weights of two closed parts as one cage against those of each alone.
-fn assert_bound_as_alone(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, tolerance: f32) {
+/// Asserts that the weights of two closed parts in one cage equal those of each part alone.
+fn assert_independent(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, tolerance: f32) {
     let both = cage(&together(a, b));
     let n = a.positions.len();
     for (mesh, columns) in [(a, 0..n), (b, n..both.n_vertices())] {
         let alone = cage(mesh);
         let points = points::inside(&alone, 300, 72);
-        // The same cells as in the cage of both.
+        // The cell size that the cage of both parts has at g = 64.
         let length = |c: &Cage| c.bounds().extent().max_element();
         let grid = (64.0 * length(&alone) / length(&both)).round() as u32;
         let expected = dense(&back_end.bind_with(&points, &alone, |o| o.grid = grid).weights);
@@ -65,22 +65,21 @@ fn assert_bound_as_alone(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, t
     }
 }
 
-/// Two parts that share a face, whole or in part, straight or askew, do not feel each other. What was behind the face
-/// leaked through it by up to 0.78.
+/// Two parts that share a face, fully or partly, aligned with the grid or rotated, have independent weights.
 pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
     let turn = Random::new(73).rotation();
     let upper = cuboid(Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 2.0, 1.0));
     let smaller = cuboid(Vec3::new(0.25, 1.0, 0.5), Vec3::new(0.75, 2.0, 1.0));
     for other in [upper, smaller] {
         let lower = cuboid(Vec3::ZERO, Vec3::ONE);
-        assert_bound_as_alone(back_end, &lower, &other, 2e-3);
+        assert_independent(back_end, &lower, &other, 2e-3);
         let [a, b] = [lower, other].map(|mesh| moved(&mesh, |p| turn * p));
-        assert_bound_as_alone(back_end, &a, &b, 8e-3);
+        assert_independent(back_end, &a, &b, 8e-3);
     }
 }
 
-/// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956): a sphere in either box is
-/// inside, and whoever comes close to the one's face outside the other takes its trilinear values.
+/// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956). Each step jumps to a random point of the
+/// largest sphere inside one of the boxes. Near the boundary of the union a walk ends with the trilinear coordinates in its box.
 fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &mut Random) -> [f64; 16] {
     let mut sums = [0.0; 16];
     for _ in 0..n_walks {
@@ -106,14 +105,13 @@ fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &
     sums
 }
 
-/// Parts that overlap are bound as one, by a hair or by half, and a notice says so. Each wall inside stopped what came
-/// through: errors of 0.9.
+/// Overlapping parts are bound as their union, with a notice: walls inside the union do not stop the field.
 pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
-    let hair = 0.03 * 6.0 / 64.0;
+    let overlap = 0.03 * 6.0 / 64.0;
     let limbs = [
-        // Half inside the body; and overlapping it by a hundredth of a cell.
+        // Half inside the body; and overlapping it by 3 % of a cell.
         [DVec3::new(2.0, 1.2, 1.3), DVec3::new(6.0, 2.6, 2.7)],
-        [DVec3::new(4.0 - hair, 1.2, 1.3), DVec3::new(6.0, 2.6, 2.7)],
+        [DVec3::new(4.0 - overlap, 1.2, 1.3), DVec3::new(6.0, 2.6, 2.7)],
     ];
     for limb in limbs {
         let boxes = [[DVec3::ZERO, DVec3::splat(4.0)], limb];
@@ -121,7 +119,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         let both = cage(&together(&body, &arm));
         let points: Vec<Vec3> = [
             [3.0, 2.0, 2.0],
-            // Next to walls inside, where rays would meet them.
+            // Next to inner walls, which sampling rays may hit.
             [3.999, 1.9, 1.9],
             [4.001, 2.0, 1.8],
             [2.001, 2.0, 2.1],
@@ -148,7 +146,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     }
 }
 
-/// Edges around which more than half of what is near is inside.
+/// Edges with more than 60 % of their neighbourhood inside the cage.
 fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
     let mut random = Random::new(75);
     let sides = cage.faces().iter().flat_map(|f| (0..f.len()).map(|k| [f[k], f[(k + 1) % f.len()]]));
@@ -161,7 +159,7 @@ fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// Largest change of a weight between points 1/250 of a cell apart, in lines that pass re-entrant edges within 1.5 cells.
+/// Largest change of a weight between points 1/250 of a cell apart, on lines that pass re-entrant edges within 1.5 cells.
 fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     let cell = cage.bounds().extent().max_element() / grid as f32;
     let edges = re_entrant_edges(cage, 0.1 * cell);
@@ -174,7 +172,7 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
         let n = (ends[0].distance(ends[1]) / (0.004 * cell)).ceil() as usize;
         let line: Vec<Vec3> = (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect();
         let way = (b - a).normalize();
-        // On the edge itself the true field is as steep as can be.
+        // The exact field is arbitrarily steep on the edge itself.
         let is_clear =
             |p: &Vec3| (*p - a).reject_from(way).length() > 0.1 * cell && points::is_inside(cage, *p);
         if line.iter().all(is_clear) { line } else { Vec::new() }
@@ -192,12 +190,12 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     largest
 }
 
-/// Next to re-entrant edges weights are continuous, to what the true field does in 1/250 of a cell. Rays that just missed
-/// an edge and rays that met it gave values up to 0.034 apart. And the finer the grid, the smaller what is left.
+/// Next to re-entrant edges weights change by at most 4e-3 per 1/250 of a cell, and less on a finer grid: rays that hit an edge and
+/// rays that just miss it give the same values.
 pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     let turn = Random::new(76).rotation();
-    let askew = moved(&l_shape(), |p| turn * p);
-    for cage in [cage(&l_shape()), cage(&askew), armadillo_cage()] {
+    let rotated = moved(&l_shape(), |p| turn * p);
+    for cage in [cage(&l_shape()), cage(&rotated), armadillo_cage()] {
         let [coarse, fine] = [32, 64].map(|grid| largest_jump(back_end, &cage, grid));
         println!("{} vertices: jumps of {coarse} at g = 32, {fine} at g = 64", cage.n_vertices());
         assert!(fine <= 4e-3, "a weight jumps by {fine}");
@@ -205,9 +203,9 @@ pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     }
 }
 
-/// A corner of the unit cube that is pulled out moves weights continuously, from flat faces on. When bent faces were split
-/// into two triangles, weights changed by 0.237 between 1.39e-5 and 1.40e-5.
-pub(crate) fn weights_are_continuous_in_a_cages_corners(back_end: &BackEnd) {
+/// Lifting a corner of the unit cube changes weights continuously, starting from planar faces. (Splitting bent faces into two
+/// triangles makes weights jump by 0.237 at the lift where the split first occurs.)
+pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd) {
     let flat = cuboid(Vec3::ZERO, Vec3::ONE);
     let points = points::inside(&cage(&flat), 300, 77);
     let bind = |lift: f32| {
@@ -220,31 +218,31 @@ pub(crate) fn weights_are_continuous_in_a_cages_corners(back_end: &BackEnd) {
     for lifts in lifts.windows(2) {
         let after = bind(lifts[1]);
         let change = largest_change(&before, &after);
-        // 1e-5: rounding, and what the solver leaves.
+        // 1e-5: rounding, and the solver's error.
         let allowed = 20.0 * (lifts[1] - lifts[0]) + 1e-5;
         assert!(change <= allowed, "from {} to {}: a weight changes by {change}", lifts[0], lifts[1]);
         before = after;
     }
 }
 
-/// Faces that no grid line meets, and fins thinner than a cell, are said with the grid that resolves them.
-pub(crate) fn what_the_grid_cannot_resolve_is_said(back_end: &BackEnd) {
+/// Faces that no grid line hits, and fins thinner than a cell, give a notice with a grid that resolves them.
+pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &BackEnd) {
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
-    // A turned bar: lines leave it through its other sides, too.
+    // A rotated bar, which grid lines also leave through its other sides.
     let turn = Random::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
     for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {
         let points = points::inside(&cage, 50, 78);
-        let said = |grid: u32| {
+        let notice = |grid: u32| {
             let report = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, 1e-5)).report;
             report.notices.into_iter().find(|n| n.contains("does not resolve"))
         };
-        let notice = said(grid).expect("a notice");
-        let words: Vec<&str> = notice.split_whitespace().collect();
+        let first = notice(grid).expect("a notice");
+        let words: Vec<&str> = first.split_whitespace().collect();
         let at = words.windows(4).position(|w| w[..4] == ["use", "a", "grid", "of"]).expect("advice");
         let enough: u32 = words[at + 4].parse().expect("a number of cells");
-        assert!(enough > grid && said(enough).is_none(), "{notice} Then: {:?}", said(enough));
+        assert!(enough > grid && notice(enough).is_none(), "{first} Then: {:?}", notice(enough));
     }
     let cube = cage(&cuboid(Vec3::ZERO, Vec3::ONE));
     let report = back_end.bind(&points::inside(&cube, 50, 79), &cube).report;

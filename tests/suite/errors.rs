@@ -1,4 +1,4 @@
-//! Bad input ends in an error that names it.
+//! Invalid input gives an error that names it.
 
 use cagework_core::bind::BindError;
 use cagework_core::options::BindOptions;
@@ -8,7 +8,6 @@ use glam::Vec3;
 
 use super::BackEnd;
 
-/// Changes options.
 type Edit = fn(&mut BindOptions);
 
 pub(crate) fn options_out_of_range_are_named(back_end: &BackEnd) {
@@ -44,7 +43,7 @@ pub(crate) fn bad_meshes_are_named(back_end: &BackEnd) {
             assert_eq!(error, BindError::NotFinite { vertex: 7 });
         }
     }
-    // Far away is unusual, not wrong, as long as something is inside.
+    // Distant vertices are valid as long as one vertex is inside.
     let mut points = points::inside(&cage, 1, 31);
     points.push(Vec3::splat(1e20));
     let far = back_end.bind(&points, &cage);
@@ -58,7 +57,7 @@ pub(crate) fn memory_limit_is_kept_and_named(back_end: &BackEnd) {
     let limit = 3 << 20;
     let error = back_end.try_bind(&points, &cage, |o| (o.grid, o.memory_limit) = (512, limit)).unwrap_err();
     let BindError::Memory { needed, limit: named } = error else { panic!("{error:?}") };
-    // An octant byte per cell of a 512-cell grid of a 4 x 3 x 1 box alone is far more.
+    // The octants of the cells of a 4 x 3 x 1 box at g = 512 take far more: one byte per cell.
     assert!(named == limit && needed > 50 << 20, "{needed} of {named} bytes");
     let message = BindError::Memory { needed, limit }.to_string();
     assert!(message.contains(&format!("{} MiB", needed >> 20)) && message.contains("3 MiB"), "{message}");

@@ -4,9 +4,9 @@ use cagework_tests::cages::{cage, cuboid, moved, tetrahedron};
 use cagework_tests::{Random, assert_close, dense, points};
 use glam::{DMat3, DVec3, Vec3};
 
-use super::{BackEnd, SOLVED};
+use super::{BackEnd, WEIGHT_TOLERANCE};
 
-/// Corners without symmetry.
+/// Corners of a tetrahedron without symmetry.
 const CORNERS: [Vec3; 4] = [
     Vec3::new(0.1, -0.2, 0.0),
     Vec3::new(1.3, 0.1, 0.2),
@@ -21,7 +21,7 @@ fn barycentric(p: Vec3) -> [f32; 4] {
     [1.0 - w.element_sum(), w.x, w.y, w.z].map(|w| w as f32)
 }
 
-/// Trilinear coordinates in the box from 0 to `size`, in the order of [`cuboid`].
+/// Trilinear coordinates in the box from 0 to `size`, in the vertex order of [`cuboid`].
 fn trilinear(p: DVec3, size: DVec3) -> [f32; 8] {
     let t = p / size;
     std::array::from_fn(|v| {
@@ -35,18 +35,18 @@ pub(crate) fn tetrahedron_is_barycentric(back_end: &BackEnd) {
     let expected: Vec<f32> = points.iter().flat_map(|&p| barycentric(p)).collect();
     for grid in [8, 16, 25] {
         let binding = back_end.bind_with(&points, &cage, |o| o.grid = grid);
-        assert_close(&dense(&binding.weights), &expected, SOLVED);
+        assert_close(&dense(&binding.weights), &expected, WEIGHT_TOLERANCE);
     }
 }
 
-/// The classic method takes values at the point of the cage closest to a boundary cell's centre, and a vertex takes
-/// its cell's: either moves a point by half a cell's diagonal at most, and the coordinates are linear in between.
+/// The classic method takes boundary values at the point of the cage closest to a cell's centre, and a vertex takes the weights of its
+/// cell. Each moves a point by at most half a cell's diagonal, and the exact coordinates are linear.
 pub(crate) fn tetrahedron_is_barycentric_within_a_cell(back_end: &BackEnd) {
     let cage = cage(&tetrahedron(CORNERS));
     let points = points::inside(&cage, 300, 1);
     let expected: Vec<f32> = points.iter().flat_map(|&p| barycentric(p)).collect();
     let binding = back_end.bind_with(&points, &cage, |o| o.grid = 32);
-    // A coordinate falls from 1 at its corner to 0 on the opposite face.
+    // A coordinate decreases from 1 at its corner to 0 on the opposite face.
     let steepest = (0..4)
         .map(|k| {
             let [a, b, c] = [1, 2, 3].map(|j| CORNERS[(k + j) % 4]);
@@ -64,11 +64,11 @@ pub(crate) fn box_is_trilinear(back_end: &BackEnd) {
         let points = points::inside(&cage, 500, 2);
         let expected: Vec<f32> =
             points.iter().flat_map(|p| trilinear(p.as_dvec3(), size.as_dvec3())).collect();
-        assert_close(&dense(&back_end.bind(&points, &cage).weights), &expected, SOLVED);
+        assert_close(&dense(&back_end.bind(&points, &cage).weights), &expected, WEIGHT_TOLERANCE);
     }
 }
 
-/// A box that lies askew in the grid: still trilinear in its own axes, but the grid no longer knows.
+/// A box rotated against the grid: the exact coordinates are trilinear in the box's axes.
 pub(crate) fn error_is_second_order(back_end: &BackEnd) {
     let size = Vec3::new(1.0, 1.4, 0.8);
     let turn = Random::new(3).rotation();
@@ -78,17 +78,17 @@ pub(crate) fn error_is_second_order(back_end: &BackEnd) {
     let expected: Vec<f32> =
         points.iter().flat_map(|p| trilinear(into_box * p.as_dvec3(), size.as_dvec3())).collect();
     let errors = [10, 20, 40].map(|grid| {
-        // Jacobi's changes to come add up to more deltas on a finer grid.
+        // On a finer grid Jacobi converges more slowly, so the same delta leaves a larger error.
         let binding = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, 1e-8));
         let got = dense(&binding.weights);
         got.iter().zip(&expected).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / got.len() as f64
     });
     for pair in errors.windows(2) {
-        // Second order: a quarter. Cells meet the cage differently on every grid, so not on the dot.
+        // Second order reduces the error to a quarter, roughly because cells intersect the cage differently on each grid.
         let ratio = pair[0] / pair[1];
         assert!(
             (3.0..5.5).contains(&ratio),
-            "errors {errors:?} fall {ratio}-fold where 4-fold is second order"
+            "errors {errors:?} decrease by a factor of {ratio}; second order is 4"
         );
     }
 }

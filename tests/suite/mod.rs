@@ -18,30 +18,28 @@ use cagework_core::progress::{Progress, Silent};
 use cagework_core::{Cage, Weights};
 use glam::{DVec3, Vec3};
 
-/// Anything that binds a mesh to a cage.
+/// Binds a mesh to a cage.
 pub(crate) type Bind = fn(&[Vec3], &Cage, &BindOptions, &dyn Progress) -> Result<Binding, BindError>;
 
-/// A back end under test: how it is called, and the options that choose it.
+/// A back end under test.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BackEnd {
-    /// The call.
     pub(crate) bind: Bind,
-    /// Method, solver and threads; properties set the rest.
+    /// Method, solver and threads; properties change the rest.
     pub(crate) options: BindOptions,
 }
 
-/// Grid for properties that hold at any resolution.
+/// Grid of properties that hold at any resolution.
 pub(crate) const GRID: u32 = 16;
 
-/// Threshold for delta at which what is left of the error is below [`SOLVED`]: at g = 16 a Jacobi sweep leaves
-/// cos(pi / 16) = 0.98 of it, so that the changes to come add up to 50 deltas.
+/// Threshold for delta at which the remaining error is below [`WEIGHT_TOLERANCE`]. At g = 16 a Jacobi sweep multiplies the error by
+/// cos(pi / 16) = 0.98, so the error is about 50 deltas.
 pub(crate) const TAU: f32 = 1e-7;
 
-/// What [`TAU`] leaves of the error, and rounding: the bar of the brief for exact solutions.
-pub(crate) const SOLVED: f32 = 1e-5;
+/// Largest error of weights solved to [`TAU`], including rounding.
 
 impl BackEnd {
-    /// Binds at [`GRID`] and [`TAU`], `edit`ed.
+    /// Binds at [`GRID`] and [`TAU`], with options changed by `edit`.
     pub(crate) fn try_bind(
         &self,
         points: &[Vec3],
@@ -53,7 +51,7 @@ impl BackEnd {
         (self.bind)(points, cage, &options, &Silent)
     }
 
-    /// [`Self::try_bind`] that must succeed.
+    /// [`Self::try_bind`], asserting success.
     pub(crate) fn bind_with(
         &self,
         points: &[Vec3],
@@ -63,18 +61,18 @@ impl BackEnd {
         self.try_bind(points, cage, edit).expect("this input can be bound")
     }
 
-    /// [`Self::bind_with`] nothing edited.
+    /// [`Self::bind_with`] without an edit.
     pub(crate) fn bind(&self, points: &[Vec3], cage: &Cage) -> Binding {
         self.bind_with(points, cage, |_| ())
     }
 
-    /// Whether weights are interpolated and reproduce linear functions.
+    /// Whether the method interpolates weights and reproduces linear functions.
     pub(crate) fn is_embedded(&self) -> bool {
         self.options.method == Method::Embedded
     }
 }
 
-/// Where the weights put each vertex, in f64.
+/// Positions `sum w c` of the vertices, in f64. `[n_vertices]`
 pub(crate) fn combined(weights: &Weights, cage: &[Vec3]) -> Vec<DVec3> {
     weights
         .rows()
@@ -84,7 +82,7 @@ pub(crate) fn combined(weights: &Weights, cage: &[Vec3]) -> Vec<DVec3> {
         .collect()
 }
 
-/// Asserts that the weights put every vertex where `expected` has it, to within `tolerance` (object units).
+/// Asserts that the weights reproduce the expected positions to within `tolerance` (object units).
 #[track_caller]
 pub(crate) fn assert_combined(weights: &Weights, cage: &[Vec3], expected: &[Vec3], tolerance: f64) {
     let got = combined(weights, cage);

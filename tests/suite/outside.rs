@@ -10,10 +10,11 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::BackEnd;
 
-/// 1e-5 of positions of size 5.
-const AFFINE: f32 = 5e-5;
+/// 1e-5 relative to positions of size 5.
+const AFFINE_TOLERANCE: f32 = 5e-5;
 
-/// Points in the C; some beside it within 5 % of its diagonal, 5.1, in its gap too; and corners of a box that are beyond 15 %.
+/// Points inside the C, points within 5 % of its diagonal (5.1) outside, some of them in its gap, and corners of a box beyond 15 %.
+/// Returns all points, and the indices of the near and the far ones.
 fn some_outside(n_inside: usize) -> (Vec<Vec3>, Vec<u32>, Vec<u32>) {
     let mut vertices = points::inside(&cage(&c_shape()), n_inside, 40);
     let near = [[-0.2, 1.5, 0.5], [2.0, -0.1, 0.4], [2.5, 1.2, 0.5], [3.0, 1.9, 0.7], [1.5, 0.3, 1.2]]
@@ -43,15 +44,18 @@ pub(crate) fn vertices_near_the_cage_follow_affine_maps_and_far_ones_stay(back_e
         let deformed = deform_bound(&binding.weights, &binding.frames, &posed);
         let rest = deform_bound(&binding.weights, &binding.frames, cage.positions());
         for &v in &far {
-            assert!(deformed[v as usize].distance(vertices[v as usize]) <= AFFINE, "{policy}: {v} moves");
+            assert!(
+                deformed[v as usize].distance(vertices[v as usize]) <= AFFINE_TOLERANCE,
+                "{policy}: {v} moves"
+            );
         }
         for &v in &listed {
             assert!(
-                rest[v as usize].distance(vertices[v as usize]) <= AFFINE,
+                rest[v as usize].distance(vertices[v as usize]) <= AFFINE_TOLERANCE,
                 "{policy}: vertex {v} at rest"
             );
         }
-        // The classic method shows its errors; a cell that the cage touches has weights, on either side of the cage.
+        // The classic method also assigns weights outside the cage, in cells that the cage intersects.
         if back_end.is_embedded() {
             let mut expected = [near.as_slice(), &far].concat();
             expected.sort_unstable();
@@ -62,16 +66,15 @@ pub(crate) fn vertices_near_the_cage_follow_affine_maps_and_far_ones_stay(back_e
                 let p = vertices[v as usize];
                 let expected = if policy == OutsidePolicy::Stay { p } else { moved(p) };
                 let at = deformed[v as usize];
-                assert!(at.distance(expected) <= AFFINE, "{policy}: {p} at {at}, not {expected}");
+                assert!(at.distance(expected) <= AFFINE_TOLERANCE, "{policy}: {p} at {at}, not {expected}");
             }
         }
     }
 }
 
-/// A round bar that sticks out of an eight-sided prism by up to 1.2 % of its diagonal, twisted by one radian a unit: edges change by
-/// factors of 1 to 1.23 on the smooth map, (1 + r^2)^(1/2) being a helix's stretch, 1.12 at r = 1/2; a diagonal's bound is the larger
-/// singular value of a shear by 1/2, 1.28.
-pub(crate) fn model_that_pokes_out_moves_as_smoothly_as_the_cage(back_end: &BackEnd) {
+/// A round bar that protrudes from an octagonal prism by up to 1.2 % of its diagonal, twisted by one radian per unit. The twist shears
+/// the surface at radius r = 1/2 by 1/2, so it stretches edges by at most the larger singular value of that shear, 1.28.
+pub(crate) fn protruding_model_deforms_smoothly(back_end: &BackEnd) {
     let ring = |n: u16, r: f32, z: f32| {
         (0..n).map(move |k| {
             let (sin, cos) = (std::f32::consts::TAU * f32::from(k) / f32::from(n)).sin_cos();
@@ -103,7 +106,7 @@ pub(crate) fn model_that_pokes_out_moves_as_smoothly_as_the_cage(back_end: &Back
     }
 }
 
-/// A cage around the end of a bar: the rest of it stays where it is, to the bit.
+/// With a cage around one end of a bar, vertices beyond 15 % of the cage's diagonal are bit-identical after deformation.
 pub(crate) fn partial_cage_leaves_the_rest_of_the_model(back_end: &BackEnd) {
     let cage = cage(&cuboid(Vec3::new(0.0, -0.3, -0.3), Vec3::new(1.0, 0.3, 0.3)));
     let bar: Vec<Vec3> = (0..100u8).map(|k| Vec3::new(f32::from(k) / 50.0 - 1.0, 0.1, 0.05)).collect();
@@ -117,9 +120,9 @@ pub(crate) fn partial_cage_leaves_the_rest_of_the_model(back_end: &BackEnd) {
     if !back_end.is_embedded() {
         return;
     }
-    // The end that the cage keeps where it is does not jump either.
+    // The transition is continuous.
     let steps = moved.windows(2).map(|w| w[0].distance(w[1]));
-    assert!(steps.fold(0.0, f32::max) < 0.03, "a step of 0.02 grows to 0.0233 in the cage");
+    assert!(steps.fold(0.0, f32::max) < 0.03, "the pose stretches steps of 0.02 to 0.0233 inside the cage");
 }
 
 pub(crate) fn refusal_names_count_and_first_vertex(back_end: &BackEnd) {
@@ -127,7 +130,7 @@ pub(crate) fn refusal_names_count_and_first_vertex(back_end: &BackEnd) {
     let mut vertices = points::inside(&cage, 20, 42);
     vertices[11] = Vec3::new(-9.0, 0.0, 0.0);
     vertices[5] = Vec3::new(0.0, 9.0, 0.0);
-    // A repeat of a vertex outside counts once, by its position.
+    // Duplicate positions outside count once.
     let error = back_end.try_bind(&vertices, &cage, |o| o.outside = OutsidePolicy::Refuse).unwrap_err();
     assert_eq!(error, BindError::Outside { count: 2, first: 5 });
     let message = error.to_string();
@@ -137,21 +140,21 @@ pub(crate) fn refusal_names_count_and_first_vertex(back_end: &BackEnd) {
     assert_eq!(inside.report.outside_vertices, 0);
 }
 
-/// A cage elsewhere, or in another unit.
-pub(crate) fn cage_around_nothing_is_refused(back_end: &BackEnd) {
+/// Cages that contain no vertex: far away, or in another unit of length.
+pub(crate) fn cage_that_contains_no_vertex_is_rejected(back_end: &BackEnd) {
     let vertices = points::inside(&cage(&c_shape()), 20, 45);
     let away = cage(&moved(&c_shape(), |p| p + Vec3::new(0.0, 0.0, 2e4)));
     let small = cage(&moved(&c_shape(), |p| Vec3::new(2.5, 1.5, 0.5) + 1e-3 * p));
     for outside in [OutsidePolicy::Extend, OutsidePolicy::Refuse] {
-        for (cage, said) in [(&away, "2e4 away"), (&small, "times smaller")] {
+        for (cage, message) in [(&away, "2e4 away"), (&small, "times smaller")] {
             let error = back_end.try_bind(&vertices, cage, |o| o.outside = outside).unwrap_err();
             assert!(matches!(error, BindError::NoneInside { vertices: 20, .. }), "{error:?}");
-            assert!(error.to_string().contains(said), "{error}");
+            assert!(error.to_string().contains(message), "{error}");
         }
     }
 }
 
-/// Vertices of a cage made from the model, or a model that touches its cage: on it, whatever rounding says.
+/// Vertices on the surface of the cage count as inside in spite of rounding.
 pub(crate) fn vertices_on_the_cage_are_not_outside(back_end: &BackEnd) {
     let turn = Random::new(43).rotation();
     for mesh in [moved(&c_shape(), |p| turn * p), sphere(2)] {

@@ -1,4 +1,4 @@
-//! What harmonic coordinates are (method of Joshi et al. 2007): positive, a partition of unity, linear, local.
+//! Defining properties of harmonic coordinates (Joshi et al. 2007): non-negative, partition of unity, linear precision, locality.
 
 use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::{
@@ -7,29 +7,29 @@ use cagework_tests::cages::{
 use cagework_tests::{Random, assert_close, dense, points};
 use glam::{Mat3, Vec3};
 
-use super::{BackEnd, SOLVED, assert_combined};
+use super::{BackEnd, WEIGHT_TOLERANCE, assert_combined};
 
-/// Below 0 by rounding only; the bar of the brief.
-const NOT_NEGATIVE: f32 = -1e-6;
+/// Smallest weight that counts as non-negative, because of rounding.
+const MIN_WEIGHT: f32 = -1e-6;
 
-/// Rounding of a sum of f32 and what [`super::TAU`] leaves; the bar of the brief.
-const SUM: f64 = 1e-5;
+/// Largest error of a sum of weights: rounding, and the error of [`super::TAU`].
+const SUM_TOLERANCE: f64 = 1e-5;
 
-/// Rest error over the diagonal at most; the brief asks for 5e-5 on a model with 110 cage vertices.
-const REPRODUCED: f64 = 1e-5;
+/// Largest rest error relative to the diagonal.
+const REST_TOLERANCE: f64 = 1e-5;
 
-/// Cages of all kinds: triangles and quads, convex and not, along the grid and askew.
+/// Cages of triangles and quads, convex and non-convex, aligned with the grid and rotated.
 pub(crate) fn cages() -> Vec<Cage> {
     let turn = Random::new(7).rotation();
-    let askew = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
+    let rotated = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     [
         tetrahedron(corners),
         octahedron(),
         sphere(1),
         l_shape(),
-        askew(&l_shape()),
-        askew(&triangulated(&c_shape())),
+        rotated(&l_shape()),
+        rotated(&triangulated(&c_shape())),
         c_prism(),
         blocks(&[[0, 0, 0]]),
     ]
@@ -42,26 +42,26 @@ pub(crate) fn weights_are_not_negative(back_end: &BackEnd) {
     for cage in cages() {
         let binding = back_end.bind(&points::inside(&cage, 400, 4), &cage);
         let min = dense(&binding.weights).into_iter().fold(f32::INFINITY, f32::min);
-        assert!(min >= NOT_NEGATIVE, "smallest weight {min}");
-        assert!(binding.report.weights.min >= NOT_NEGATIVE);
-        // Stored weights were clipped at 0: what was solved and sampled must not have needed it.
+        assert!(min >= MIN_WEIGHT, "smallest weight {min}");
+        assert!(binding.report.weights.min >= MIN_WEIGHT);
+        // Stored weights are clipped at 0; this is the minimum before clipping.
         let sampled = binding.report.raw_error.min_weight;
-        assert!(sampled >= NOT_NEGATIVE, "smallest weight {sampled} before clipping");
+        assert!(sampled >= MIN_WEIGHT, "smallest weight {sampled} before clipping");
         assert!(binding.weights.data().iter().all(|w| w.is_finite()));
     }
 }
 
 pub(crate) fn weights_sum_to_one(back_end: &BackEnd) {
     for cage in cages() {
-        // The sum converges with the weights: below the bar in the middle of the cage, too.
+        // At this tau the sum is accurate everywhere, also before rows are restored.
         let points = points::inside(&cage, 400, 5);
         let binding = back_end.bind_with(&points, &cage, |o| o.tau = 1e-8);
         for (v, (_, row)) in binding.weights.rows().enumerate() {
             let sum: f64 = row.iter().map(|&w| f64::from(w)).sum();
-            assert!((sum - 1.0).abs() <= SUM, "weights of vertex {v} sum to {sum}");
+            assert!((sum - 1.0).abs() <= SUM_TOLERANCE, "weights of vertex {v} sum to {sum}");
         }
-        assert!(binding.report.weights.max_sum_error <= SUM);
-        assert!(binding.report.raw_error.sum.max <= SUM, "{:?}", binding.report.raw_error);
+        assert!(binding.report.weights.max_sum_error <= SUM_TOLERANCE);
+        assert!(binding.report.raw_error.sum.max <= SUM_TOLERANCE, "{:?}", binding.report.raw_error);
     }
 }
 
@@ -71,11 +71,11 @@ pub(crate) fn points_are_reproduced(back_end: &BackEnd) {
         let binding = back_end.bind(&points, &cage);
         let diagonal = f64::from(cage.diagonal());
         assert_eq!(binding.outside, []);
-        assert_combined(&binding.weights, cage.positions(), &points, REPRODUCED * diagonal);
-        assert!(binding.report.rest_error.max_rel <= REPRODUCED);
-        // Rows were restored: operator, solver and sampling must have come as near without.
+        assert_combined(&binding.weights, cage.positions(), &points, REST_TOLERANCE * diagonal);
+        assert!(binding.report.rest_error.max_rel <= REST_TOLERANCE);
+        // The accuracy before rows are restored.
         let raw = binding.report.raw_error.point_rel;
-        assert!(raw.max <= f64::from(SOLVED), "{raw:?}");
+        assert!(raw.max <= f64::from(WEIGHT_TOLERANCE), "{raw:?}");
     }
 }
 
@@ -83,12 +83,12 @@ pub(crate) fn affine_motion_is_followed(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 400, 8);
     let binding = back_end.bind(&points, &cage);
-    // Shear, scaling, mirror image and translation at once.
+    // Shear, scaling, reflection and translation.
     let matrix = Mat3::from_cols_array(&[1.5, 0.3, -0.2, 0.4, -0.7, 0.1, 0.0, 0.6, 2.0]);
     let to = |p: &Vec3| matrix * *p + Vec3::new(3.0, -2.0, 1.0);
     let [posed, expected] = [cage.positions(), &points].map(|p| p.iter().map(to).collect::<Vec<_>>());
-    // The map stretches a distance at most threefold.
-    assert_combined(&binding.weights, &posed, &expected, 3.0 * REPRODUCED * f64::from(cage.diagonal()));
+    // The map stretches distances at most threefold.
+    assert_combined(&binding.weights, &posed, &expected, 3.0 * REST_TOLERANCE * f64::from(cage.diagonal()));
 }
 
 pub(crate) fn vertex_at_a_cage_vertex_has_weight_one(back_end: &BackEnd) {
@@ -96,20 +96,20 @@ pub(crate) fn vertex_at_a_cage_vertex_has_weight_one(back_end: &BackEnd) {
         let n = cage.n_vertices();
         let binding = back_end.bind(cage.positions(), &cage);
         let identity: Vec<f32> = (0..n * n).map(|k| if k / n == k % n { 1.0 } else { 0.0 }).collect();
-        assert_close(&dense(&binding.weights), &identity, SOLVED);
+        assert_close(&dense(&binding.weights), &identity, WEIGHT_TOLERANCE);
         assert_eq!(binding.outside, [], "cage vertices lie on the cage");
     }
 }
 
-/// The outer half of the upper arm has no influence on the lower arm: below 1e-3 of its largest, as the brief asks.
+/// Vertices at the end of the upper arm have less than 1e-3 of their largest weight in the lower arm.
 pub(crate) fn influence_stays_in_its_arm_of_a_c(back_end: &BackEnd) {
-    const VANISHED: f32 = 1e-3;
+    const MAX_RATIO: f32 = 1e-3;
     for mesh in [c_shape(), c_prism()] {
-        influence_stays(back_end, &mesh, VANISHED);
+        influence_stays(back_end, &mesh, MAX_RATIO);
     }
 }
 
-fn influence_stays(back_end: &BackEnd, mesh: &PolygonMesh, vanished: f32) {
+fn influence_stays(back_end: &BackEnd, mesh: &PolygonMesh, max_ratio: f32) {
     let cage = cage(mesh);
     let points = points::inside(&cage, 2000, 9);
     let binding = back_end.bind_with(&points, &cage, |o| o.grid = 32);
@@ -121,15 +121,15 @@ fn influence_stays(back_end: &BackEnd, mesh: &PolygonMesh, vanished: f32) {
         let column = || points.iter().zip(weights[i..].iter().step_by(n));
         let max = column().fold(0.0, |max: f32, (_, &w)| max.max(w));
         let there = column().filter(|(p, _)| in_lower_arm(p)).fold(0.0, |max: f32, (_, &w)| max.max(w.abs()));
-        assert!(max > 0.3, "cage vertex {i} has its own points");
-        assert!(there < vanished * max, "cage vertex {i}: {there} in the other arm, {max} at most");
+        assert!(max > 0.3, "cage vertex {i} influences its own arm");
+        assert!(there < max_ratio * max, "cage vertex {i}: {there} in the other arm, {max} in its own");
     }
 }
 
 pub(crate) fn renumbering_the_cage_renumbers_the_weights(back_end: &BackEnd) {
     let mesh = c_shape();
     let n = mesh.positions.len() as u32;
-    // 7 and n have no common divisor: every vertex gets another number, and another batch.
+    // 7 and n are coprime, so the map is a permutation that moves vertices to other batches.
     assert_ne!(n % 7, 0);
     let new_of = |i: u32| 7 * i % n;
     let mut renumbered = mesh.clone();
@@ -144,14 +144,13 @@ pub(crate) fn renumbering_the_cage_renumbers_the_weights(back_end: &BackEnd) {
     let [before, after] = [before, after].map(|cage| dense(&back_end.bind(&points, &cage).weights));
     let reordered: Vec<f32> =
         (0..before.len() as u32).map(|k| after[(k / n * n + new_of(k % n)) as usize]).collect();
-    assert_close(&before, &reordered, SOLVED);
+    assert_close(&before, &reordered, WEIGHT_TOLERANCE);
 }
 
-/// The octahedron is its own mirror image in x; the grid, whose centres are shifted a little, is not.
+/// The octahedron is symmetric in x; the grid, whose cell centres are offset slightly, is not.
 pub(crate) fn mirrored_cage_has_mirrored_weights(back_end: &BackEnd) {
-    /// Twice the largest error of g = 32 near edges of a cage, whose second derivatives are unbounded (the largest
-    /// of a pose of the Armadillo is 9e-3 of the diagonal; here edges are convex and blunt).
-    const DISCRETE: f32 = 5e-3;
+    /// Twice the largest error at g = 32 near the octahedron's edges, where second derivatives are unbounded.
+    const DISCRETISATION_ERROR: f32 = 5e-3;
     let cage = cage(&octahedron());
     let points = points::inside(&cage, 300, 11);
     let mirrored: Vec<Vec3> = points.iter().map(|p| p * Vec3::new(-1.0, 1.0, 1.0)).collect();
@@ -160,7 +159,7 @@ pub(crate) fn mirrored_cage_has_mirrored_weights(back_end: &BackEnd) {
     for row in swapped.chunks_mut(6) {
         row.swap(0, 1);
     }
-    assert_close(&bound(&points), &swapped, DISCRETE);
+    assert_close(&bound(&points), &swapped, DISCRETISATION_ERROR);
 }
 
 pub(crate) fn runs_are_bit_identical(back_end: &BackEnd) {

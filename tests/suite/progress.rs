@@ -47,25 +47,25 @@ pub(crate) fn break_cancels_in_every_stage(back_end: &BackEnd) {
         let options = cagework_core::BindOptions { grid: 24, ..back_end.options };
         let result = (back_end.bind)(&points, &cage, &options, &watch);
         assert!(matches!(result, Err(BindError::Cancelled(_))), "{stage:?}");
-        // Nobody goes on after the break; another thread may be about to report when it comes.
+        // No events follow the break, except from threads that were already reporting.
         let calls = after.into_inner().unwrap();
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         assert!(calls <= threads.max(1), "{calls} reports after the break in {stage:?}");
     }
 }
 
-/// Between the grid and the solve all points are looked up in it: with faces of hundreds of corners that takes minutes.
-pub(crate) fn who_waits_is_asked_while_points_are_looked_up(back_end: &BackEnd) {
+/// Locating all points in the grid, between voxelizing and solving, can take minutes for faces with hundreds of corners.
+pub(crate) fn cancellation_is_polled_while_points_are_located(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 2000, 52);
-    let asked = Mutex::new(0);
+    let polls = Mutex::new(0);
     let watch = |event: ProgressEvent| {
-        // The grid is done.
-        *asked.lock().expect("no panic") += u32::from(event.stage == Stage::Voxelize && event.fraction > 0.0);
+        // A positive fraction in this stage means that the grid is done.
+        *polls.lock().expect("no panic") += u32::from(event.stage == Stage::Voxelize && event.fraction > 0.0);
         ControlFlow::Continue(())
     };
     let options = cagework_core::BindOptions { grid: 24, ..back_end.options };
     (back_end.bind)(&points, &cage, &options, &watch).unwrap();
     let runs = points.len().div_ceil(cagework_core::team::VERTEX_RUN) as u32;
-    assert!(asked.into_inner().unwrap() >= runs, "once for each run of {} points", points.len());
+    assert!(polls.into_inner().unwrap() >= runs, "one poll per run of {} points", points.len());
 }

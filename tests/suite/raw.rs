@@ -1,4 +1,4 @@
-//! What a solver leaves, seen in rows before they are restored: operator and sampling reproduce linear functions exactly.
+//! Solver errors, measured in rows before they are restored: operator and sampling reproduce linear functions exactly.
 
 use cagework_core::PolygonMesh;
 use cagework_tests::cages::{c_shape, cage, moved, sphere, triangulated};
@@ -6,15 +6,15 @@ use cagework_tests::{Random, points};
 
 use super::BackEnd;
 
-/// Largest distance from the vertex over the cage's diagonal that tau = 1e-5 may leave.
-const LARGEST: f64 = 5e-5;
+/// Largest distance between `sum w c` and the vertex at tau = 1e-5, relative to the cage's diagonal.
+const MAX_POINT_ERROR: f64 = 5e-5;
 
-/// On a convex cage and on one that is not, at `grids`: `sum w c` misses the vertex by less than `mean` on average (over the
-/// cage's diagonal, tau = 1e-5), and a tau a hundred times as large shows.
-pub(crate) fn tau_bounds_what_the_solver_leaves(back_end: &BackEnd, grids: &[u32], mean: f64) {
+/// On a convex and a non-convex cage: the mean distance between `sum w c` and the vertex is below `mean` at tau = 1e-5, relative to the
+/// cage's diagonal, and at least ten times larger at tau = 1e-3.
+pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mean: f64) {
     let turn = Random::new(30).rotation();
-    let askew = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
-    for mesh in [sphere(1), askew(&triangulated(&c_shape()))] {
+    let rotated = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
+    for mesh in [sphere(1), rotated(&triangulated(&c_shape()))] {
         let cage = cage(&mesh);
         let points = points::inside(&cage, 1000, 30);
         for &grid in grids {
@@ -22,15 +22,15 @@ pub(crate) fn tau_bounds_what_the_solver_leaves(back_end: &BackEnd, grids: &[u32
                 let binding = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, tau));
                 binding.report.raw_error.point_rel
             });
-            assert!(fine.mean < mean && fine.max < LARGEST, "g = {grid}: {fine:?}");
+            assert!(fine.mean < mean && fine.max < MAX_POINT_ERROR, "g = {grid}: {fine:?}");
             let ratio = coarse.mean / fine.mean;
-            assert!(ratio >= 10.0, "g = {grid}: tau = 1e-3 leaves only {ratio} times as much");
+            assert!(ratio >= 10.0, "g = {grid}: the error at tau = 1e-3 is only {ratio} times that at 1e-5");
         }
     }
 }
 
-/// f32 must not pull all columns to the same side: at g = 128 their sum was off by 2.7e-5 on average where cells were
-/// multiplied by 1/6, which f32 rounds up, and is by 1.0e-6 where they are divided by 6.
+/// Rounding must not be biased: multiplying by 1/6, which f32 rounds up, shifts the sum of all columns by 2.7e-5 on average at
+/// g = 128; dividing by 6 shifts it by 1.0e-6.
 pub(crate) fn rounding_does_not_add_up_over_columns(back_end: &BackEnd) {
     let cage = cage(&sphere(1));
     let points = points::inside(&cage, 1000, 30);

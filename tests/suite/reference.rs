@@ -1,4 +1,4 @@
-//! A cage that is not convex, against weights that know no grid: quadratic finite elements, and Walk on Spheres.
+//! A non-convex cage, compared with weights computed without a grid: quadratic finite elements, and Walk on Spheres.
 //!
 //! Source of the numbers: `tests/data/README.md`.
 
@@ -10,14 +10,13 @@ use glam::Vec3;
 
 use super::BackEnd;
 
-/// Vertices that have weights by Walk on Spheres, too: the first ones.
+/// Number of vertices that have weights by Walk on Spheres: the first ones.
 const N_WALKED: usize = 100;
 
-/// Largest mean error of a weight at g = 64, where 6.9e-5 was measured; weights of the nearest centre
-/// away from the cage make it 3.3e-4, and 1.8e-4 at g = 128.
+/// Limit of the mean error of a weight at g = 64; measured 6.9e-5. Taking the weights of the nearest cell centre gives 3.3e-4.
 const LIMIT_AT_64: f64 = 1.05e-4;
 
-/// The same at g = 128, where 2.3e-5 was measured; the finite elements' own mean error is 1.3e-5.
+/// Limit of the mean error of a weight at g = 128; measured 2.3e-5. The mean error of the finite elements is 1.3e-5.
 const LIMIT_AT_128: f64 = 3.6e-5;
 
 /// Little-endian words of a NumPy file in `tests/data/armadillo`.
@@ -27,7 +26,7 @@ macro_rules! npy {
     };
 }
 
-/// What follows the header, whose length is in bytes 8 and 9.
+/// Words after the header, whose length is in bytes 8 and 9.
 fn words(npy: &[u8]) -> impl Iterator<Item = [u8; 4]> {
     let header = usize::from(u16::from_le_bytes([npy[8], npy[9]]));
     npy[10 + header..].chunks_exact(4).map(|word| word.try_into().expect("four bytes"))
@@ -62,14 +61,14 @@ pub(crate) fn armadillo_cage() -> Cage {
 
 fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
     let cage = armadillo_cage();
-    // As a user binds, not to the last digit.
+    // The default tau, as for users.
     let tau = BindOptions::default().tau;
     let binding = back_end.bind_with(&points(npy!("points")), &cage, |o| (o.grid, o.tau) = (grid, tau));
     assert_eq!(binding.report.outside_vertices, 0);
     let weights = dense(&binding.weights);
     let error = mean_difference(&weights, npy!("weights_fem"));
     assert!(error <= limit, "mean difference from finite elements is {error:e}, more than {limit:e}");
-    // A witness that shares nothing with finite elements; its own error adds one standard error on average at most.
+    // Walk on Spheres is independent of the finite elements. Its own mean error is at most one standard error.
     let walked = &weights[..N_WALKED * cage.n_vertices()];
     let noise = mean_difference(&vec![0.0; walked.len()], npy!("stderr_wos"));
     let (error, limit) = (mean_difference(walked, npy!("weights_wos")), limit + noise);

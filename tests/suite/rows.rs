@@ -1,4 +1,4 @@
-//! Rows of the result, and what is reported about the solve.
+//! Rows of the weights, and the report of the solve.
 
 use cagework_tests::cages::{c_shape, cage, triangulated};
 use cagework_tests::points;
@@ -11,7 +11,7 @@ pub(crate) fn equal_positions_have_equal_rows(back_end: &BackEnd) {
     let mut points = points::inside(&cage, 50, 60);
     points.push(-Vec3::ONE);
     let n = points.len();
-    // Split at a seam: the same vertices again, in another order.
+    // Duplicate positions in another order, as at a texture seam.
     let twice: Vec<Vec3> = points.iter().chain(points.iter().rev()).copied().collect();
     let binding = back_end.bind(&twice, &cage);
     assert_eq!(binding.weights.n_rows(), 2 * n);
@@ -19,7 +19,7 @@ pub(crate) fn equal_positions_have_equal_rows(back_end: &BackEnd) {
         assert_eq!(binding.weights.row(v), binding.weights.row(2 * n - 1 - v));
     }
     let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
-    assert_eq!(outside, [n as u32 - 1, n as u32], "a vertex outside is outside both times");
+    assert_eq!(outside, [n as u32 - 1, n as u32], "both copies are outside");
     let once = back_end.bind(&points, &cage);
     for v in 0..n {
         assert_eq!(binding.weights.row(v), once.weights.row(v));
@@ -49,8 +49,8 @@ pub(crate) fn history_has_one_entry_per_iteration(back_end: &BackEnd) {
     assert_eq!((report.vertices, report.cage_vertices), (50, cage.n_vertices() as u64));
 }
 
-/// f32 has seven digits: a tau that asks for more must end, not cycle until the limit (20,000 V-cycles once took 75 s on
-/// this cage). Jacobi's sweeps come to a stand at the limit, as published.
+/// A tau below the precision of f32 ends at the rounding level, not at the iteration limit. Jacobi is excluded: it runs
+/// to the limit, as published.
 pub(crate) fn tau_below_round_off_ends(back_end: &BackEnd) {
     let cage = cage(&c_shape());
     let points = points::inside(&cage, 50, 65);
@@ -63,7 +63,7 @@ pub(crate) fn tau_below_round_off_ends(back_end: &BackEnd) {
     assert!(report.delta_history.last().is_some_and(|d| *d < 1e-6));
 }
 
-/// The threshold of the brief. The classic method has no rest pose to keep: what sparsification restores is better.
+/// The classic method has a rest error of its own, so the error after restoring may be smaller than before.
 pub(crate) fn dropping_small_weights_keeps_sums_and_rest_pose(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 1000, 63);
@@ -81,12 +81,12 @@ pub(crate) fn dropping_small_weights_keeps_sums_and_rest_pose(back_end: &BackEnd
 pub(crate) fn sparse_weights_follow_affine_motion(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 1000, 64);
-    // A threshold that drops weights one can see.
+    // A threshold large enough to drop significant weights.
     let binding = back_end.bind_with(&points, &cage, |o| o.sparsify = 1e-3);
     let matrix = Mat3::from_cols_array(&[1.5, 0.3, -0.2, 0.4, -0.7, 0.1, 0.0, 0.6, 2.0]);
     let [posed, expected] =
         [cage.positions(), &points].map(|p| p.iter().map(|&p| matrix * p).collect::<Vec<_>>());
     assert_combined(&binding.weights, &posed, &expected, 3e-5 * f64::from(cage.diagonal()));
     let smallest = binding.weights.data().iter().fold(f32::INFINITY, |m, &w| m.min(w));
-    assert!(smallest > 0.0, "what is left after a threshold is positive: {smallest}");
+    assert!(smallest > 0.0, "a weight that was kept is not positive: {smallest}");
 }

@@ -1,4 +1,4 @@
-//! Cages as they come: polygons, bent quads, several parts, thin parts, any size, any place.
+//! Kinds of cages: polygons, bent quads, several components, thin parts, any size and position.
 
 use cagework_tests::cages::{
     blocks, c_shape, cage, cuboid, inside_out, l_shape, moved, pentagonal_prism, sphere, thin_bar, together,
@@ -7,21 +7,21 @@ use cagework_tests::cages::{
 use cagework_tests::{Random, assert_close, dense, points};
 use glam::Vec3;
 
-use super::{BackEnd, SOLVED, TAU, assert_combined};
+use super::{BackEnd, TAU, WEIGHT_TOLERANCE, assert_combined};
 
 pub(crate) fn inside_out_cage_gives_the_same_weights(back_end: &BackEnd) {
     let mesh = triangulated(&l_shape());
     let (outward, inward) = (cage(&mesh), cage(&inside_out(&mesh)));
     let points = points::inside(&outward, 300, 70);
     let [a, b] = [outward, inward].map(|cage| back_end.bind(&points, &cage));
-    assert_close(&dense(&a.weights), &dense(&b.weights), SOLVED);
+    assert_close(&dense(&a.weights), &dense(&b.weights), WEIGHT_TOLERANCE);
     assert!(a.report.notices.is_empty() && b.report.notices.len() == 1, "{:?}", b.report.notices);
 }
 
 pub(crate) fn unused_cage_vertex_has_no_weight(back_end: &BackEnd) {
     let mesh = l_shape();
     let mut with_one_more = mesh.clone();
-    // First, so that every other column moves up by one; far away, so that it would stretch the grid.
+    // Inserted first, so that all other columns are shifted by one; far away, so that it would enlarge the grid if it were used.
     with_one_more.positions.insert(0, Vec3::splat(50.0));
     for i in with_one_more.faces.iter_mut().flatten() {
         *i += 1;
@@ -32,11 +32,11 @@ pub(crate) fn unused_cage_vertex_has_no_weight(back_end: &BackEnd) {
     assert_eq!(with.n_columns(), without.n_columns() + 1);
     let kept: Vec<f32> = dense(&with).chunks(with.n_columns()).flat_map(|row| row[1..].to_vec()).collect();
     assert!(dense(&with).iter().step_by(with.n_columns()).all(|&w| w == 0.0));
-    assert_close(&kept, &dense(&without), SOLVED);
+    assert_close(&kept, &dense(&without), WEIGHT_TOLERANCE);
 }
 
 pub(crate) fn components_do_not_feel_each_other(back_end: &BackEnd) {
-    // So close that cells of a coarse grid reach from one to the other; in the embedded method nothing leaks.
+    // The gap is smaller than a cell of the coarse levels.
     let gap = if back_end.is_embedded() { 0.01 } else { 0.5 };
     let second = moved(&sphere(1), |p| p + Vec3::new(2.0 + gap, 0.0, 0.0));
     let both = cage(&together(&sphere(1), &second));
@@ -47,7 +47,7 @@ pub(crate) fn components_do_not_feel_each_other(back_end: &BackEnd) {
         let in_first = p.x < 1.0 + 0.5 * gap;
         let (columns, row) = binding.weights.row(v);
         for (&i, &w) in columns.iter().zip(row) {
-            // Coarse levels of multigrid reach over the gap; what a cycle leaves of that is below tau.
+            // Coarse levels of multigrid couple both components; the cycles reduce that below tau.
             assert!(
                 (i < n_first) == in_first || w < TAU,
                 "vertex {v} at {p} has weight {w} of cage vertex {i}"
@@ -56,8 +56,8 @@ pub(crate) fn components_do_not_feel_each_other(back_end: &BackEnd) {
     }
 }
 
-/// Object units are the user's: millimetres or kilometres give the same weights.
-pub(crate) fn sizes_of_the_unit_do_not_matter(back_end: &BackEnd) {
+/// Weights do not depend on the unit of length.
+pub(crate) fn weights_are_independent_of_scale(back_end: &BackEnd) {
     let mesh = triangulated(&c_shape());
     let points = points::inside(&cage(&mesh), 300, 73);
     let bound = |scale: f32| {
@@ -65,21 +65,21 @@ pub(crate) fn sizes_of_the_unit_do_not_matter(back_end: &BackEnd) {
         dense(&back_end.bind(&points, &cage(&moved(&mesh, |p| p * scale))).weights)
     };
     let unit = bound(1.0);
-    // Powers of two scale f32 exactly, so that not even a vertex next to a cell's border changes its cell.
+    // Powers of two scale f32 exactly, so that no vertex changes its cell by rounding.
     for scale in [2f32.powi(-12), 2f32.powi(14)] {
-        assert_close(&bound(scale), &unit, SOLVED);
+        assert_close(&bound(scale), &unit, WEIGHT_TOLERANCE);
     }
 }
 
 pub(crate) fn cage_far_from_the_origin_is_bound(back_end: &BackEnd) {
-    // 1/64 of f32's digits are left for the shape: positions are multiples of 1/8192.
+    // Positions of this size are multiples of 1/8192 in f32, which costs six bits of the shape.
     let shift = Vec3::new(1000.0, -500.0, 800.0);
     let mesh = moved(&c_shape(), |p| p + shift);
     let cage = cage(&mesh);
     let points = points::inside(&cage, 300, 74);
     let binding = back_end.bind(&points, &cage);
     assert_eq!(binding.outside, []);
-    // A sum of f32 weights is 1 to within 2e-7, which the distance to the origin, 1,400, multiplies.
+    // Sums of f32 weights are 1 to within 2e-7; the distance to the origin, 1,400, multiplies that error.
     assert_combined(&binding.weights, cage.positions(), &points, 3e-4);
     assert!(binding.report.weights.max_sum_error <= 1e-5);
 }
@@ -112,13 +112,13 @@ pub(crate) fn quads_that_are_not_planar_reproduce_points(back_end: &BackEnd) {
     assert!(binding.report.weights.min >= -1e-6);
 }
 
-/// A leg of a horse on a coarse grid: few cell centres inside, or none.
+/// Like the leg of a horse on a coarse grid: few or no cell centres are inside.
 pub(crate) fn parts_thinner_than_a_cell_get_weights(back_end: &BackEnd) {
     let leg = moved(&blocks(&[[0, 0, 0], [0, 0, 1]]), |p| p * Vec3::new(0.02, 0.02, 1.0));
     let with_body = together(&cuboid(Vec3::new(1.0, 0.0, 0.0), Vec3::new(2.0, 1.0, 2.0)), &leg);
     for mesh in [thin_bar(0.5), thin_bar(0.1), thin_bar(0.01), with_body] {
         let cage = cage(&mesh);
-        // Few: so thin, each takes a hundred tries.
+        // Few points, because rejection sampling needs about a hundred attempts each.
         let points = points::inside(&cage, 60, 77);
         for grid in [8, 16] {
             let binding = back_end.bind_with(&points, &cage, |o| o.grid = grid);

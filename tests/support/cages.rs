@@ -1,27 +1,27 @@
-//! Cages of simple shape, outward and without fault.
+//! Valid cages of simple shapes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use cagework_core::{Cage, PolygonMesh};
 use glam::Vec3;
 
-/// A mesh of this module as a cage.
+/// Builds a cage from a mesh of this module.
 ///
 /// # Panics
-/// If it is none, which is a mistake in the test.
+/// If the mesh is not a valid cage.
 #[must_use]
 pub fn cage(mesh: &PolygonMesh) -> Cage {
     Cage::new(mesh).expect("test cages are closed and not degenerate")
 }
 
-/// A tetrahedron of any orientation ([`Cage::new`] turns its faces outward together).
+/// A tetrahedron. The orientation may be inward: [`Cage::new`] flips it if needed.
 #[must_use]
 pub fn tetrahedron(corners: [Vec3; 4]) -> PolygonMesh {
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(Vec::from).to_vec();
     PolygonMesh { positions: corners.to_vec(), faces }
 }
 
-/// A box of six quads; vertex `x + 2 y + 4 z` with 0 for `min` and 1 for `max`.
+/// A box of six quads. Bit k of a vertex index selects `min` or `max` on axis k.
 #[must_use]
 pub fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
@@ -33,19 +33,19 @@ pub fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     }
 }
 
-/// Corners at distance 1 on the axes: +x, -x, +y, -y, +z, -z.
+/// The octahedron with vertices at distance 1 on the axes, in the order +x, -x, +y, -y, +z, -z.
 #[must_use]
 pub fn octahedron() -> PolygonMesh {
     let positions = Vec3::AXES.iter().flat_map(|&a| [a, -a]).collect();
     let faces = (0..8u32).map(|octant| {
         let [x, y, z] = [octant & 1, 2 + (octant >> 1 & 1), 4 + (octant >> 2 & 1)];
-        // Each mirrored axis turns the face round.
+        // Each reflected axis reverses the orientation.
         if octant.count_ones().is_multiple_of(2) { vec![x, y, z] } else { vec![x, z, y] }
     });
     PolygonMesh { positions, faces: faces.collect() }
 }
 
-/// Twelve corners at distance 1, as far from each other as can be.
+/// The regular icosahedron with vertices at distance 1.
 #[must_use]
 pub fn icosahedron() -> PolygonMesh {
     let golden = f32::midpoint(1.0, 5.0_f32.sqrt());
@@ -56,7 +56,7 @@ pub fn icosahedron() -> PolygonMesh {
         Vec3::from(at)
     };
     let positions: Vec<Vec3> = (0..12).map(corner).collect();
-    // Corners 2 apart are neighbours.
+    // Neighbouring corners are 2 apart.
     let is_near = |a: usize, b: usize| (positions[a].distance(positions[b]) - 2.0).abs() < 1e-3;
     let mut faces = Vec::new();
     for (a, b, c) in (0..12).flat_map(|a| (a..12).flat_map(move |b| (b..12).map(move |c| (a, b, c)))) {
@@ -69,13 +69,13 @@ pub fn icosahedron() -> PolygonMesh {
     PolygonMesh { positions: positions.into_iter().map(Vec3::normalize).collect(), faces }
 }
 
-/// An octahedron whose faces are cut in four `times` times, pushed onto the unit sphere: 6, 18, 66, 258, 1,026 vertices.
+/// An octahedron with its faces split in four `times` times, projected onto the unit sphere: 6, 18, 66, 258, 1,026 vertices.
 #[must_use]
 pub fn sphere(times: u32) -> PolygonMesh {
     rounded(octahedron(), times)
 }
 
-/// As [`sphere`], of an icosahedron: 12, 42, 162, 642, 2,562 vertices.
+/// The same for an icosahedron: 12, 42, 162, 642, 2,562 vertices.
 #[must_use]
 pub fn icosphere(times: u32) -> PolygonMesh {
     rounded(icosahedron(), times)
@@ -102,7 +102,7 @@ fn rounded(mut mesh: PolygonMesh, times: u32) -> PolygonMesh {
     mesh
 }
 
-/// A counter-clockwise outline in x and y, from z = 0 to `height`: two polygons and a quad per side.
+/// The prism over a counter-clockwise outline in x and y, from z = 0 to `height`: two polygons, and a quad per side.
 #[must_use]
 pub fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     let n = outline.len() as u32;
@@ -122,8 +122,8 @@ pub fn pentagonal_prism() -> PolygonMesh {
     prism(&outline, 1.5)
 }
 
-/// The surface of a union of unit cubes, given by their lowest corners: a quad for every free side, vertices shared.
-/// Cubes must not meet in a single edge or corner only.
+/// The surface of a union of unit cubes with these minimum corners: a quad per exposed side, with shared vertices.
+/// Cubes must not touch in only an edge or a corner.
 #[must_use]
 pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let filled: BTreeSet<[i32; 3]> = cubes.iter().copied().collect();
@@ -131,7 +131,7 @@ pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let mut mesh = PolygonMesh::default();
     for cube in &filled {
         for axis in 0..3 {
-            // (u, v, axis) is right-handed: counter-clockwise in u and v faces up the axis.
+            // (u, v, axis) is right-handed, so counter-clockwise in u and v faces in the positive direction of the axis.
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             for up in [false, true] {
                 let mut beside = *cube;
@@ -160,22 +160,20 @@ pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     mesh
 }
 
-/// L-shaped: arms of length 1 along x and y on a unit cube.
+/// An L of three unit cubes: two arms of length 1 along x and y.
 #[must_use]
 pub fn l_shape() -> PolygonMesh {
     blocks(&[[0, 0, 0], [1, 0, 0], [0, 1, 0]])
 }
 
-/// C-shaped: two arms, `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]`, on a back `[0, 1] x [0, 3]`, from z = 0 to 1, cut into
-/// unit quads.
+/// A C of unit cubes: arms `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]` on a back `[0, 1] x [0, 3]`, from z = 0 to 1.
 #[must_use]
 pub fn c_shape() -> PolygonMesh {
     let arms = (1..4).flat_map(|x| [[x, 0, 0], [x, 2, 0]]);
     blocks(&arms.chain((0..3).map(|y| [0, y, 0])).collect::<Vec<_>>())
 }
 
-/// A C whose two caps are one concave polygon each: arms `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]` on a back `[0, 1] x [0, 3]`,
-/// from z = 0 to 1; 16 vertices.
+/// The same C with one concave polygon for each of its two caps; 16 vertices.
 #[must_use]
 pub fn c_prism() -> PolygonMesh {
     const OUTLINE: [[f32; 2]; 8] =
@@ -187,8 +185,7 @@ pub fn c_prism() -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(1.0)).collect(), faces }
 }
 
-/// A bar of length 4 and the given thickness along a direction that is no axis: like a horse's leg, thinner than the
-/// cells of a coarse grid.
+/// A bar of length 4 and the given thickness, not aligned with an axis. Thinner than the cells of a coarse grid.
 #[must_use]
 pub fn thin_bar(thickness: f32) -> PolygonMesh {
     let long = blocks(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]);
@@ -196,13 +193,13 @@ pub fn thin_bar(thickness: f32) -> PolygonMesh {
     moved(&long, |p| turn * (p * Vec3::new(1.0, thickness, thickness)))
 }
 
-/// Every vertex moved by `to`.
+/// The mesh with every vertex mapped by `to`.
 #[must_use]
 pub fn moved(mesh: &PolygonMesh, to: impl Fn(Vec3) -> Vec3) -> PolygonMesh {
     PolygonMesh { positions: mesh.positions.iter().map(|&p| to(p)).collect(), faces: mesh.faces.clone() }
 }
 
-/// Both, without common vertices; the first one's vertices come first.
+/// The disjoint union of two meshes; the vertices of `a` come first.
 #[must_use]
 pub fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     let n = a.positions.len() as u32;
@@ -212,7 +209,7 @@ pub fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     both
 }
 
-/// Every face turned.
+/// The mesh with all faces reversed.
 #[must_use]
 pub fn inside_out(mesh: &PolygonMesh) -> PolygonMesh {
     let mut turned = mesh.clone();
@@ -222,7 +219,7 @@ pub fn inside_out(mesh: &PolygonMesh) -> PolygonMesh {
     turned
 }
 
-/// Every quad cut into two triangles along its first diagonal.
+/// The mesh with every polygon split into a fan of triangles at its first vertex.
 #[must_use]
 pub fn triangulated(mesh: &PolygonMesh) -> PolygonMesh {
     let faces = mesh.faces.iter().flat_map(|f| (2..f.len()).map(move |k| vec![f[0], f[k - 1], f[k]]));

@@ -1,4 +1,4 @@
-//! An animal of capsules in a cage of blocks: an input of realistic size without a file.
+//! An animal of capsules in a cage of blocks: a generated input of realistic size.
 
 use std::f32::consts::{PI, TAU};
 
@@ -7,12 +7,12 @@ use glam::{Quat, Vec3};
 
 use crate::cages::{blocks, moved};
 
-/// Direction of the animal's axes: none of them along the grid, as real cages are.
+/// Rotation of animal and cage, so that no face is aligned with the grid.
 fn turn() -> Quat {
     Quat::from_euler(glam::EulerRot::XYZ, 0.2, -0.35, 0.5)
 }
 
-/// From, to (in blocks of the cage) and radius of each part: body, neck, head, tail, legs.
+/// Ends (in blocks of the cage) and radius of each capsule: body, neck, head, tail, legs.
 const PARTS: [(Vec3, Vec3, f32); 8] = [
     (Vec3::new(0.9, 1.5, 3.0), Vec3::new(4.1, 1.5, 3.0), 0.8),
     (Vec3::new(4.6, 1.5, 3.4), Vec3::new(5.5, 1.5, 4.3), 0.3),
@@ -24,7 +24,7 @@ const PARTS: [(Vec3, Vec3, f32); 8] = [
     (Vec3::new(4.5, 2.5, 2.6), Vec3::new(4.5, 2.5, 0.5), 0.35),
 ];
 
-/// Rings and vertices per ring of a capsule.
+/// Rings of a capsule, and vertices per ring.
 const RINGS: u32 = 42;
 const AROUND: u32 = 44;
 
@@ -41,7 +41,7 @@ pub fn creature() -> TriMesh {
     mesh
 }
 
-/// Its cage: a body of 5 x 3 x 2 blocks, four legs of two, tail, neck and head; 112 vertices, all faces quads.
+/// The cage: a body of 5 x 3 x 2 blocks, four legs of two blocks, tail, neck and head; 112 vertices, all faces are quads.
 #[must_use]
 pub fn creature_cage() -> PolygonMesh {
     let body = (0..30).map(|k| [k % 5, k / 5 % 3, 2 + k / 15]);
@@ -58,7 +58,7 @@ fn add_capsule(mesh: &mut TriMesh, from: Vec3, to: Vec3, radius: f32) {
     let first = mesh.positions.len() as u32;
     mesh.positions.push(from - radius * axis);
     for ring in 0..RINGS {
-        // Half of the rings on either half sphere.
+        // Half of the rings are on each hemisphere.
         let polar = PI * (ring + 1) as f32 / (RINGS + 1) as f32;
         let center = if 2 * ring < RINGS { from } else { to };
         for step in 0..AROUND {
@@ -104,7 +104,7 @@ mod tests {
             .map(|t| t.map(|i| mesh.positions[i as usize]))
             .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
             .sum();
-        // pi r^2 (length + 4/3 r), summed over the parts; the tessellation is inscribed.
+        // pi r^2 (length + 4/3 r), summed over the capsules. The mesh is inscribed, so its volume is smaller.
         let exact: f32 = PARTS.iter().map(|(a, b, r)| PI * r * r * (a.distance(*b) + 4.0 / 3.0 * r)).sum();
         assert!((0.98..1.0).contains(&(volume / exact)), "{volume} against {exact}");
     }

@@ -6,14 +6,14 @@ use glam::Vec3;
 
 use crate::Random;
 
-/// Whether a point lies inside, by its winding number.
+/// Whether a point is inside, by its winding number.
 #[must_use]
 pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
     let facets = (0..cage.facets().len() as u32).map(|f| cage.facet_corners(f));
     winding_number(point.as_dvec3(), facets) > 0.5
 }
 
-/// `n` random points inside a cage.
+/// `n` uniformly distributed points inside a cage.
 #[must_use]
 pub fn inside(cage: &Cage, n: usize, seed: u64) -> Vec<Vec3> {
     let mut random = Random::new(seed);

@@ -1,4 +1,4 @@
-//! Random numbers that are the same on every machine and with every version of every library.
+//! Random numbers that do not depend on the machine or on library versions.
 
 use glam::{Quat, Vec3};
 
@@ -11,7 +11,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// The sequence number `seed`.
+    /// A generator with this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
@@ -28,7 +28,7 @@ impl Random {
 
     /// Uniform in `[0, 1)`.
     pub fn unit(&mut self) -> f32 {
-        // 24 bits: every value is an f32 exactly.
+        // 24 bits, so that the value is exact in f32.
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
     }
 
@@ -37,13 +37,13 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in the box.
+    /// Uniform in the box from `min` to `max`.
     pub fn point(&mut self, min: Vec3, max: Vec3) -> Vec3 {
         let t = Vec3::new(self.unit(), self.unit(), self.unit());
         min + t * (max - min)
     }
 
-    /// A rotation about a random axis by a random angle.
+    /// A rotation by a random angle about a random axis.
     pub fn rotation(&mut self) -> Quat {
         let axis = loop {
             let p = self.point(Vec3::splat(-1.0), Vec3::ONE);

@@ -1,4 +1,4 @@
-//! NumPy arrays as the core's arrays and back.
+//! Conversion between NumPy arrays and the core's arrays.
 
 use cagework_core::{Binding, Frames, Weights};
 use cagework_io::origin_near;
@@ -13,71 +13,73 @@ use pyo3::types::PyDict;
 use crate::error;
 use crate::options::{dictionary, from_dictionary};
 
-/// Points of an array: lent where it holds 32-bit floats in rows, otherwise converted.
+/// Points from an array: borrowed if it is C-contiguous float32, otherwise converted.
 pub(crate) enum Points<'py> {
-    Lent(PyReadonlyArray2<'py, f32>),
+    Borrowed(PyReadonlyArray2<'py, f32>),
     Converted(Vec<Vec3>),
 }
 
 impl Points<'_> {
-    /// As seen from an origin. `[n]`
+    /// The points relative to the origin they were read with. `[n]`
     pub(crate) fn as_slice(&self) -> &[Vec3] {
         match self {
-            Self::Lent(array) => bytemuck::cast_slice(array.as_slice().expect("rows were asked for")),
+            Self::Borrowed(array) => {
+                bytemuck::cast_slice(array.as_slice().expect("the array is C-contiguous"))
+            }
             Self::Converted(points) => points,
         }
     }
 }
 
-/// An array, or what can be made one, in rows one after the other: itself where it is.
-fn in_rows<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+/// Converts a value to a C-contiguous array. Arrays that are one already are returned unchanged.
+fn c_contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let none = value.py().None();
     Ok(value.py().import("numpy")?.call_method1("require", (value, none, "CA"))?.cast_into()?)
 }
 
-/// That an array is not what is needed.
-fn wrong(name: &str, array: &Bound<'_, PyUntypedArray>, needed: &str) -> PyErr {
+/// An `ArrayError` with the actual and the expected type and shape.
+fn mismatch(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> PyErr {
     let (dtype, shape) = (array.dtype(), array.shape());
-    error::array(format!("{name}: {dtype} of shape {shape:?} came; {needed} is needed"))
+    error::array(format!("{name}: expected {expected}, got {dtype} of shape {shape:?}"))
 }
 
-/// Points `[n, 3]` as seen from an origin; as many as `n` says, if it does.
+/// Reads points `[n, 3]` relative to an origin. If `n` is given, the number of points must match.
 ///
 /// # Errors
-/// `ArrayError` names type and shape that came, and those that are needed.
+/// `ArrayError`, with the actual and the expected type and shape.
 pub(crate) fn points<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
     n: Option<usize>,
     origin: DVec3,
 ) -> PyResult<Points<'py>> {
-    let array = in_rows(value)?;
+    let array = c_contiguous(value)?;
     let fits = matches!(*array.shape(), [rows, 3] if n.is_none_or(|n| n == rows));
     match (fits, array.cast::<PyArray2<f32>>(), array.cast::<PyArray2<f64>>()) {
-        (true, Ok(array), _) if origin == DVec3::ZERO => Ok(Points::Lent(array.try_readonly()?)),
+        (true, Ok(array), _) if origin == DVec3::ZERO => Ok(Points::Borrowed(array.try_readonly()?)),
         (true, Ok(array), _) => {
             let array = array.try_readonly()?;
-            let rows = array.as_slice().expect("rows were asked for").as_chunks::<3>().0;
+            let rows = array.as_slice().expect("the array is C-contiguous").as_chunks::<3>().0;
             let from = |&p: &[f32; 3]| (Vec3::from_array(p).as_dvec3() - origin).as_vec3();
             Ok(Points::Converted(rows.iter().map(from).collect()))
         }
         (true, _, Ok(array)) => {
             let array = array.try_readonly()?;
-            let rows = array.as_slice().expect("rows were asked for").as_chunks::<3>().0;
+            let rows = array.as_slice().expect("the array is C-contiguous").as_chunks::<3>().0;
             Ok(Points::Converted(rows.iter().map(|&p| (DVec3::from_array(p) - origin).as_vec3()).collect()))
         }
         _ => {
             let n = n.map_or("n".to_owned(), |n| n.to_string());
-            Err(wrong(name, &array, &format!("float32 or float64 of shape [{n}, 3]")))
+            Err(mismatch(name, &array, &format!("float32 or float64 of shape [{n}, 3]")))
         }
     }
 }
 
-/// Points `[n, 3]` as seen from an origin near them, and that origin: zero unless they are far away.
+/// Reads points `[n, 3]` relative to an origin near them, and returns that origin: zero unless they are far away.
 ///
 /// # Errors
-/// As [`points`].
-pub(crate) fn placed<'py>(
+/// Those of [`points`].
+pub(crate) fn points_and_origin<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
     n: Option<usize>,
@@ -87,63 +89,65 @@ pub(crate) fn placed<'py>(
     if origin == DVec3::ZERO { Ok((world, origin)) } else { Ok((points(name, value, n, origin)?, origin)) }
 }
 
-/// Indices of an array of whole numbers.
-fn indices(name: &str, array: &Bound<'_, PyUntypedArray>, needed: &str) -> PyResult<Vec<u32>> {
+/// Reads indices from an array of integers.
+fn indices(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> PyResult<Vec<u32>> {
     if !matches!(array.dtype().kind(), b'i' | b'u') {
-        return Err(wrong(name, array, needed));
+        return Err(mismatch(name, array, expected));
     }
     let array = array.call_method1("astype", ("int64",))?.cast_into::<PyArrayDyn<i64>>()?.try_readonly()?;
     let index = |&i: &i64| {
         let largest = u32::MAX;
-        u32::try_from(i).map_err(|_| error::array(format!("{name}: index {i} is not from 0 to {largest}")))
+        u32::try_from(i)
+            .map_err(|_| error::array(format!("{name}: index {i} is not between 0 and {largest}")))
     };
-    array.as_slice().expect("astype keeps the order").iter().map(index).collect()
+    array.as_slice().expect("astype keeps the memory order").iter().map(index).collect()
 }
 
-/// Indices `[n]`.
+/// Reads indices `[n]`.
 ///
 /// # Errors
-/// `ArrayError`.
+/// `ArrayError`
 pub(crate) fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
-    let (array, needed) = (in_rows(value)?, "whole numbers of shape [n]");
+    let (array, expected) = (c_contiguous(value)?, "integers of shape [n]");
     match *array.shape() {
         [0] => Ok(Vec::new()),
-        [_] => indices(name, &array, needed),
-        _ => Err(wrong(name, &array, needed)),
+        [_] => indices(name, &array, expected),
+        _ => Err(mismatch(name, &array, expected)),
     }
 }
 
-/// Triangles `[n, 3]`.
+/// Reads triangles `[n, 3]`.
 ///
 /// # Errors
-/// `ArrayError`.
+/// `ArrayError`
 pub(crate) fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
-    let (name, array, needed) = ("triangles", in_rows(value)?, "whole numbers of shape [n, 3]");
+    let (name, array, expected) = ("triangles", c_contiguous(value)?, "integers of shape [n, 3]");
     match *array.shape() {
-        [_, 3] => Ok(indices(name, &array, needed)?.as_chunks().0.to_vec()),
-        _ => Err(wrong(name, &array, needed)),
+        [_, 3] => Ok(indices(name, &array, expected)?.as_chunks().0.to_vec()),
+        _ => Err(mismatch(name, &array, expected)),
     }
 }
 
-/// Faces: an array `[n, k]`, or a list of arrays of any lengths.
+/// Reads faces: an array `[n, k]`, or a list of arrays of any lengths.
 ///
 /// # Errors
-/// `ArrayError`.
+/// `ArrayError`
 pub(crate) fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     let Ok(array) = value.cast::<PyUntypedArray>() else {
         return value.try_iter()?.map(|face| list("a face", &face?)).collect();
     };
-    let (array, needed) = (in_rows(array)?, "whole numbers of shape [n, 3] or [n, 4], or a list of them,");
+    let (array, expected) =
+        (c_contiguous(array)?, "integers of shape [n, 3] or [n, 4], or a list of such arrays");
     match *array.shape() {
-        [_, k] if k > 0 => Ok(indices("faces", &array, needed)?.chunks(k).map(<[u32]>::to_vec).collect()),
-        _ => Err(wrong("faces", &array, needed)),
+        [_, k] if k > 0 => Ok(indices("faces", &array, expected)?.chunks(k).map(<[u32]>::to_vec).collect()),
+        _ => Err(mismatch("faces", &array, expected)),
     }
 }
 
-/// Points as seen from an origin as an array `[n, 3]` of 32-bit floats, or of 64-bit ones far away.
+/// Converts points relative to an origin to an array `[n, 3]`: float32, or float64 if the origin is not zero.
 ///
 /// # Errors
-/// None in practice.
+/// Never in practice.
 pub(crate) fn array_of(py: Python<'_>, points: Vec<Vec3>, origin: DVec3) -> PyResult<Bound<'_, PyAny>> {
     if origin != DVec3::ZERO {
         return Ok(wide_array_of(py, points.iter().map(|p| origin + p.as_dvec3()))?.into_any());
@@ -153,10 +157,10 @@ pub(crate) fn array_of(py: Python<'_>, points: Vec<Vec3>, origin: DVec3) -> PyRe
     Ok(PyArray1::from_vec(py, flat).reshape([n, 3])?.into_any())
 }
 
-/// Points as an array `[n, 3]` of 64-bit floats.
+/// Converts points to a float64 array `[n, 3]`.
 ///
 /// # Errors
-/// None in practice.
+/// Never in practice.
 pub(crate) fn wide_array_of<'py>(
     py: Python<'py>,
     points: impl Iterator<Item = DVec3>,
@@ -166,22 +170,22 @@ pub(crate) fn wide_array_of<'py>(
     PyArray1::from_vec(py, flat).reshape([n, 3])
 }
 
-/// Triples of indices as an array `[n, 3]`.
+/// Converts triples of indices to an int32 array `[n, 3]`.
 ///
 /// # Errors
-/// None in practice.
+/// Never in practice.
 pub(crate) fn triples<'py>(py: Python<'py>, all: &[[u32; 3]]) -> PyResult<Bound<'py, PyArray2<i32>>> {
     PyArray1::from_iter(py, all.as_flattened().iter().map(|&i| i as i32)).reshape([all.len(), 3])
 }
 
-/// Weights as a `scipy.sparse.csr_array`, without a copy.
+/// Converts weights to a `scipy.sparse.csr_array` without copying.
 ///
 /// # Errors
-/// When SciPy is not there.
+/// If SciPy is not installed.
 pub(crate) fn matrix_of(py: Python<'_>, weights: Weights) -> PyResult<Bound<'_, PyAny>> {
     let shape = (weights.n_rows(), weights.n_columns());
     let (indptr, indices, data) = weights.into_parts();
-    // SciPy counts with signed numbers.
+    // SciPy needs signed indices. Viewing u32 as int32 is valid as long as all values fit.
     let small = i32::try_from(data.len()).is_ok();
     let signed = |unsigned: Vec<u32>| {
         let array = PyArray1::from_vec(py, unsigned);
@@ -191,41 +195,40 @@ pub(crate) fn matrix_of(py: Python<'_>, weights: Weights) -> PyResult<Bound<'_, 
     py.import("scipy.sparse")?.getattr("csr_array")?.call1((parts, shape))
 }
 
-/// Weights of a sparse matrix of SciPy.
+/// Reads weights from a sparse SciPy matrix.
 ///
 /// # Errors
-/// `ArrayError` when it is none, or no matrix of weights.
+/// `ArrayError` if it is not a sparse matrix, or its rows are not valid weights.
 pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
     let Ok(rows) = value.call_method0("tocsr") else {
-        let came = value.get_type().name()?;
+        let actual = value.get_type().name()?;
         return Err(error::array(format!(
-            "weights: {came} came; a sparse matrix or array of SciPy is needed"
+            "weights: expected a sparse matrix or array of SciPy, got {actual}"
         )));
     };
-    let part = |name: &str| in_rows(&rows.getattr(name)?);
+    let part = |name: &str| c_contiguous(&rows.getattr(name)?);
     let data = part("data")?;
     if data.dtype().kind() != b'f' {
-        return Err(wrong("weights", &data, "float32 or float64"));
+        return Err(mismatch("weights", &data, "float32 or float64"));
     }
     let data = data.call_method1("astype", ("float32",))?.cast_into::<PyArray1<f32>>()?;
     let (_, n_columns): (u32, u32) = rows.getattr("shape")?.extract()?;
-    let [indptr, indices] =
-        [part("indptr")?, part("indices")?].map(|a| indices("weights", &a, "whole numbers"));
+    let [indptr, indices] = [part("indptr")?, part("indices")?].map(|a| indices("weights", &a, "integers"));
     Weights::new(n_columns, indptr?, indices?, data.to_vec()?)
         .map_err(|e| error::array(format!("weights: {e}")))
 }
 
-/// What a report says beside the weights of the controls, which are returned: points outside, and the offsets with their frames.
+/// Adds `outside`, `frames` and `offsets` to a report, and returns the weights of the controls: the offset columns are split off.
 ///
 /// # Errors
-/// None in practice.
-pub(crate) fn put_beside<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
+/// Never in practice.
+pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
     let (py, Binding { weights, frames, outside, .. }) = (report.py(), binding);
-    let said = PyDict::new(py);
-    said.set_item("vertex", PyArray1::from_iter(py, outside.iter().map(|o| o.vertex as i32)))?;
-    said.set_item("distance", PyArray1::from_iter(py, outside.iter().map(|o| o.distance)))?;
-    said.set_item("share", PyArray1::from_iter(py, outside.iter().map(|o| o.share)))?;
-    report.set_item("outside", said)?;
+    let points = PyDict::new(py);
+    points.set_item("vertex", PyArray1::from_iter(py, outside.iter().map(|o| o.vertex as i32)))?;
+    points.set_item("distance", PyArray1::from_iter(py, outside.iter().map(|o| o.distance)))?;
+    points.set_item("share", PyArray1::from_iter(py, outside.iter().map(|o| o.share)))?;
+    report.set_item("outside", points)?;
     report.set_item("frames", dictionary(py, &frames)?)?;
     if !frames.is_used() {
         return Ok(weights);
@@ -236,11 +239,11 @@ pub(crate) fn put_beside<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> P
     Ok(weights.columns(0..n_controls))
 }
 
-/// The way back from [`put_beside`].
+/// Inverse of [`split_offsets`]: appends the offset columns in a report to the weights of the controls.
 ///
 /// # Errors
-/// `ArrayError`; `KeyError` when it is not what a bind reports.
-pub(crate) fn with_beside(report: Option<&Bound<'_, PyAny>>, own: Weights) -> PyResult<(Weights, Frames)> {
+/// `ArrayError`; `KeyError` if the report is not one of `bind`.
+pub(crate) fn join_offsets(report: Option<&Bound<'_, PyAny>>, own: Weights) -> PyResult<(Weights, Frames)> {
     let Some(report) = report else { return Ok((own, Frames::default())) };
     let frames: Frames = from_dictionary(&report.get_item("frames")?)?;
     if !frames.is_used() {
@@ -250,7 +253,7 @@ pub(crate) fn with_beside(report: Option<&Bound<'_, PyAny>>, own: Weights) -> Py
     let [rows, columns] = [own.n_rows(), own.n_columns()];
     if offsets.n_rows() != rows || offsets.n_columns() != frames.n_columns() || !frames.fits(columns) {
         return Err(error::array(format!(
-            "the report is not of these weights, which have shape [{rows}, {columns}]"
+            "the report does not match the weights, which have shape [{rows}, {columns}]"
         )));
     }
     Ok((own.beside(&offsets), frames))

@@ -1,4 +1,4 @@
-//! Weights, and models posed by them.
+//! `bind`, `bind_many` and `deform`.
 
 use cagework_core::bind::{BindError, Binding, SolvedCage};
 use cagework_core::deform::deform_bound;
@@ -11,10 +11,10 @@ use crate::cage::Cage;
 use crate::options::{dictionary, options};
 use crate::{arrays, error, work};
 
-/// Options of a bind, in range.
+/// Options of a bind, checked for their ranges.
 ///
 /// # Errors
-/// `OptionError`; `TypeError` for a name that there is not.
+/// `OptionError`; `TypeError` for an unknown name.
 pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOptions> {
     let mut all: BindOptions = options(given)?;
     let solver = given.map(|given| given.get_item("solver")).transpose()?.flatten();
@@ -27,19 +27,20 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 
 /// Binds points to a cage by harmonic coordinates: bind(points, cage, **options) -> (weights, report)
 ///
-/// points: [n_points, 3] float32 or float64, object units; float32 in rows is read where it is: do not write to it meanwhile.
+/// points: [n_points, 3] float32 or float64, object units. A C-contiguous float32 array is not copied, so do not write to it while
+/// bind runs.
 ///
-/// Returns weights, a scipy.sparse.csr_array [n_points, n_cage] of float32, dimensionless, each row summing to 1, and a dict:
-/// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and so on, as `cagework bind --report`
-/// writes it, and outside: vertex [k], distance [k] (object units), share [k] of points outside the cage; where points need offsets beside their
-/// weights (outside, near controls inside), offsets, a csr_array, and its frames, which deform needs.
+/// Returns (weights, report). weights: scipy.sparse.csr_array [n_points, n_cage] of float32; each row sums to 1. report: dict with
+/// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and the other entries that
+/// `cagework bind --report` writes; outside: arrays vertex [k], distance [k] (object units) and share [k] of the points outside the
+/// cage. If points are outside, or near inner controls, it also has offsets (csr_array) and frames, which deform uses.
 ///
-/// Options, as of `cagework bind`: grid=64 (cells along the longest side, 8 to 512), method="embedded" or "classic",
+/// Options, as for `cagework bind`: grid=64 (cells along the longest side, 8 to 512), method="embedded" or "classic",
 /// solver="multigrid", "jacobi" or "cg", preconditioner="none" or "v_cycle", cell_shape="box" or "cubic",
 /// delta_norm="euclidean" or "literal", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
 /// (bytes), outside="extend", "stay" or "refuse".
 ///
-/// Raises BindError (no point inside, memory), OptionError, ArrayError; Ctrl-C ends it.
+/// Raises BindError (for example if no point is inside, or the memory limit is exceeded), OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
 #[pyo3(signature = (points, cage, **options))]
 pub(crate) fn bind<'py>(
@@ -47,31 +48,31 @@ pub(crate) fn bind<'py>(
     points: &Bound<'py, PyAny>,
     cage: &Bound<'py, Cage>,
     options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Returned<'py>> {
+) -> PyResult<WeightsAndReport<'py>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let points = arrays::points("points", points, None, cage.get().origin())?;
     let positions = points.as_slice();
     let options = BindOptions { held: size_of_val(positions) as u64, ..options };
     let binding = work::run(py, |progress| bind_points(positions, controls, &options, progress))?;
-    returned(py, binding.map_err(error::bind)?)
+    weights_and_report(py, binding.map_err(error::bind)?)
 }
 
 /// Binds several models to one cage with one solve: bind_many(models, cage, **options) -> list of (weights, report)
 ///
-/// models: a list of points [n_points, 3]: clothes, levels of detail, variants. What is returned for each is what bind returns, to
-/// the bit, at the cost of sampling alone; times in a report are of the model alone. The fields of all columns are kept meanwhile,
-/// for which half of memory_limit is there. Options and errors are those of bind.
+/// models: list of points [n_points, 3], such as clothes, levels of detail or variants. Each result is identical to that of bind, and
+/// costs only the sampling; times in a report are those of its model. The fields of all columns are kept in memory and may
+/// take half of memory_limit. Options are those of bind.
 ///
-/// Raises BindError, OptionError, ArrayError; Ctrl-C ends it.
+/// Raises BindError, OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
 #[pyo3(signature = (models, cage, **options))]
-#[expect(clippy::needless_pass_by_value, reason = "a list of Python becomes a vector")]
+#[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python list to an owned vector")]
 pub(crate) fn bind_many<'py>(
     py: Python<'py>,
     models: Vec<Bound<'py, PyAny>>,
     cage: &Bound<'py, Cage>,
     options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Vec<Returned<'py>>> {
+) -> PyResult<Vec<WeightsAndReport<'py>>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let of = |points| arrays::points("points", points, None, cage.get().origin());
     let points: Vec<_> = models.iter().map(of).collect::<PyResult<_>>()?;
@@ -84,23 +85,22 @@ pub(crate) fn bind_many<'py>(
             .map(|of| solved.bind(of, (held(of), 0), progress))
             .collect::<Result<Vec<_>, BindError>>()
     })?;
-    all.map_err(error::bind)?.into_iter().map(|binding| returned(py, binding)).collect()
+    all.map_err(error::bind)?.into_iter().map(|binding| weights_and_report(py, binding)).collect()
 }
 
-/// Weights and report for Python.
-type Returned<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+type WeightsAndReport<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-fn returned(py: Python<'_>, binding: Binding) -> PyResult<Returned<'_>> {
+fn weights_and_report(py: Python<'_>, binding: Binding) -> PyResult<WeightsAndReport<'_>> {
     let report = dictionary(py, &binding.report)?;
-    let weights = arrays::put_beside(&report, binding)?;
+    let weights = arrays::split_offsets(&report, binding)?;
     Ok((arrays::matrix_of(py, weights)?, report))
 }
 
-/// Points of a posed cage: deform(weights, posed, report=None) -> [n_points, 3] float32, object units;
-/// float64 where posed is so far from the origin that 32 bits would round it
+/// Deforms the bound points: deform(weights, posed, report=None) -> [n_points, 3], object units
 ///
-/// weights: a sparse matrix [n_points, n_cage]; posed: [n_cage, 3] float32 or float64, object units; report: what bind
-/// returned, for points that need offsets. Without it this is weights @ posed, summed in 64 bits.
+/// weights: sparse matrix [n_points, n_cage]; posed: [n_cage, 3] float32 or float64, object units; report: the report of bind,
+/// needed for points with offsets. Without it the result is weights @ posed, summed in float64. Returns float32, or float64 if
+/// posed is so far from the origin that float32 would lose digits.
 ///
 /// Raises ArrayError.
 #[pyfunction]
@@ -112,8 +112,8 @@ pub(crate) fn deform<'py>(
     report: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let weights = arrays::weights(weights)?;
-    let (posed, origin) = arrays::placed("posed", posed, Some(weights.n_columns()))?;
-    let (weights, frames) = arrays::with_beside(report, weights)?;
+    let (posed, origin) = arrays::points_and_origin("posed", posed, Some(weights.n_columns()))?;
+    let (weights, frames) = arrays::join_offsets(report, weights)?;
     let posed = posed.as_slice();
     arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &frames, posed))?, origin)
 }

@@ -1,4 +1,4 @@
-//! Cages: made, checked, read and written.
+//! The class `Cage`, `generate_cage` and `check_cage`.
 
 use std::path::PathBuf;
 
@@ -17,28 +17,28 @@ use pyo3::types::{PyDict, PyList, PyTuple};
 use crate::options::{dictionary, options};
 use crate::{arrays, error, files, work};
 
-/// A closed, outward polygon mesh around a model: checked when it is made, and not changed afterwards.
+/// A closed polygon mesh around a model, with outward faces. Checked on construction, and immutable.
 ///
 /// Cage(vertices, faces, smooth=0)
 ///
-/// vertices: [n_cage, 3] float32 or float64, object units; faces: whole numbers of shape [n, 3] or [n, 4], or a list of
-/// arrays of any lengths, counter-clockwise seen from outside (the other way round is mended, see notices); smooth: 0 to 3 steps of
-/// Catmull-Clark subdivision between the cage and its surface. Numbers are kept in 32 bits, as seen from an
-/// origin near the cage if it is far away.
+/// vertices: [n_cage, 3] float32 or float64, object units; faces: integers of shape [n, 3] or [n, 4], or a list of
+/// arrays of any lengths, counter-clockwise seen from outside (an inside-out mesh is flipped, with a notice); smooth: 0 to 3 steps of
+/// Catmull-Clark subdivision of the surface. Positions are stored as float32 relative to an origin near the cage, which is zero
+/// unless the cage is far away.
 ///
-/// Raises CageError, which names the face, edge or vertex that is wrong, and ArrayError.
+/// Raises CageError, which names the invalid face, edge or vertex, and ArrayError.
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Cage {
     set: ControlSet,
-    /// What it is seen from.
+    /// Subtracted from all positions.
     origin: DVec3,
-    /// `[n_cage, 3]`, not writeable: poses are copies.
+    /// `[n_cage, 3]`, not writeable.
     vertices: Py<PyArray2<f64>>,
     report: Option<CageReport>,
 }
 
 impl Cage {
-    /// Of a mesh as seen from an origin.
+    /// Builds a cage from a mesh with positions relative to an origin.
     fn of(
         py: Python<'_>,
         (mesh, origin): (&PolygonMesh, DVec3),
@@ -52,12 +52,12 @@ impl Cage {
         Ok(Self { set, origin, vertices: vertices.unbind(), report })
     }
 
-    /// What it is seen from: zero unless it is far away.
+    /// Origin of the positions: zero unless the cage is far away.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// What a model is bound to.
+    /// Controls to bind to.
     pub(crate) fn controls(&self) -> Controls<'_> {
         Controls::from(&self.set)
     }
@@ -67,7 +67,7 @@ impl Cage {
     }
 }
 
-/// Steps of subdivision; any number comes in, so that the core's sentence answers wrong ones.
+/// Converts the steps of subdivision. Takes a float, so that any number gets the core's error message.
 fn steps(smooth: f64) -> PyResult<u32> {
     SMOOTH.check(smooth).map_err(error::option)?;
     Ok(smooth as u32)
@@ -84,15 +84,15 @@ impl Cage {
         smooth: f64,
     ) -> PyResult<Self> {
         let smooth = steps(smooth)?;
-        let (positions, origin) = arrays::placed("vertices", vertices, None)?;
+        let (positions, origin) = arrays::points_and_origin("vertices", vertices, None)?;
         let positions = positions.as_slice().to_vec();
         Self::of(py, (&PolygonMesh { positions, faces: arrays::faces(faces)? }, origin), smooth, None)
     }
 
-    /// A cage from a file, faces of any size: .obj, .ply, .off, .stl, .gltf or .glb; vertices of the last three are joined where their
-    /// positions are equal.
+    /// Reads a cage from a .obj, .ply, .off, .stl, .gltf or .glb file with faces of any size. Vertices of the last three formats are
+    /// merged if their positions are equal.
     ///
-    /// Raises OSError, ModelError when it is no model, CageError when it is no cage.
+    /// Raises OSError, ModelError if the file cannot be read as a model, CageError if it is not a valid cage.
     #[staticmethod]
     #[pyo3(signature = (path, smooth = 0.0))]
     fn load(py: Python<'_>, path: PathBuf, smooth: f64) -> PyResult<Self> {
@@ -102,7 +102,7 @@ impl Cage {
         Self::of(py, (&model.cage_mesh(), model.origin()), smooth, None)
     }
 
-    /// Writes the cage as an OBJ file, at rest or in a pose: vertices [n_cage, 3], float32 or float64, object units.
+    /// Writes the cage as an OBJ file: at rest, or with the posed vertices [n_cage, 3], float32 or float64, object units.
     ///
     /// Raises OSError, ArrayError.
     #[pyo3(signature = (path, vertices = None))]
@@ -115,45 +115,45 @@ impl Cage {
         files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh, self.origin))
     }
 
-    /// [n_cage, 3] float64, object units; read-only, because a cage does not change: poses begin as cage.vertices.copy().
+    /// Rest positions, [n_cage, 3] float64, object units. Read-only: use cage.vertices.copy() for a pose.
     #[getter]
     fn vertices(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
         self.vertices.clone_ref(py)
     }
 
-    /// Vertices of each face, counter-clockwise seen from outside: a list of arrays of int32.
+    /// Vertex indices of each face, counter-clockwise seen from outside: list of int32 arrays.
     #[getter]
     fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let face = |face: &Vec<u32>| PyArray1::from_iter(py, face.iter().map(|&i| i as i32));
         PyList::new(py, self.set.cage().faces().iter().map(face))
     }
 
-    /// The faces as triangles, [n_triangles, 3] int32: for trimesh and for drawing.
+    /// The faces split into triangles, [n_triangles, 3] int32.
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
         arrays::triples(py, self.set.cage().triangles())
     }
 
-    /// Steps of subdivision between the cage and its surface.
+    /// Steps of Catmull-Clark subdivision.
     #[getter]
     fn smooth(&self) -> u32 {
         self.set.smooth()
     }
 
-    /// What was mended or is worth knowing, a sentence each.
+    /// Notices about the cage: repairs and possible problems, one sentence each.
     #[getter]
     fn notices(&self) -> Vec<String> {
         notices(self.set.cage())
     }
 
-    /// What a check of the cage alone says: valid, vertices, faces, components, thickness (object units), problems.
+    /// Result of a check of the cage: dict with valid, vertices, faces, components, thickness (object units), problems.
     #[getter]
     fn checked<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (mesh, smooth) = (self.mesh(), self.smooth());
         dictionary(py, &work::run(py, move |_| check_smooth(&mesh, None, None, smooth))?)
     }
 
-    /// How a generated cage came about: voxels, clearance, mirror and so on; None for others.
+    /// Report of generate_cage: dict with voxels, clearance, mirror and other entries; None for other cages.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.report.as_ref().map(|report| dictionary(py, report)).transpose()
@@ -164,21 +164,22 @@ impl Cage {
         format!("Cage({} vertices, {} faces)", cage.n_vertices(), cage.faces().len())
     }
 
-    /// For pickle: the cage goes to other processes.
+    /// Arguments for pickle.
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         (self.vertices(py), self.faces(py)?, self.smooth()).into_pyobject(py)
     }
 }
 
-/// A cage that encloses a model strictly: generate_cage(vertices, triangles, **options) -> Cage
+/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, **options) -> Cage
 ///
-/// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] whole numbers, any soup.
+/// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap itself.
 ///
-/// Options, as of `cagework cage`: target=80 (vertices, 8 to 400), detail=0.028 (fraction of the longest side), quads=True,
-/// shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of the
-/// diagonal), voxels=0 (along the longest side; 0: by the target), smooth=0 (steps of subdivision after which it encloses).
+/// Options, as for `cagework cage`: target=80 (maximum number of vertices, 8 to 400), detail=0.028 (fraction of the longest side),
+/// quads=True, shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of
+/// the diagonal), voxels=0 (along the longest side; 0: derived from target), smooth=0 (steps of subdivision; the smooth surface
+/// encloses the model).
 ///
-/// Raises CageError when none can be made, OptionError, ArrayError.
+/// Raises CageError if no cage can be generated, OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
 #[pyo3(signature = (vertices, triangles, **options))]
 pub(crate) fn generate_cage(
@@ -189,22 +190,24 @@ pub(crate) fn generate_cage(
 ) -> PyResult<Cage> {
     let options: CageOptions = self::options(options)?;
     options.check().map_err(error::option)?;
-    let (points, origin) = arrays::placed("vertices", vertices, None)?;
+    let (points, origin) = arrays::points_and_origin("vertices", vertices, None)?;
     let triangles = arrays::triangles(triangles)?;
     let positions = points.as_slice();
-    let made = work::run(py, |progress| generate(positions, &triangles, &options, progress))?;
-    let made = made.map_err(error::cage)?;
-    Cage::of(py, (&made.cage.to_polygon_mesh(), origin), options.smooth, Some(made.report))
+    let generated = work::run(py, |progress| generate(positions, &triangles, &options, progress))?;
+    let generated = generated.map_err(error::cage)?;
+    Cage::of(py, (&generated.cage.to_polygon_mesh(), origin), options.smooth, Some(generated.report))
 }
 
-/// Everything that is wrong with a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
+/// Lists the faults of a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
 ///
-/// cage: a Cage, or anything with vertices and faces, such as a trimesh.Trimesh, which need not be closed; points: [n, 3] that
-/// should be inside; grid: cells along the longest side that will be used to bind, to find parts thinner than one; smooth: steps
-/// of subdivision (the cage's own).
+/// cage: a Cage, or an object with vertices and faces such as trimesh.Trimesh, which need not be closed; points: [n, 3] that
+/// should be inside; grid: cells along the longest side, to find parts thinner than a cell; smooth: steps of subdivision,
+/// by default those of the Cage.
 ///
-/// A problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
-/// fixes. No error among them: it can be bound. Raises ArrayError, OptionError.
+/// Each problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
+/// fixes. A cage without errors can be bound.
+///
+/// Raises ArrayError, OptionError.
 #[pyfunction]
 #[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
 pub(crate) fn check_cage<'py>(
@@ -218,7 +221,7 @@ pub(crate) fn check_cage<'py>(
     let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
     let smooth = smooth.map_or(Ok(own), steps)?;
     let vertices = cage.getattr("vertices")?;
-    let (positions, origin) = arrays::placed("vertices", &vertices, None)?;
+    let (positions, origin) = arrays::points_and_origin("vertices", &vertices, None)?;
     let positions = positions.as_slice().to_vec();
     let mesh = PolygonMesh { positions, faces: arrays::faces(&cage.getattr("faces")?)? };
     let points = points.map(|points| arrays::points("points", points, None, origin)).transpose()?;

@@ -1,10 +1,10 @@
-//! Errors of core and io as Python's exceptions, with their sentences. The classes are in `python/cagework/_errors.py`.
+//! Conversion of the libraries' errors to the exceptions in `python/cagework/_errors.py`.
 
 use std::fmt::Display;
 
 use pyo3::PyErr;
 
-/// A class of Python and the function that makes one of an error.
+/// Imports an exception class, and defines a function that creates it from an error.
 macro_rules! exceptions {
     ($($(#[$about:meta])* $name:ident: $class:ident,)+) => {
         mod classes {
@@ -17,16 +17,16 @@ macro_rules! exceptions {
 }
 
 exceptions! {
-    /// An array of another shape or type than is needed.
+    /// An array with an unexpected shape or type.
     array: ArrayError,
-    /// A bind that failed.
+    /// A failed bind.
     bind: BindError,
-    /// No cage, or none could be made.
+    /// An invalid cage, or a failed generation.
     cage: CageError,
     /// A model that cannot be read or written.
     model: ModelError,
-    /// An option out of range.
+    /// An option with an invalid value.
     option: OptionError,
-    /// Nothing that can be pulled.
+    /// Invalid grabs, pins or targets.
     pull: PullError,
 }

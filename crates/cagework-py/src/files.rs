@@ -1,4 +1,4 @@
-//! Models from files or bytes.
+//! Reads models from files or bytes, and writes files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use pyo3::types::PyBytes;
 
 use crate::{arrays, error, work};
 
-/// Where a model comes from.
+/// A model to read.
 pub(crate) enum Source {
     File(PathBuf),
     Bytes(Vec<u8>),
 }
 
 impl Source {
-    /// Of an argument: bytes, or a path.
+    /// Interprets an argument: bytes, or a path.
     pub(crate) fn of(argument: &Bound<'_, PyAny>) -> PyResult<Self> {
         match argument.cast::<PyBytes>() {
             Ok(bytes) => Ok(Self::Bytes(bytes.as_bytes().to_vec())),
@@ -26,7 +26,7 @@ impl Source {
         }
     }
 
-    /// Reads the model, and the files beside it that it names.
+    /// Reads the model and the files in its folder that it refers to, with the default memory limit.
     ///
     /// # Errors
     /// `OSError`, `ModelError`.
@@ -34,7 +34,7 @@ impl Source {
         self.read_within(BindOptions::default().memory_limit)
     }
 
-    /// As [`Self::read`], within so many bytes.
+    /// Reads the model and the files in its folder that it refers to. `memory_limit`: bytes.
     ///
     /// # Errors
     /// `OSError`, `ModelError`.
@@ -56,10 +56,10 @@ impl Source {
     }
 }
 
-/// A file that a model names, from its folder or below.
+/// Reads a file that a model refers to. `None` if it does not exist.
 fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    // Also when a link leads there.
+    // Canonical paths, so that a symbolic link cannot lead out of the folder either.
     let (folder, path) = (folder.canonicalize().ok()?, folder.join(name).canonicalize().ok()?);
     if !path.starts_with(folder) {
         return Some(Err("leads out of the model's folder".into()));
@@ -67,7 +67,7 @@ fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     Some(std::fs::read(path).map_err(|e| format!("cannot be read ({e})")))
 }
 
-/// The exception of a kind of error, such as `FileNotFoundError`, with the file's name.
+/// The exception for this kind of error, such as `FileNotFoundError`, with the file's name.
 fn named(path: &Path, error: &io::Error) -> PyErr {
     io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
 }
@@ -80,14 +80,16 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
     std::fs::write(path, bytes).map_err(|e| named(path, &e))
 }
 
-/// Vertices and triangles of a model: read_model(model, states=False, clip=None) -> (vertices [n, 3] float32, triangles [m, 3]
-/// int32); vertices so far from the origin that 32 bits would round them, such as those of a map, are float64
+/// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off, or its bytes. Vertices are in world space, object units, in the file's order, split
-/// at seams as the file has them: those that reshape moves. A file without faces is read, too: a pose of a cage is one.
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off file, or its bytes. A file without faces can be read as well, such as
+/// the pose of a cage.
 ///
-/// states: after the vertices also where each morph target takes them; clip: the name of a clip, with states, whose frames come
-/// after those. That is what a cage should enclose: generate_cage(*read_model(model, states=True)).
+/// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as in the file. They
+/// are float32, or float64 if float32 would lose digits, as for map coordinates.
+///
+/// states: append the vertices in each morph target; clip: with states, also append the vertices in the frames of this clip. A cage
+/// around all of them is generate_cage(*read_model(model, states=True)).
 ///
 /// Raises OSError, ModelError.
 #[pyfunction]

@@ -1,8 +1,8 @@
-//! Cagework for Python: the package `cagework`, whose Python half is in `python/cagework`.
+//! The native module of the Python package `cagework`. Its Python code is in `python/cagework`.
 //!
-//! Functions and a class over core and io. Arrays of NumPy come in, as they are where they hold 32-bit floats in rows, and go
-//! out without copies; weights are matrices of scipy.sparse. Work runs without the interpreter's lock and hears Ctrl-C
-//! (`work.rs`). What is documented here is what Python's `help` shows. No mathematics.
+//! Wraps core, cage, pose and io. Arrays are exchanged with NumPy without copies where possible, weights as scipy.sparse matrices.
+//! Long work releases the interpreter lock and can be cancelled by Ctrl-C (`work.rs`). Doc comments of functions are shown by
+//! Python's `help`.
 
 mod arrays;
 mod bind;
@@ -16,7 +16,7 @@ mod work;
 
 use pyo3::pymodule;
 
-/// What Python imports; `cagework/__init__.py` passes it on.
+/// The module `cagework._native`; `cagework/__init__.py` re-exports its contents.
 #[pymodule]
 #[pyo3(name = "_native")]
 mod native {
@@ -31,6 +31,6 @@ mod native {
     #[pymodule_export]
     use crate::reshape::reshape;
     #[pymodule_export]
-    #[expect(non_upper_case_globals, reason = "Python's name")]
+    #[expect(non_upper_case_globals, reason = "this is the conventional name in Python")]
     const __version__: &str = env!("CARGO_PKG_VERSION");
 }

@@ -1,4 +1,4 @@
-//! Keyword arguments as options of the core, and reports as dictionaries.
+//! Conversion of keyword arguments to options, and of reports to dictionaries.
 
 use cagework_io::{json_fault, value_fault};
 use pyo3::exceptions::PyTypeError;
@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use crate::error;
 
-/// Options with their defaults where nothing is said, under the names that they have everywhere. None stands for the default.
+/// Options from keyword arguments. Missing arguments and `None` have their default.
 ///
 /// # Errors
-/// `TypeError` for a name that there is not, `OptionError` for a value of another kind; ranges are for the core to check.
+/// `TypeError` for an unknown name, `OptionError` for a value of the wrong type. Ranges are checked by the core.
 pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
     given: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<T> {
@@ -28,7 +28,7 @@ pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
         };
         if !value.is_none() {
             *option = json(&name, &value)?;
-            // One by one, so that the error is of this one.
+            // Checked one by one, so that the error names the option.
             serde_json::from_value::<T>(all.clone()).map_err(|e| wrong(&name, e))?;
         }
     }
@@ -42,23 +42,26 @@ fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     let number = value.extract::<u64>().map(Value::from).or_else(|_| value.extract::<i64>().map(Value::from));
     let number = number.or_else(|_| value.extract::<f64>().map(Value::from));
     number.or_else(|_| value.extract::<String>().map(Value::from)).map_err(|_| {
-        error::option(format!("{name} is of type {}; a number, a word or a bool is needed", value.get_type()))
+        error::option(format!(
+            "{name} is of type {}; expected a number, a string or a bool",
+            value.get_type()
+        ))
     })
 }
 
-/// The way back from [`dictionary`].
+/// Inverse of [`dictionary`].
 ///
 /// # Errors
-/// `ArrayError` when it is not what [`dictionary`] made.
-pub(crate) fn from_dictionary<T: DeserializeOwned>(said: &Bound<'_, PyAny>) -> PyResult<T> {
-    let text: String = said.py().import("json")?.call_method1("dumps", (said,))?.extract()?;
+/// `ArrayError` if the value does not have the expected structure.
+pub(crate) fn from_dictionary<T: DeserializeOwned>(value: &Bound<'_, PyAny>) -> PyResult<T> {
+    let text: String = value.py().import("json")?.call_method1("dumps", (value,))?.extract()?;
     serde_json::from_str(&text).map_err(|e| error::array(json_fault(text.as_bytes(), &e)))
 }
 
-/// A report as a dictionary.
+/// Converts a report to a dictionary.
 ///
 /// # Errors
-/// None in practice: reports are of text, numbers and lists.
+/// Never in practice, because reports contain only text, numbers and lists.
 pub(crate) fn dictionary<'py>(py: Python<'py>, report: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(report).map_err(error::option)?;
     py.import("json")?.call_method1("loads", (text,))

@@ -1,4 +1,4 @@
-//! A cage solved for points of the model that are pulled.
+//! `pull`: solves for the pose of the cage.
 
 use cagework_core::bind as bind_points;
 use cagework_core::deform::deform_bound;
@@ -14,19 +14,19 @@ use crate::bind::bind_options;
 use crate::cage::Cage;
 use crate::{arrays, error, work};
 
-/// Frames of a drag, as many as `cagework pull` takes.
+/// Frames of a drag; the default of `cagework pull`.
 const FRAMES: u32 = 30;
 
-/// Pulls vertices of a model, and solves for the cage, so that the rest bends as little as it can:
+/// Solves for the pose of the cage that moves vertices of the model to targets with little bending:
 /// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5, **options)
-/// -> [n_cage, 3] float64, object units: the posed cage
+/// -> [n_cage, 3] float64, object units
 ///
-/// vertices: [n, 3], triangles: [m, 3], weights: [n, n_cage], as bind made them; grabs: [k] numbers of vertices, to: [k, 3] where
-/// they go; pins: [l] vertices that stay; report: of bind, for points that need offsets; start: [n_cage, 3] to begin with (the cage at
-/// rest); reach: how far the drag reaches over the model's size, None by its area, math.inf for all of it; relax: 0 to 1, how much
-/// parts within reach go back to their shape at rest; options: of the bind of the model's samples.
+/// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their targets;
+/// pins: [l] vertices that stay; report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by default the cage at
+/// rest; reach: how far along the surface the model follows, as a fraction of its size; None for automatic, math.inf for the whole model;
+/// relax: 0 keeps the details of the initial pose, 1 restores the rest shape; options: of the bind of the solver's samples.
 ///
-/// Raises PullError, BindError, OptionError, ArrayError.
+/// Raises PullError, BindError, OptionError, ArrayError. Ctrl-C cancels the bind.
 #[pyfunction]
 #[pyo3(signature = (vertices, triangles, cage, weights, grabs, to, *, pins = None, report = None, start = None, reach = None, relax = 0.5, **options))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -45,13 +45,13 @@ pub(crate) fn pull<'py>(
     relax: f64,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    // Some samples lie beside the model, and outside of the cage where that is close.
+    // Samples lie next to the model, and may be outside the cage where it is close to the model.
     let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
     let (controls, origin) = (cage.get().controls(), cage.get().origin());
     let positions = arrays::points("vertices", vertices, None, origin)?.as_slice().to_vec();
     let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
     let weights = arrays::weights(weights)?;
-    let (weights, frames) = arrays::with_beside(report, weights)?;
+    let (weights, frames) = arrays::join_offsets(report, weights)?;
     let handles = |name, value| -> PyResult<Vec<Handle>> {
         Ok(arrays::list(name, value)?.into_iter().map(Handle::Vertex).collect())
     };
@@ -59,7 +59,7 @@ pub(crate) fn pull<'py>(
     let pins = pins.map(|pins| handles("pins", pins)).transpose()?.unwrap_or_default();
     let to = arrays::points("to", to, Some(grabs.len()), origin)?.as_slice().to_vec();
     if let Some(at) = to.iter().find(|at| !at.is_finite()) {
-        return Err(error::pull(format!("a grab goes to {at}: it must be finite numbers of 32 bits")));
+        return Err(error::pull(format!("a target is {at}; its coordinates must be finite in float32")));
     }
     let n = controls.n_controls();
     let start = start.map(|start| arrays::points("start", start, Some(n), origin)).transpose()?;

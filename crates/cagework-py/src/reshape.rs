@@ -1,4 +1,4 @@
-//! Models in, models out: what `cagework bind` and `cagework deform` do with a file.
+//! `reshape`: binds and deforms a model file, as `cagework bind` and `cagework deform` do.
 
 use std::collections::BTreeMap;
 
@@ -13,18 +13,18 @@ use crate::cage::Cage;
 use crate::files::Source;
 use crate::{arrays, error, work};
 
-/// A model that follows a posed cage, as the bytes of a file: reshape(model, cage, posed, *, joints="follow",
+/// Deforms a model with its rig: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
-/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ, PLY, STL or OFF stays one. The
-/// bytes are those that `cagework bind` and `cagework deform` write.
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off file, or its bytes; posed: [n_cage, 3] float32 or float64, object units;
+/// options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and textures; other formats
+/// are kept. The bytes are identical to those that `cagework bind` and `cagework deform` write.
 ///
-/// joints: "follow" the cage, "stay", or "turn" with the shape, too; keep_travel: clips travel as far as before; rigid: names of
-/// parts that keep their shape, each of their pieces: materials, nodes, joints, groups; mask: a dict of parts that stay as they
-/// are, and how much, 0 to 1; static: the shape alone, no rig.
+/// joints: "follow" moves them with the cage, "stay" leaves them, "turn" also rotates them; keep_travel: do not scale the travel
+/// distance of clips; rigid: names of parts (materials, nodes, joints, groups) whose connected pieces keep their shape; mask: dict from
+/// the name of a part to how much of it stays in place, 0 to 1; static: write the mesh only, without its rig.
 ///
-/// Raises OSError, ModelError, BindError, OptionError, ArrayError; Ctrl-C ends it.
+/// Raises OSError, ModelError, BindError, OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
 #[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, rigid = Vec::new(), mask = None, r#static = false, **options))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -65,7 +65,7 @@ pub(crate) fn reshape<'py>(
         let keeps_rig = model.is_rigged() && !r#static;
         let extra = if keeps_rig { model.extra_points().map_err(error::model)? } else { Vec::new() };
         let points = [model.positions.as_slice(), &extra].concat();
-        // What writing takes counts from the start, so that it does not end what took long.
+        // Includes the memory for writing, so that exceeding the limit is an error before the bind.
         let held = model.bytes() + model.bytes_to_write(model.format());
         let options = BindOptions { held, extra_points: extra.len(), ..options };
         let bound = bind(&points, controls, &options, progress).map_err(error::bind)?;

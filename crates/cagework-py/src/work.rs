@@ -1,4 +1,4 @@
-//! Work that does not keep the interpreter, and ends on Ctrl-C.
+//! Runs work without the interpreter lock, cancellable by Ctrl-C.
 
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
@@ -10,14 +10,14 @@ use std::time::Duration;
 use cagework_core::{Progress, ProgressEvent};
 use pyo3::{PyResult, Python};
 
-/// How often signals are looked for: Ctrl-C is answered about as fast as a hand can be taken off the key.
-const LISTEN: Duration = Duration::from_millis(50);
+/// Interval of checks for Ctrl-C.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Runs `work` in a thread of its own, without the interpreter's lock. Meanwhile this thread looks for signals, which Python
-/// only shows to its main thread, and cancels the work through the progress that it reports to.
+/// Runs `work` in another thread and releases the interpreter lock. This thread polls for signals, which Python delivers
+/// to its main thread only, and cancels the work through its progress.
 ///
 /// # Errors
-/// What a signal's handler raised: `KeyboardInterrupt`, as a rule.
+/// The exception of a signal handler, usually `KeyboardInterrupt`.
 #[expect(clippy::redundant_closure_for_method_calls, reason = "the method itself is of one lifetime only")]
 pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T + Send) -> PyResult<T> {
     let cancelled = AtomicBool::new(false);
@@ -28,12 +28,12 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
         thread::scope(|scope| {
             let (working, ended) = channel::<()>();
             let worker = scope.spawn(|| {
-                // Dropped at the end, also by a panic.
+                // Dropped when the work ends or panics.
                 let _working = working;
                 work(&progress)
             });
             let mut raised = None;
-            while matches!(ended.recv_timeout(LISTEN), Err(RecvTimeoutError::Timeout)) {
+            while matches!(ended.recv_timeout(POLL_INTERVAL), Err(RecvTimeoutError::Timeout)) {
                 if raised.is_none() {
                     raised = Python::attach(|py| py.check_signals()).err();
                     cancelled.store(raised.is_some(), Ordering::Relaxed);

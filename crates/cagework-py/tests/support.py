@@ -1,4 +1,4 @@
-"""Models of the tests, made by formula, and the command that the package is compared with."""
+"""Generated models, and the `cagework` command, whose results the package must equal."""
 
 import json
 import os
@@ -14,23 +14,23 @@ COMMAND = os.environ["CAGEWORK_COMMAND"]
 
 
 def command(folder, line):
-    """Runs the `cagework` command in a folder; returns what it printed."""
+    """Runs the `cagework` command in a folder and returns its stdout."""
     done = subprocess.run([COMMAND, *line.split()], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def capsule():
-    """A closed model, two units long, about z."""
+    """A capsule of length 2 along z."""
     return trimesh.creation.capsule(height=1.4, radius=0.3, count=[16, 16])
 
 
 def box(divisions=1):
-    """Vertices and quads of the cube from -1 to 1."""
+    """Vertices and quads of the cube from -1 to 1, subdivided divisions - 1 times."""
     vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
     faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     for _ in range(1, divisions):
-        # Each quad into four, joined by position.
+        # Split each quad into four, and merge equal positions.
         corners = vertices[faces]
         edges = (corners + np.roll(corners, -1, axis=1)) / 2
         middle = corners.mean(axis=1)
@@ -44,14 +44,14 @@ def box(divisions=1):
 
 
 def bent(cage):
-    """A pose: the part above the middle goes aside, more the higher it is."""
+    """A pose of the cage: x grows with the square of z above the middle."""
     posed = cage.vertices.copy()
     posed[:, 0] += 0.4 * np.maximum(posed[:, 2], 0.0) ** 2
     return posed
 
 
 def rigged_glb(radius=0.3):
-    """A capsule on two joints, with a morph target and a clip that turns the second joint."""
+    """A capsule with two joints, a morph target, and a clip that rotates the second joint."""
     mesh = trimesh.creation.capsule(height=1.4, radius=radius, count=[12, 12])
     positions = mesh.vertices.astype("<f4")
     joints = np.zeros((len(positions), 4), dtype="u1")
@@ -60,7 +60,7 @@ def rigged_glb(radius=0.3):
     weights[:, 1] = np.clip(positions[:, 2] + 0.5, 0, 1)
     weights[:, 0] = 1 - weights[:, 1]
     bind = np.stack([np.eye(4, dtype="<f4")] * 2)
-    bind[1, 3, 2] = -0.5  # The inverse of the second joint, in columns.
+    bind[1, 3, 2] = -0.5  # Inverse of the second joint, column-major.
     half = np.sqrt(0.5)
     arrays = {
         "positions": (positions, "VEC3"),
@@ -111,5 +111,5 @@ def rigged_glb(radius=0.3):
 
 
 def cage_of(mesh, **options):
-    """A generated cage of a trimesh."""
+    """A cage generated for a trimesh."""
     return cw.generate_cage(mesh.vertices, mesh.faces, **options)

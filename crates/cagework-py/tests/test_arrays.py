@@ -12,37 +12,37 @@ N_MANY = 200_000
 
 
 @pytest.mark.parametrize(
-    ("call", "came", "needed"),
+    ("call", "actual", "expected"),
     [
         (lambda: cw.bind(np.zeros((5, 2)), CUBE), "float64 of shape [5, 2]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind(np.zeros(3, "f4"), CUBE), "float32 of shape [3]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind(np.zeros((5, 3), int), CUBE), "int64 of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind(np.zeros((5, 3), ">f4"), CUBE), ">f4 of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
         (lambda: cw.bind([["a", "b", "c"]], CUBE), "<U1 of shape [1, 3]", "float32 or float64 of shape [n, 3]"),
-        (lambda: cw.generate_cage(POINTS, POINTS), "float64 of shape [5, 3]", "whole numbers of shape [n, 3]"),
-        (lambda: cw.generate_cage(POINTS, [[0, 1, 2, 3]]), "int64 of shape [1, 4]", "whole numbers of shape [n, 3]"),
-        (lambda: cw.Cage(POINTS, np.zeros((2, 3))), "float64 of shape [2, 3]", "whole numbers of shape"),
-        (lambda: cw.Cage(POINTS, [[0.5, 1.0, 2.0]]), "float64 of shape [3]", "whole numbers of shape [n]"),
-        (lambda: cw.reshape(b"", CUBE, np.zeros((7, 3))), "float64 of shape [7, 3]", "float64 of shape [8, 3]"),
-        (lambda: CUBE.save("x", np.zeros((7, 3))), "float64 of shape [7, 3]", "float64 of shape [8, 3]"),
-        (lambda: cw.deform(np.eye(8), POINTS), "ndarray", "sparse matrix or array of SciPy"),
+        (lambda: cw.generate_cage(POINTS, POINTS), "float64 of shape [5, 3]", "integers of shape [n, 3]"),
+        (lambda: cw.generate_cage(POINTS, [[0, 1, 2, 3]]), "int64 of shape [1, 4]", "integers of shape [n, 3]"),
+        (lambda: cw.Cage(POINTS, np.zeros((2, 3))), "float64 of shape [2, 3]", "integers of shape"),
+        (lambda: cw.Cage(POINTS, [[0.5, 1.0, 2.0]]), "float64 of shape [3]", "integers of shape [n]"),
+        (lambda: cw.reshape(b"", CUBE, np.zeros((7, 3))), "float64 of shape [7, 3]", "float32 or float64 of shape [8, 3]"),
+        (lambda: CUBE.save("x", np.zeros((7, 3))), "float64 of shape [7, 3]", "float32 or float64 of shape [8, 3]"),
+        (lambda: cw.deform(np.eye(8), POINTS), "ndarray", "a sparse matrix or array of SciPy"),
         (lambda: cw.deform(scipy.sparse.eye_array(8, dtype=int), POINTS), "int64 of shape [8]", "float32 or float64"),
-        (lambda: cw.deform(scipy.sparse.eye_array(8), POINTS), "float64 of shape [5, 3]", "float64 of shape [8, 3]"),
+        (lambda: cw.deform(scipy.sparse.eye_array(8), POINTS), "float64 of shape [5, 3]", "float32 or float64 of shape [8, 3]"),
     ],
 )
-def test_wrong_types_and_shapes_are_answered_by_what_came_and_what_is_needed(call, came, needed):
+def test_wrong_types_and_shapes_are_reported_with_the_expected_ones(call, actual, expected):
     with pytest.raises(cw.ArrayError) as error:
         call()
-    assert came in str(error.value) and needed in str(error.value)
+    assert f"got {actual}" in str(error.value) and f"expected {expected}" in str(error.value)
     assert isinstance(error.value, cw.Error) and isinstance(error.value, ValueError)
 
 
-def test_indices_that_are_none_are_named():
-    with pytest.raises(cw.ArrayError, match="index -1 is not from 0 to 4294967295"):
+def test_negative_indices_are_named():
+    with pytest.raises(cw.ArrayError, match="index -1 is not between 0 and 4294967295"):
         cw.generate_cage(POINTS, [[0, 1, -1]])
 
 
-def test_all_layouts_of_the_same_points_give_the_same_weights():
+def test_weights_do_not_depend_on_the_memory_layout():
     points = np.random.default_rng(1).uniform(-0.9, 0.9, (50, 3)).astype(np.float32)
     wide = np.zeros((50, 6), np.float32)
     wide[:, ::2] = points
@@ -52,7 +52,7 @@ def test_all_layouts_of_the_same_points_give_the_same_weights():
 
 
 def allocated(call):
-    """Most bytes that Python and NumPy had allocated at once during a call."""
+    """Peak of the bytes that Python and NumPy allocate during a call, and its result."""
     tracemalloc.start()
     try:
         result = call()
@@ -61,19 +61,19 @@ def allocated(call):
         tracemalloc.stop()
 
 
-def test_200_000_points_are_bound_without_copies_of_them():
+def test_points_and_weights_are_not_copied():
     points = np.random.default_rng(2).uniform(-0.9, 0.9, (N_MANY, 3)).astype(np.float32)
-    cw.bind(points[:10], CUBE, grid=8)  # What is imported at the first call is not looked at.
-    bytes_at_once, (weights, _) = allocated(lambda: cw.bind(points, CUBE, grid=16))
-    assert weights.shape == (N_MANY, 8) and bytes_at_once < points.nbytes / 10
-    # Nor are weights copied on the way to SciPy: 64 bytes a row.
+    cw.bind(points[:10], CUBE, grid=8)  # Excludes the imports of the first call.
+    peak_bytes, (weights, _) = allocated(lambda: cw.bind(points, CUBE, grid=16))
+    assert weights.shape == (N_MANY, 8) and peak_bytes < points.nbytes / 10
+    # The weights, 64 bytes per row, are not copied either.
     assert all(not a.flags.owndata for a in (weights.indices, weights.indptr)) and weights.nnz == 8 * N_MANY
-    # Where a copy has to be made, it is seen.
+    # The measurement detects a copy, which Fortran order requires.
     assert allocated(lambda: cw.bind(np.asfortranarray(points), CUBE, grid=8))[0] > points.nbytes
 
 
-def test_coordinates_of_a_map_keep_their_digits(tmp_path):
-    """32-bit floats have steps of 0.5 there; all is compared with the same work at the origin."""
+def test_map_coordinates_keep_their_precision(tmp_path):
+    """At map coordinates float32 has steps of 0.5. Results must equal those of the same model at the origin."""
     place = np.array([500_000.25, 0, 4_500_000.5])
     model, faces = box(4)
     model, near = 0.8 * model, cw.Cage(*box())
@@ -84,9 +84,9 @@ def test_coordinates_of_a_map_keep_their_digits(tmp_path):
     posed = cw.deform(weights, far.vertices + [0, 0.5, 0])
     assert posed.dtype == np.float64 and np.abs(posed - place - model - [0, 0.5, 0]).max() < 1e-6
     triangles = [[a, b, c] for f in faces for a, b, c in ((f[0], f[1], f[2]), (f[0], f[2], f[3]))]
-    made = cw.generate_cage(model + place, triangles)
-    assert (np.abs(made.vertices - place) < 1.5).all()
-    assert not [p for p in cw.check_cage(made, model + place) if p["severity"] == "error"]
+    generated = cw.generate_cage(model + place, triangles)
+    assert (np.abs(generated.vertices - place) < 1.5).all()
+    assert not [p for p in cw.check_cage(generated, model + place) if p["severity"] == "error"]
     grabbed = cw.pull(model + place, triangles, far, weights, [0], [model[0] + place - [0.2, 0, 0]], grid=8)
     assert 0.1 < np.abs(grabbed - far.vertices).max() < 1
 

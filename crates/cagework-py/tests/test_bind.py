@@ -5,11 +5,11 @@ import numpy as np
 import scipy.sparse
 from support import bent, box, command
 
-# Weights and positions are f32, sums of them f64: a few units in the last place of coordinates near 1.
-ROUNDED = 1e-6
+# A few units in the last place of float32 for coordinates near 1.
+TOLERANCE = 1e-6
 
 
-def test_weights_are_those_of_the_command_to_the_bit(model, cage, tmp_path):
+def test_weights_are_identical_to_those_of_the_command(model, cage, tmp_path):
     model.export(tmp_path / "model.obj")
     cage.save(tmp_path / "cage.obj")
     for options, line in [
@@ -25,43 +25,43 @@ def test_weights_are_those_of_the_command_to_the_bit(model, cage, tmp_path):
         for part in ["indptr", "indices", "data"]:
             ours, theirs = getattr(weights, part), getattr(expected, part)
             assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes(), part
-        said = json.loads((tmp_path / "r.json").read_text())
+        expected_report = json.loads((tmp_path / "r.json").read_text())
         for name in ["grid", "method", "solver", "tau", "iterations", "delta_history", "rest_error", "notices"]:
-            assert report[name] == said[name], name
+            assert report[name] == expected_report[name], name
 
 
-def test_rows_sum_to_one_and_the_rest_pose_comes_back(model, cage, bound):
+def test_rows_sum_to_one_and_reproduce_the_rest_pose(model, cage, bound):
     weights, report = bound
     assert weights.shape == (len(model.vertices), len(cage.vertices)) and report["outside_vertices"] == 0
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=ROUNDED)
-    np.testing.assert_allclose(weights @ cage.vertices, model.vertices, atol=ROUNDED)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=TOLERANCE)
+    np.testing.assert_allclose(weights @ cage.vertices, model.vertices, atol=TOLERANCE)
 
 
-def test_an_affine_map_of_the_cage_is_one_of_the_model(model, cage, bound):
-    # Weights reproduce positions and sum to 1: all affine maps follow.
+def test_affine_map_of_the_cage_is_applied_to_the_model(model, cage, bound):
+    # Follows from the sum of 1 and the reproduced positions.
     turn = np.array([[0.5, -1.0, 0.2], [0.9, 0.4, 0.0], [0.0, 0.3, 1.5]])
     moved = bound[0] @ (cage.vertices @ turn.T + [3.0, -2.0, 1.0])
-    np.testing.assert_allclose(moved, model.vertices @ turn.T + [3.0, -2.0, 1.0], atol=10 * ROUNDED)
+    np.testing.assert_allclose(moved, model.vertices @ turn.T + [3.0, -2.0, 1.0], atol=10 * TOLERANCE)
 
 
-def test_deform_is_the_product_but_for_points_far_outside_which_stay(cage, bound):
+def test_deform_is_the_matrix_product_except_for_points_far_outside(cage, bound):
     weights, _ = bound
     posed = bent(cage)
-    np.testing.assert_allclose(cw.deform(weights, posed), weights @ posed, atol=ROUNDED)
+    np.testing.assert_allclose(cw.deform(weights, posed), weights @ posed, atol=TOLERANCE)
 
     cube = cw.Cage(*box())
-    # 0.1 and 1 from a cube whose diagonal is 3.46: within 5 % of it, and beyond 15 %.
+    # At distances of 0.1 and 1 from a cube with the diagonal 3.46: within 5 % of it, and beyond 15 %.
     weights, report = cw.bind(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.1], [0.0, 0.0, 2.0]]), cube, grid=8)
     assert report["outside_vertices"] == 2 and report["staying_vertices"] == 1
     assert report["outside"]["vertex"].tolist() == [1, 2] and report["outside"]["share"].tolist() == [1, 0]
     moved = cube.vertices + [5.0, 0.0, 0.0]
     expected = [[5.0, 0.0, 0.0], [5.0, 0.0, 1.1], [0.0, 0.0, 2.0]]
-    np.testing.assert_allclose(cw.deform(weights, moved, report), expected, atol=ROUNDED)
-    # Rows outside are sampled, not restored: their offsets hold what they miss.
-    np.testing.assert_allclose(weights @ moved, expected * np.array([[1], [1], [0]]), atol=10 * ROUNDED)
+    np.testing.assert_allclose(cw.deform(weights, moved, report), expected, atol=TOLERANCE)
+    # Rows of points outside are not restored; their offsets contain the difference.
+    np.testing.assert_allclose(weights @ moved, expected * np.array([[1], [1], [0]]), atol=10 * TOLERANCE)
 
 
-def test_pull_poses_the_cage_as_the_command_does(model, cage, tmp_path):
+def test_pull_equals_the_command(model, cage, tmp_path):
     model.export(tmp_path / "model.obj")
     cage.save(tmp_path / "cage.obj")
     points, triangles = cw.read_model(tmp_path / "model.obj")
@@ -80,17 +80,17 @@ def test_pull_poses_the_cage_as_the_command_does(model, cage, tmp_path):
     assert np.abs((weights @ posed)[top] - to).max() < 0.01
 
 
-def test_models_bound_together_are_bound_as_alone_by_one_solve(model, cage):
+def test_bind_many_equals_bind_without_further_solves(model, cage):
     models = [model.vertices, (model.vertices * 0.9).astype(np.float32)]
-    together = cw.bind_many(models, cage, grid=24)
-    for points, (weights, report) in zip(models, together):
-        alone, said = cw.bind(points, cage, grid=24)
-        assert weights.data.tobytes() == alone.data.tobytes() and np.array_equal(weights.indices, alone.indices)
-        assert report["rest_error"] == said["rest_error"] and report["timings_ms"]["solve"] == 0.0
+    results = cw.bind_many(models, cage, grid=24)
+    for points, (weights, report) in zip(models, results):
+        expected, expected_report = cw.bind(points, cage, grid=24)
+        assert weights.data.tobytes() == expected.data.tobytes() and np.array_equal(weights.indices, expected.indices)
+        assert report["rest_error"] == expected_report["rest_error"] and report["timings_ms"]["solve"] == 0.0
     assert cw.bind_many([], cage) == []
 
 
-def test_smooth_cages_bind_to_their_surface(model, tmp_path):
+def test_smooth_cage_equals_the_command(model, tmp_path):
     cage = cw.generate_cage(model.vertices, model.faces, target=40, smooth=2)
     cage.save(tmp_path / "cage.obj")
     model.export(tmp_path / "model.obj")

@@ -7,9 +7,8 @@ import trimesh
 from support import box, command
 
 
-def test_a_cage_from_a_trimesh_is_closed_and_encloses_it(model, cage):
+def test_generated_cage_is_closed_and_encloses_the_model(model, cage):
     assert len(cage.vertices) <= 44 and cage.report["target_met"]
-    # What trimesh says of it.
     surface = trimesh.Trimesh(cage.vertices, cage.triangles, process=False)
     assert surface.is_watertight and surface.is_winding_consistent and surface.volume > model.volume
     assert cage.checked["valid"] and cage.checked["vertices"] == len(cage.vertices)
@@ -17,15 +16,15 @@ def test_a_cage_from_a_trimesh_is_closed_and_encloses_it(model, cage):
     assert "model_outside" not in codes
 
 
-def test_the_cage_is_the_commands(model, tmp_path):
+def test_generated_cage_equals_that_of_the_command(model, tmp_path):
     model.export(tmp_path / "model.obj")
     command(tmp_path, "cage model.obj -o cage.obj --vertices 30 --triangles")
-    made = cw.generate_cage(*cw.read_model(tmp_path / "model.obj"), target=30, quads=False)
+    ours = cw.generate_cage(*cw.read_model(tmp_path / "model.obj"), target=30, quads=False)
     theirs = cw.Cage.load(tmp_path / "cage.obj")
-    assert np.array_equal(made.vertices, theirs.vertices) and np.array_equal(made.triangles, theirs.triangles)
+    assert np.array_equal(ours.vertices, theirs.vertices) and np.array_equal(ours.triangles, theirs.triangles)
 
 
-def test_vertices_and_faces_come_back_as_they_were_given():
+def test_vertices_and_faces_are_returned_unchanged():
     vertices, faces = box()
     cage = cw.Cage(vertices, faces)
     assert cage.vertices.dtype == np.float64 and np.array_equal(cage.vertices, vertices)
@@ -36,14 +35,14 @@ def test_vertices_and_faces_come_back_as_they_were_given():
     assert all(np.array_equal(a, b) for a, b in zip(again.faces, cage.faces))
 
 
-def test_cages_go_to_other_processes(cage, model):
+def test_cages_can_be_pickled(cage, model):
     copy = pickle.loads(pickle.dumps(cage))
     first, second = (cw.bind(model.vertices, c, grid=12)[0] for c in (cage, copy))
     assert first.data.tobytes() == second.data.tobytes()
 
 
-def test_check_counts_what_trimesh_counts(model):
-    # Two triangles less: their edges, without the one that both have.
+def test_check_finds_the_open_edges_that_trimesh_finds(model):
+    # Removing two adjacent triangles opens four edges.
     neighbours = model.face_adjacency[0]
     opened = trimesh.Trimesh(model.vertices, np.delete(model.faces, neighbours, axis=0), process=False)
     found = {problem["code"]: problem for problem in cw.check_cage(opened)}
@@ -52,7 +51,7 @@ def test_check_counts_what_trimesh_counts(model):
     assert {tuple(sorted(edge)) for edge in found["open_edge"]["places"]["edges"]} == shared
 
 
-def test_points_outside_are_named():
+def test_check_lists_points_outside():
     cube = cw.Cage(*box())
     points = np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
     found = {problem["code"]: problem for problem in cw.check_cage(cube, points)}

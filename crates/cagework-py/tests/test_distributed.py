@@ -1,4 +1,4 @@
-"""Many files on a cluster of two processes of this machine."""
+"""Many files on a cluster of two local worker processes."""
 
 import logging
 import os
@@ -14,8 +14,8 @@ from support import bent, rigged_glb
 N_FILES = 200
 
 
-class Counted:
-    """cagework.reshape, which notes what it has done. At some files its process is killed, the first time."""
+class KilledOnce:
+    """Calls cagework.reshape and logs it. At the first call for each file in `fatal`, kills its process."""
 
     def __init__(self, log, fatal):
         self.log, self.fatal = log, fatal
@@ -23,7 +23,7 @@ class Counted:
     def __call__(self, file, *args, **options):
         if Path(file).name in self.fatal:
             try:
-                # Only one can make it.
+                # Fails unless this is the first call for the file.
                 (self.log / f"{Path(file).name}.killed").touch(exist_ok=False)
             except FileExistsError:
                 pass
@@ -46,55 +46,55 @@ def client():
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """Small rigged models, each of another width."""
+    """Small rigged models of different widths."""
     folder = tmp_path_factory.mktemp("models")
     for k in range(N_FILES):
         (folder / f"model-{k:03}.glb").write_bytes(rigged_glb(0.2 + 0.1 * k / N_FILES))
     return sorted(folder.iterdir())
 
 
-def test_200_files_are_done_once_each_by_workers_of_which_two_are_killed(client, files, tmp_path):
+def test_files_are_processed_once_each_although_workers_are_killed(client, files, tmp_path):
     cage = cw.generate_cage(*cw.read_model(files[-1]), target=24, clearance=0.05)
     posed, out, log = bent(cage), tmp_path / "out", tmp_path / "log"
     log.mkdir()
     fatal = {files[20].name, files[150].name}
     workers = set(client.run(os.getpid).values())
     assert len(workers) == 2 and os.getpid() not in workers
-    options = {"grid": 8, "threads": 1, "client": client, "work": Counted(log, fatal)}
+    options = {"grid": 8, "threads": 1, "client": client, "work": KilledOnce(log, fatal)}
     done = reshape_files(files, out, cage, posed, **options)
 
     assert len(list(log.glob("*.killed"))) == len(fatal) == 2
     assert workers != set(client.run(os.getpid).values())
-    assert [Path(said["file"]) for said in done] == files
-    # Kept: done by the worker that then was killed, and what it said of them with it.
-    assert {said["state"] for said in done} == {"written", "kept"}
+    assert [Path(result["file"]) for result in done] == files
+    # "kept" are files that a worker wrote before it was killed: their results were lost.
+    assert {result["state"] for result in done} == {"written", "kept"}
     counted = (log / "done").read_text().split()
     assert sorted(counted) == [file.name for file in files]
     assert sorted(out.iterdir()) == [out / file.name for file in files]
     for file in [files[0], files[20], files[199]]:
         assert (out / file.name).read_bytes() == cw.reshape(file, cage, posed, grid=8)
 
-    # Again: nothing is done, but what is newer than its output, and what is missing.
+    # The second call processes only changed inputs and missing outputs.
     os.utime(files[7])
     (out / files[8].name).unlink()
     again = reshape_files(files, out, cage, posed, **options)
-    assert [Path(said["file"]) for said in again if said["state"] == "written"] == files[7:9]
+    assert [Path(result["file"]) for result in again if result["state"] == "written"] == files[7:9]
     assert len((log / "done").read_text().split()) == N_FILES + 2
 
 
-def test_what_fails_is_named_and_the_rest_is_done(client, files, tmp_path):
+def test_failures_are_reported_and_other_files_are_written(client, files, tmp_path):
     broken = tmp_path / "broken.glb"
     broken.write_bytes(b"no model")
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
     names = [broken, tmp_path / "missing.glb", files[0]]
     done = reshape_files(names, tmp_path / "out", cage, cage.vertices, client=client, grid=8, files_per_task=3)
-    assert [said["state"] for said in done] == ["failed", "failed", "written"]
+    assert [result["state"] for result in done] == ["failed", "failed", "written"]
     assert "ModelError" in done[0]["error"] and "FileNotFoundError" in done[1]["error"]
     assert [path.name for path in (tmp_path / "out").iterdir()] == [files[0].name]
 
 
-class Fatal:
-    """Kills its process at one file, always."""
+class AlwaysKilled:
+    """Calls cagework.reshape, and kills its process at each call for one file."""
 
     def __init__(self, name):
         self.name = name
@@ -105,22 +105,21 @@ class Fatal:
         return cw.reshape(file, *args, **options)
 
 
-def test_a_file_that_kills_every_worker_has_failed_and_the_rest_is_done(client, files, tmp_path):
+def test_file_that_kills_every_worker_fails_and_the_others_are_written(client, files, tmp_path):
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
-    some, work = files[:4], Fatal(files[2].name)
+    some, work = files[:4], AlwaysKilled(files[2].name)
     done = reshape_files(some, tmp_path / "out", cage, cage.vertices, client=client, work=work, grid=8, threads=1)
-    assert [said["file"] for said in done if said["state"] == "failed"] == [str(files[2])]
+    assert [result["file"] for result in done if result["state"] == "failed"] == [str(files[2])]
     assert done[2]["error"].startswith("KilledWorker")
     assert sorted((tmp_path / "out").iterdir()) == [tmp_path / "out" / files[k].name for k in (0, 1, 3)]
 
 
-def test_two_files_of_one_name_are_refused(files, tmp_path):
+def test_conflicting_outputs_are_rejected(files, tmp_path):
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
     other = tmp_path / files[0].name
     with pytest.raises(ValueError, match="would both be written to"):
         reshape_files([files[0], other], tmp_path / "out", cage, cage.vertices)
-    # It was said to be there already, and nothing was done.
-    with pytest.raises(ValueError, match="is in the folder .* take another one"):
+    with pytest.raises(ValueError, match="is in the output folder .* choose another one"):
         reshape_files([files[0]], files[0].parent, cage, cage.vertices)
     with pytest.raises(ValueError, match="files_per_task is 0; it must be at least 1"):
         reshape_files(files, tmp_path / "out", cage, cage.vertices, files_per_task=0)

@@ -9,7 +9,7 @@ from support import bent, command, rigged_glb
 
 @pytest.fixture(scope="module")
 def rigged(tmp_path_factory):
-    """A folder with a rigged model, a cage and a pose; the cage."""
+    """A folder with a rigged model, its cage and a pose, and the cage."""
     folder = tmp_path_factory.mktemp("rigged")
     (folder / "model.glb").write_bytes(rigged_glb())
     cage = cw.generate_cage(*cw.read_model(folder / "model.glb"), target=40, clearance=0.05)
@@ -27,7 +27,7 @@ def rigged(tmp_path_factory):
         ({"mask": {"skin": 0.5}, "rigid": ["arm"]}, "--mask skin=0.5 --rigid arm"),
     ],
 )
-def test_bytes_of_a_rigged_model_are_those_of_the_command(rigged, options, line):
+def test_rigged_model_is_identical_to_that_of_the_command(rigged, options, line):
     folder, cage = rigged
     command(folder, "bind model.glb --cage cage.obj -g 20 --weights w.npz")
     command(folder, f"deform model.glb --cage cage.obj --weights w.npz --pose pose.obj {line} -o out.glb")
@@ -41,7 +41,7 @@ def test_bytes_of_a_rigged_model_are_those_of_the_command(rigged, options, line)
     assert len(document["meshes"][0]["primitives"][0]["targets"]) == 1
 
 
-def test_the_shape_alone_and_obj_files_are_those_of_the_command(rigged, model):
+def test_static_and_obj_models_are_identical_to_those_of_the_command(rigged, model):
     folder, cage = rigged
     posed, _ = cw.read_model(folder / "pose.obj")
     command(folder, "bind model.glb --cage cage.obj -g 20 --static --weights s.npz")
@@ -53,12 +53,12 @@ def test_the_shape_alone_and_obj_files_are_those_of_the_command(rigged, model):
     assert cw.reshape(folder / "model.obj", cage, posed, grid=20) == (folder / "out.obj").read_bytes()
 
 
-def test_a_pose_at_rest_leaves_the_file_as_it_was(rigged):
+def test_rest_pose_leaves_the_file_unchanged(rigged):
     folder, cage = rigged
     assert cw.reshape(folder / "model.glb", cage, cage.vertices, grid=12) == rigged_glb()
 
 
-def test_what_a_cage_should_enclose_are_the_vertices_those_of_targets_and_frames_of_a_clip(rigged):
+def test_states_append_vertices_of_morph_targets_and_clip_frames(rigged):
     path = rigged[0] / "model.glb"
     vertices, triangles = cw.read_model(path)
     n = len(vertices)
@@ -66,7 +66,7 @@ def test_what_a_cage_should_enclose_are_the_vertices_those_of_targets_and_frames
     moving, more = cw.read_model(path, states=True, clip="bend")
     assert np.array_equal(states[:n], vertices) and np.array_equal(same, triangles)
     assert np.array_equal(moving[: len(states)], states) and len(more) > len(triangles)
-    # The target widens the capsule by a fifth, the clip lays its half aside.
+    # The target widens the capsule by a fifth, and the clip rotates its upper half by 90 degrees.
     width = np.abs(vertices[:, 0]).max()
     assert np.abs(states[:, 0]).max() == pytest.approx(1.2 * width, rel=1e-4)
     assert np.abs(moving[:, 1]).max() > 1.5 * width
@@ -74,7 +74,7 @@ def test_what_a_cage_should_enclose_are_the_vertices_those_of_targets_and_frames
         cw.read_model(path, states=True, clip="run")
 
 
-def test_buffers_beside_a_gltf_are_read_and_no_others(rigged, tmp_path):
+def test_gltf_buffers_are_read_from_the_models_folder_only(rigged, tmp_path):
     _, cage = rigged
     glb = rigged_glb()
     (length,) = struct.unpack_from("<I", glb, 12)

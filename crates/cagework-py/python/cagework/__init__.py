@@ -1,4 +1,4 @@
-"""Harmonic-coordinate cage deformation: cages for models, weights, posed points, rigged models reshaped.
+"""Harmonic-coordinate cage deformation: cages for models, weights, posed points, deformed rigged models.
 
     import cagework as cw
     cage = cw.generate_cage(vertices, triangles, target=80)
@@ -8,7 +8,7 @@
     deformed = weights @ posed
     data = cw.reshape("fox.glb", cage, posed)
 
-Lengths are in the model's own units. Many files, on many machines: cagework.distributed.
+Lengths are in the model's own units. For many files on many machines see cagework.distributed.
 """
 
 from cagework._errors import ArrayError, BindError, CageError, Error, ModelError, OptionError, PullError

@@ -1,24 +1,24 @@
-"""What cagework raises, with the core's sentences. A file that is not there is an OSError, Ctrl-C a KeyboardInterrupt."""
+"""Exceptions of cagework. A missing file is an OSError, and Ctrl-C a KeyboardInterrupt."""
 
 
 class Error(Exception):
-    """All errors of cagework."""
+    """Base class of all exceptions of cagework."""
 
 
 class ArrayError(Error, ValueError):
-    """An array of another type or shape than is needed; the message names both."""
+    """An array with an unexpected type or shape; the message names the actual and the expected ones."""
 
 
 class OptionError(Error, ValueError):
-    """An option out of range."""
+    """An option with an invalid value."""
 
 
 class CageError(Error, ValueError):
-    """A mesh that is no cage, or a model for which none can be made."""
+    """A mesh that is not a valid cage, or a failed cage generation."""
 
 
 class BindError(Error):
-    """A bind that failed: no point inside the cage, more memory needed than allowed."""
+    """A failed bind: no point is inside the cage, or the memory limit is exceeded."""
 
 
 class ModelError(Error):
@@ -26,4 +26,4 @@ class ModelError(Error):
 
 
 class PullError(Error):
-    """Nothing that can be pulled."""
+    """Invalid grabs, pins or targets of a pull."""

@@ -1,11 +1,11 @@
-"""Many files past one machine: each is reshaped by itself, so that Dask's bag over the names is all the scheduling there is.
+"""Reshapes many files on many machines with Dask: one task per file or per group of files.
 
     from dask.distributed import Client
     from cagework.distributed import reshape_files
     done = reshape_files(files, "out", cage, posed, client=Client("scheduler:8786"))
 
-Inputs and outputs are on a file system that all workers see. An output appears whole or not at all; one that is newer than its
-input is left alone: after a crash, the same call does what is missing. A task of a worker that dies is given to another.
+Inputs and outputs are on a file system that all workers share. Outputs are written atomically. Outputs newer than their inputs
+are kept, so the same call after a crash processes only the remaining files. Tasks of a worker that dies are given to another one.
 """
 
 import os
@@ -35,15 +35,15 @@ def reshape_files(
     work: Callable[..., bytes] = reshape,
     **options: Any,
 ) -> list[dict[str, str]]:
-    """Reshapes files into the folder `out`, under their names; a .gltf becomes a .glb.
+    """Reshapes files into the folder `out`, keeping their names; a .gltf becomes a .glb.
 
-    cage, posed and options are those of cagework.reshape; posed: [n_cage, 3], object units. client: of the workers; None: the one
-    that is there, or processes of this machine. files_per_task: more of them for many small files. work: what is called for
-    each file, cagework.reshape or a function like it.
+    cage, posed ([n_cage, 3], object units) and options are those of cagework.reshape. client: Dask client; None uses the default client,
+    or starts worker processes on this machine. files_per_task: larger values reduce overhead for small files. work: function called for
+    each file, with the signature of cagework.reshape.
 
-    Returns a dict for each file, in their order: file, output, state ("written", "kept" when the output was there, "failed") and
-    the error. One that is named twice is done once. What fails does not end the rest; a task whose workers die again and again has
-    failed with all its files. Raises ValueError when two files would be written to one, or into their own folder.
+    Returns a dict per file, in input order: file, output, state ("written", "kept" for an output that is newer than its input, or
+    "failed") and error. Duplicate inputs are processed once. A failure does not stop the other files; if the workers of a task die
+    repeatedly, all its files have failed. Raises ValueError if two files have the same output, or `out` is a folder of the inputs.
     """
     if files_per_task < 1:
         raise ValueError(f"files_per_task is {files_per_task}; it must be at least 1")
@@ -51,7 +51,7 @@ def reshape_files(
     for file in map(Path, files):
         output = Path(out) / (file.with_suffix(".glb") if file.suffix.lower() == ".gltf" else file).name
         if Path(out).resolve() in (file.parent.resolve(), file.resolve().parent):
-            raise ValueError(f"{file} is in the folder {out}: take another one for what is written")
+            raise ValueError(f"{file} is in the output folder {out}: choose another one")
         other = jobs.setdefault(output.absolute(), file.absolute())
         if other != file.absolute():
             raise ValueError(f"{other} and {file.absolute()} would both be written to {output}")
@@ -66,7 +66,7 @@ def reshape_files(
         for future in workers.compute(tasks):
             part = named[len(done) : len(done) + files_per_task]
             error = future.exception()
-            done += future.result() if error is None else [_said(job, "failed", error) for job in part]
+            done += future.result() if error is None else [_result(job, "failed", error) for job in part]
     return done
 
 
@@ -77,7 +77,7 @@ def _client(client: Client | None) -> AbstractContextManager[Client]:
         return Client(threads_per_worker=1, dashboard_address=None)
 
 
-def _said(job: tuple[str, str], state: str, error: BaseException | None = None) -> dict[str, str]:
+def _result(job: tuple[str, str], state: str, error: BaseException | None = None) -> dict[str, str]:
     text = f"{type(error).__name__}: {error}" if error else ""
     return {"file": job[0], "output": job[1], "state": state, "error": text}
 
@@ -89,11 +89,11 @@ def _reshape_file(
     part = Path(output).with_name(f".{Path(output).name}.{uuid4().hex}")
     try:
         if os.path.exists(output) and os.path.getmtime(output) >= os.path.getmtime(file):
-            return _said(job, "kept")
+            return _result(job, "kept")
         part.write_bytes(work(file, cage, posed, **options))
         part.replace(output)
     except Exception as error:
-        return _said(job, "failed", error)
+        return _result(job, "failed", error)
     finally:
         part.unlink(missing_ok=True)
-    return _said(job, "written")
+    return _result(job, "written")
