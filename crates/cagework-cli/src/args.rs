@@ -44,7 +44,6 @@ pub(crate) struct Cli {
     pub(crate) json: bool,
 }
 
-/// Subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Describe a model, and check whether it is a valid cage.

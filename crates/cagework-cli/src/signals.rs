@@ -38,7 +38,7 @@ pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    // Without handlers the signals end the process, which is their default action.
+    // If the handlers cannot be installed, signals keep their default action and end the process.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGUSR1, SIGXFSZ]) else {
         return;
     };

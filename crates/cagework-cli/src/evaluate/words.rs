@@ -32,7 +32,7 @@ pub(super) fn verdicts(evaluation: &Evaluation) -> String {
             let needs = |run: &Run| format!("{} {}", run.report.iterations, run.implementation.iterations());
             let _ = writeln!(
                 out,
-                "- At g = {grid} the paper's algorithm needs {}, conjugate gradients in our cells {}, multigrid {}; on one thread \
+                "- At g = {grid} the paper's algorithm needs {}, conjugate gradients in the embedded method's cells {}, multigrid {}; on one thread \
                  they take {}, {} and {}.",
                 needs(paper),
                 needs(cg),

@@ -138,7 +138,8 @@ fn assert_times_agree(report: &str, table: &Table) {
             assert_eq!(threaded.contains(verdict), k == expected, "{one:?} {all:?}: {threaded}");
         }
         assert_eq!(threaded.contains("within the spread"), expected == 2, "{threaded}");
-        let needs = line(report, "conjugate gradients in our cells", &format!("At g = {g} "));
+        let needs =
+            line(report, "conjugate gradients in the embedded method's cells", &format!("At g = {g} "));
         for (implementation, unit) in
             [("paper-one-thread", "sweeps"), ("cg-one-thread", "steps"), ("multigrid-one-thread", "cycles")]
         {
