@@ -130,7 +130,7 @@ fn sheet_across_a_box_separates_its_halves() {
         assert!(most < 1e-6, "{p}: {most}");
         let of_sheet: f32 =
             columns.iter().zip(weights).filter(|(c, _)| **c as usize >= at.len()).map(|(_, w)| w).sum();
-        // Near the middle of the sheet its weights are close to 1; at the walls those of the cage are.
+        // Near the middle of the sheet the sheet's weights sum to nearly 1; near the walls the cage's weights dominate.
         let is_close = (p.x - 1.0).abs() < 0.05 && (p.yz() - 0.5).abs().max_element() < 0.3;
         assert!(of_sheet > 0.0 && (!is_close || of_sheet > 0.8), "{p}: {of_sheet}");
     }

@@ -18,7 +18,7 @@ const MEAN_TOLERANCE: f64 = 1.0;
 /// A pixel counts as different if a channel differs by more than this, in 255ths.
 const PIXEL_TOLERANCE: u8 = 40;
 
-/// Largest fraction of different pixels: half of a small picture's edges, where adapters rasterise lines and points differently.
+/// Largest fraction of different pixels: about half of the edge pixels, because adapters rasterise lines and points differently.
 const MAX_DIFFERENT_FRACTION: f64 = 0.01;
 
 fn root() -> &'static Path {

@@ -18,7 +18,7 @@ use cagework_core::progress::{Progress, Silent};
 use cagework_core::{Cage, Weights};
 use glam::{DVec3, Vec3};
 
-/// Binds a mesh to a cage.
+/// A function that binds a mesh to a cage.
 pub(crate) type Bind = fn(&[Vec3], &Cage, &BindOptions, &dyn Progress) -> Result<Binding, BindError>;
 
 /// A back end under test.

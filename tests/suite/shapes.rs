@@ -72,7 +72,7 @@ pub(crate) fn weights_are_independent_of_scale(back_end: &BackEnd) {
 }
 
 pub(crate) fn cage_far_from_the_origin_is_bound(back_end: &BackEnd) {
-    // Positions of this size are multiples of 1/8192 in f32, which costs six bits of the shape.
+    // At this distance from the origin f32 has steps of 2^-14.
     let shift = Vec3::new(1000.0, -500.0, 800.0);
     let mesh = moved(&c_shape(), |p| p + shift);
     let cage = cage(&mesh);

@@ -90,7 +90,7 @@ pub(crate) struct InfoArgs {
     cagework bind horse.glb --cage cage.obj -g 128 --sparsify 1e-5 --report horse.json\n  \
     cagework bind horse.obj --cage auto:80 --save-cage cage.obj -o rest.glb\n  \
     cagework bind horse.glb --cage cage.obj --smooth 2 --controls spine.obj --weights horse.npz\n  \
-    cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's way)")]
+    cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's algorithm)")]
 pub(crate) struct BindArgs {
     /// Mesh to bind.
     #[arg(help = model_help("Mesh to bind"))]

@@ -40,7 +40,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
 /// Reads a file that `main` names by a relative path, such as a glTF buffer. `None` if the file does not exist.
 ///
 /// # Errors
-/// If [`read`] would fail, or the path or a symbolic link on it leaves the folder of `main`. The message continues the file's name.
+/// If [`read`] would fail, or the path or a symbolic link on it leaves the folder of `main`. The message has no subject, because it follows the file's name.
 pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>, String>> {
     let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
     match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
@@ -70,7 +70,7 @@ fn to_read() -> OpenOptions {
     options
 }
 
-/// Reads an open file. The error message continues the file's name.
+/// Reads an open file. The error message has no subject, because it follows the file's name.
 fn content(file: File) -> Result<Vec<u8>, String> {
     // Of the open file, because the path may be replaced at any time.
     let metadata = file.metadata().map_err(|e| reason(&e))?;

@@ -42,7 +42,8 @@ pub(crate) struct CageArgs {
     /// Maximum number of vertices of the cage, 8 to 400; simple shapes get fewer [default: 80; 24 for a hull].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_TARGET)..=i64::from(MAX_TARGET)))]
     pub(crate) vertices: Option<u32>,
-    /// Largest distance of the cage from the model's surface, as a fraction of the model's longest side, 0.005 to 0.2.
+    /// Root mean square distance of the cage from the model's shape that is tolerated to save vertices, as a fraction of its longest side,
+    /// 0.005 to 0.2.
     #[arg(long, default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
     pub(crate) detail: f32,
     /// Triangles only; no quads.

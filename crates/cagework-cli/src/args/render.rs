@@ -27,7 +27,7 @@ pub(crate) struct RenderArgs {
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the model.
+    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE", required_if_eq_any = [
         ("show", "wireframe"), ("show", "weights"), ("show", "error"), ("show", "cells"), ("show", "slice"),
     ])]

@@ -34,7 +34,7 @@ impl MemoryArgs {
 /// Arguments of the solver: shared by all commands that bind.
 #[derive(Args, Debug)]
 pub(crate) struct SolveArgs {
-    /// Discretisation of the cage: embedded places the boundary exactly on grid lines, classic marks whole cells as published.
+    /// Boundary of the grid: embedded takes the exact intersections of grid lines with the cage, classic whole cells, as published.
     #[arg(long, default_value_t, value_parser = words::<Method>())]
     method: Method,
     /// Solver of Laplace's equation [default: multigrid; jacobi with --method classic].

@@ -136,7 +136,7 @@ fn error(evaluation: &Evaluation) -> Plot {
     }
     for grid in evaluation.grids.all() {
         if let Some(error) = evaluation.mean_rel(Implementation::MultigridThreads, grid, 1e-5) {
-            // Multigrid reaches the same error for any tau; its one run is drawn as a horizontal line.
+            // Measured at one tau only, so drawn as a horizontal line.
             let points = ERROR_TAUS.map(|tau| (f64::from(tau), error)).to_vec();
             series.push((format!("embedded, g = {grid}"), points));
         }

@@ -62,7 +62,7 @@ struct DeformedModel<'a> {
 /// The model that another thread is writing.
 type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
 
-/// A model is written in parallel with reading the next one, unless both need more than 1/16 of the memory limit.
+/// A model is written while the next one is read, unless it needs more than the memory limit divided by this.
 const PARALLEL_MEMORY_DIVISOR: u64 = 16;
 
 /// Runs `cagework refit`.
