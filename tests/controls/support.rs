@@ -1,7 +1,7 @@
 //! Shared helpers.
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, Prepared};
+use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};
 use cagework_core::progress::Silent;
 use cagework_core::solve::rows::LANES;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, bind};
@@ -18,7 +18,7 @@ pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut Bi
 pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOptions) -> Vec<Vec<f32>> {
     let watch = Watch::new(&Silent);
     let mut prepared =
-        Prepared::new(points, controls, options, FieldsOn::Host, &watch).expect("they are inside");
+        PreparedBind::new(points, controls, options, FieldsOn::Host, &watch).expect("they are inside");
     let blocks = prepared.solve_on_host(&watch).expect("Silent never cancels").blocks;
     let lanes = blocks
         .iter()

@@ -37,6 +37,7 @@ pub(crate) const GRID: u32 = 16;
 pub(crate) const TAU: f32 = 1e-7;
 
 /// Largest error of weights solved to [`TAU`], including rounding.
+pub(crate) const WEIGHT_TOLERANCE: f32 = 1e-5;
 
 impl BackEnd {
     /// Binds at [`GRID`] and [`TAU`], with options changed by `edit`.

@@ -108,7 +108,7 @@ fn surface_point(bound: &BoundModel, landmark: &LandmarkJson) -> Result<SurfaceP
         let last = count.saturating_sub(1);
         ((index as usize) < count)
             .then_some(())
-            .ok_or(format!("names {what} {index}; indices go from 0 to {last}"))
+            .ok_or(format!("names {what} {index}; indices run from 0 to {last}"))
     };
     match *landmark {
         LandmarkJson { vertex: Some(v), triangle: None, bary: None, point: None, .. } => {
