@@ -8,6 +8,7 @@ mod deny;
 mod licences;
 mod npm;
 mod package;
+mod prose;
 mod python;
 mod site;
 mod tasks;
@@ -20,7 +21,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   start [ARGS]   build the page and serve it on this machine (ARGS for `vite preview`: --port 8080, --open)
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
   test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser, packages
-  check          format, lints, documentation, dependency arrows, import circles, types, biome
+  check          format, lints, documentation, dependency arrows, import circles, phrases in prose, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only

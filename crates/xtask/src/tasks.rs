@@ -2,7 +2,7 @@
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
-use crate::{arrows, deny, licences, package, python, site, wasm};
+use crate::{arrows, deny, licences, package, prose, python, site, wasm};
 
 /// Builds the release command and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -56,6 +56,7 @@ pub(crate) fn check() -> Result<(), String> {
     run("cargo", &fuzz, &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     arrows::check()?;
+    prose::check()?;
     deny::check()?;
     one_version()?;
     // Names what a package lacks; `cargo publish --dry-run` builds them as well, once before a release.
