@@ -70,7 +70,7 @@ fn invalid_arguments_are_rejected_before_the_work() {
         sandbox.run(args).code(2).stderr(contains(message));
     }
     let args = "render mesh.obj --cage cage.obj --show weights --column 8 -o p.png";
-    sandbox.run(args).code(1).stderr(contains("the cage has 8 vertices"));
+    sandbox.run(args).code(1).stderr(contains("the weights have 8 columns"));
 }
 
 /// 20,000 triangles that fill the picture take the software adapter minutes, so they are rejected.
