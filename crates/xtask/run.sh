@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# What must happen before cargo can run: a linker and the pinned Rust toolchain. Then `cargo xtask "$@"` takes over.
-# `npm start`, `npm test`, `npm run build` and `npm run check` all come through here.
+# Installs a linker and the pinned Rust toolchain, then runs `cargo xtask "$@"`.
+# `npm start`, `npm test`, `npm run build` and `npm run check` call this script.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-# Debian packages, as "command package...": what is missing is installed, what is there is left alone.
+# Debian packages, as "command package...". Packages of existing commands are not installed.
 debian_packages=(
   "cc gcc libc6-dev"
 )
@@ -14,19 +14,19 @@ for row in "${debian_packages[@]}"; do
   read -r command packages <<<"$row"
   command -v "$command" >/dev/null || missing+=($packages)
 done
-# The page is tested in a browser; Debian's will do.
+# Tests of the page use Debian's Chromium, and Mesa's software OpenGL.
 if [[ " test page-test npm " == *" ${1:-} "* ]]; then
   command -v chromium >/dev/null || missing+=(chromium)
+  compgen -G "/usr/lib/*/libEGL_mesa.so.0" >/dev/null || missing+=(libegl1 libgl1-mesa-dri)
 fi
-# The tests of the kernels need a Vulkan device: Mesa's software one where there is no other. The second browser needs a
-# screen and OpenGL.
+# Tests of the kernels need a Vulkan device, for example Mesa's software device. Firefox needs a screen.
 if [ "${1:-}" = test ]; then
-  command -v firefox-esr >/dev/null || missing+=(firefox-esr libegl1 libgl1-mesa-dri)
+  command -v firefox-esr >/dev/null || missing+=(firefox-esr)
   command -v Xvfb >/dev/null || missing+=(xvfb)
   compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)
   compgen -G "/usr/share/vulkan/icd.d/*.json" >/dev/null || missing+=(mesa-vulkan-drivers)
 fi
-# The Python package is built and tested in an environment of its own.
+# The Python package is built and tested in a virtual environment.
 if [[ " test python wheel " == *" ${1:-} "* ]]; then
   python3 -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 fi
@@ -42,7 +42,7 @@ if ((${#missing[@]})); then
   DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
 
-# rustup puts cargo here, but only login shells look there.
+# rustup installs cargo here, which only login shells have in their PATH.
 if ! command -v cargo >/dev/null && [ -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ]; then
   export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 fi
@@ -55,7 +55,7 @@ TXT
   exit 1
 fi
 if command -v rustup >/dev/null; then
-  # rust-toolchain.toml names the version, the wasm32 target, rustfmt and clippy; rustup skips what is installed.
+  # rust-toolchain.toml names the version, the wasm32 target, rustfmt and clippy.
   channel=$(sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
   if ! rustup run "$channel" rustc --version >/dev/null 2>&1; then
     echo "setup: installing Rust $channel (rustup)"
