@@ -1,4 +1,4 @@
-/** A smooth cage, and controls inside, of a worm in a roomy box. */
+/** Smooth cages and interior controls, for a worm in a large box. */
 
 import type { Page } from "@playwright/test";
 import type { CageControls } from "../src/contract";
@@ -19,7 +19,7 @@ import {
   test,
 } from "./support";
 
-/** A box around the worm, whose middle is (0.15, 1, 0), so large that its rounded surface holds it too. */
+/** A box around the worm, centred at (0.15, 1, 0); its smooth surface encloses the worm too. */
 function cage(): Uint8Array {
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) =>
     [k & 1, (k >> 1) & 1, k >> 2].map((bit) => 6 * bit - 3),
@@ -32,13 +32,13 @@ function cage(): Uint8Array {
 const controls = (page: Page): Promise<CageControls | undefined> =>
   page.evaluate(() => globalThis.cagework?.engine.cageControls());
 
-/** Waits until the model is bound to a cage of so many steps, and controls inside. */
+/** Waits until the model is bound with `smooth` subdivision steps and `inner` interior controls. */
 async function boundTo(page: Page, smooth: number, inner: number): Promise<void> {
   await expect.poll(() => controls(page)).toMatchObject({ smooth, inner });
   await bound(page);
 }
 
-/** Clicks a place of the model at rest. */
+/** Clicks a point given in object space. */
 async function click(page: Page, place: [number, number, number]): Promise<void> {
   const box = await page.locator("canvas").first().boundingBox();
   const [x = 0, y = 0] = await page.evaluate(
@@ -48,10 +48,10 @@ async function click(page: Page, place: [number, number, number]): Promise<void>
   await page.mouse.click((box?.x ?? 0) + x, (box?.y ?? 0) + y);
 }
 
-/** The worm's axis at a height. */
+/** The point of the worm's axis at height y. */
 const axis = (y: number): [number, number, number] => [0.3 * Math.sin(1.5 * y), y, 0];
 
-test("a smooth surface and controls inside are bound, posed, undone and kept", async ({ page }) => {
+test("a smooth cage and interior controls are bound, posed, undone and saved", async ({ page }) => {
   await open(page);
   await drop(page, [
     { name: "worm.glb", bytes: await glb() },
@@ -69,11 +69,11 @@ test("a smooth surface and controls inside are bound, posed, undone and kept", a
   });
   const plain = await modelPositions(page);
 
-  await test.step("smooth: bound again, in the same pose, with other weights", async () => {
+  await test.step("a smooth cage is bound in the same pose with other weights", async () => {
     await page.getByRole("switch", { name: /Smooth its surface/ }).click();
     await boundTo(page, 2, 0);
     const smooth = await modelPositions(page);
-    // The corner's weight of the B-spline is smaller than that of the box.
+    // A corner of the box has a smaller weight in the B-spline.
     expect(largestMove(plain, smooth)).toBeGreaterThan(0.01);
     await shoot(page, "controls-smooth");
     await page.keyboard.press("Control+z");
@@ -81,7 +81,7 @@ test("a smooth surface and controls inside are bound, posed, undone and kept", a
     expect(largestMove(plain, await modelPositions(page))).toBeLessThan(1e-4);
   });
 
-  await test.step("a point and a bone are put where clicks are", async () => {
+  await test.step("clicks place a point and a bone", async () => {
     await page.getByRole("button", { name: "Point", exact: true }).click();
     await click(page, axis(0.3));
     await boundTo(page, 0, 1);
@@ -91,29 +91,29 @@ test("a smooth surface and controls inside are bound, posed, undone and kept", a
     await boundTo(page, 0, 4);
     expect((await controls(page))?.elements).toEqual([{ point: 0 }, { line: [1, 2, 3] }]);
     const inside = (await cagePositions(page)).slice(3 * 8);
-    // In the middle of the worm, seen from the camera: off its axis by less than half its radius.
+    // Midway through the worm along the view ray: less than half its radius from its axis.
     const wanted = [0.3, 0.9, 1.3, 1.7].flatMap(axis);
     expect(largestMove(wanted, inside)).toBeLessThan(0.2);
     await shoot(page, "controls-inside");
   });
 
-  await test.step("pulled like a handle, the model follows", async () => {
+  await test.step("a control is dragged like a handle", async () => {
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     const before = await modelPositions(page);
     const { x, y } = await handle(page, 11);
-    // All of the bone is selected: its end alone.
+    // The whole bone is selected: select its end only.
     await page.mouse.click(x, y);
     await pull(page, { x, y }, 60, 0);
     await rested(page);
     const after = await modelPositions(page);
     const reached = largestMove(await cagePositions(page), await restPositions(page));
     expect(reached).toBeGreaterThan(0.2);
-    // What is inside the tube's end follows it all the way; the worm's surface, two radii off, in part.
+    // Points at the control follow it completely, the surface of the worm partly.
     expect(largestMove(before, after)).toBeGreaterThan(0.2 * reached);
     await shoot(page, "controls-posed");
   });
 
-  await test.step("a file that does not fit ends in a sentence, and nothing changes", async () => {
+  await test.step("an unsuitable file is refused with a message", async () => {
     const before = await modelPositions(page);
     for (const [text, sentence] of [
       ["v 0 1 0\np 2\n", /names vertex|does not exist|vertex 2/i],
@@ -129,7 +129,7 @@ test("a smooth surface and controls inside are bound, posed, undone and kept", a
     expect(largestMove(before, await modelPositions(page))).toBe(0);
   });
 
-  await test.step("a project brings all of it back", async () => {
+  await test.step("a project restores everything", async () => {
     const posed = { cage: await cagePositions(page), model: await modelPositions(page) };
     const elements = (await controls(page))?.elements;
     const project = await download(page, "project");

@@ -1,4 +1,4 @@
-/** A body in its clothes, as tests see it. */
+/** Helpers for the models of wardrobe.ts. */
 
 import { readFileSync } from "node:fs";
 import type { Download, Page } from "@playwright/test";
@@ -6,9 +6,9 @@ import { validationErrors } from "./models";
 import { bound, type Dropped, drop, expect, largestMove, modelPositions } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
-/** Of the buckle's size: what keeps its shape does so up to rounding. */
+/** Rounding of rigid models, relative to their size. */
 export const RIGID = 1e-5;
-/** What is drawn is what is exported, up to the file's rounding. */
+/** Rounding of exported positions. */
 export const SAME = 1e-5;
 export const BUCKLE = 0.2;
 
@@ -19,7 +19,7 @@ export const row = (page: Page, name: string) => page.getByRole("listitem", { na
 export const press = (page: Page, name: string) => page.getByRole("button", { name, exact: true }).click();
 export const undo = (page: Page) => page.keyboard.press("Control+z");
 
-/** Drops the three and waits until they are bound; shows the list. */
+/** Drops the three models, waits until they are bound and opens the list. */
 export async function dressed(page: Page): Promise<readonly Dropped[]> {
   const files = await wardrobe();
   await drop(page, files);
@@ -30,7 +30,7 @@ export async function dressed(page: Page): Promise<readonly Dropped[]> {
   return files;
 }
 
-/** Bends all of the cage: no part of what is inside keeps its shape, or stays, by itself. */
+/** Bends the whole cage, so that no model stays or keeps its shape by itself. */
 export async function bend(page: Page): Promise<void> {
   await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
@@ -42,13 +42,13 @@ export async function bend(page: Page): Promise<void> {
   });
 }
 
-/** Of all models, in the order of the list: body, shirt, buckle. */
+/** Splits the positions of all models. */
 export function apart(all: readonly number[]) {
   const [shirt, buckle] = [3 * SIZES.body, 3 * (SIZES.body + SIZES.shirt)];
   return { body: all.slice(0, shirt), shirt: all.slice(shirt, buckle), buckle: all.slice(buckle) };
 }
 
-/** All files that one click brings. */
+/** The `n` files that one click downloads. */
 export async function downloads(page: Page, kind: string, n: number): Promise<Dropped[]> {
   await step(page, "Export");
   const heard: Download[] = [];
@@ -62,7 +62,7 @@ export async function downloads(page: Page, kind: string, n: number): Promise<Dr
   );
 }
 
-/** What is exported of each is what is drawn of it. */
+/** Exports each model, and checks that the files match the screen. */
 export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" | "buckle", number[]>> {
   const drawn = apart(await modelPositions(page));
   const files = await downloads(page, "glb", 3);
@@ -82,7 +82,7 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
   return found;
 }
 
-/** How much of the body's skin and trousers does not move, up to a distance: a graphics card rounds, an export does not. */
+/** Shares of the skin and of the trousers that are within a distance of their rest positions. The GPU rounds, an export does not. */
 export function still(
   points: readonly number[],
   rest: readonly number[],
@@ -96,7 +96,7 @@ export function still(
   return [share(kept.slice(0, half)), share(kept.slice(half))];
 }
 
-/** A place of the view where the brush touches a model, beside its handles; nothing is left painted. */
+/** A point of the window where the brush touches the model, away from handles; paints nothing. */
 export async function paintable(page: Page, id: number): Promise<{ x: number; y: number }> {
   const look = (id: number) => {
     const engine = globalThis.cagework?.engine;
@@ -109,7 +109,7 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
     const before = engine?.painted(id) ?? new Uint8Array();
     for (let y = 0.1 * height; y < height; y += 6) {
       for (let x = 0.3 * width; x < 0.7 * width; x += 6) {
-        // Well within: its neighbours are the model's as well.
+        // The brush must also hit the model 14 pixels further.
         const isOn = [0, 14].every((d) => engine?.paint(x + d, y + d, 0.005, 255));
         if (!isOn) continue;
         engine?.setPainted(id, before);
@@ -121,7 +121,7 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
   };
   let found = { x: 0, y: 0 };
   await expect(async () => {
-    // The graphics card may be busy with the stroke before.
+    // The GPU may be busy with the previous stroke.
     found = await page.evaluate(look, id);
   }).toPass();
   return found;

@@ -1,12 +1,12 @@
-/** Editing by keyboard and pointer. */
+/** Posing by keyboard and pointer. */
 
 import { showsColours } from "./stories";
 import { cagePositions, drag, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
 
-test("a visit that edits by keys and pointer", async ({ page }) => {
+test("poses are edited by keyboard and pointer", async ({ page }) => {
   await open(page);
 
-  await test.step("everything that a pose needs works without a pointer", async () => {
+  await test.step("posing works with the keyboard alone", async () => {
     const before = await cagePositions(page);
     await page.locator("canvas").first().locator("xpath=ancestor-or-self::*[@tabindex]").first().focus();
     await page.keyboard.press("]");
@@ -29,10 +29,10 @@ test("a visit that edits by keys and pointer", async ({ page }) => {
     await page.keyboard.press("Escape");
   });
 
-  await test.step("escape puts a gesture back, symmetry moves both sides", async () => {
+  await test.step("Escape reverts a gesture, symmetry moves both sides", async () => {
     await page.keyboard.press("Alt+a");
     const before = await cagePositions(page);
-    await test.step("R rotates whatever gizmo shows, and Escape keeps the selection", async () => {
+    await test.step("R rotates with any gizmo, and Escape keeps the selection", async () => {
       const selected = () => page.evaluate(() => globalThis.cagework?.engine.selection().length ?? 0);
       for (let k = 0; k < 2; k++) {
         await page.keyboard.press("r");
@@ -65,7 +65,7 @@ test("a visit that edits by keys and pointer", async ({ page }) => {
     expect(moved.length, "a vertex and its mirror image").toBeGreaterThan(3);
   });
 
-  await test.step("turning, moving and zooming leave the model alone", async () => {
+  await test.step("moving the view leaves the model unchanged", async () => {
     const before = await cagePositions(page);
     const first = await handle(page, 0);
     await page.mouse.move(620, 180);

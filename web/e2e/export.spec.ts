@@ -1,13 +1,13 @@
-/** What leaves the page is what was on screen, and other programs accept it. */
+/** Exported files match the screen and are valid. */
 
 import { validationErrors } from "./models";
 import { exportsAPicture, exportsWhatIsShown, posesAWorm } from "./stories";
 import { bound, cagePositions, download, drag, drop, expect, largestMove, open, test } from "./support";
 
-test("a visit that takes files along", async ({ page }) => {
+test("every export is valid and opens again", async ({ page }) => {
   await open(page);
 
-  await test.step("poses, cage, weights and picture are files that others read", async () => {
+  await test.step("poses, cage, weights and picture are valid files", async () => {
     await drag(page, 40, -40);
     await page.keyboard.press("Shift+P");
     const poses = await download(page, "poses");
@@ -20,11 +20,11 @@ test("a visit that takes files along", async ({ page }) => {
     await exportsAPicture(page);
   });
 
-  await test.step("a posed model comes back as it was exported", async () => {
+  await test.step("a posed model opens as it was exported", async () => {
     await exportsWhatIsShown(page, "export");
   });
 
-  await test.step("its shape alone is a file of the chosen format, which opens again", async () => {
+  await test.step("the shape is exported in the chosen format and opens again", async () => {
     const plain = await download(page, "shape");
     expect(plain.name).toMatch(/-posed\.obj$/);
     await page.getByRole("radio", { name: "PLY" }).check({ force: true });
@@ -37,7 +37,7 @@ test("a visit that takes files along", async ({ page }) => {
     expect(await page.evaluate(() => globalThis.cagework?.engine.modelTriangles().length)).toBe(corners);
   });
 
-  await test.step("a project brings back model, cage, poses and pose", async () => {
+  await test.step("a project restores model, cage, poses and pose", async () => {
     await posesAWorm(page, [50, 0]);
     await page.keyboard.press("Shift+P");
     const posed = await cagePositions(page);

@@ -1,12 +1,27 @@
-/** Files that people drop: good ones open, bad ones say what is wrong and leave the model on screen. */
+/** Files that are dropped on the page. */
 
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { box, dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
-import { bound, cagePositions, drag, drop, expect, modelPositions, open, shoot, test } from "./support";
+import { box, boxFaces, dracoGlb, glb, gltfFiles, meshoptGlb, obj, objOf } from "./models";
+import {
+  bound,
+  cagePositions,
+  drag,
+  drop,
+  dropBox,
+  expect,
+  modelPositions,
+  open,
+  shoot,
+  test,
+} from "./support";
 
-test("good files get a cage, are bound and can be dragged", async ({ page }) => {
+test("good files get a cage and can be dragged, bad files leave the model open and report the cause", async ({
+  page,
+  complaints,
+}) => {
+  await page.setViewportSize({ width: 820, height: 520 });
   const worm = [{ name: "worm.glb", bytes: await glb() }];
   const draco = [{ name: "draco.glb", bytes: await dracoGlb() }];
   const meshopt = [{ name: "meshopt.glb", bytes: await meshoptGlb() }];
@@ -26,101 +41,55 @@ test("good files get a cage, are bound and can be dragged", async ({ page }) => 
       await shoot(page, `dropped-${name}`);
     });
   }
-});
 
-test("a dropped folder is opened with all that lies in it", async ({ page }) => {
-  await page.setViewportSize({ width: 820, height: 520 });
-  await open(page);
-  // A real drop, from the disk: what a page makes up has no folders.
-  const folder = mkdtempSync(join(tmpdir(), "cagework-"));
-  const model = join(folder, "garden");
-  mkdirSync(join(model, "parts"), { recursive: true });
-  const files = await gltfFiles();
-  const document = JSON.parse(Buffer.from(files[0]?.bytes ?? []).toString());
-  // The texture and the buffer lie in a folder of their own, and something else beside them.
-  for (const part of [...document.buffers, ...document.images]) part.uri = `parts/${part.uri}`;
-  writeFileSync(join(model, "worm.gltf"), JSON.stringify(document));
-  for (const { name, bytes } of files.slice(1)) writeFileSync(join(model, "parts", name), bytes);
-  writeFileSync(join(model, "notes.txt"), "drawn on a rainy day");
-  writeFileSync(join(model, ".hidden.gltf"), "not a model");
-  const cdp = await page.context().newCDPSession(page);
-  const data = { items: [], files: [model], dragOperationsMask: 1 };
-  for (const type of ["dragEnter", "dragOver", "drop"] as const)
-    await cdp.send("Input.dispatchDragEvent", { type, x: 200, y: 250, data });
-  await expect(page).toHaveTitle(/worm/);
-  await bound(page);
-  const [triangles, textures] = [2 * 40 * 32, 1];
-  await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  const facts = page.locator("#panel").filter({ visible: true });
-  await expect(facts).toContainText(new RegExp(`${triangles.toLocaleString("en")}|${triangles}`));
-  await expect(facts).toContainText(new RegExp(`Textures\\s*${textures}`));
-  await shoot(page, "dropped-folder");
-  rmSync(folder, { recursive: true });
-});
-
-test("a model with Z up is turned with its cage and pose, and files keep their axes", async ({ page }) => {
-  await open(page);
-  await drop(page, [
-    { name: "tower.obj", bytes: box([0.5, 0.7, 1.5]) },
-    { name: "tower-cage.obj", bytes: box([0.8, 1, 2]) },
-  ]);
-  await bound(page);
-  await drag(page, 30, -20);
-  const lying = await cagePositions(page);
-  await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  const choice = page.getByRole("group", { name: "Up axis" });
-  await choice.getByRole("radio", { name: "Z" }).click();
-  // By -90 degrees about x. A kept pose has 16 bits for the longest way of a vertex.
-  const TOLERANCE = 1e-3;
-  const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
-  const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);
-  await expect.poll(async () => farthest(await cagePositions(page), upright)).toBeLessThan(TOLERANCE);
-  await bound(page);
-  const files = await page.evaluate(() => {
-    const engine = globalThis.cagework?.engine;
-    const cage = new TextDecoder().decode(engine?.exportCage());
-    return { cage, project: Array.from(engine?.writeProject([], [], "{}") ?? []) };
+  await test.step("a dropped folder is opened with the files in it", async () => {
+    // A drop from the disk: a DataTransfer made by a script cannot hold folders.
+    const folder = mkdtempSync(join(tmpdir(), "cagework-"));
+    const model = join(folder, "garden");
+    mkdirSync(join(model, "parts"), { recursive: true });
+    const files = await gltfFiles();
+    const document = JSON.parse(Buffer.from(files[0]?.bytes ?? []).toString());
+    // The texture and the buffer are in a subfolder; other files are next to it.
+    for (const part of [...document.buffers, ...document.images]) part.uri = `parts/${part.uri}`;
+    writeFileSync(join(model, "worm.gltf"), JSON.stringify(document));
+    for (const { name, bytes } of files.slice(1)) writeFileSync(join(model, "parts", name), bytes);
+    writeFileSync(join(model, "notes.txt"), "drawn on a rainy day");
+    writeFileSync(join(model, ".hidden.gltf"), "not a model");
+    const cdp = await page.context().newCDPSession(page);
+    const data = { items: [], files: [model], dragOperationsMask: 1 };
+    for (const type of ["dragEnter", "dragOver", "drop"] as const)
+      await cdp.send("Input.dispatchDragEvent", { type, x: 200, y: 250, data });
+    await expect(page).toHaveTitle(/worm/);
+    await bound(page);
+    const [triangles, textures] = [2 * 40 * 32, 1];
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+    const facts = page.locator("#panel").filter({ visible: true });
+    await expect(facts).toContainText(new RegExp(`${triangles.toLocaleString("en")}|${triangles}`));
+    await expect(facts).toContainText(new RegExp(`Textures\\s*${textures}`));
+    await shoot(page, "dropped-folder");
+    rmSync(folder, { recursive: true });
   });
-  const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
-  expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
-  await shoot(page, "turned");
-  // What is added lies as the others do, where it stays as it is in a bent cage, too.
-  const chooser = page.waitForEvent("filechooser");
-  await page.getByRole("button", { name: "Add to this cage" }).click();
-  const beam = { name: "beam.obj", mimeType: "text/plain", buffer: Buffer.from(box([0.1, 0.2, 0.6])) };
-  await (await chooser).setFiles([beam]);
-  await bound(page);
-  await page.getByRole("button", { name: "beam.obj stays as it is", exact: true }).click();
-  const off = async () =>
-    farthest((await modelPositions(page)).slice(-24).map(Math.abs), Array(8).fill([0.1, 0.6, 0.2]).flat());
-  await expect.poll(off).toBeLessThan(1e-5);
-  await drop(page, [{ name: "tower.cagework.glb", bytes: Uint8Array.from(files.project) }]);
-  await bound(page);
-  await expect(choice.getByLabel("Z")).toBeChecked();
-  const heights = (await cagePositions(page)).filter((_, k) => k % 3 === 1);
-  expect(Math.max(...heights)).toBe(2);
-});
 
-test("bad files say what is wrong, and the model stays", async ({ page, complaints }) => {
-  await open(page);
-  const before = await cagePositions(page);
-  const good = await glb();
-  const alert = page.locator("#toasts [role=alert]");
-  const cases: [string, Uint8Array, RegExp][] = [
-    ["empty.glb", new Uint8Array(), /empty|no content/i],
-    ["broken.glb", good.slice(0, good.length - 1000), /cut off|damaged/i],
-    ["noise.glb", new Uint8Array(5000).map((_, k) => (k * 7919) % 251), /not a GLB|damaged/i],
-    ["picture.blend", new TextEncoder().encode("BLENDER-v401"), /opens|Blender/i],
-    ["numbers.obj", new TextEncoder().encode("v 1 2\nf 1 2 3\n"), /line 1/i],
-  ];
-  for (const [name, bytes, message] of cases) {
-    await drop(page, [{ name, bytes }]);
-    await expect(alert.getByText(message).first(), name).toBeVisible();
-    await alert.getByRole("button", { name: /close/i }).first().click();
-  }
-  await shoot(page, "bad-files");
-  expect(await cagePositions(page)).toEqual(before);
-  expect(complaints).toEqual([]);
+  await test.step("a bad file is reported", async () => {
+    const before = await cagePositions(page);
+    const good = await glb();
+    const alert = page.locator("#toasts [role=alert]");
+    const cases: [string, Uint8Array, RegExp][] = [
+      ["empty.glb", new Uint8Array(), /empty|no content/i],
+      ["broken.glb", good.slice(0, good.length - 1000), /cut off|damaged/i],
+      ["noise.glb", new Uint8Array(5000).map((_, k) => (k * 7919) % 251), /not a GLB|damaged/i],
+      ["picture.blend", new TextEncoder().encode("BLENDER-v401"), /opens|Blender/i],
+      ["numbers.obj", new TextEncoder().encode("v 1 2\nf 1 2 3\n"), /line 1/i],
+    ];
+    for (const [name, bytes, message] of cases) {
+      await drop(page, [{ name, bytes }]);
+      await expect(alert.getByText(message).first(), name).toBeVisible();
+      await alert.getByRole("button", { name: /close/i }).first().click();
+    }
+    await shoot(page, "bad-files");
+    expect(await cagePositions(page)).toEqual(before);
+    expect(complaints).toEqual([]);
+  });
 
   await test.step("a file too large for a browser is refused before it is read", async () => {
     await page.evaluate(() => {
@@ -143,4 +112,60 @@ test("bad files say what is wrong, and the model stays", async ({ page, complain
     await expect(fault.first()).toBeVisible();
     await shoot(page, "open-cage");
   });
+
+  await test.step("a cage with a vertex at 1e30 is refused or opened as a draft", async () => {
+    const { positions, faces } = boxFaces(0.8);
+    const far = objOf({ positions: positions.map((p, k) => (k === 7 ? [1e30, 1e30, 1e30] : p)), faces });
+    await drop(page, [
+      { name: "model.obj", bytes: box(0.5) },
+      { name: "model-cage.obj", bytes: far },
+    ]);
+    await expect(page).toHaveTitle(/model/);
+    await expect(page.locator("#stage .busy")).toBeHidden();
+    await dropBox(page, "good");
+    await drag(page, 20, 10);
+  });
+});
+
+test("choosing Z as the up axis turns model, cage and pose, but not exported files", async ({ page }) => {
+  await open(page);
+  await drop(page, [
+    { name: "tower.obj", bytes: box([0.5, 0.7, 1.5]) },
+    { name: "tower-cage.obj", bytes: box([0.8, 1, 2]) },
+  ]);
+  await bound(page);
+  await drag(page, 30, -20);
+  const lying = await cagePositions(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  const choice = page.getByRole("group", { name: "Up axis" });
+  await choice.getByRole("radio", { name: "Z" }).click();
+  // A turn by -90 degrees about x. A saved pose has 16 bits for the largest displacement.
+  const TOLERANCE = 1e-3;
+  const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
+  const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);
+  await expect.poll(async () => farthest(await cagePositions(page), upright)).toBeLessThan(TOLERANCE);
+  await bound(page);
+  const files = await page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const cage = new TextDecoder().decode(engine?.exportCage());
+    return { cage, project: Array.from(engine?.writeProject([], [], "{}") ?? []) };
+  });
+  const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
+  expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
+  await shoot(page, "turned");
+  // An added model is turned as well, even if it does not follow the bent cage.
+  const chooser = page.waitForEvent("filechooser");
+  await page.getByRole("button", { name: "Add to this cage" }).click();
+  const beam = { name: "beam.obj", mimeType: "text/plain", buffer: Buffer.from(box([0.1, 0.2, 0.6])) };
+  await (await chooser).setFiles([beam]);
+  await bound(page);
+  await page.getByRole("button", { name: "beam.obj stays as it is", exact: true }).click();
+  const off = async () =>
+    farthest((await modelPositions(page)).slice(-24).map(Math.abs), Array(8).fill([0.1, 0.6, 0.2]).flat());
+  await expect.poll(off).toBeLessThan(1e-5);
+  await drop(page, [{ name: "tower.cagework.glb", bytes: Uint8Array.from(files.project) }]);
+  await bound(page);
+  await expect(choice.getByLabel("Z")).toBeChecked();
+  const heights = (await cagePositions(page)).filter((_, k) => k % 3 === 1);
+  expect(Math.max(...heights)).toBe(2);
 });

@@ -1,5 +1,4 @@
-// The page in a second browser: Debian's Firefox, driven by WebDriver BiDi. It opens, drags, undoes and exports, by WebGL2
-// and by WebGPU.
+// Tests the page in Debian's Firefox, by WebDriver BiDi: opens, drags, undoes and exports with WebGL2 and with WebGPU.
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
@@ -12,17 +11,17 @@ import { launch } from "puppeteer-core";
 
 const PORT = Number(process.env.E2E_PORT ?? 4180);
 const ADDRESS = `http://127.0.0.1:${PORT}/`;
-/** A software GPU on two cores is slow, ms. */
+/** Timeout, ms: a software GPU on two cores is slow. */
 const PATIENCE = 120_000;
 
-/** Waits for something that becomes true in the page. */
+/** Waits until `condition` is true in the page. */
 const until = (page, what, condition) =>
   page.waitForFunction(condition, { timeout: PATIENCE }).catch(() => assert.fail(`never: ${what}`));
 
 const bound = (page) => until(page, "bound", () => globalThis.cagework?.engine.bound === true);
 const heights = (page) => page.evaluate(() => Array.from(globalThis.cagework.engine.cagePositions()));
 
-/** A screen that nobody sees: Firefox has no WebGL without one. Its number, as DISPLAY has it. */
+/** Starts a virtual screen, which Firefox needs for WebGL; returns its name for DISPLAY. */
 async function openScreen() {
   const screen = spawn("Xvfb", ["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"], {
     stdio: ["ignore", "pipe", "ignore"],
@@ -58,7 +57,7 @@ async function visit(name, display, preferences) {
     });
     console.log(`${name}: ${adapter}${lack ? ` (${lack})` : ""}`);
 
-    // A handle that the pointer reaches.
+    // A handle that a click selects.
     const place = await page.evaluate(() => {
       const { engine } = globalThis.cagework;
       const canvas = document.querySelector("canvas");
@@ -79,7 +78,7 @@ async function visit(name, display, preferences) {
     await page.mouse.move(place.x + 15, place.y + 10, { steps: 3 });
     await page.mouse.move(place.x + 30, place.y + 20, { steps: 3 });
     await page.mouse.up();
-    // A worker solves what the hand pulls, once it is ready.
+    // A worker computes the pose asynchronously.
     const isMoved = () => /Undo: /.test(document.querySelector('#bar [data-tip^="Undo"]')?.dataset.tip ?? "");
     await page.waitForFunction(isMoved, { timeout: PATIENCE });
     assert.notDeepEqual(await heights(page), before, "a drag moves the cage");
@@ -103,7 +102,7 @@ async function visit(name, display, preferences) {
   }
 }
 
-/** The file that was downloaded, once it is whole. */
+/** Waits until a download is complete; returns the file. */
 async function downloaded(folder) {
   const began = Date.now();
   while (Date.now() - began < PATIENCE) {
@@ -129,7 +128,7 @@ try {
   ]);
   const lack = await visit("Firefox, WebGL2", screen.display, { "dom.webgpu.enabled": false });
   assert.equal(lack, "NoWebGPU", "without WebGPU the page says so");
-  // Firefox blocks adapters made of processor cores unless it is told not to.
+  // By default Firefox blocks software adapters.
   const allowed = {
     "dom.webgpu.enabled": true,
     "dom.webgpu.workers.enabled": true,

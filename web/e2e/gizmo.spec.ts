@@ -1,21 +1,21 @@
-/** The gizmo's handles move what is selected along their own direction only; and the view that is split in two. */
+/** The handles of the gizmo, and the split view. */
 
 import type { Page } from "@playwright/test";
 import type { GizmoHandle } from "../src/contract";
 import { box } from "./models";
 import { bound, cagePositions, drawn, drop, expect, handle, open, reachable, shoot, test } from "./support";
 
-/** Largest distance of numbers that should be alike: `f32` of a model two units long. */
+/** Tolerance for equal coordinates: rounding of `f32` in a model two units long. */
 const ALIKE = 1e-4;
 
 interface Grip {
   readonly x: number;
   readonly y: number;
-  /** Away from the gizmo's middle, CSS pixels. */
+  /** Unit vector from the centre of the gizmo, in screen space. */
   readonly away: readonly [number, number];
 }
 
-/** Where a handle of the gizmo can be grabbed: the middle of the pixels that belong to it, on one side. */
+/** A point of the window that belongs to a handle of the gizmo. */
 async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
   const found = await page.evaluate((wanted) => {
     const engine = globalThis.cagework?.engine;
@@ -24,7 +24,7 @@ async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
     if (!engine || !canvas || !center) return null;
     const { left, top } = canvas.getBoundingClientRect();
     const [cx = 0, cy = 0] = engine.project(center[0] ?? 0, center[1] ?? 0, center[2] ?? 0);
-    // A circle of 98 pixels holds the whole gizmo, the ring around the view too.
+    // A circle of 98 pixels encloses the whole gizmo, including the screen-space ring.
     for (const radius of [60, 70, 80, 50, 40, 30, 20, 92, 98]) {
       for (let k = 0; k < 120; k++) {
         const away = [Math.cos((k * Math.PI) / 60), Math.sin((k * Math.PI) / 60)] as const;
@@ -53,19 +53,19 @@ async function pull(page: Page, wanted: GizmoHandle, by: (grip: Grip) => readonl
   return { before, after: await cagePositions(page) };
 }
 
-/** What changed along one axis. */
+/** Displacements along one axis. */
 function along(axis: number, { before, after }: { before: number[]; after: number[] }): number[] {
   return after.map((value, k) => value - (before[k] ?? 0)).filter((_, k) => k % 3 === axis);
 }
 
 const largest = (list: readonly number[]) => list.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-/** Outwards, and across, in the picture. */
+/** Drags away from the centre, and around it, pixels. */
 const outwards = ({ away: [x, y] }: Grip) => [36 * x, 36 * y] as const;
 const across = ({ away: [x, y] }: Grip) => [-36 * y, 36 * x] as const;
 
 const point = (list: readonly number[], i: number) => [0, 1, 2].map((axis) => list[3 * i + axis] ?? 0);
 
-/** Middle of all points. */
+/** Centroid of the points. */
 function middle(list: readonly number[]): number[] {
   const n = list.length / 3;
   return [0, 1, 2].map((axis) => list.reduce((sum, value, k) => sum + (k % 3 === axis ? value / n : 0), 0));
@@ -74,7 +74,7 @@ function middle(list: readonly number[]): number[] {
 test("arrows, rings and boxes move along their own axis only", async ({ page }) => {
   await page.setViewportSize({ width: 820, height: 520 });
   await open(page);
-  // Few vertices: a frame costs little, and there are many of them.
+  // A small model, because the test draws many frames.
   await drop(page, [
     { name: "cube.obj", bytes: box(0.5) },
     { name: "cube-cage.obj", bytes: box(1) },
@@ -106,7 +106,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     expect(largest([...along(0, moved), ...along(2, moved)])).toBeGreaterThan(0.01);
   });
 
-  await test.step("a ring turns around its axis", async () => {
+  await test.step("a ring rotates around its axis", async () => {
     await page.keyboard.press("a");
     await page.keyboard.press("e");
     const turned = await pull(page, "y", across);
@@ -121,7 +121,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     expect(largest(reach(turned.after).map((r, i) => r - (before[i] ?? 0)))).toBeLessThan(ALIKE);
   });
 
-  await test.step("the ring around the view turns as seen", async () => {
+  await test.step("the outer ring rotates around the view direction", async () => {
     const seen = (list: number[]) =>
       page.evaluate((list) => {
         const engine = globalThis.cagework?.engine;
@@ -132,7 +132,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.keyboard.press("5");
     const turned = await pull(page, "all", across);
     expect(largest(turned.after.map((value, k) => value - (turned.before[k] ?? 0)))).toBeGreaterThan(0.05);
-    // Without perspective, a turn around the view direction keeps distances in the picture.
+    // Without perspective, a rotation around the view direction keeps distances on the screen.
     const [center] = await seen(middle(turned.before));
     const [from, to] = [await seen(turned.before), await seen(turned.after)];
     const reach = (p: number[]) =>
@@ -157,7 +157,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.keyboard.press("q");
   });
 
-  await test.step("each drag was one step", async () => {
+  await test.step("each drag is one undo step", async () => {
     const steps = 7;
     for (let k = 0; k < steps; k++) await page.keyboard.press("Control+z");
     const rest = await page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
@@ -171,12 +171,12 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.getByRole("checkbox", { name: "Mean value" }).check({ force: true });
     await expect(page.locator(".compare-labels")).toBeVisible();
     await page.keyboard.press("n");
-    // At rest both give the model back; lines and edges are smoothed, so that a few pixels may differ.
+    // At rest both reproduce the model; antialiasing makes a few pixels differ.
     const alike = await difference(page);
     await page.evaluate(() => {
       const session = globalThis.cagework;
       const positions = session?.engine.restPositions();
-      // One corner far out. (Both ways would give a cage that is moved or stretched as a whole back alike.)
+      // One corner far out. (Both coordinates reproduce affine maps of the whole cage exactly.)
       session?.engine.setCagePositions(
         positions?.map((value, k) => (k >= 21 ? 3 * value : value)) ?? new Float32Array(),
       );
@@ -188,7 +188,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   });
 });
 
-/** Pixels of the left half that differ from the right half's, and how many of either are not background. */
+/** Number of pixels that differ between the two halves, and of foreground pixels in each. */
 async function difference(page: Page): Promise<{ different: number; left: number; right: number }> {
   const veil = (visibility: string) =>
     page.evaluate((visibility) => {
@@ -212,7 +212,7 @@ async function difference(page: Page): Promise<{ different: number; left: number
       Math.max(...[0, 1, 2].map((c) => Math.abs((data[4 * a + c] ?? 0) - (data[4 * b + c] ?? 0))));
     const counts = { different: 0, left: 0, right: 0 };
     for (let y = 0; y < height; y++) {
-      // The leftmost column of a row is background: a gradient from top to bottom.
+      // The leftmost pixel of each row is background, a vertical gradient.
       const edge = y * width;
       for (let x = 0; x < half; x++) {
         const [a, b] = [edge + x, edge + x + shift];

@@ -1,8 +1,8 @@
-/** What the page keeps in the browser. */
+/** The work that the page saves in the browser. */
 
 import type { Page } from "@playwright/test";
 
-/** Whether the browser keeps work that was saved after a moment, ms since 1970; `name`: of that model. */
+/** Whether the browser has work saved after `moment`, ms since 1970, of a model whose name contains `name`. */
 export const savedSince = (page: Page, moment: number, name = ""): Promise<boolean> =>
   page.evaluate(
     ({ moment, name }) =>
@@ -23,7 +23,7 @@ export const savedSince = (page: Page, moment: number, name = ""): Promise<boole
     { moment, name },
   );
 
-/** Cuts kept files off, as a disk that failed might. */
+/** Truncates the saved files, as a disk failure would. */
 export const cutKept = (page: Page): Promise<void> =>
   page.evaluate(
     () =>

@@ -1,4 +1,4 @@
-/** Opening a large model never keeps the page from answering. */
+/** Opening a large model never blocks the page. */
 
 import type { Page } from "@playwright/test";
 import { torus } from "./models";
@@ -6,8 +6,8 @@ import { bound, carry, expect, letGo, open, test } from "./support";
 import { longestTask } from "./tasks";
 
 /**
- * Vertices, and the longest task of the main thread that may be, ms of processor time: three times what is promised, since a slow
- * machine takes twice as long. Reading, caging or binding on the main thread takes seconds.
+ * Vertices, and the upper limit of a main-thread task, ms of processor time: three times the promised limit, for slow machines.
+ * Reading, caging or binding on the main thread would take seconds.
  */
 const LIMITS = [
   [30_000, 150],
@@ -15,11 +15,11 @@ const LIMITS = [
 ] as const;
 
 declare global {
-  /** Tasks that the browser calls long (50 ms and more), milliseconds by the clock. */
+  /** Durations of tasks of 50 ms or more, ms of wall-clock time. */
   var longTasks: (() => number[]) | undefined;
 }
 
-/** Notes long tasks from now on. */
+/** Starts recording long tasks. */
 const watch = (page: Page): Promise<void> =>
   page.evaluate(() => {
     const durations: number[] = [];
@@ -34,7 +34,7 @@ const watch = (page: Page): Promise<void> =>
     };
   });
 
-// Every pixel is computed by the processor: a small picture.
+// A small picture, since the processor computes each pixel.
 test.use({ viewport: { width: 420, height: 420 } });
 
 for (const [vertices, most] of LIMITS) {
@@ -43,10 +43,10 @@ for (const [vertices, most] of LIMITS) {
     page,
   }) => {
     await open(page);
-    // The file's way into the browser is none of the page's work.
+    // Transferring the file to the browser is not part of the measurement.
     const files = await carry(page, [{ name: "torus.glb", bytes: await torus(vertices) }]);
     await watch(page);
-    // The Long Tasks API has the clock's time, which grows when others use the machine: it is told, processor time is asked.
+    // The limit applies to processor time. The wall-clock times of the Long Tasks API grow under load and are only reported.
     const longest = await longestTask(browser, page, async () => {
       await letGo(page, files);
       await expect(page).toHaveTitle(/torus/, { timeout: 120_000 });

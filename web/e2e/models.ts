@@ -1,4 +1,4 @@
-/** Models made by formula, as the files that people drop. */
+/** Model files made by formula. */
 
 import { crc32, deflateSync } from "node:zlib";
 import { Document, type Node, NodeIO } from "@gltf-transform/core";
@@ -12,7 +12,7 @@ import draco3d from "draco3dgltf";
 import validator from "gltf-validator";
 import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
 
-/** A PNG of 8 x 8 pixels, orange and teal in turn. */
+/** A PNG of 8 x 8 pixels, alternately orange and teal. */
 function png(): Uint8Array {
   const SIDE = 8;
   const rows = Array.from({ length: SIDE }, (_, j) => [
@@ -40,7 +40,7 @@ function tube(rings = 40, around = 32): { positions: Float32Array; uvs: Float32A
   const indices: number[] = [];
   for (let j = 0; j <= rings; j++) {
     const v = j / rings;
-    // Ends are closed by rings that shrink to a point.
+    // The first and last rings have radius 0, which closes the ends.
     const radius = 0.4 * Math.sqrt(Math.max(0, Math.sin(Math.PI * v))) ** 0.5;
     for (let i = 0; i <= around; i++) {
       const angle = (2 * Math.PI * i) / around;
@@ -83,14 +83,14 @@ export async function glb(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document().document);
 }
 
-/** The same as a .gltf with its .bin and texture. */
+/** The same model as .gltf with .bin and texture. */
 export async function gltfFiles(): Promise<{ name: string; bytes: Uint8Array }[]> {
   const { json, resources } = await new NodeIO().writeJSON(document().document, { basename: "worm" });
   const files = Object.entries(resources).map(([name, bytes]) => ({ name, bytes }));
   return [{ name: "worm.gltf", bytes: new TextEncoder().encode(JSON.stringify(json)) }, ...files];
 }
 
-/** A torus of about so many vertices, as GLB: radii 1 and 0.35. */
+/** A torus of about `vertices` vertices, radii 1 and 0.35, as GLB. */
 export async function torus(vertices: number): Promise<Uint8Array> {
   const around = Math.round(Math.sqrt(vertices / 3));
   const rings = Math.round(vertices / around);
@@ -139,7 +139,7 @@ export async function meshoptGlb(): Promise<Uint8Array> {
   return io.writeBinary(made);
 }
 
-/** A tetrahedron and a cage for it, as OBJ; with a face less it is open. */
+/** A tetrahedron as OBJ; `open` omits a face. */
 export function obj(scale: number, open = false): Uint8Array {
   const corners = [
     [1, 1, 1],
@@ -152,13 +152,13 @@ export function obj(scale: number, open = false): Uint8Array {
   return new TextEncoder().encode([...lines, ...faces, ""].join("\n"));
 }
 
-/** Corners and faces, counted from 0. */
+/** Corners, and faces of corner indices from 0. */
 export interface Mesh {
   readonly positions: readonly (readonly number[])[];
   readonly faces: readonly (readonly number[])[];
 }
 
-/** A box around the origin by half its sides: six quads, seen from outside counter-clockwise. */
+/** A box around the origin, given half its sides: six quads, counter-clockwise from outside. */
 export function boxFaces(half: number | readonly [number, number, number]): Mesh {
   const sides = typeof half === "number" ? [half, half, half] : half;
   const signs = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 1, k & 2, k & 4].map((bit) => (bit ? 1 : -1)));
@@ -198,7 +198,7 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
     .map(({ code, pointer, message }) => `${code} at ${pointer}: ${message}`);
 }
 
-/** A body and a hat on one skeleton of two joints: keys with defaults 0 and 1, and a clip of turns, a way and keys. */
+/** A body and a hat on a skeleton of two joints, with two morph targets of default weights 0 and 1, and a clip that animates all. */
 export async function dancer(): Promise<Uint8Array> {
   const document = new Document();
   const buffer = document.createBuffer();
@@ -218,7 +218,7 @@ export async function dancer(): Promise<Uint8Array> {
   const SIDES = 16;
   const RINGS = 13;
 
-  /** A closed tube; `bulge` of each key at a height, 0 to 1. */
+  /** A closed tube. Each key maps the relative height, 0 to 1, to a radial displacement. */
   const tube = (
     name: string,
     [from, to]: [number, number],
@@ -295,14 +295,14 @@ export async function dancer(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document);
 }
 
-/** Positions of a mesh as a file has them. */
+/** Positions of the mesh `name` in a file. */
 export async function positionsOf(bytes: Uint8Array, name: string): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const mesh = root.listMeshes().find((mesh) => mesh.getName() === name);
   return [...(mesh?.listPrimitives()[0]?.getAttribute("POSITION")?.getArray() ?? [])];
 }
 
-/** Where the vertices of a file's one mesh are at a key of its one animation of morph targets. */
+/** Vertices of the first mesh of a file at a keyframe of its animation of morph targets. */
 export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const [primitive] = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());

@@ -1,4 +1,4 @@
-/** No tests: makes the pictures of the samples that the page shows, and those of docs/. Run by `cargo xtask pictures`. */
+/** Makes the pictures of samples in the page, and those of docs/, for `cargo xtask pictures`. */
 
 import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -8,7 +8,7 @@ import { bound, drawn, grip, open } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
 
-/** Pixels of a side: sharp on dense screens at the size shown. */
+/** Side length, pixels: sharp on high-density screens. */
 const SIDE = 216;
 
 test("pictures of the samples", async ({ page }) => {
@@ -39,7 +39,7 @@ test("pictures of the samples", async ({ page }) => {
 
 const DOCUMENTS = join(import.meta.dirname, "../../docs/pictures");
 
-/** Pictures of stops of the tour, which the documents repeat: the stop's number, from 1, and what is changed there. */
+/** Stops of the tour that the documents show: number from 1, and options. */
 const FIGURES: readonly { readonly name: string; readonly stop: number; readonly choose?: string }[] = [
   { name: "cage", stop: 1 },
   { name: "weights", stop: 2 },
@@ -50,7 +50,7 @@ const FIGURES: readonly { readonly name: string; readonly stop: number; readonly
   { name: "enough-smoothing", stop: 5, choose: "1e-5" },
 ];
 
-/** The picture of the README: a hand has the knee, the other leg stays. */
+/** The picture of the README: a knee is dragged, the other leg stays. */
 async function liftsAKnee(page: Page): Promise<void> {
   await page.getByRole("button", { name: /Legs close together/ }).click();
   await expect(page).toHaveTitle(/Legs/);
@@ -65,13 +65,13 @@ async function liftsAKnee(page: Page): Promise<void> {
   await page.mouse.move(knee.x, knee.y);
   await page.mouse.down();
   await page.mouse.move(knee.x - 70, knee.y - 110, { steps: 20 });
-  // The worker follows the hand.
+  // The worker computes the pose.
   await page.waitForTimeout(2000);
   await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70 });
   await page.mouse.up();
 }
 
-/** Begins the tour at a stop, and chooses what its card offers. */
+/** Opens the tour at a stop, and chooses an option of its card. */
 async function visit(page: Page, stop: number, choice?: string): Promise<void> {
   await page.evaluate((stop) => {
     location.hash = `tour=${stop}`;
@@ -81,7 +81,7 @@ async function visit(page: Page, stop: number, choice?: string): Promise<void> {
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
   if (choice) await card.getByRole("radio", { name: choice, exact: true }).check({ force: true });
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
-  // A slice is computed a moment after it was asked for.
+  // The slice is computed with a delay.
   await expect(page.locator("[data-busy]")).toHaveCount(0);
 }
 
@@ -106,7 +106,7 @@ test("pictures of the documents", async ({ page }) => {
     });
     writeFileSync(join(DOCUMENTS, `${name}.webp`), Uint8Array.from(data));
   }
-  // Pictures side by side are drawn on the page only, under its tools.
+  // The split view exists only in the page, below its tools.
   await visit(page, 9);
   await page.evaluate(() => {
     for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;

@@ -1,4 +1,4 @@
-/** The model is taken by the hand. */
+/** Pulling points of the model. */
 
 import {
   cagePositions,
@@ -16,13 +16,12 @@ import {
   test,
 } from "./support";
 
-/** The panel says that the worker is ready by nothing: the first pull waits for it. */
-test("a visit that pulls the model", async ({ page }) => {
+test("points of the model are pulled and pinned", async ({ page }) => {
   await open(page);
   const rest = await cagePositions(page);
   const modelAtRest = await modelPositions(page);
 
-  await test.step("a point goes where the pointer goes, as one step of the history", async () => {
+  await test.step("a point follows the pointer in one undo step", async () => {
     const at = await grip(page, [0.35, 0.45]);
     await page.mouse.move(at.x, at.y);
     await shoot(page, "pull-hover");
@@ -38,12 +37,12 @@ test("a visit that pulls the model", async ({ page }) => {
     const model = await modelPositions(page);
     const least = 0.03 * largestMove(modelAtRest, model);
     const still = model.filter((value, k) => Math.abs(value - (modelAtRest[k] ?? 0)) < least);
-    expect(still.length, "what is far stays").toBeGreaterThan(model.length / 3);
+    expect(still.length, "distant vertices stay").toBeGreaterThan(model.length / 3);
     await page.keyboard.press("Control+z");
     expect(largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
   });
 
-  await test.step("Esc puts it back", async () => {
+  await test.step("Escape reverts the pull", async () => {
     const at = await grip(page, [0.35, 0.45]);
     await page.mouse.move(at.x, at.y);
     await page.mouse.down();
@@ -55,7 +54,7 @@ test("a visit that pulls the model", async ({ page }) => {
     expect(largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
   });
 
-  await test.step("a pin holds its point, and the whole model follows if asked", async () => {
+  await test.step("a pin keeps its point in place when the whole model follows", async () => {
     const pinned = await grip(page, [0.65, 0.6]);
     await page.keyboard.down("Shift");
     await page.mouse.click(pinned.x, pinned.y);
@@ -73,7 +72,7 @@ test("a visit that pulls the model", async ({ page }) => {
     await shoot(page, "pull-pinned");
   });
 
-  await test.step("arrow keys pull as well", async () => {
+  await test.step("arrow keys pull", async () => {
     await page.keyboard.press("Control+z");
     await page.locator(".viewport").focus();
     for (let k = 0; k < 3; k++) await page.keyboard.press("Shift+ArrowUp");
@@ -82,7 +81,7 @@ test("a visit that pulls the model", async ({ page }) => {
     await page.keyboard.press("Control+z");
   });
 
-  await test.step("a handle is pulled by the same solver: its neighbours come along; with Alt it moves alone", async () => {
+  await test.step("a dragged handle moves its neighbours; with Alt it moves alone", async () => {
     const changed = (cage: number[]) =>
       new Set(cage.flatMap((x, k) => (Math.abs(x - (rest[k] ?? 0)) > 1e-5 ? [Math.floor(k / 3)] : []))).size;
     const { handle, reachable, drag } = await import("./support");
@@ -96,7 +95,7 @@ test("a visit that pulls the model", async ({ page }) => {
     await page.keyboard.press("Control+z");
   });
 
-  await test.step("a project brings the pins back", async () => {
+  await test.step("a project restores the pins", async () => {
     const project = await download(page, "project");
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     await page.getByRole("button", { name: "Remove all pins" }).click();

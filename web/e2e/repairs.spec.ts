@@ -1,4 +1,4 @@
-/** Each button that the Cage step shows beside a fault, with a cage that has it. */
+/** The repair buttons of the Cage step, each with a cage that has the fault. */
 
 import type { Page } from "@playwright/test";
 import { box, boxFaces, type Mesh, objOf } from "./models";
@@ -7,15 +7,15 @@ import { bound, drop, expect, open, test } from "./support";
 interface Fault {
   readonly name: string;
   readonly cage: Mesh;
-  /** Half the side of the cube inside. */
+  /** Half the sides of the model, a box. */
   readonly model?: readonly [number, number, number] | number;
   readonly says: RegExp;
   readonly button: RegExp;
-  /** Whether it cannot be bound before. */
+  /** Whether the faulty cage cannot be bound. */
   readonly broken?: boolean;
-  /** Whether it is a cage, but none that the model can be bound to. */
+  /** Whether the cage is valid but the model cannot be bound to it. */
   readonly refused?: boolean;
-  /** Of the mended cage, where that is known. */
+  /** Vertices of the repaired cage, if known. */
   readonly vertices?: number;
 }
 
@@ -55,13 +55,13 @@ const FAULTS: readonly Fault[] = [
     vertices: 8,
   },
   {
-    name: "a corner through the side across, which nothing but another cage mends",
+    name: "a corner that crosses the opposite side, which only a new cage repairs",
     cage: { ...cube, positions: cube.positions.map((p, k) => (k === 0 ? [1.5, 0.1, 0.2] : p)) },
     says: /through itself/,
     button: /Make a new cage/,
   },
   {
-    name: "a model all of whose corners stick out, which no bind takes",
+    name: "a model with all vertices outside, which cannot be bound",
     cage: cube,
     model: 1.2,
     refused: true,
@@ -79,14 +79,14 @@ async function show(page: Page, { cage, model = 0.8 }: Pick<Fault, "cage" | "mod
   await expect(page).toHaveTitle(/cube/);
 }
 
-test("every fault has a button that mends it", async ({ page }) => {
+test("every fault has a button that repairs it", async ({ page }) => {
   await page.setViewportSize({ width: 900, height: 560 });
   await open(page);
   const panel = page.locator("#panel");
   for (const fault of FAULTS) {
     await test.step(fault.name, async () => {
       await show(page, fault);
-      // What can be bound is, and the page goes on to the next steps by itself.
+      // The page binds usable cages and moves to the next step.
       if (fault.refused) await expect(page.getByText(/none of the model's/i).first()).toBeVisible();
       else if (!fault.broken) await bound(page);
       await page.getByRole("button", { name: "Cage", exact: false }).first().click();
@@ -112,7 +112,7 @@ test("every fault has a button that mends it", async ({ page }) => {
     await bound(page);
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const card = panel.locator(".problem-card").filter({ hasText: /thinner than a cell/ });
-    // 2 long and 2/128 thick: 128 cells make one across. (A power of two, which files and f32 hold exactly.)
+    // 2 long and 2/128 thick: one cell at a grid of 128. (Powers of two are exact in files and f32.)
     await card.getByRole("button", { name: /Bind with 128 cells/ }).click();
     await expect(card.getByText("Fine enough")).toBeVisible();
     await bound(page);

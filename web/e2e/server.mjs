@@ -1,10 +1,10 @@
-// Serves dist/, or another folder, as the plainest of web servers would: at the root and below a path, without special headers.
+// Serves dist/, or another folder, at the root and below a path, without special headers.
 
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
 
-// Two copies of the repository can be tested at once, each on its own port.
+// Different ports allow tests of two copies of the repository at once.
 const PORT = Number(process.env.E2E_PORT ?? 4179);
 const FOLDER = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 const BELOW = "/~student/some%20where/cagework";

@@ -1,13 +1,10 @@
-/** The list of models: adding to it, and how it looks. */
+/** Adding models to the list. */
 
-import { dressed, press, row, rows, step, undo } from "./dressed";
+import { press, rows, step, undo } from "./dressed";
 import { box } from "./models";
-import { complaintsOfAxe } from "./stories";
-import { bound, calm, carry, expect, open, shoot, test } from "./support";
+import { bound, carry, expect, open, shoot, test } from "./support";
 
-test("clothes are added to a sample, dropped on the list, and said when they reach outside", async ({
-  page,
-}) => {
+test("models are added to a sample, and reported when they reach outside its cage", async ({ page }) => {
   await open(page);
   await step(page, "Model");
   const list = page.locator("[data-adds]");
@@ -40,34 +37,4 @@ test("clothes are added to a sample, dropped on the list, and said when they rea
   await undo(page);
   await expect(page).toHaveTitle(/Rat/);
   await bound(page);
-});
-
-test("the list is legible on every screen, and axe finds nothing", async ({ page }) => {
-  await open(page);
-  await dressed(page);
-  await press(page, "buckle.glb keeps its shape");
-  for (const [width, height, colorScheme] of [
-    [1440, 900, "light"],
-    [390, 844, "dark"],
-  ] as const) {
-    await page.setViewportSize({ width, height });
-    await page.emulateMedia({ colorScheme });
-    const shot = (what: string) => shoot(page, `several-${width}-${colorScheme}-${what}`);
-    await row(page, "body.glb").scrollIntoViewIfNeeded();
-    await calm(page);
-    await shot("list");
-    const fold = row(page, "body.glb").getByText("How parts follow the cage");
-    await fold.click();
-    await press(page, "Trousers stays as it is");
-    await row(page, "body.glb").getByText("Trousers").scrollIntoViewIfNeeded();
-    await shot("parts");
-    await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
-    await row(page, "body.glb").getByRole("slider").scrollIntoViewIfNeeded();
-    await calm(page);
-    await shot("painting");
-    expect(await complaintsOfAxe(page), `${width} ${colorScheme}`).toEqual([]);
-    await row(page, "body.glb").getByRole("button", { name: "Done" }).click();
-    await press(page, "Trousers stays as it is");
-    await fold.click();
-  }
 });

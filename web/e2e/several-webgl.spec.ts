@@ -1,4 +1,4 @@
-/** Several models without WebGPU: the processor keeps parts in shape and in place. */
+/** Several models without WebGPU: the processor computes rigid and fixed parts. */
 
 import { WITH_WEBGL } from "./browser";
 import { apart, BUCKLE, bend, dressed, exportsEach, paintable, press, RIGID, row, still } from "./dressed";
@@ -7,7 +7,7 @@ import { distances } from "./wardrobe";
 
 test.use({ launchOptions: WITH_WEBGL });
 
-test("two models follow, keep their shape and stay as they are exported", async ({ page }) => {
+test("models that follow, keep their shape or stay are exported as drawn", async ({ page }) => {
   await page.addInitScript(() => {
     Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
   });

@@ -1,4 +1,4 @@
-/** Several models in one cage: dropped together, each with its own way to follow, each its own file again. */
+/** Several models in one cage: dropped together, following it in different ways, exported separately. */
 
 import type { Page } from "@playwright/test";
 import {
@@ -20,8 +20,10 @@ import {
 } from "./dressed";
 import { savedSince } from "./kept";
 import { validationErrors } from "./models";
+import { complaintsOfAxe } from "./stories";
 import {
   bound,
+  calm,
   download,
   drag,
   drawing,
@@ -36,7 +38,7 @@ import {
 } from "./support";
 import { distances, pointsOf, SIZES } from "./wardrobe";
 
-/** Clicks with the brush; how far from there it has touched the model `0`, whose vertices are at `positions`, pixels. */
+/** Clicks with the brush. Returns the largest distance of a painted vertex of model 0 from there, pixels. */
 async function dabbed(page: Page, at: { x: number; y: number }, positions: number[]): Promise<number> {
   await page.mouse.click(at.x, at.y);
   return page.evaluate(
@@ -54,7 +56,7 @@ async function dabbed(page: Page, at: { x: number; y: number }, positions: numbe
   );
 }
 
-test("a body, its shirt and a buckle are dropped, told apart, undone, exported and kept", async ({
+test("a body, its shirt and a buckle share a cage, and are painted, undone, exported and saved", async ({
   page,
 }) => {
   await open(page);
@@ -62,7 +64,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
   const rest = await modelPositions(page);
   const own = apart(rest);
 
-  await test.step("one cage, one bind, and all of them follow", async () => {
+  await test.step("all models follow one cage", async () => {
     expect(rest.length / 3).toBe(SIZES.body + SIZES.shirt + SIZES.buckle);
     const cage = await page.evaluate(() => globalThis.cagework?.engine.cageCorners().length ?? 0);
     expect(cage).toBeGreaterThan(0);
@@ -74,9 +76,9 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await shoot(page, "several");
   });
 
-  await test.step("an eye hides one", async () => {
+  await test.step("a model is hidden", async () => {
     const picture = () => drawing(page);
-    // Away from the handles, which show that the pointer is near.
+    // Handles are highlighted when the pointer is near.
     await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
     const before = await picture();
     await press(page, "Hide shirt.glb");
@@ -93,7 +95,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     Math.max(...size(points).map((d, k) => Math.abs(d - (size(own.buckle)[k] ?? 0))));
 
   await test.step("the buckle keeps its shape, the trousers stay; each is undone", async () => {
-    expect(worst(bent.buckle), "bent, if nobody says otherwise").toBeGreaterThan(0.01);
+    expect(worst(bent.buckle), "bent by default").toBeGreaterThan(0.01);
     await press(page, "buckle.glb keeps its shape");
     await expect(row(page, "buckle.glb")).toContainText("keeps its shape");
     expect(worst(apart(await modelPositions(page)).buckle)).toBeLessThan(RIGID * BUCKLE);
@@ -109,7 +111,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await page.keyboard.press("Control+y");
   });
 
-  await test.step("a stroke of the brush stays, another takes some of it back", async () => {
+  await test.step("one stroke paints, another erases", async () => {
     await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
     await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
     const before = still(apart(await modelPositions(page)).body, own.body)[0];
@@ -131,7 +133,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBe(before);
     await page.keyboard.press("Control+y");
     await page.getByRole("radio", { name: "Follow again" }).check({ force: true });
-    // What stays has gone back to where it rests: another place is under the pointer.
+    // Painted vertices have returned to their rest positions, so that others are under the pointer.
     await pull(page, await paintable(page, 0), 2, 6);
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBeLessThan(painted);
     await undo(page);
@@ -139,7 +141,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await expect(row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" })).toBeVisible();
   });
 
-  const exported = await test.step("each leaves as its own file", async () => {
+  const exported = await test.step("each model is exported to its own file", async () => {
     const found = await exportsEach(page);
     expect(worst(found.buckle)).toBeLessThan(RIGID * BUCKLE);
     const before = await pointsOf(files[0] ?? { bytes: new Uint8Array() });
@@ -151,7 +153,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     return found;
   });
 
-  await test.step("the shirt is taken out, and comes back", async () => {
+  await test.step("the shirt is removed, and undo restores it", async () => {
     await step(page, "Model");
     await press(page, "Remove shirt.glb from the cage");
     await expect(rows(page)).toHaveCount(2);
@@ -176,7 +178,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
       expect(largestMove(again[name], exported[name]), name).toBeLessThan(SAME);
   };
 
-  await test.step("a reload brings all of it back", async () => {
+  await test.step("a reload restores everything", async () => {
     const moment = await page.evaluate(() => Date.now());
     await drag(page, 40, 0);
     await undo(page);
@@ -186,7 +188,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await same();
   });
 
-  await test.step("and so does a project", async () => {
+  await test.step("a project restores everything", async () => {
     await bend(page);
     const project = await download(page, "project");
     expect(project.name).toBe("body.cagework.glb");
@@ -196,5 +198,33 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await expect(page).toHaveTitle(/body/);
     await bound(page);
     await same();
+  });
+
+  await test.step("the list is legible on large and small screens, and axe finds no fault", async () => {
+    await step(page, "Model");
+    for (const [width, height, colorScheme] of [
+      [1440, 900, "light"],
+      [390, 844, "dark"],
+    ] as const) {
+      await page.setViewportSize({ width, height });
+      await page.emulateMedia({ colorScheme });
+      const shot = (what: string) => shoot(page, `several-${width}-${colorScheme}-${what}`);
+      await row(page, "body.glb").scrollIntoViewIfNeeded();
+      await calm(page);
+      await shot("list");
+      const fold = row(page, "body.glb").getByText("How parts follow the cage");
+      await fold.click();
+      await press(page, "Trousers stays as it is");
+      await row(page, "body.glb").getByText("Trousers").scrollIntoViewIfNeeded();
+      await shot("parts");
+      await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
+      await row(page, "body.glb").getByRole("slider").scrollIntoViewIfNeeded();
+      await calm(page);
+      await shot("painting");
+      expect(await complaintsOfAxe(page), `${width} ${colorScheme}`).toEqual([]);
+      await row(page, "body.glb").getByRole("button", { name: "Done" }).click();
+      await press(page, "Trousers stays as it is");
+      await fold.click();
+    }
   });
 });

@@ -1,4 +1,4 @@
-/** What the page does on either kind of device. */
+/** Checks that run with WebGPU and with WebGL. */
 
 import AxeBuilder from "@axe-core/playwright";
 import type { Page } from "@playwright/test";
@@ -23,13 +23,13 @@ import {
   shoot,
 } from "./support";
 
-/** What axe finds wrong with the page. */
+/** Accessibility faults that axe finds. */
 export async function complaintsOfAxe(page: Page): Promise<string[]> {
   const { violations } = await new AxeBuilder({ page }).analyze();
   return violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
 }
 
-/** The model follows a handle, on the screen and in numbers; undo and redo bring both back. */
+/** Drags a handle, and checks cage, model and pixels, then undo and redo. */
 export async function followsAHandle(page: Page, picture: string): Promise<void> {
   const before = { cage: await cagePositions(page), model: await modelPositions(page) };
   const pixels = await drawing(page);
@@ -52,7 +52,7 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
 }
 
-/** A point of the model goes where it is pulled to; undo brings it back. */
+/** Pulls a point of the model, then undoes that. */
 export async function pullsTheModel(page: Page): Promise<void> {
   const before = await cagePositions(page);
   const at = await grip(page, [0.35, 0.45]);
@@ -64,7 +64,7 @@ export async function pullsTheModel(page: Page): Promise<void> {
   expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
 }
 
-/** A heat map of a vertex, a slice through the grid, and harmonic beside mean value coordinates: each with its legend. */
+/** Checks the heat map of a vertex, the slice through the grid and the coordinates side by side. */
 export async function showsColours(page: Page, picture: string): Promise<void> {
   const pixels = () => drawing(page);
   const vertex = await reachable(page);
@@ -82,7 +82,7 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   await page.keyboard.press("n");
   const slice = page.getByRole("group", { name: "Slice through the grid" });
   await slice.getByRole("radio", { name: "Cells" }).check({ force: true });
-  // There once the slice has been computed.
+  // The legend appears when the slice has been computed.
   await expect(legend).toContainText("Cells");
   expect((await pixels()).equals(plain), "cells of the grid are shown").toBe(false);
   await shoot(page, `${picture}-slice`);
@@ -91,7 +91,7 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   await shoot(page, `${picture}-compare`);
 }
 
-/** All three kinds of coordinates side by side, of a small model: alike at rest, and each its own way in a pose. */
+/** Shows the three coordinates side by side: equal at rest, different in a pose. */
 async function comparesAll(page: Page): Promise<void> {
   await dropsAWorm(page);
   const choices = page.getByRole("group", { name: "Coordinates side by side" });
@@ -127,7 +127,7 @@ async function comparesAll(page: Page): Promise<void> {
   await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
     const at = engine?.cagePositions();
-    // Half of it to the side.
+    // Stretch the upper half along x.
     engine?.setCagePositions(
       (at ?? new Float32Array()).map((x, k, all) => (k % 3 === 0 && (all[k + 1] ?? 0) > 0 ? 1.3 * x : x)),
     );
@@ -147,7 +147,7 @@ export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]
   await drag(page, dx, dy);
 }
 
-/** A posed model comes back as it was exported. */
+/** Exports a posed model, and opens the file. */
 export async function exportsWhatIsShown(page: Page, picture: string): Promise<void> {
   await posesAWorm(page, [60, 10]);
   const posed = await modelPositions(page);
@@ -160,14 +160,14 @@ export async function exportsWhatIsShown(page: Page, picture: string): Promise<v
   expect(largestMove(posed, again)).toBeLessThan(1e-4);
 }
 
-/** The picture that is exported shows something. */
+/** Exports a picture, which is not empty. */
 export async function exportsAPicture(page: Page): Promise<void> {
   const picture = await download(page, "picture");
   expect(Buffer.from(picture.bytes.slice(1, 4)).toString()).toBe("PNG");
   expect(picture.bytes.length).toBeGreaterThan(20_000);
 }
 
-/** Model and pose survive when the GPU is lost, and can be dragged again. */
+/** Checks that model and pose survive a lost GPU and can be dragged. */
 export async function survives(page: Page, lose: () => Promise<unknown>): Promise<void> {
   await drag(page, 40, 40);
   const before = await modelPositions(page);

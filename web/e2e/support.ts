@@ -1,23 +1,24 @@
-/** What all tests of the page share: opening it, looking at its engine, dropping files on it. */
+/** Helpers of all tests: opening the page, querying its engine, dropping files. */
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test as base, expect, type JSHandle, type Page } from "@playwright/test";
 import type { Session, SurfacePoint } from "../src/contract";
+import { box } from "./models";
 
 declare global {
   var cagework: Session | undefined;
-  /** Resolves when the GPU is lost: a test that loses it waits for that. */
+  /** Resolves when the GPU is lost. */
   var wasLost: Promise<unknown> | undefined;
 }
 
-/** Pictures of each state, to be looked at. */
+/** Folder of screenshots, for inspection. */
 export const SCREENS = join(import.meta.dirname, "../../target/screens");
 
-/** A note of the software GL driver about its own speed, seen once in a hundred visits; it says nothing of the page. */
+/** A rare performance warning of the software GL driver. */
 const OF_THE_DRIVER = /GL Driver Message .*queueSerial/;
 
-/** A page whose console must stay empty. */
+/** Tests fail if the console has errors or warnings at their end. */
 export const test = base.extend<{ complaints: string[] }>({
   complaints: [
     async ({ page }, use) => {
@@ -31,7 +32,7 @@ export const test = base.extend<{ complaints: string[] }>({
         if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`);
       });
       await use(complaints);
-      // A script that a test answers for may still be on its way; a page that the test closed waits for none.
+      // Routed requests may still be in progress, unless the test has closed the page.
       if (!page.isClosed()) await page.unrouteAll({ behavior: "wait" });
       expect(complaints, "the console is clean").toEqual([]);
     },
@@ -41,13 +42,13 @@ export const test = base.extend<{ complaints: string[] }>({
 
 export { expect };
 
-/** Opens the page and waits until its model follows its cage. */
+/** Opens the page and waits until a model is bound. */
 export async function open(page: Page, address = "./"): Promise<void> {
   await page.goto(address);
   await bound(page);
 }
 
-/** Waits until a model is bound as asked, and nothing is under way any more. */
+/** Waits until a model is bound and no job is running. */
 export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,
@@ -57,7 +58,7 @@ export async function bound(page: Page): Promise<void> {
   });
 }
 
-/** Where a cage vertex is in the window. */
+/** The position of a cage vertex in the window. */
 export async function handle(page: Page, vertex: number): Promise<{ x: number; y: number }> {
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
@@ -69,8 +70,8 @@ export async function handle(page: Page, vertex: number): Promise<{ x: number; y
   return { x: box.x + x, y: box.y + y };
 }
 
-/** A cage vertex that the pointer reaches: in front, not beneath the tools, and so far (share of its extent) within the
- * cage's bounding box. */
+/** A cage vertex that a click selects, and that is inside the cage's bounding box by at least the share `within` of its extents;
+ * -1 if there is none. */
 export async function reachable(page: Page, within = 0): Promise<number> {
   return page.evaluate((within) => {
     const engine = globalThis.cagework?.engine;
@@ -97,7 +98,7 @@ export async function reachable(page: Page, within = 0): Promise<number> {
   }, within);
 }
 
-/** The middle of an edge (2 corners) or a face (more) that the pointer reaches, in the window. */
+/** The centre in the window of an edge (2 corners) or face (more) that a click selects. */
 export async function spot(
   page: Page,
   corners: number,
@@ -133,7 +134,7 @@ export async function spot(
   return found;
 }
 
-/** Drags a cage vertex alone (with Alt) by pixels; returns the vertex. */
+/** Drags one cage vertex (with Alt) by pixels; returns its index. */
 export async function drag(page: Page, dx: number, dy: number): Promise<number> {
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
@@ -147,7 +148,7 @@ export async function drag(page: Page, dx: number, dy: number): Promise<number> 
   return vertex;
 }
 
-/** A point of the model under the pointer, with no handle near it: the nearest to the middle of the view, or to a place of it. */
+/** The model point nearest to a position in the view, given as shares of its size, that has no handle near it. */
 export async function grip(
   page: Page,
   share: readonly [number, number] = [0.5, 0.5],
@@ -176,7 +177,7 @@ export async function grip(
   return found;
 }
 
-/** Where a point of the model is in the window. */
+/** The position of a point of the model in the window. */
 export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: number; y: number }> {
   return page.evaluate((point) => {
     const engine = globalThis.cagework?.engine;
@@ -187,7 +188,7 @@ export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: num
   }, point);
 }
 
-/** Drags from one place to another, in steps. */
+/** Drags by pixels, in steps. */
 export async function pull(
   page: Page,
   from: { x: number; y: number },
@@ -200,7 +201,7 @@ export async function pull(
   await page.mouse.up();
 }
 
-/** Waits until a pull has come to rest and is a step of the history. */
+/** Waits until a pull has ended and can be undone. */
 export async function rested(page: Page): Promise<void> {
   await expect(page.getByRole("button", { name: /^Undo/ })).toHaveAttribute("data-tip", /Pull/);
 }
@@ -209,7 +210,7 @@ export function cagePositions(page: Page): Promise<number[]> {
   return page.evaluate(() => Array.from(globalThis.cagework?.engine.cagePositions() ?? []));
 }
 
-/** Positions of the model's vertices, as the GPU has them. */
+/** Vertex positions of the model, read back from the GPU. */
 export function modelPositions(page: Page): Promise<number[]> {
   return page.evaluate(async () => Array.from((await globalThis.cagework?.readPositions()) ?? []));
 }
@@ -229,7 +230,7 @@ export interface Dropped {
   readonly bytes: Uint8Array;
 }
 
-/** Files in a hand, on their way to the window. */
+/** A DataTransfer that holds files. */
 export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHandle<DataTransfer>> {
   const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
   return page.evaluateHandle((packed) => {
@@ -242,19 +243,29 @@ export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHa
   }, packed);
 }
 
-/** Lets go of them above the window. */
+/** Drops a DataTransfer on the window. */
 export async function letGo(page: Page, data: JSHandle<DataTransfer>): Promise<void> {
   for (const type of ["dragenter", "dragover", "drop"]) {
     await page.locator("#stage").dispatchEvent(type, { dataTransfer: data });
   }
 }
 
-/** Drops files on the window, as a hand would. */
+/** Drops files on the window. */
 export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
   await letGo(page, await carry(page, files));
 }
 
-/** Waits until what was changed before is drawn with all its pixels. */
+/** Drops a box with a box as its cage, and waits until they are bound. */
+export async function dropBox(page: Page, name: string): Promise<void> {
+  await drop(page, [
+    { name: `${name}.obj`, bytes: box(0.5) },
+    { name: `${name}-cage.obj`, bytes: box(0.8) },
+  ]);
+  await expect(page).toHaveTitle(new RegExp(name));
+  await bound(page);
+}
+
+/** Waits until the current state is drawn at full resolution. */
 export async function drawn(page: Page): Promise<void> {
   await page.evaluate(
     () =>
@@ -269,13 +280,13 @@ export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(isSharp);
 }
 
-/** What is drawn in the view, without what lies on it: toasts come and go, and the browser does not always paint shadows alike. */
+/** Screenshot of the canvas without the elements above it: toasts disappear, and the rendering of shadows varies. */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
   const { x, y, width, height } = box;
-  // Not an element, which the page's Content-Security-Policy forbids; not hidden, which would take the focus away.
+  // The Content-Security-Policy forbids style elements, and `visibility: hidden` would remove the focus.
   const sheet = await page.evaluateHandle(() => {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(
@@ -291,7 +302,7 @@ export async function drawing(page: Page): Promise<Buffer> {
   return picture;
 }
 
-/** Waits until nothing of the page moves by itself. */
+/** Waits until all finite animations have ended. */
 export async function calm(page: Page): Promise<void> {
   await page.waitForFunction(() =>
     document.getAnimations().every(({ playState, effect }) => {
@@ -306,10 +317,10 @@ const isSharp = () => {
   return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
 };
 
-/** A picture waits so long for the canvas to have all its pixels, ms; while something is computed it never has. */
+/** How long a screenshot waits for full resolution, ms. The canvas stays coarse during computations. */
 const SHARPENED = 2000;
 
-/** Saves a picture of the page, as sharp as it gets. */
+/** Saves a screenshot. */
 export async function shoot(page: Page, name: string): Promise<void> {
   await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
@@ -325,16 +336,16 @@ export async function download(page: Page, kind: string): Promise<Dropped> {
   return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
 }
 
-/** More than a module's memory can hold: taking it in is a trap. */
+/** More bytes than the memory of a wasm module can hold: copying them into it traps. */
 export const TOO_MUCH = 2_400_000_000;
 
-/** Calls of the engine as a handler of events would make them: what they throw reaches the window. */
+/** Crashes the wasm module outside any promise, so that the error reaches the window. */
 export async function crash(page: Page, how: "panic" | "out of memory"): Promise<void> {
   await page.evaluate(
     ([how, bytes]) => {
       setTimeout(() => {
         const engine = globalThis.cagework?.engine;
-        // A box of more squares than can be counted, and more numbers than there is room for.
+        // A box with more faces than an index can count, and an array larger than the memory.
         if (how === "panic") globalThis.cagework?.boxCage(3000);
         else engine?.setCagePositions(new Float32Array(bytes / 4));
       });
@@ -344,18 +355,17 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
 }
 
 /**
- * Makes workers fail, or never end, when they read a file of 100 bytes; or any file. Must be called before the page is
- * loaded.
+ * Makes workers trap or hang when they read a file of the given size, bytes; or any file. Call it before the page loads.
  */
 export async function spoilReading(
   page: Page,
-  how: "trap" | "hang",
-  which: 100 | "all" = 100,
+  sizes: { readonly trap?: number; readonly hang?: number | "any" },
 ): Promise<void> {
-  const act = how === "trap" ? `return new ArrayBuffer(${TOO_MUCH});` : "for (;;);";
+  const { trap, hang } = sizes;
   const spoiled = `const real = Blob.prototype.arrayBuffer;
     Blob.prototype.arrayBuffer = async function () {
-      if (${which === "all"} || this.size === 100) { ${act} }
+      if (this.size === ${trap}) return new ArrayBuffer(${TOO_MUCH});
+      if (${hang === "any"} || this.size === ${hang === "any" ? -1 : hang}) for (;;);
       return real.call(this);
     };`;
   await page.route(/\/worker[^/]*\.js$/, async (route) => {

@@ -1,4 +1,4 @@
-/** How long the page's main thread is busy with one thing. */
+/** Durations of tasks of the main thread. */
 
 import type { Browser, Page } from "@playwright/test";
 
@@ -7,12 +7,12 @@ interface TraceEvent {
   readonly name: string;
   readonly pid: number;
   readonly tid: number;
-  /** Processor time, microseconds: unlike wall-clock time it does not grow when others use the machine. */
+  /** Processor time, microseconds: unlike wall-clock time, it does not grow under load. */
   readonly tdur?: number;
   readonly args?: { readonly name?: string };
 }
 
-/** Runs `work` and returns the longest task of the main thread meanwhile, milliseconds of processor time. */
+/** Runs `work` and returns the longest task of the main thread during it, milliseconds of processor time. */
 export async function longestTask(browser: Browser, page: Page, work: () => Promise<void>): Promise<number> {
   await browser.startTracing(page, { categories: ["toplevel", "__metadata"] });
   await work();

@@ -1,4 +1,4 @@
-/** Fingers: two move and magnify the view, one drags a handle. */
+/** Touch: two fingers move and zoom the view, one finger drags handles and the model. */
 
 import type { CDPSession } from "@playwright/test";
 import {
@@ -29,7 +29,7 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
     }));
   const send = (type: "touchStart" | "touchMove" | "touchEnd", share?: number) =>
     cdp.send("Input.dispatchTouchEvent", { type, touchPoints: share === undefined ? [] : at(share) });
-  // At once: were each waited for, a busy page would take the time in between for a long press.
+  // Without waiting: delays between the events could make the touch a long press.
   await Promise.all([
     send("touchStart", 0),
     ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share)),
@@ -37,18 +37,31 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
   await send("touchEnd");
 }
 
-test("two fingers look around, one finger poses", async ({ page }) => {
+test("two fingers move the view, one finger poses", async ({ page }) => {
   await open(page);
+  await test.step("the page fits the screen, and the status fades", async () => {
+    await page.setViewportSize({ width: 390, height: 844 });
+    await shoot(page, "phone");
+    const width = await page.evaluate(() => document.documentElement.scrollWidth);
+    expect(width).toBeLessThanOrEqual(390);
+    await page.touchscreen.tap(200, 200);
+    // The status covers the model: it becomes transparent, but stays available to screen readers.
+    await expect(page.locator("#status span")).toHaveText(/selected|Ready/);
+    await expect(page.locator("#status span")).toHaveCSS("opacity", "0");
+    await shoot(page, "phone-read");
+    await page.setViewportSize({ width: 412, height: 760 });
+    await page.keyboard.press("Alt+a");
+  });
   const cdp = await page.context().newCDPSession(page);
   const rest = await cagePositions(page);
-  // Without perspective everything moves alike.
+  // Without perspective, all points move by the same distance.
   await page.getByRole("button", { name: "Parallel projection" }).tap();
   /** Two vertices of the cage, far apart in the picture. */
   const seen = async () => [await handle(page, 0), await handle(page, 40)] as const;
   const apart = (p: { x: number; y: number }, q: { x: number; y: number }) =>
     Math.hypot(p.x - q.x, p.y - q.y);
 
-  await test.step("side by side they move the view", async () => {
+  await test.step("two parallel fingers move the view", async () => {
     const before = await seen();
     await fingers(
       cdp,
@@ -68,7 +81,7 @@ test("two fingers look around, one finger poses", async ({ page }) => {
     }
   });
 
-  await test.step("apart they magnify, together they make smaller", async () => {
+  await test.step("spreading fingers zooms in, pinching zooms out", async () => {
     const together = [
       [170, 220],
       [250, 220],
@@ -101,7 +114,7 @@ test("two fingers look around, one finger poses", async ({ page }) => {
     await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.01);
     await touch("touchStart", [
       [x + 30, y + 30],
-      // Beside everything, and on the view, not on the panel below it.
+      // On the background of the view.
       [90, 170],
     ]);
     await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
@@ -122,7 +135,7 @@ test("two fingers look around, one finger poses", async ({ page }) => {
     await page.keyboard.press("Alt+a");
     const at = await grip(page, [0.4, 0.3]);
     await fingers(cdp, [[at.x, at.y]], [[at.x + 25, at.y - 25]]);
-    // The step before was a pull, too: its name in the history says nothing.
+    // The previous undo step is also a pull, so that its name does not show the end of this one.
     await expect
       .poll(async () => apart(await placeOf(page, at.point), { x: at.x + 25, y: at.y - 25 }))
       .toBeLessThan(4);

@@ -1,4 +1,4 @@
-/** The tour: each stop shows what it says, in numbers that the session or its binds report. */
+/** The tour: the claims of each stop hold for the numbers that it shows. */
 
 import type { Page } from "@playwright/test";
 import { box } from "./models";
@@ -21,7 +21,7 @@ test.use({ hasTouch: true });
 
 const card = (page: Page) => page.getByRole("region", { name: "Tour" });
 
-/** Waits until a stop is ready. */
+/** Waits until the stop is ready. */
 async function arrived(page: Page, stop: number): Promise<void> {
   await expect(card(page)).toContainText(`${stop} of 10`);
   await expect(card(page)).toHaveAttribute("aria-busy", "false", { timeout: 60_000 });
@@ -32,19 +32,19 @@ async function next(page: Page, stop: number): Promise<void> {
   await arrived(page, stop);
 }
 
-/** Numbers that the card shows for something, in order. */
+/** The first groups of all matches in the card, as numbers. */
 async function numbers(page: Page, what: RegExp): Promise<number[]> {
   const text = (await card(page).textContent()) ?? "";
   return [...text.matchAll(what)].map((found) => Number(found[1]));
 }
 
-/** Chooses among what the card offers, and waits for it. */
+/** Chooses an option of the card and waits for the result. */
 async function choose(page: Page, name: string, stop: number): Promise<void> {
   await card(page).getByRole("radio", { name, exact: true }).check({ force: true });
   await arrived(page, stop);
 }
 
-/** Weights of a vertex of the cage: how far the model follows when it alone is moved by 1 along x. */
+/** Weights of a cage vertex: displacements of the model when this vertex moves by 1 along x. */
 async function weightsOf(page: Page, vertex: number): Promise<number[]> {
   const rest = await cagePositions(page);
   const set = (at: number[]) =>
@@ -56,13 +56,13 @@ async function weightsOf(page: Page, vertex: number): Promise<number[]> {
   return after.filter((_, k) => k % 3 === 0).map((x, v) => x - (before[3 * v] ?? 0));
 }
 
-/** How many different places the vertices of the model are at. */
+/** Number of distinct positions of model vertices. */
 async function spots(page: Page): Promise<number> {
   const at = (await modelPositions(page)).map((x) => x.toFixed(4));
   return new Set(at.flatMap((x, k) => (k % 3 === 0 ? [`${x} ${at[k + 1]} ${at[k + 2]}`] : []))).size;
 }
 
-/** By how much more than at rest the model is folded along one of its edges, radians; of a thousand edges the worst but one. */
+/** The 99.9th percentile over all edges of the increase of the dihedral angle from rest, radians. */
 async function sharpestFold(page: Page): Promise<number> {
   return page.evaluate(async () => {
     const session = globalThis.cagework;
@@ -105,13 +105,13 @@ async function sharpestFold(page: Page): Promise<number> {
   });
 }
 
-test("each stop shows what it says", async ({ page }) => {
+test("the claims of each stop hold", async ({ page }) => {
   await open(page);
   const rest = await page.evaluate(() => Array.from(globalThis.cagework?.engine.modelPositions() ?? []));
   const n = rest.length / 3;
   await page.getByRole("button", { name: "Take the tour" }).click();
 
-  await test.step("1: the model is a mix of the cage's points", async () => {
+  await test.step("1: the model is a combination of cage vertices", async () => {
     await arrived(page, 1);
     const nCage = (await cagePositions(page)).length / 3;
     await expect(card(page)).toContainText(
@@ -120,14 +120,14 @@ test("each stop shows what it says", async ({ page }) => {
     expect(largestMove(rest, await modelPositions(page)), "at rest it is where it was").toBeLessThan(1e-5);
   });
 
-  await test.step("2: a weight is from 0 to 1, and does not reach through the air", async () => {
+  await test.step("2: a weight is from 0 to 1, and small across a gap", async () => {
     await next(page, 2);
     const legend = await page.evaluate(() => globalThis.cagework?.engine.legend());
     const weights = await weightsOf(page, 55);
     expect(Math.min(...weights)).toBeGreaterThan(-1e-6);
     expect(Math.max(...weights)).toBeCloseTo(legend?.largest?.value ?? 0, 3);
     expect(Math.max(...weights)).toBeLessThan(1);
-    // Of a hind leg what follows a vertex at the other one.
+    // Weights in one hind leg of a vertex at the other.
     const leg = await weightsOf(page, 48);
     const other = leg.filter((_, v) => {
       const [x = 0, y = 0, z = 0] = rest.slice(3 * v, 3 * v + 3);
@@ -137,7 +137,7 @@ test("each stop shows what it says", async ({ page }) => {
     expect(Math.max(...other)).toBeLessThan(0.1 * Math.max(...leg));
   });
 
-  await test.step("3: a coordinate on the grid, and its cells", async () => {
+  await test.step("3: a coordinate and the cells of the grid", async () => {
     await next(page, 3);
     const legend = () => page.evaluate(() => globalThis.cagework?.engine.legend());
     await expect.poll(legend).toMatchObject({ map: "viridis", low: 0, high: 1 });
@@ -145,7 +145,7 @@ test("each stop shows what it says", async ({ page }) => {
     await expect.poll(legend).toMatchObject({ map: "kinds" });
   });
 
-  await test.step("4: all points of a cell land on one spot", async () => {
+  await test.step("4: the classic method moves all points of a cell to one position", async () => {
     await next(page, 4);
     const coarse = await spots(page);
     expect(coarse).toBeLessThan(n / 20);
@@ -156,14 +156,14 @@ test("each stop shows what it says", async ({ page }) => {
     expect(errors[1] ?? 0, "there are still steps").toBeGreaterThan(1e-3);
   });
 
-  await test.step("5: a solve that stops early leaves the model too small", async () => {
+  await test.step("5: stopping early makes errors larger", async () => {
     await next(page, 5);
     await choose(page, "1e-5", 5);
     const [early = 0, late = 0] = await numbers(page, /tau = 1e-\d\s*(\d[\d.e-]*)/g);
     expect(early).toBeGreaterThan(3 * late);
   });
 
-  await test.step("6: hundreds of sweeps, dozens of steps, a handful of cycles", async () => {
+  await test.step("6: Jacobi, conjugate gradients and multigrid need fewer iterations", async () => {
     await next(page, 6);
     const iterations = () => numbers(page, /(?:multigrid|conjugate gradients|Jacobi): (\d+)/g);
     const [multigrid = 0, cg = 0, jacobi = 0] = await iterations();
@@ -178,7 +178,7 @@ test("each stop shows what it says", async ({ page }) => {
     expect(sweeps).toBeLessThan(jacobi / 2);
   });
 
-  await test.step("7: ours takes less time here than the paper's way", async () => {
+  await test.step("7: the default method takes less time than the paper's", async () => {
     await next(page, 7);
     const texts = await card(page).locator("tbody td:nth-child(2)").allInnerTexts();
     const [paper = 0, ours = 0] = texts.map((text) => Number.parseFloat(text) * (/ms/.test(text) ? 1 : 1000));
@@ -197,7 +197,7 @@ test("each stop shows what it says", async ({ page }) => {
     expect(await complaintsOfAxe(page)).toEqual([]);
   });
 
-  await test.step("9: who is dragged along, and whose details keep their shape", async () => {
+  await test.step("9: harmonic, mean value and Green coordinates differ", async () => {
     await next(page, 9);
     const { moved, sheared } = await page.evaluate(async () => {
       const session = globalThis.cagework;
@@ -219,7 +219,7 @@ test("each stop shows what it says", async ({ page }) => {
             ...jaw.map((k) => Math.hypot(...[0, 1, 2].map((c) => (at[k + c] ?? 0) - (rest[k + c] ?? 0)))),
           ),
         );
-        // How differently the sides of a triangle are stretched; of a hundred triangles the worst but one.
+        // The ratio of the largest to the smallest stretch of a triangle's sides, 99th percentile.
         const shears: number[] = [];
         for (let t = 0; t < triangles.length; t += 3) {
           const [a, b, c] = triangles.slice(t, t + 3);
@@ -241,7 +241,7 @@ test("each stop shows what it says", async ({ page }) => {
     await shoot(page, "tour-coordinates");
   });
 
-  await test.step("10: a smooth cage leaves no edges, and a bone is one handle more", async () => {
+  await test.step("10: a smooth cage avoids sharp folds, and a bone adds a handle", async () => {
     await next(page, 10);
     const plain = await sharpestFold(page);
     await choose(page, "2", 10);
@@ -268,7 +268,7 @@ test("each stop shows what it says", async ({ page }) => {
   expect(largestMove(rest, await modelPositions(page)), "bound as before").toBeLessThan(1e-5);
 });
 
-test("a link begins it, keys and fingers lead through it, and what was open comes back", async ({ page }) => {
+test("a link starts the tour, keys and touch navigate, and the open model is restored", async ({ page }) => {
   await page.setViewportSize({ width: 390, height: 844 });
   await page.goto("./#tour=3");
   await arrived(page, 3);

@@ -1,4 +1,4 @@
-/** A body, its shirt and a buckle, made by formula: three files for one cage. */
+/** A body, a shirt and a buckle, made by formula: three files for one cage. */
 
 import { Document, type Material, type Node, NodeIO } from "@gltf-transform/core";
 import type { Dropped } from "./support";
@@ -7,11 +7,11 @@ import type { Dropped } from "./support";
 export const SIZES = { body: 2 * 13 * 24, shirt: 15 * 24, buckle: 8 } as const;
 
 const AROUND = 24;
-/** The body is 2 high and closes like an egg; its lower half is another material. */
+/** Radius of the body, which is 2 high and closed at both ends; its lower half has another material. */
 const RADIUS = 0.35;
 const radiusAt = (y: number) => RADIUS * Math.sqrt(Math.max(0, Math.sin((Math.PI * y) / 2)));
 
-/** Rings from one height to another, and the faces between them. */
+/** A surface of rings between two heights. */
 function sleeve(from: number, to: number, rings: number, radius: (y: number) => number) {
   const positions: number[] = [];
   const indices: number[] = [];
@@ -84,7 +84,7 @@ function body(): Promise<Dropped> {
   return all.file("body.glb");
 }
 
-/** Around the upper half of the body, on a skeleton of two joints that nods. */
+/** A sleeve around the upper body, on a skeleton of two joints with a clip. */
 function shirt(): Promise<Dropped> {
   const all = new Builder();
   const { document } = all;
@@ -128,7 +128,7 @@ function shirt(): Promise<Dropped> {
   return all.file("shirt.glb");
 }
 
-/** A box in front of the body's middle. */
+/** A box in front of the body. */
 function buckle(): Promise<Dropped> {
   const all = new Builder();
   const positions = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((k) => [

@@ -15,7 +15,7 @@ import { bound, calm, expect, grip, open, shoot, test } from "./support";
 
 test.use({ launchOptions: WITH_WEBGL });
 
-/** Takes WebGPU away; asked for an adapter, Chromium would complain in the console, which must stay empty. */
+/** Removes WebGPU: Chromium warns in the console, which must stay empty, if the page requests an adapter. */
 async function withoutWebGpu(page: Page): Promise<void> {
   await page.addInitScript(() => {
     Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
@@ -24,7 +24,7 @@ async function withoutWebGpu(page: Page): Promise<void> {
 
 test.beforeEach(async ({ page }) => withoutWebGpu(page));
 
-test("opens bound, follows a handle, shows colours, exports, and survives a lost context", async ({
+test("without WebGPU the page opens, poses, draws, exports, and recovers from a lost context", async ({
   page,
 }) => {
   const wasm: string[] = [];
@@ -37,6 +37,27 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     "only the artifact for WebGL2 is downloaded",
   ).toBe(true);
   await shoot(page, "webgl-opens");
+  const notice = page.getByText(/No WebGPU here/);
+  await test.step("a notice explains what is different and how to enable WebGPU", async () => {
+    await expect(notice).toBeVisible();
+    await page.getByRole("button", { name: "How to switch it on" }).click();
+    await expect(page.getByRole("dialog").getByText(/Firefox on Linux/)).toBeVisible();
+    await shoot(page, "webgl-steps");
+    expect(await complaintsOfAxe(page)).toEqual([]);
+    await page.keyboard.press("Escape");
+
+    await page.getByRole("button", { name: "Bind", exact: false }).first().click();
+    await expect(page.getByRole("radio", { name: "Graphics card" })).toBeDisabled();
+    await expect(page.getByRole("radio", { name: "Processor" })).toBeChecked();
+    await expect(page.getByText(/graphics card needs WebGPU/)).toBeVisible();
+    for (const scheme of ["light", "dark"] as const) {
+      await page.emulateMedia({ colorScheme: scheme });
+      await calm(page);
+      expect(await complaintsOfAxe(page), scheme).toEqual([]);
+      await shoot(page, `webgl-${scheme}-bind`);
+    }
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  });
   await followsAHandle(page, "webgl-posed");
   await test.step("the model is pulled", () => pullsTheModel(page));
   await test.step("colours, slice and comparison are shown", () => showsColours(page, "webgl"));
@@ -67,8 +88,8 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
       session.engine.stopClip();
       return all;
     });
-    expect(pictures[0], "the same time looks the same").toBe(pictures[2]);
-    expect(pictures[0], "another one does not").not.toBe(pictures[1]);
+    expect(pictures[0], "equal times look equal").toBe(pictures[2]);
+    expect(pictures[0], "different times look different").not.toBe(pictures[1]);
   });
   await test.step("a smooth cage with a point inside is bound on the processor", async () => {
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
@@ -88,7 +109,7 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     await bound(page);
   });
   await test.step("a lost context comes back with model and pose", async () => {
-    // As the browser takes it away: the canvas's own context, not the page's way to give it up.
+    // Through the context of the canvas, as the browser does.
     await survives(page, () =>
       page.evaluate(() => {
         const context = document.querySelector("canvas")?.getContext("webgl2");
@@ -97,37 +118,16 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     );
     await shoot(page, "webgl-recovered");
   });
+  await test.step("a closed notice stays closed", async () => {
+    await page.getByRole("button", { name: "Close this notice" }).click();
+    await expect(notice).toHaveCount(0);
+    await page.reload();
+    await bound(page);
+    await expect(notice).toHaveCount(0);
+  });
 });
 
-test("says once what is different, and how to get WebGPU", async ({ page }) => {
-  await open(page);
-  const notice = page.getByText(/No WebGPU here/);
-  await expect(notice).toBeVisible();
-  await page.getByRole("button", { name: "How to switch it on" }).click();
-  await expect(page.getByRole("dialog").getByText(/Firefox on Linux/)).toBeVisible();
-  await shoot(page, "webgl-steps");
-  expect(await complaintsOfAxe(page)).toEqual([]);
-  await page.keyboard.press("Escape");
-
-  await page.getByRole("button", { name: "Bind", exact: false }).first().click();
-  await expect(page.getByRole("radio", { name: "Graphics card" })).toBeDisabled();
-  await expect(page.getByRole("radio", { name: "Processor" })).toBeChecked();
-  await expect(page.getByText(/graphics card needs WebGPU/)).toBeVisible();
-  for (const scheme of ["light", "dark"] as const) {
-    await page.emulateMedia({ colorScheme: scheme });
-    await calm(page);
-    expect(await complaintsOfAxe(page), scheme).toEqual([]);
-    await shoot(page, `webgl-${scheme}-bind`);
-  }
-
-  await page.getByRole("button", { name: "Close this notice" }).click();
-  await expect(notice).toHaveCount(0);
-  await page.reload();
-  await bound(page);
-  await expect(notice).toHaveCount(0);
-});
-
-test("without WebGL2 either the page says what to do", async ({ page }) => {
+test("without WebGPU and WebGL2 the page explains what to do", async ({ page }) => {
   await page.addInitScript(() => {
     const original = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (

@@ -1,24 +1,18 @@
-/** Work that the browser keeps: a piece for each model, one tab at a time. */
+/** Work that the browser saves: one entry per model, open in one tab at a time. */
 
 import type { Page } from "@playwright/test";
 import { cutKept, savedSince } from "./kept";
-import { box } from "./models";
 import { complaintsOfAxe } from "./stories";
-import { bound, cagePositions, calm, drag, drop, expect, largestMove, open, shoot, test } from "./support";
+import { bound, cagePositions, calm, drag, dropBox, expect, largestMove, open, shoot, test } from "./support";
 
-/** Drops a box in a cage and waits until the browser keeps it. */
+/** Drops a box in a cage and waits until the browser has saved it. */
 async function work(page: Page, name: string): Promise<void> {
   const before = await page.evaluate(() => Date.now());
-  await drop(page, [
-    { name: `${name}.obj`, bytes: box(0.5) },
-    { name: `${name}-cage.obj`, bytes: box(0.8) },
-  ]);
-  await expect(page).toHaveTitle(new RegExp(name));
-  await bound(page);
+  await dropBox(page, name);
   await expect.poll(() => savedSince(page, before, name), { timeout: 60_000 }).toBe(true);
 }
 
-/** Goes to where the page's storage is, and not the page. */
+/** Leaves the page for another document of the same origin, which has the same storage. */
 async function leave(page: Page): Promise<void> {
   await page.route("**/favicon.ico", (route) => route.fulfill({ body: "" }));
   await page.goto("./licences.txt");
@@ -32,13 +26,22 @@ async function showList(page: Page): Promise<void> {
   await page.getByRole("button", { name: /^Kept in this browser/ }).click();
 }
 
-test("two tabs with two works, and a third visit lists both", async ({ page, context }) => {
+test("each tab reopens its own work, and a new tab lists or opens the others", async ({ page, context }) => {
   await open(page);
   await work(page, "workA");
   const second = await context.newPage();
   await open(second);
   await expect(second, "another tab has the only work open").toHaveTitle(/Rat/);
   await work(second, "workB");
+
+  for (const [tab, name] of [
+    [page, /workA/],
+    [second, /workB/],
+  ] as const) {
+    await tab.reload();
+    await expect(tab, "a reloaded tab has its own work").toHaveTitle(name);
+    await bound(tab);
+  }
 
   const third = await context.newPage();
   await third.goto("./");
@@ -65,85 +68,82 @@ test("two tabs with two works, and a third visit lists both", async ({ page, con
   await listOf(third).getByRole("button", { name: "Open workA.obj" }).click();
   await expect(third).toHaveTitle(/workA/);
   await bound(third);
+
+  const fourth = await context.newPage();
+  await open(fourth);
+  await expect(fourth, "the only work that no other tab has open").toHaveTitle(/workB/);
 });
 
-test("a tab that is loaded again has its own work, whatever else is kept", async ({ page, context }) => {
-  await open(page);
-  await work(page, "workA");
-  await work(page, "workB");
-  const other = await context.newPage();
-  await open(other);
-  await expect(other, "the only work that no other tab has open").toHaveTitle(/workA/);
-  await work(other, "workC");
-  for (const [tab, name] of [
-    [page, /workB/],
-    [other, /workC/],
-  ] as const) {
-    await tab.reload();
-    await expect(tab).toHaveTitle(name);
-    await bound(tab);
-  }
-});
-
-test("a second model keeps the first, one click brings it back, and Delete takes two", async ({ page }) => {
-  await open(page);
-  await work(page, "workA");
-  const before = await page.evaluate(() => Date.now());
-  await drag(page, 30, 20);
-  const posed = await cagePositions(page);
-  await expect.poll(() => savedSince(page, before, "workA")).toBe(true);
-  await work(page, "workB");
-  const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
-  await expect(kept).toBeVisible();
-  await page.getByRole("button", { name: "Bring it back" }).click();
-  await expect(page).toHaveTitle(/workA/);
-  await bound(page);
-  expect(largestMove(posed, await cagePositions(page)), "with its pose").toBeLessThan(1e-3);
-  await showList(page);
-  const list = listOf(page);
-  await expect(list.getByRole("listitem")).toHaveText([/workA\.obj.*open here/, /workB\.obj/]);
-  await list.getByRole("button", { name: "Delete workB.obj", exact: true }).click();
-  await expect(list.getByRole("listitem")).toHaveCount(2);
-  await list.getByRole("button", { name: "Confirm delete workB.obj" }).click();
-  await expect(list.getByRole("listitem")).toHaveText([/workA\.obj/]);
-  await page.reload();
-  await bound(page);
-  expect(await savedSince(page, 0, "workB")).toBe(false);
-  expect(await savedSince(page, 0, "workA")).toBe(true);
-});
-
-test("samples that nobody touched leave nothing, and what was changed a moment before another came is kept", async ({
+test("changed work is saved before another model opens, listed, restored, deleted, and dropped if damaged", async ({
   page,
 }) => {
   await open(page);
-  await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  const show = async (sample: string) => {
-    await page.locator(`[data-sample="${sample}"]`).click();
-    await expect(page).toHaveTitle(new RegExp(sample, "i"));
-    await bound(page);
-  };
-  await show("strider");
-  await show("clamp");
-  expect(await savedSince(page, 0)).toBe(false);
-  await drag(page, 50, 30);
-  // Within the pause after which work is kept by itself.
-  await show("strider");
-  await showList(page);
-  await expect(listOf(page).getByRole("listitem")).toHaveText([/^Clamp/]);
-});
+  const list = listOf(page);
+  const items = list.getByRole("listitem");
 
-test("damaged work is deleted, and a sentence says so", async ({ page }) => {
-  await open(page);
-  await work(page, "workA");
-  await leave(page);
-  await cutKept(page);
-  // It goes away by itself: a slow page may still be binding by then.
-  await Promise.all([
-    open(page),
-    expect(page.locator("#toasts")).toContainText(
-      "Your work on workA.obj, kept in this browser, was damaged",
-    ),
-  ]);
-  await expect(page).toHaveTitle(/Rat/);
-  expect(await savedSince(page, 0)).toBe(false);
+  await test.step("unchanged samples are not saved, a change is saved when another sample opens", async () => {
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+    const show = async (sample: string) => {
+      await page.locator(`[data-sample="${sample}"]`).click();
+      await expect(page).toHaveTitle(new RegExp(sample, "i"));
+      await bound(page);
+    };
+    await show("strider");
+    await show("clamp");
+    expect(await savedSince(page, 0)).toBe(false);
+    await drag(page, 50, 30);
+    // Within the delay of the autosave.
+    await show("strider");
+    await showList(page);
+    await expect(items).toHaveText([/^Clamp/]);
+    await page.keyboard.press("Escape");
+  });
+
+  await test.step("a second model keeps the first, and one click restores it", async () => {
+    await work(page, "workA");
+    const before = await page.evaluate(() => Date.now());
+    await drag(page, 30, 20);
+    const posed = await cagePositions(page);
+    await expect.poll(() => savedSince(page, before, "workA")).toBe(true);
+    await work(page, "workB");
+    const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
+    await expect(kept).toBeVisible();
+    await page.getByRole("button", { name: "Bring it back" }).click();
+    await expect(page).toHaveTitle(/workA/);
+    await bound(page);
+    expect(largestMove(posed, await cagePositions(page)), "with its pose").toBeLessThan(1e-3);
+  });
+
+  await test.step("deleting takes two clicks", async () => {
+    await showList(page);
+    await expect(items).toHaveText([/workA\.obj.*open here/, /workB\.obj/, /^Clamp/]);
+    for (const [name, left] of [
+      ["workB.obj", 2],
+      ["Clamp", 1],
+    ] as const) {
+      await list.getByRole("button", { name: `Delete ${name}`, exact: true }).click();
+      await expect(items).toHaveCount(left + 1);
+      await list.getByRole("button", { name: `Confirm delete ${name}` }).click();
+      await expect(items).toHaveCount(left);
+    }
+    await expect(items).toHaveText([/workA\.obj/]);
+    await page.reload();
+    await bound(page);
+    expect(await savedSince(page, 0, "workB")).toBe(false);
+    expect(await savedSince(page, 0, "workA")).toBe(true);
+  });
+
+  await test.step("damaged work is deleted and reported", async () => {
+    await leave(page);
+    await cutKept(page);
+    // The message disappears after a while, which a slow bind can outlast.
+    await Promise.all([
+      open(page),
+      expect(page.locator("#toasts")).toContainText(
+        "Your work on workA.obj, kept in this browser, was damaged",
+      ),
+    ]);
+    await expect(page).toHaveTitle(/Rat/);
+    expect(await savedSince(page, 0)).toBe(false);
+  });
 });
