@@ -22,7 +22,7 @@ const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
 const MIN_COLLAPSE_COSINE: f64 = 0.15;
 
 /// Smallest quality of a new triangle, see [`quality`].
-const MIN_QUALITY: f64 = 0.12;
+pub(super) const MIN_QUALITY: f64 = 0.12;
 
 /// Most triangles around a vertex.
 const MAX_VALENCE: usize = 11;
@@ -301,6 +301,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if pinned.is_none() || self.surface.on_mirror[gone as usize] {
             candidates.push(q);
         }
+        candidates.retain(|&c| !self.surface.is_blocked(c));
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
         // Cheapest valid candidate; mostly the first one tested.
         while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {

@@ -136,6 +136,16 @@ impl<'a> GuardedSurface<'a> {
             && !self.sheets.as_ref().is_some_and(crosses)
     }
 
+    /// Whether no triangle may have a corner at a point: its voxel is one of the solid or outside the band.
+    pub(super) fn is_blocked(&self, p: DVec3) -> bool {
+        let dims = self.keep_out.dims.map(|n| n as f64);
+        let at = p + 0.5 * DVec3::from_array(dims);
+        if at.cmplt(DVec3::ZERO).any() || at.cmpge(DVec3::from_array(dims)).any() {
+            return self.has_band;
+        }
+        self.keep_out.has(at.to_array().map(|x| x as usize))
+    }
+
     pub(super) fn has_band(&self) -> bool {
         self.has_band
     }
@@ -172,6 +182,22 @@ impl<'a> GuardedSurface<'a> {
 
     /// Smallest cosine between the normals of neighbours among `triangles`, to `others` and across the mirror.
     fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
+        self.folds(triangles, others).into_iter().fold(1.0, f64::min)
+    }
+
+    /// How far turns around triangles that stand, or would, where those numbered `gone` were exceed what [`MIN_FOLD_COSINE`] allows:
+    /// sum of cosines.
+    pub(super) fn excess(&self, triangles: &[Corners], gone: &[u32]) -> f64 {
+        let around = triangles.iter().flat_map(|t| t.index).flat_map(|i| &self.around[i as usize]);
+        let mut others: Vec<u32> = around.copied().filter(|t| !gone.contains(t)).collect();
+        others.sort_unstable();
+        others.dedup();
+        let others: Vec<Corners> = others.into_iter().map(|t| self.corners(t)).collect();
+        self.folds(triangles, &others).into_iter().map(|cosine| (MIN_FOLD_COSINE - cosine).max(0.0)).sum()
+    }
+
+    /// Cosines of the turns from the triangles to each other, to `others` and across the mirror.
+    fn folds(&self, triangles: &[Corners], others: &[Corners]) -> Vec<f64> {
         let real = |t: &Corners| self.obstacle.unstretched(t);
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
         let others: Vec<Corners> = others.iter().map(real).collect();
@@ -184,7 +210,7 @@ impl<'a> GuardedSurface<'a> {
             let beside = triangles[..k].iter().chain(&others);
             beside.filter_map(|other| t.fold_cosine(other)).chain(across(t))
         });
-        folds.fold(1.0, f64::min)
+        folds.collect()
     }
 
     /// Whether `new` triangles may replace those with the indices `gone`: clear of the obstacle, of the rest of the
@@ -270,6 +296,25 @@ impl<'a> GuardedSurface<'a> {
             }
         }
         self.place(kept, at);
+    }
+
+    /// The triangle beyond the edge from corner `k` of one, and the two of the edge between their tips `c` and `d`, `[a, d, c]` and
+    /// `[d, b, c]`; none if the surface would be no manifold (or half of one) with them.
+    pub(super) fn swapped(&self, t: u32, k: usize) -> Option<(u32, [Corners; 2])> {
+        let first = self.triangles[t as usize];
+        let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
+        let mut around = self.around[a as usize].iter().copied();
+        let other = around.find(|&u| u != t && self.triangles[u as usize].contains(&b))?;
+        let d = self.triangles[other as usize].into_iter().find(|&i| i != a && i != b)?;
+        let on_mirror = |v: u32| self.on_mirror[v as usize];
+        let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
+        let joined = self.around[c as usize].iter().any(|&u| self.triangles[u as usize].contains(&d));
+        let is_needed = |v: u32| self.around[v as usize].len() <= least(v);
+        if c == d || joined || (on_mirror(c) && on_mirror(d)) || is_needed(a) || is_needed(b) {
+            return None;
+        }
+        let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| self.positions[i as usize]) };
+        Some((other, [[a, d, c], [d, b, c]].map(corners)))
     }
 
     /// Flips the edge `a`-`b` of two triangles.

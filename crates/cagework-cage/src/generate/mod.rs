@@ -26,6 +26,7 @@ mod smooth;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod unfold;
 mod verify;
 mod voxels;
 
@@ -267,6 +268,7 @@ fn relax_and_verify(
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<Option<Cage>, Cancelled> {
     let collapsed = guarded.surface();
+    unfold::unfold(&mut guarded);
     relax::relax(&mut guarded, quadrics, &|share| go_on(0.6 + 0.2 * share))?;
     let triangles = guarded.surface();
     if of_quads {

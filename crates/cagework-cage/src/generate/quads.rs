@@ -9,6 +9,7 @@ use super::pairing::{
     Pairing, Partner, Quad, badness, is_free, other_cut, pair, places, quad_of, warp, worth,
 };
 use super::quadric::Quadric;
+use super::unfold::unfold;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
@@ -51,6 +52,7 @@ pub(super) fn quads(
             }
         }
     }
+    unfold(surface);
     pairing = pair(surface, &pairing, true);
     settle(surface, &mut pairing);
     Ok(pairing)

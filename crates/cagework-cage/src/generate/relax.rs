@@ -102,33 +102,14 @@ fn slide(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], v: u32) {
 
 /// Swaps the edge from corner `k` of a triangle if that improves both triangles.
 fn swap(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], t: u32, k: usize) {
-    let first = surface.triangles[t as usize];
-    let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
-    if a > b {
-        return;
-    }
-    let other = surface.around[a as usize]
-        .iter()
-        .copied()
-        .find(|&u| u != t && surface.triangles[u as usize].contains(&b));
-    let Some(other) = other else { return };
-    let Some(d) = surface.triangles[other as usize].into_iter().find(|&i| i != a && i != b) else { return };
-    let mut near = Vec::new();
-    surface.neighbours(c, &mut near);
-    let on_mirror = |v: u32| surface.on_mirror[v as usize];
-    let triangles_of = |v: u32| surface.around[v as usize].len();
-    let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
-    if c == d
-        || near.contains(&d)
-        || (on_mirror(c) && on_mirror(d))
-        || [a, b].iter().any(|&v| triangles_of(v) <= least(v))
-        || [c, d].iter().any(|&v| triangles_of(v) >= MAX_VALENCE)
-    {
+    let Some((other, after)) = surface.swapped(t, k) else { return };
+    let [a, d, c] = after[0].index;
+    let b = after[1].index[1];
+    if a > b || [c, d].iter().any(|&v| surface.around[v as usize].len() >= MAX_VALENCE) {
         return;
     }
     let at = |v: u32| surface.positions[v as usize];
-    let corners = |index: [u32; 3]| Corners { index, at: index.map(at) };
-    let (before, after) = ([[a, b, c], [b, a, d]].map(corners), [[a, d, c], [d, b, c]].map(corners));
+    let before = [[a, b, c], [b, a, d]].map(|index| Corners { index, at: index.map(at) });
     let edge = |v: u32, w: u32| {
         let quadric = quadrics[v as usize].plus(&quadrics[w as usize]);
         fit(&quadric, 0.5 * (at(v) + at(w)))

@@ -1,0 +1,126 @@
+//! Folds above 120 degrees that collapses left, opened where the solid and the cage itself leave room.
+
+use glam::DVec3;
+
+use super::collapse::{MIN_QUALITY, quality};
+use super::guarded::GuardedSurface;
+use cagework_core::contact::Corners;
+
+/// Rounds over all sharp folds.
+const ROUNDS: usize = 4;
+
+/// Steps of a vertex that are tried, over the mean length of its edges.
+const STEP_SHARES: [f64; 4] = [0.1, 0.25, 0.5, 1.0];
+
+/// A change must lower the sum of excess cosines by this much.
+const MIN_DECREASE: f64 = 1e-3;
+
+/// Smallest cosine between a triangle's normals before and after a move.
+const MIN_MOVE_COSINE: f64 = 0.3;
+
+/// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those less.
+pub(super) fn unfold(surface: &mut GuardedSurface<'_>) {
+    for _ in 0..ROUNDS {
+        let mut changed = false;
+        for t in 0..surface.triangles.len() as u32 {
+            if !surface.is_alive(t) || surface.excess(&[surface.corners(t)], &[t]) <= 0.0 {
+                continue;
+            }
+            changed |= (0..3).any(|k| swap(surface, t, k));
+            for v in surface.triangles[t as usize] {
+                changed |= shift(surface, v);
+            }
+        }
+        if !changed {
+            return;
+        }
+    }
+}
+
+/// Swaps the edge from corner `k` of a triangle if that leaves less excess.
+fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
+    let Some((other, new)) = surface.swapped(t, k) else { return false };
+    let before = [t, other].map(|t| surface.corners(t));
+    let gone = [t, other];
+    let is_better = new.iter().all(|t| quality(&t.at) >= MIN_QUALITY)
+        && surface.excess(&new, &gone) < surface.excess(&before, &gone) - MIN_DECREASE;
+    if is_better && surface.may_stand(&new, &gone) {
+        surface.swap(gone, new.map(|t| t.index));
+        return true;
+    }
+    false
+}
+
+/// Moves a vertex where its triangles have less excess.
+fn shift(surface: &mut GuardedSurface<'_>, v: u32) -> bool {
+    let gone = surface.around[v as usize].clone();
+    let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
+    let limit = surface.excess(&star, &gone) - MIN_DECREASE;
+    if limit <= 0.0 {
+        return false;
+    }
+    let here = surface.positions[v as usize];
+    let mut near = Vec::new();
+    surface.neighbours(v, &mut near);
+    let ways: Vec<DVec3> = near.iter().map(|&w| surface.positions[w as usize] - here).collect();
+    let length = ways.iter().map(|way| way.length()).sum::<f64>() / ways.len() as f64;
+    let outward = star.iter().map(Corners::normal).sum::<DVec3>();
+    let mut directions = vec![outward, -outward, ways.iter().sum::<DVec3>()];
+    directions.extend(DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]));
+    directions.extend(star.iter().map(Corners::normal));
+    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let mut better = Vec::new();
+    for direction in directions {
+        for step in STEP_SHARES {
+            let mut at = here + step * length * direction.normalize_or_zero();
+            if let Some(axis) = pinned {
+                at[axis] = 0.0;
+            }
+            let moved: Vec<Corners> = star.iter().map(|t| t.with_corner(v, at)).collect();
+            let spoils = |(before, after): (&Corners, &Corners)| {
+                let (m, n) = (before.normal(), after.normal());
+                quality(&after.at) < MIN_QUALITY.min(quality(&before.at))
+                    || m.dot(n) < MIN_MOVE_COSINE * m.length() * n.length()
+            };
+            let excess = surface.excess(&moved, &gone);
+            if excess < limit && !surface.is_blocked(at) && !star.iter().zip(&moved).any(spoils) {
+                better.push((excess, at, moved));
+            }
+        }
+    }
+    better.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, at, _)) = better.into_iter().find(|(.., moved)| surface.may_stand(moved, &gone)) else {
+        return false;
+    };
+    surface.place(v, at);
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::guarded::Obstacle;
+    use crate::generate::surface::Surface;
+    use crate::generate::voxels::Voxels;
+
+    /// Turns across the rim of a square bipyramid of half height h and half side 2 are 180 degrees - 2 atan(h / 2): 163 for 0.3.
+    #[test]
+    fn a_flat_bipyramid_is_opened_to_120_degrees() {
+        let positions =
+            [[2, 2], [-2, 2], [-2, -2], [2, -2]].map(|[x, y]| DVec3::new(x.into(), y.into(), 0.0));
+        let positions = positions.into_iter().chain([0.3, -0.3].map(|z| z * DVec3::Z)).collect();
+        let triangles = (0..4).flat_map(|k| [[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]).collect();
+        let surface = Surface { positions, triangles, on_mirror: vec![false; 6], mirror: None };
+        let obstacle = Obstacle { voxels: Voxels::new([16; 3]), clearance: 0.0, stretch: DVec3::ONE };
+        let mut guarded = GuardedSurface::new(surface, &obstacle);
+        let excess = |guarded: &GuardedSurface<'_>| {
+            let of_triangle = |t: u32| guarded.excess(&[guarded.corners(t)], &[t]);
+            (0..8).map(of_triangle).sum::<f64>()
+        };
+        let before = excess(&guarded);
+        let of_rim = (180.0 - 2.0 * 0.15_f64.atan().to_degrees()).to_radians().cos();
+        assert!((before - 8.0 * (-0.5 - of_rim)).abs() < 1e-9, "{before}");
+        unfold(&mut guarded);
+        assert!(excess(&guarded) < 1e-9, "{:?}", guarded.positions);
+    }
+}
