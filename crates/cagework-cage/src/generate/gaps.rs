@@ -228,7 +228,9 @@ impl Gap {
             let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
             winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
         };
-        (1..4).filter(|&k| is_inside(k)).count() > 1
+        // Most of three points; the third is needed only if the others differ.
+        let [first, second] = [1, 2].map(is_inside);
+        if first == second { first } else { is_inside(3) }
     }
 }
 
