@@ -25,6 +25,10 @@ const MIN_WEIGHT_SPREAD: f32 = 1e-3;
 /// twice as large as its model. The weights of a coarse cage then differ by less than the inverse of this.
 const MIN_OVERSIZE_RATIO: f64 = 50.0;
 
+/// Difference of a weight from which no cage is oversized: the larger of [`MIN_WEIGHT_SPREAD`] and the inverse of
+/// [`MIN_OVERSIZE_RATIO`].
+const MAX_OVERSIZE_SPREAD: f32 = 0.02;
+
 /// Relative position and size of a cage and a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
@@ -138,6 +142,10 @@ pub(super) fn oversized(
     for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
+        // Mostly the first vertices show it.
+        if *high - low.max(0.0) > MAX_OVERSIZE_SPREAD {
+            return None;
+        }
     }
     // Weights that are not stored are 0.
     let spread = |&(low, high, n): &(f32, f32, usize)| if n < held { high.max(0.0) } else { high - low };
