@@ -310,7 +310,7 @@ fn assert_orderly_end(name: &str, run: &Run) {
     );
     assert!(run.code == Some(0) || run.stderr.starts_with("error: "), "{name}: {}", run.stderr);
     assert!(
-        !run.stderr.contains("panicked") && !run.stderr.contains("is not there"),
+        !run.stderr.contains("panicked") && !run.stderr.contains("which is missing"),
         "{name}: {}",
         run.stderr
     );

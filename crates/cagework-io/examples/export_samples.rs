@@ -1,4 +1,4 @@
-//! Writes one exported GLB of every kind into a directory, for the Khronos validator (`tests/validate.mjs`).
+//! Writes one exported GLB of each kind into a directory, for the Khronos validator (`tests/validate.mjs`).
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut mirrored_skin = skinned();
     mirrored_skin.json["nodes"][1]["scale"] = json!([-1.0, 1.0, 1.0]);
-    // A place on a map, where 32-bit numbers have steps of 0.5.
+    // Map coordinates: 32-bit numbers have steps of 0.5.
     let far = |mut model: common::Builder| {
         model.json["nodes"][0]["translation"] = json!([500_000.25, 0.125, 4_500_000.5]);
         model
@@ -70,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let options = cagework_io::ReshapeOptions::default();
             let (reshaped, _) = model.write_reshaped(&by, &[], &[], &options)?;
             if let Some(player) = model.player_of(&reshaped).ok().filter(|p| !p.clips().is_empty()) {
-                let played: Vec<_> = (0..10)
+                let frames: Vec<_> = (0..10)
                     .map(|k| {
                         let seconds = 0.099 * k as f32;
                         let posed = player.at(Some(0), seconds, &[]);
@@ -80,7 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     })
                     .collect();
                 let name = format!("{stem}-reshaped.played.json");
-                std::fs::write(directory.join(name), serde_json::to_vec(&played)?)?;
+                std::fs::write(directory.join(name), serde_json::to_vec(&frames)?)?;
             }
             std::fs::write(directory.join(format!("{stem}-reshaped.glb")), reshaped)?;
             let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;

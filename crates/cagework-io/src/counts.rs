@@ -1,6 +1,6 @@
-//! How much of everything a document has.
+//! Statistics of a document.
 
-/// How much of everything a document has. OBJ counts `o` and `g` lines as nodes, `usemtl` names as materials.
+/// Numbers of elements in a document. OBJ: `o` and `g` lines count as nodes, `usemtl` names as materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Scenes.
@@ -9,7 +9,7 @@ pub struct Counts {
     pub nodes: usize,
     /// Meshes.
     pub meshes: usize,
-    /// Triangle primitives in use; a mesh shown twice counts twice.
+    /// Triangle primitives in use, once per node that shows their mesh.
     pub primitives: usize,
     /// Materials.
     pub materials: usize,
@@ -17,7 +17,7 @@ pub struct Counts {
     pub textures: usize,
     /// Skins.
     pub skins: usize,
-    /// Joints of all skins; one of several skins counts once.
+    /// Joints of all skins. Shared joints count once.
     pub joints: usize,
     /// Animations.
     pub animations: usize,

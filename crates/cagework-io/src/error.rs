@@ -1,39 +1,40 @@
-//! Why files of any format could not be written, or do not belong together.
+//! Errors of writing models and of reading poses.
 
+use cagework_core::words::counted;
 use thiserror::Error;
 
 use crate::shown::shown;
 
-/// Why a model could not be written.
+/// Error of writing a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WriteError {
-    /// Not one position per vertex.
-    #[error("{given} positions for a model of {expected} vertices")]
+    /// The number of positions differs from the model's number of vertices.
+    #[error("{} for a model of {}: give one position per vertex", counted(*given, "position", "positions"), counted(*expected, "vertex", "vertices"))]
     Count {
-        /// Positions given.
+        /// Number of positions given.
         given: usize,
-        /// Vertices of the model.
+        /// Number of vertices of the model.
         expected: usize,
     },
     /// A position is not a finite number.
     #[error("the new position of vertex {vertex} is not a finite number")]
     NotFinite {
-        /// The vertex.
+        /// Vertex index.
         vertex: usize,
     },
-    /// A GLB needs triangles.
-    #[error("the model has no faces, and a GLB needs some: write an OBJ instead")]
+    /// GLB export of a model without triangles.
+    #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
     NoFaces,
-    /// Only glTF has rigs.
-    #[error("the model is no glTF: it has no rig to keep")]
+    /// Only glTF models have rigs.
+    #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,
-    /// There is no clip of this number.
-    #[error("the model has no clip {0}")]
+    /// Clip index out of range.
+    #[error("the model has no clip {0}: clips count from 0")]
     NoClip(usize),
-    /// A GLB holds at most 4 GiB.
-    #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: write an OBJ instead")]
+    /// The export exceeds the GLB limit of 4 GiB.
+    #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: export an OBJ instead")]
     TooLarge {
-        /// Bytes needed.
+        /// Size of the export.
         bytes: u64,
     },
     /// The original document cannot be patched.
@@ -41,49 +42,49 @@ pub enum WriteError {
     Document(String),
 }
 
-/// Why a file is not a pose of a cage.
+/// Error of reading a model as a pose of a cage.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PoseError {
-    /// It has another number of vertices.
+    /// The number of vertices differs.
     #[error(
         "pose {} has {given} vertices, but cage {} has {expected}: a pose keeps the cage's vertices and their order",
         shown(pose),
         shown(cage)
     )]
     Count {
-        /// Name of the pose.
+        /// Name of the pose's file.
         pose: String,
-        /// Vertices of the pose.
+        /// Number of vertices in the pose.
         given: usize,
         /// Name of the cage.
         cage: String,
-        /// Vertices of the cage.
+        /// Number of vertices of the cage.
         expected: usize,
     },
-    /// Its clip or morph targets cannot be read.
+    /// The clip or morph targets of the pose cannot be read.
     #[error("pose {}: {source}", shown(pose))]
     States {
-        /// Name of the pose.
+        /// Name of the pose's file.
         pose: String,
-        /// Why.
+        /// Cause.
         source: WriteError,
     },
-    /// Its faces join vertices that have nothing to do with each other in the cage.
+    /// An edge of the pose joins vertices that share no face in the cage, so the vertices are in another order.
     #[error(
-        "pose {} has an edge from vertex {} to {}, which are of no face together in cage {}: its vertices are in another order; {hint}",
+        "pose {} has an edge from vertex {} to {}, which share no face in cage {}: its vertices are in another order; {hint}",
         shown(pose),
         edge[0],
         edge[1],
         shown(cage)
     )]
     Order {
-        /// Name of the pose.
+        /// Name of the pose's file.
         pose: String,
-        /// Vertices of the edge, from 0.
+        /// Vertex indices of the edge, from 0.
         edge: [u32; 2],
         /// Name of the cage.
         cage: String,
-        /// What to do.
+        /// How to export a pose that keeps the order.
         hint: &'static str,
     },
 }

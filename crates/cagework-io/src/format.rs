@@ -1,11 +1,11 @@
-//! The formats of models: the one list of what is read and written.
+//! File formats that can be read and written.
 
 use thiserror::Error;
 
 use crate::shown::shown;
 use crate::{off, stl};
 
-/// Format of a model's file.
+/// File format of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -18,24 +18,24 @@ pub enum ModelFormat {
     Ply,
     /// STL, text or binary.
     Stl,
-    /// OFF of Geomview, as text: OFF, COFF, NOFF.
+    /// Geomview OFF, text: OFF, COFF, NOFF.
     Off,
 }
 
-/// The content of a file is no format that is read here.
+/// A file is not in a supported format.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{} is {found}: {hint}", shown(name))]
 pub struct FormatError {
-    /// Name the caller gave.
+    /// Name given by the caller.
     pub name: String,
-    /// What it seems to be.
+    /// What the content looks like.
     pub found: &'static str,
     /// What to do.
     pub hint: &'static str,
 }
 
 impl ModelFormat {
-    /// Every format, in the order in which people are told of them.
+    /// All formats, in the order of listings.
     pub const ALL: [Self; 5] = [Self::Gltf, Self::Obj, Self::Ply, Self::Stl, Self::Off];
 
     /// Short name, lower case.
@@ -50,7 +50,7 @@ impl ModelFormat {
         }
     }
 
-    /// Endings of names of files that are read, lower case, without the dot; what says most of a model comes first.
+    /// Extensions of readable files, lower case, without the dot. The most complete variant comes first.
     #[must_use]
     pub fn endings(self) -> &'static [&'static str] {
         match self {
@@ -62,7 +62,7 @@ impl ModelFormat {
         }
     }
 
-    /// Ending of names of files that are written, lower case, without the dot.
+    /// Extension of exported files, lower case, without the dot.
     #[must_use]
     pub fn export_extension(self) -> &'static str {
         match self {
@@ -74,13 +74,13 @@ impl ModelFormat {
         }
     }
 
-    /// Whether one file holds several poses.
+    /// Whether a file can store several poses.
     #[must_use]
     pub fn holds_poses(self) -> bool {
         self == Self::Gltf
     }
 
-    /// The format that the name of a file to be written asks for by its ending.
+    /// Format for exporting to a file of this name, by its extension.
     #[must_use]
     pub fn of_export(name: &str) -> Option<Self> {
         match extension(name).as_str() {
@@ -90,10 +90,10 @@ impl ModelFormat {
         }
     }
 
-    /// The format of a file to be read, by its content.
+    /// Detects the format of a file from its content.
     ///
     /// # Errors
-    /// [`FormatError`] when its name promises another, or its content is known to be something else.
+    /// [`FormatError`] if the content contradicts the file's extension or is known to be something else.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint| Err(FormatError { name: name.into(), found, hint });
         let export = "export it as GLB, OBJ, PLY, STL or OFF";
@@ -110,16 +110,13 @@ impl ModelFormat {
             [0xff, 0xfe, ..]
             | [0xfe, 0xff, ..]
             | [b'#' | b'v' | b'o' | b'g' | b's' | b'm' | b'p' | b'{', 0, ..] => {
-                return fault("a text in UTF-16", "save it as UTF-8");
+                return fault("a UTF-16 text", "save it as UTF-8");
             }
             _ if off::is_off(bytes) => return Ok(Self::Off),
             _ if text.starts_with(b"version https://git-lfs.github.com/spec/") => {
-                return fault(
-                    "a Git LFS pointer, which stands for the file",
-                    "fetch the file itself with `git lfs pull`",
-                );
+                return fault("a Git LFS pointer, not the file itself", "fetch the file with `git lfs pull`");
             }
-            [b'<', ..] => return fault("an XML or HTML text", export),
+            [b'<', ..] => return fault("an XML or HTML file", export),
             _ => {}
         }
         if text.first() == Some(&b'{') {
@@ -133,7 +130,7 @@ impl ModelFormat {
             "stl" => Ok(Self::Stl),
             "off" => Ok(Self::Off),
             "ply" => fault("not a PLY", "its first line is not 'ply': it is damaged or has the wrong name"),
-            "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" => fault("of a format that is not read", export),
+            "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" => fault("in an unsupported format", export),
             _ => Ok(Self::Obj),
         }
     }

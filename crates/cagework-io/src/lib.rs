@@ -1,12 +1,12 @@
-//! Bytes to scene and back: OBJ, glTF/GLB, PLY, STL, OFF, NPZ, project files.
+//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF), weights (NPZ) and projects, as bytes.
 //!
-//! No mathematics beyond transforms and normals, no file system, no clock; everything compiles for
-//! `wasm32-unknown-unknown`. A [`Model`] keeps the document it was read from, so that an export is the user's own file
-//! with new vertex positions: materials, texture coordinates, names and the node tree survive.
+//! No file system and no clock; compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the document it was
+//! read from, and an export is that document with new vertex positions: materials, texture coordinates, names
+//! and the node tree are preserved.
 //!
-//! Vertex order, the contract of the weights file: OBJ `v` lines in file order; glTF meshes in document order, for each
-//! mesh the nodes that show it by ascending index, for each node the mesh's triangle primitives in order (so a file
-//! whose meshes are shown once each has its primitives in document order), unwelded.
+//! Weights files rely on the vertex order. OBJ: `v` lines in file order. glTF: unwelded, ordered by mesh,
+//! then by ascending index of the nodes that show the mesh, then by triangle primitive of the mesh. If each
+//! mesh is shown once, this is document order.
 
 mod counts;
 mod error;
@@ -50,7 +50,7 @@ pub use part_kind::PartKind;
 pub use polygons::PolygonsError;
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
-pub use rigged::NoClip;
+pub use rigged::UnknownClip;
 pub use select::SelectError;
 pub use shown::{escaped, json_fault, shown, value_fault};
 pub use siblings::Resolve;

@@ -1,36 +1,35 @@
-//! How a model looks: texture coordinates, colours, materials and the bytes of their textures.
+//! Appearance of a model: texture coordinates, colours, materials and encoded textures.
 //!
-//! Decoration, so nothing here is an error: what cannot be read is left out. Images stay undecoded: a browser does that
-//! itself, and a command has a library for it.
+//! Appearance is optional, so unreadable parts are skipped and never an error. Images stay encoded: browsers
+//! decode them, and the command line has a decoder.
 
 use std::ops::Range;
 
 /// A model's triangles for drawing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
-    /// Corners of triangles. `[n_corners]`
+    /// Corners of the triangles. `[n_corners]`
     pub vertices: Vec<LookVertex>,
-    /// Vertices that an OBJ shares between surfaces with a hard edge between them, once more for each further surface:
-    /// the model's vertex that each moves with. They are counted on from the model's own. A glTF has split them itself.
+    /// Duplicates of OBJ vertices at hard edges: the model vertex that each one follows. Duplicate `k` has
+    /// index `n_vertices + k`. Empty for glTF, which stores split vertices.
     pub copies: Vec<u32>,
-    /// Indices into `vertices`; the model's triangles, those of one material in a row. `[n_triangles]`
+    /// Indices into `vertices`: the model's triangles, grouped by material. `[n_triangles, 3]`
     pub triangles: Vec<[u32; 3]>,
-    /// Materials of ranges of triangles; those of none have no material.
+    /// Materials of ranges of `triangles`. Triangles in no range have no material.
     pub groups: Vec<LookGroup>,
-    /// Images that materials name.
+    /// Images that the groups refer to.
     pub images: Vec<LookImage>,
 }
 
-/// A corner of triangles.
+/// A triangle corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LookVertex {
-    /// The model's vertex that it moves with, or one of [`Look::copies`]. Corners that are one surface at a seam of a
-    /// glTF name one vertex, so that normals of the moved mesh show no seam; where the file has a hard edge, they name
-    /// different ones.
+    /// Model vertex that the corner follows, or a duplicate in [`Look::copies`]. Corners on both sides of a UV seam
+    /// share one source, so recomputed normals stay smooth there; corners across a hard edge have different sources.
     pub source: u32,
-    /// Texture coordinates, v downwards, transformed by the material.
+    /// Texture coordinates, v downwards, with the material's texture transform applied.
     pub uv: [f32; 2],
-    /// Factor of the base colour, linear RGBA.
+    /// Vertex colour, linear RGBA; multiplies the base colour.
     pub color: [f32; 4],
 }
 
@@ -43,49 +42,49 @@ pub struct LookGroup {
     pub base_color: [f32; 4],
     /// Base colour texture, an index into [`Look::images`].
     pub image: Option<u32>,
-    /// What the texture is outside its image, along u and v.
+    /// Wrap mode along u and v.
     pub wrap: [LookWrap; 2],
-    /// What alpha means.
+    /// Alpha mode.
     pub alpha: LookAlpha,
-    /// Whether the file asks for both sides to be drawn.
+    /// Whether back faces are drawn.
     pub double_sided: bool,
 }
 
-/// What alpha means (glTF 2.0, section 3.9.4).
+/// Alpha mode of a material (glTF 2.0, section 3.9.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum LookAlpha {
-    /// Nothing.
+    /// Alpha is ignored.
     #[default]
     Opaque,
-    /// Below the cutoff nothing is drawn.
+    /// Fragments with alpha below the cutoff are discarded.
     Mask {
-        /// The cutoff.
+        /// Alpha cutoff, 0 to 1.
         cutoff: f32,
     },
-    /// How much covers what is behind.
+    /// Alpha is the coverage for blending over the background.
     Blend,
 }
 
-/// What a texture is outside its image.
+/// Wrap mode of a texture outside [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LookWrap {
-    /// The image again.
+    /// Repeats the image.
     #[default]
     Repeat,
-    /// The image mirrored.
+    /// Repeats the image, mirrored every second time.
     Mirror,
-    /// Its edge.
+    /// Repeats the edge texel.
     Clamp,
 }
 
 /// An encoded image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LookImage {
-    /// What the file calls it, for messages.
+    /// Name in the file, for messages.
     pub name: String,
-    /// PNG, JPEG, WebP or KTX2.
+    /// Encoded PNG, JPEG, WebP or KTX2.
     pub bytes: Vec<u8>,
-    /// Media type, by content.
+    /// Media type, detected from the bytes.
     pub mime: String,
 }
 
@@ -103,14 +102,14 @@ impl Default for LookGroup {
 }
 
 impl LookVertex {
-    /// A corner without texture and colour.
+    /// A corner without texture coordinates, in white.
     #[must_use]
     pub fn plain(source: u32) -> Self {
         Self { source, uv: [0.0; 2], color: [1.0; 4] }
     }
 }
 
-/// Media type by content, of the formats that glTF has: what a file calls an image may be anything.
+/// Media type detected from the bytes. The type that the file declares is not trusted.
 pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some("image/png"),
@@ -121,7 +120,7 @@ pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Linear from sRGB (IEC 61966-2-1): colours of OBJ files are written as they look.
+/// sRGB to linear (IEC 61966-2-1). Colours of OBJ files are sRGB.
 pub(crate) fn linear_from_srgb(c: f32) -> f32 {
     if c <= 0.040_45 { c.max(0.0) / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }

@@ -1,8 +1,8 @@
-//! What models take, counted before it is allocated: a few bytes of a file may ask for anything.
+//! Memory limits, checked before allocation: a small file can declare huge arrays.
 
 use thiserror::Error;
 
-/// More memory would be needed than is allowed.
+/// A file needs more memory than the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
     "it needs about {} MiB of memory, more than the limit of {} MiB: use a smaller model or raise the limit",
@@ -12,7 +12,7 @@ use thiserror::Error;
 pub struct MemoryError {
     /// Bytes needed.
     pub needed: u64,
-    /// Bytes allowed.
+    /// Limit in bytes.
     pub limit: u64,
 }
 

@@ -1,4 +1,4 @@
-//! A model: vertices and triangles, and the document they came from.
+//! A model: vertices, triangles and the document they were read from.
 
 mod cage;
 mod write;
@@ -23,70 +23,70 @@ use crate::siblings::Resolve;
 use crate::up::UpAxis;
 use crate::{off, ply, stl};
 
-/// Why bytes could not be read as a model.
+/// Error of reading a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ReadError {
-    /// The content is no format that is read here.
+    /// The format is not supported.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Vertices, but no faces, where faces are needed.
+    /// A file of vertices without faces where faces are required.
     #[error(
-        "{} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)",
+        "{} has {vertices} vertices but no faces: export it with faces (a file without faces can only be used as a pose)",
         shown(name)
     )]
     NoFaces {
-        /// Name of the model.
+        /// Name given by the caller.
         name: String,
-        /// Vertices it has.
+        /// Number of vertices.
         vertices: usize,
     },
-    /// A fault in an OBJ file.
+    /// Error in an OBJ file.
     #[error("{}: {source}", shown(name))]
     Obj {
-        /// Name the caller gave.
+        /// Name given by the caller.
         name: String,
-        /// The fault.
+        /// Cause.
         source: ObjError,
     },
-    /// A fault in a PLY, STL or OFF file.
+    /// Error in a PLY, STL or OFF file.
     #[error("{}: {source}", shown(name))]
     Polygons {
-        /// Name the caller gave.
+        /// Name given by the caller.
         name: String,
-        /// The fault.
+        /// Cause.
         source: PolygonsError,
     },
-    /// A fault in a glTF file.
+    /// Error in a glTF file.
     #[error("{}: {source}", shown(name))]
     Gltf {
-        /// Name the caller gave.
+        /// Name given by the caller.
         name: String,
-        /// The fault.
+        /// Cause.
         source: GltfError,
     },
 }
 
-/// A model that was read from bytes.
+/// A model read from bytes.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Name the caller gave.
+    /// Name given by the caller.
     pub name: String,
-    /// World-space position of every vertex, Y up, in the order of the input (see the crate's root), not welded; as seen from
-    /// [`Self::origin`].
+    /// Positions in world space, Y up, relative to [`Self::origin`]. In file order (see the crate
+    /// documentation), not welded. `[n_vertices]`
     pub positions: Vec<Vec3>,
-    /// Triangles, counter-clockwise seen from outside; polygons are triangulated.
+    /// Triangles, counter-clockwise from outside; polygons are triangulated. `[n_triangles, 3]`
     pub triangles: Vec<[u32; 3]>,
-    /// How much of everything there is.
+    /// Numbers of nodes, meshes, materials and so on.
     pub counts: Counts,
-    /// What the user should know: each a sentence.
+    /// Warnings for the user, one sentence each.
     pub notices: Vec<String>,
-    /// What points up in the document.
+    /// Up axis of the file.
     pub(crate) up: UpAxis,
-    /// Origin of the positions, in the file's axes.
+    /// Origin of `positions`, in the file's axes.
     pub(crate) origin: DVec3,
     bytes: u64,
     format: ModelFormat,
-    /// Of a PLY, STL or OFF: how its numbers are written; whether its vertices have normals.
+    /// PLY, STL and OFF: number encoding, and whether vertices have normals.
     encoding: Encoding,
     has_normals: bool,
     pub(crate) document: Document,
@@ -99,15 +99,16 @@ pub(crate) enum Document {
 }
 
 impl Model {
-    /// Takes the compressed file that this model was decoded from before it was read: where nothing has moved it is what is written.
+    /// Stores the compressed file that this model was decoded from. An export of the undeformed model returns
+    /// these bytes.
     pub fn set_packed(&mut self, file: Vec<u8>) {
         if let Document::Gltf(document) = &mut self.document {
             document.set_packed(file);
         }
     }
 
-    /// Names of the files that [`Self::read`] asks `resolve` for. Only materials of an OBJ are asked for here, with their textures;
-    /// a file that cannot be read names none.
+    /// Names of the external files that the model refers to: buffers and images of a glTF; material libraries
+    /// and their textures of an OBJ, for which `resolve` is called. Empty if the file cannot be read.
     pub fn named_files(
         name: &str,
         bytes: &[u8],
@@ -121,24 +122,24 @@ impl Model {
         }
     }
 
-    /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file; the content decides which, `name` helps with the error if it is none of them.
-    /// A model far from the world's origin has its positions from an [`Self::origin`] near it, without loss.
+    /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The format is detected from the content; `name` is used
+    /// in messages. Models far from the world origin are stored relative to [`Self::origin`], without loss.
     ///
-    /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
-    /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
-    /// notice. A file of vertices without faces is read: it may be a pose. Memory is limited by what there is.
+    /// `resolve` is called once for each external file (buffers and textures of a `.gltf`, materials and textures of an
+    /// OBJ) with its relative path; `data:` URIs are decoded here. A missing buffer is an error, other missing files
+    /// are notices. A file without faces is accepted, since it can be a pose. Memory is not limited.
     ///
     /// # Errors
-    /// [`ReadError`], which names the line, accessor, node or file at fault.
+    /// [`ReadError`] naming the line, accessor, node or file at fault.
     pub fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<Self, ReadError> {
         Self::read_within(name, bytes, resolve, u64::MAX)
     }
 
-    /// As [`Self::read`], within `memory_limit` bytes: `bytes` and what they become, up to the table of different
-    /// positions.
+    /// Like [`Self::read`], using at most `memory_limit` bytes. The estimate covers `bytes`, the model and
+    /// the table that welds positions.
     ///
     /// # Errors
-    /// [`ReadError`]; of memory, before it is allocated.
+    /// [`ReadError`]. The memory limit is checked before allocating.
     pub fn read_within(
         name: &str,
         bytes: &[u8],
@@ -148,7 +149,8 @@ impl Model {
         Self::read_from(name, bytes, resolve, memory_limit, true)
     }
 
-    /// A mesh that was made, its positions as seen from an origin, as the model that its OBJ file would be.
+    /// A model from a generated mesh whose positions are relative to `origin`; same result as reading the
+    /// mesh as an OBJ file.
     ///
     /// # Errors
     /// [`ReadError`] when it has no vertices.
@@ -251,19 +253,19 @@ impl Model {
         }
     }
 
-    /// Bytes that the model takes with the document it came from, about.
+    /// Approximate memory of the model and its document, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Bytes that writing it takes besides, at once, about.
+    /// Approximate additional memory while exporting to `format`, bytes.
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
-        /// Normals before and after, the new positions, and the file; an OBJ may be without normals.
+        /// Old and new normals, new positions and the output; OBJ files without normals need a third.
         const VERTEX_BYTES: u64 = 300;
         const TRIANGLE_BYTES: u64 = 60;
-        /// New accessors and buffer views as JSON.
+        /// JSON of new accessors and buffer views.
         const PRIMITIVE_BYTES: u64 = 6000;
         let n = |count: usize| count as u64;
         let shape = VERTEX_BYTES * n(self.positions.len()) + TRIANGLE_BYTES * n(self.triangles.len());
@@ -274,34 +276,35 @@ impl Model {
         }
     }
 
-    /// Bytes in use while so many poses are written as morph targets, besides [`Self::bytes_to_write`].
+    /// Additional memory for `n_poses` morph targets on top of [`Self::bytes_to_write`], bytes.
     #[must_use]
     pub fn bytes_of_poses(&self, n_poses: usize) -> u64 {
-        /// Position and normal of a vertex: how far they move, and in the file, twice each. 103 measured.
+        /// Position and normal displacement of a vertex, in memory and in the output, twice each. Measured:
+        /// 103.
         const POSED_VERTEX_BYTES: u64 = 130;
         POSED_VERTEX_BYTES.saturating_mul(n_poses as u64 * self.positions.len() as u64)
     }
 
-    /// What points up in the file; Y unless said otherwise.
+    /// Up axis of the file; Y unless set by [`Self::set_up`].
     #[must_use]
     pub fn up(&self) -> UpAxis {
         self.up
     }
 
-    /// Says what points up in the file, and turns the model to it. Files written later have the file's axes.
+    /// Sets the up axis of the file and converts the positions to Y up. Exports use the file's axes.
     pub fn set_up(&mut self, up: UpAxis) {
         self.positions = up.turned(&self.positions_in_file()).into_owned();
         self.up = up;
     }
 
-    /// What the positions are seen from, in the file's axes: zero unless the model is far away.
+    /// Origin of the positions, in the file's axes: zero unless the model is far from the world origin.
     #[must_use]
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Sees the positions from another origin, in the file's axes: a cage and its poses from that of their model. Adds a notice
-    /// if the model is so far from it that positions are rounded.
+    /// Makes the positions relative to another origin, in the file's axes. Cages and poses take their model's
+    /// origin. Adds a notice if the model is so far from `origin` that f32 rounds its positions noticeably.
     pub fn see_from(&mut self, origin: DVec3) {
         if origin != self.origin {
             let from = |p: &Vec3| relative(self.origin + p.as_dvec3(), origin);
@@ -312,12 +315,12 @@ impl Model {
         }
     }
 
-    /// Positions at rest as they are in the file, as seen from the origin.
+    /// Rest positions in the file's axes, relative to the origin.
     pub(crate) fn positions_in_file(&self) -> Cow<'_, [Vec3]> {
         self.up.turned_back(&self.positions)
     }
 
-    /// How the model looks: texture coordinates, colours, materials, undecoded images.
+    /// Texture coordinates, colours, materials and encoded images.
     #[must_use]
     pub fn look(&self) -> Look {
         match &self.document {
@@ -326,13 +329,13 @@ impl Model {
         }
     }
 
-    /// Format of the document.
+    /// Format of the file.
     #[must_use]
     pub fn format(&self) -> ModelFormat {
         self.format
     }
 
-    /// Number of faces: polygons of an OBJ, triangles of a glTF.
+    /// Number of faces: triangles for glTF, polygons otherwise.
     #[must_use]
     pub fn n_faces(&self) -> usize {
         match &self.document {
@@ -341,8 +344,10 @@ impl Model {
         }
     }
 
+    /// Rejects a file without faces, which can be a pose but not a model or a cage.
+    ///
     /// # Errors
-    /// [`ReadError::NoFaces`] for a file of vertices only, which is fit for a pose but not for a mesh or a cage.
+    /// [`ReadError::NoFaces`].
     pub fn require_faces(&self) -> Result<(), ReadError> {
         if self.n_faces() > 0 {
             return Ok(());
@@ -350,7 +355,7 @@ impl Model {
         Err(ReadError::NoFaces { name: self.name.clone(), vertices: self.positions.len() })
     }
 
-    /// Vertices and triangles as the core takes them.
+    /// Copy of vertices and triangles for `cagework_core`.
     #[must_use]
     pub fn tri_mesh(&self) -> TriMesh {
         TriMesh { positions: self.positions.clone(), triangles: self.triangles.clone() }

@@ -1,24 +1,25 @@
-//! Normals that follow a deformation.
+//! Normals of deformed shapes.
 //!
-//! The original normals of a model may be an artist's work (hard edges, weighted normals), so they are not thrown away:
-//! area-weighted normals are computed before and after, and each original normal (and tangent) is turned by the rotation
-//! between the two. At rest the result is the original; where the original was the area-weighted normal, it is the new
-//! area-weighted normal. Vertices at one rest position whose normals agree are one surface there (a UV seam) and stay
-//! smooth; where they differ there is a hard edge and it stays hard. Without normals, a smoothing group is one surface.
+//! Original normals can carry hard edges and artistic weighting, so they are rotated and not recomputed:
+//! area-weighted normals are computed at rest and after deformation, and the rotation between them is applied
+//! to the original normal and tangent. An undeformed shape keeps its normals exactly.
+//!
+//! Vertices at the same rest position belong to one smooth surface if their normals agree (a UV seam);
+//! otherwise a hard edge separates them. Without normals, smoothing groups define the surfaces.
 
 use cagework_core::mesh::weld;
 use glam::{DVec3, Quat, Vec3};
 
-/// Cosine of about 2.5 degrees: normals this close were one normal before rounding or quantisation to 8 bits.
-const SAME_NORMAL: f32 = 0.999;
-/// Different normals looked through at one position. A hundred thousand vertices at the origin must not take hours.
+/// Cosine of 2.5 degrees: normals within it differ only by rounding or 8-bit quantisation.
+const MIN_SAME_NORMAL_COS: f32 = 0.999;
+/// Limit on normals compared per position. Without it, n vertices at one point cost O(n²).
 const MAX_CLUSTERS_AT_ONE_PLACE: usize = 64;
 
-/// Vertices for shading: a model's vertex with one of the normals it has there.
+/// Shading vertices: distinct (model vertex, normal) pairs.
 pub(crate) struct Shading {
-    /// Model vertex of each.
+    /// Model vertex of each shading vertex.
     pub(crate) vertex: Vec<u32>,
-    /// Unit normal of each; area-weighted where the model has none.
+    /// Unit normal of each shading vertex; area-weighted if the model has none.
     pub(crate) normal: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     cluster: Vec<u32>,
@@ -26,14 +27,16 @@ pub(crate) struct Shading {
 }
 
 impl Shading {
-    /// For each shading vertex the surface it belongs to, counted from 0.
+    /// Surface of each shading vertex, numbered from 0.
     pub(crate) fn clusters(&self) -> &[u32] {
         &self.cluster
     }
 
-    /// `vertex`: model vertex of each shading vertex; `normal`: its original unit normal, zero where it has none;
-    /// `surface`: what it belongs to if it has none, empty where that is not known; `triangles`: of shading vertices;
-    /// `positions`: of model vertices, at rest.
+    /// Groups shading vertices into smooth surfaces.
+    ///
+    /// `positions`: model vertices at rest. `vertex`: model vertex of each shading vertex. `normal`: its
+    /// original unit normal, zero if there is none. `surface`: smooth surface of a shading vertex without
+    /// normal; may be empty. `triangles`: indices of shading vertices.
     pub(crate) fn new(
         positions: &[Vec3],
         vertex: Vec<u32>,
@@ -49,7 +52,7 @@ impl Shading {
             let surface = surface.get(k).copied().unwrap_or(0);
             let here = &mut at_place[welded.unique_of[v as usize] as usize];
             let same = |&&(_, m, other): &&(u32, Vec3, u32)| {
-                n.dot(m) >= SAME_NORMAL || (n == Vec3::ZERO && m == Vec3::ZERO && surface == other)
+                n.dot(m) >= MIN_SAME_NORMAL_COS || (n == Vec3::ZERO && m == Vec3::ZERO && surface == other)
             };
             let found = here.iter().take(MAX_CLUSTERS_AT_ONE_PLACE).find(same).map(|&(c, ..)| c);
             cluster.push(found.unwrap_or_else(|| {
@@ -65,7 +68,7 @@ impl Shading {
                 *n = shading.rest[c as usize];
             }
             if *n == Vec3::ZERO {
-                // No face and no normal: any unit vector is as good, and formats demand one.
+                // Neither face nor normal: formats require a unit vector, so use any.
                 *n = Vec3::Z;
             }
         }
@@ -73,7 +76,7 @@ impl Shading {
         shading
     }
 
-    /// Rotation of each shading vertex between the rest shape and `positions`.
+    /// Rotation of each shading vertex's surface normal from rest to `positions`.
     pub(crate) fn rotations(&self, positions: &[Vec3]) -> Vec<Quat> {
         let now = self.area_weighted(positions, self.rest.len());
         let turns: Vec<Quat> = self
@@ -88,12 +91,13 @@ impl Shading {
         self.cluster.iter().map(|&c| turns[c as usize]).collect()
     }
 
-    /// Normal of each shading vertex on the deformed shape.
+    /// Rotated unit normals.
     pub(crate) fn normals(&self, rotations: &[Quat]) -> Vec<Vec3> {
         rotations.iter().zip(&self.normal).map(|(&q, &n)| (q * n).normalize_or(n)).collect()
     }
 
-    /// Unit normal of each cluster; zero where no face has an area. In f64: squares of kilometres in millimetres.
+    /// Unit normal of each cluster, zero without area. Sums in f64: areas of
+    /// kilometre-sized models in millimetres exceed the precision of f32.
     fn area_weighted(&self, positions: &[Vec3], n_clusters: usize) -> Vec<Vec3> {
         let mut sum = vec![DVec3::ZERO; n_clusters];
         for t in &self.triangles {

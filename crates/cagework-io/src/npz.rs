@@ -1,11 +1,17 @@
-//! Weights as NumPy `.npz`, the layout of `scipy.sparse.save_npz`.
+//! Weights as NumPy `.npz`, in the layout of `scipy.sparse.save_npz`.
 //!
-//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32), of the controls' columns; with
-//! vertices outside the cage also `outside_vertex` (int32), `outside_distance` (float32, object units) and `outside_share` (float32);
-//! with offsets also `offset_indptr`, `offset_indices` and `offset_data`, the columns of [`Frames`], and of those `frame_whole`
-//! (float32, [n_cage, 3]), `frame_joints` (int32), `frame_bones` (int32, [n, 2]) and `frame_plain` (float32, [n_joints x n_cage, 4]); of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
-//! the cage also `inner_controls` (float32, [n, 3]): the last n columns are theirs.
-//! Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
+//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32) and `data` (float32) hold the
+//! columns of the controls. Optional arrays:
+//!
+//! - vertices outside the cage: `outside_vertex` (int32), `outside_distance` (float32, object units),
+//!   `outside_share` (float32);
+//! - offset columns of [`Frames`]: `offset_indptr`, `offset_indices`, `offset_data`, `frame_whole` (float32,
+//!   `[n_cage, 3]`), `frame_joints` (int32), `frame_bones` (int32, `[n, 2]`), `frame_plain` (float32,
+//!   `[n_joints x n_cage, 4]`);
+//! - rig points of a rigged model: `extra_points` (float32, `[n, 3]`), whose weights are the last n rows;
+//! - controls inside the cage: `inner_controls` (float32, `[n, 3]`), whose weights are the last n columns.
+//!
+//! The reader also accepts SciPy's variants: deflated, 64-bit indices, 64-bit floats.
 
 mod arrays;
 
@@ -20,32 +26,32 @@ use crate::memory::MemoryError;
 use crate::shown::shown;
 use arrays::{Archive, NpzWriter, array, required};
 
-/// Why a weights file could not be read.
+/// Error of reading a weights file.
 #[derive(Debug, Error)]
 pub enum NpzError {
     /// Not a zip archive, or a damaged one.
-    #[error("not an .npz file, or a damaged one")]
+    #[error("not an .npz file, or damaged: export it again")]
     Zip(String),
-    /// An array is not in the file.
+    /// A required array is missing.
     #[error(
         "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
     )]
     Missing(&'static str),
-    /// Offsets as they were kept by versions that wrote `outside_corners`.
-    #[error("holds offsets as an earlier version wrote them, which are not read any more: bind again")]
+    /// Offsets in the obsolete layout with `outside_corners`.
+    #[error("the file was written by an earlier version with another layout of offsets: bind again")]
     Old,
-    /// An array is not what it must be.
+    /// An array has a wrong type, shape or value.
     #[error("array '{array}': {problem}")]
     Array {
-        /// Its name.
+        /// Name of the array.
         array: &'static str,
-        /// What is wrong with it.
+        /// Problem, as a predicate: "has 3 values, not 2".
         problem: String,
     },
     /// More memory than is allowed.
     #[error(transparent)]
     Memory(#[from] MemoryError),
-    /// The arrays are no CSR matrix.
+    /// The arrays do not form a CSR matrix.
     #[error(transparent)]
     Weights(#[from] WeightsError),
 }
@@ -56,29 +62,29 @@ impl From<ZipError> for NpzError {
     }
 }
 
-/// What a weights file holds.
+/// Contents of a weights file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedWeights {
-    /// A row for each vertex, then one for each extra point.
+    /// One row per model vertex, then one per extra point.
     pub weights: Weights,
-    /// Its columns after those of the controls.
+    /// Meaning of the columns after those of the controls.
     pub frames: Frames,
-    /// Rows outside the cage.
+    /// Rows of points outside the cage.
     pub outside: Vec<OutsideVertex>,
-    /// Points of the model's rig that were bound with it, object units.
+    /// Rig points that were bound with the model, object units.
     pub extra_points: Vec<Vec3>,
-    /// Where the controls inside the cage rest, object units: the last columns.
+    /// Rest positions of the controls inside the cage, object units; their weights are the last columns.
     pub inner_controls: Vec<Vec3>,
 }
 
 impl SavedWeights {
-    /// Rows of the model's vertices.
+    /// Number of rows of model vertices.
     #[must_use]
     pub fn n_vertices(&self) -> usize {
         self.weights.n_rows().saturating_sub(self.extra_points.len())
     }
 
-    /// The same without the rig's points.
+    /// The weights without the rows of rig points.
     #[must_use]
     pub fn of_vertices(mut self) -> Self {
         let n = self.n_vertices() as u32;
@@ -91,8 +97,7 @@ impl SavedWeights {
     }
 }
 
-/// Weights and the rows outside the cage as an `.npz` file; the last rows are those of `extra_points`, the last columns those of
-/// `inner_controls`.
+/// Writes weights as an `.npz` file. The last rows belong to `extra_points`, the last columns to `inner_controls`.
 #[must_use]
 pub fn write_weights_npz(
     weights: &Weights,
@@ -134,7 +139,7 @@ pub fn write_weights_npz(
     zip.finish()
 }
 
-/// The arrays of the columns after those of the controls.
+/// CSR arrays of the offset columns.
 const OFFSETS: [&str; 3] = ["offset_indptr", "offset_indices", "offset_data"];
 
 fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weights) {
@@ -143,11 +148,11 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
     zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
 }
 
-/// Reads weights and the vertices outside the cage within `memory_limit` bytes, besides those of the file.
+/// Reads a weights file, using at most `memory_limit` bytes in addition to `bytes`.
 ///
 /// # Errors
-/// [`NpzError`] when the file is no archive, an array is missing, of a wrong type or too large, or the arrays are no CSR
-/// matrix.
+/// [`NpzError`] if the file is not an archive, an array is missing, has a wrong type or is too large, or the
+/// arrays do not form a CSR matrix.
 pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights, NpzError> {
     let mut zip = Archive::new(bytes, memory_limit)?;
     let format = required(&mut zip, "format")?;
@@ -180,7 +185,7 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights,
     Ok(SavedWeights { weights, frames, outside, extra_points, inner_controls })
 }
 
-/// An array of points, of which there are at most so many of something; empty if it is not there.
+/// Reads an optional array of at most `most` points; empty if it is missing.
 fn read_points(
     zip: &mut Archive<'_>,
     array: &'static str,
@@ -191,11 +196,11 @@ fn read_points(
     if points.len() <= most as usize {
         return Ok(points);
     }
-    let problem = format!("has {} points, but there are {most} {what}", points.len());
+    let problem = format!("has {} points, but the matrix has {most} {what}", points.len());
     Err(NpzError::Array { array, problem })
 }
 
-/// A matrix of so many rows and columns.
+/// Reads a CSR matrix of the given shape.
 fn read_rows(
     zip: &mut Archive<'_>,
     [name, indices, data]: [&'static str; 3],
@@ -223,7 +228,7 @@ fn read_frames(zip: &mut Archive<'_>, columns: u32) -> Result<Frames, NpzError> 
     if frames.is_used() && frames.fits(columns as usize) {
         return Ok(frames);
     }
-    let problem = format!("does not belong to {columns} columns and the joints and bones beside it");
+    let problem = format!("does not match the {columns} columns, the joints and the bones");
     Err(NpzError::Array { array: "frame_plain", problem })
 }
 
@@ -235,10 +240,17 @@ fn read_outside(zip: &mut Archive<'_>, rows: u32) -> Result<Vec<OutsideVertex>, 
     let fault = |array, problem: String| Err(NpzError::Array { array, problem });
     let n = vertices.len();
     if distances.len() != n || shares.len() != n {
-        return fault("outside_share", format!("{n} vertices need {n} distances and shares"));
+        return fault(
+            "outside_share",
+            format!(
+                "has {} values, and outside_distance {}, for {n} vertices",
+                shares.len(),
+                distances.len()
+            ),
+        );
     }
     if let Some(v) = vertices.iter().find(|&&v| v >= rows) {
-        return fault("outside_vertex", format!("names vertex {v}, but there are {rows}"));
+        return fault("outside_vertex", format!("refers to vertex {v}, but there are {rows}"));
     }
     let of = |((vertex, distance), share)| OutsideVertex { vertex, distance, share };
     Ok(vertices.into_iter().zip(distances).zip(shares).map(of).collect())

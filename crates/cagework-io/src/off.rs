@@ -1,4 +1,4 @@
-//! OFF in and out (Geomview's object file format, as text): vertices with colours or normals, and polygons.
+//! OFF reader and writer (Geomview's object file format, text only): vertices with colours or normals, and polygons.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -9,18 +9,19 @@ use crate::obj::{lines, shown_token, tokens};
 use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
-/// Whether the first word names the format: `OFF` after letters for what its vertices have.
+/// Whether the first word is `OFF`, with optional prefix letters for vertex attributes.
 pub(crate) fn is_off(bytes: &[u8]) -> bool {
     let word = lines(bytes).find_map(|line| tokens(bytes, line.range).next());
     word.is_some_and(|word| prefix(&bytes[word]).is_some())
 }
 
-/// The letters before `OFF`.
+/// Prefix letters before `OFF`.
 fn prefix(word: &[u8]) -> Option<&[u8]> {
     word.strip_suffix(b"OFF").filter(|letters| letters.iter().all(|b| b"STCN4n".contains(b)))
 }
 
-/// Reads a file within `memory_limit` bytes. A vertex and a face have a line each.
+/// Reads a file using at most `memory_limit` bytes. Each vertex and each face has its own line. `near`: store
+/// positions relative to an origin near them.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let n_bytes = bytes.len() as u64;
     Polygons::check_memory(n_bytes, 0, 0, memory_limit)?;
@@ -34,10 +35,10 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
             words.next();
             rows.next();
             if letters.contains(&b'4') || letters.contains(&b'n') {
-                return Err(fault(line.number, "its vertices are not of three dimensions"));
+                return Err(fault(line.number, "only three-dimensional vertices are supported"));
             }
             (has_colors, has_normals) = (letters.contains(&b'C'), letters.contains(&b'N'));
-            // The numbers may follow in the same line.
+            // The counts may be on the same line.
             header = words.peek().is_some().then(|| (line, words.collect::<Vec<_>>()));
         }
     }
@@ -49,10 +50,10 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     });
     let Some((line, words)) = header else { return Err(PolygonsError::Empty) };
     if words.first().is_some_and(|word| bytes[word.clone()].eq_ignore_ascii_case(b"BINARY")) {
-        return Err(fault(line.number, "it is binary; only OFF files of text are read"));
+        return Err(fault(line.number, "it is a binary OFF file: save it as text"));
     }
     let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.into_iter())?;
-    // Each has a line of two bytes at least.
+    // Each vertex and face takes a line of at least two bytes.
     for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
         if count > n_bytes / 2 {
             return Err(PolygonsError::Count { name: name.into(), count, bytes: n_bytes });
@@ -60,7 +61,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     }
     Polygons::check_memory(n_bytes, n_vertices, n_bytes / 2, memory_limit)?;
     let mut read = Polygons { face_starts: vec![0], encoding: Encoding::Text, ..Polygons::default() };
-    let ends = |last, n, what| fault(last, &format!("the text ends after {n} {what}"));
+    let ends = |last, n, what| fault(last, &format!("the file ends after {n} {what}: it is cut off"));
     let mut odd_words = 0_usize;
     let mut positions = Vec::new();
     for v in 0..n_vertices {
@@ -74,7 +75,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         if has_colors {
             read.colors.push(numbers(bytes, &line, words.by_ref())?);
         }
-        // A fourth number of a colour is its opacity.
+        // The fourth colour channel, opacity, is ignored.
         odd_words += words.skip(usize::from(has_colors)).count();
     }
     read.place(&positions, near);
@@ -91,7 +92,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
                 std::str::from_utf8(&bytes[word.clone()]).ok().and_then(|w| w.parse().ok());
             let Some(index) = index else {
                 let word = shown_token(&bytes[word]);
-                return Err(fault(last, &format!("'{word}' is not a vertex, which have numbers from 0")));
+                return Err(fault(last, &format!("'{word}' is not a vertex index; indices count from 0")));
             };
             odd = odd.or((index < 0).then_some(index as f64));
             read.corners.push(u32::try_from(index).unwrap_or(u32::MAX));
@@ -99,23 +100,23 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         read.end_face(odd)?;
         colored += usize::from(words.next().is_some());
     }
-    // Whole numbers up to 255, or shares of 1.
+    // Channels are in 0 to 255 or in 0 to 1.
     if read.colors.as_flattened().iter().any(|&share| share > 1.0) {
         read.colors.as_flattened_mut().iter_mut().for_each(|share| *share /= 255.0);
     }
     let mut say = |count: usize, what: &str| {
         if count > 0 {
-            read.notices.push(format!("{what} of the OFF file are not kept"));
+            read.notices.push(format!("{what} in an OFF file are not supported: ignored"));
         }
     };
-    say(colored, "colours of faces");
-    say(odd_words, "further numbers of vertices");
-    say(usize::from(has_normals && has_colors), "normals beside colours");
+    say(colored, "face colours");
+    say(odd_words, "additional vertex values");
+    say(usize::from(has_normals && has_colors), "normals together with colours");
     read.has_normals = has_normals && !has_colors;
     Ok(read)
 }
 
-/// As a file: OFF, or COFF if there are colours (of vertices, sRGB from 0 to 1), or NOFF if there are normals.
+/// Writes COFF if there are vertex colours (sRGB, 0 to 1), NOFF if there are normals, OFF otherwise.
 pub(crate) fn write(
     positions: &[Vec3],
     origin: DVec3,

@@ -1,13 +1,13 @@
-//! What parts of a model have names.
+//! Kinds of named parts.
 
-/// What a name can be the name of.
+/// Kind of a named part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PartKind {
     /// A material.
     Material,
-    /// A node of a glTF, with all that hangs below it.
+    /// A glTF node with its descendants.
     Node,
-    /// A joint of a glTF: the vertices that it holds more than any other does. A vertex group, elsewhere.
+    /// A glTF joint: the vertices on which it has the largest weight. Other programs call this a vertex group.
     Joint,
     /// An `o` or `g` line of an OBJ.
     Group,
@@ -16,7 +16,7 @@ pub enum PartKind {
 impl PartKind {
     pub(crate) const ALL: [Self; 4] = [Self::Material, Self::Node, Self::Joint, Self::Group];
 
-    /// The word before a name, as in `material:skin`.
+    /// Prefix of qualified names, as in `material:skin`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

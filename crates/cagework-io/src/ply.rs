@@ -1,4 +1,4 @@
-//! PLY in and out: vertices with colours, and polygons.
+//! PLY reader and writer: vertices with colours, and polygons.
 
 use cagework_core::deform::vertex_normals;
 use glam::{DVec3, Vec3};
@@ -13,23 +13,23 @@ use crate::ply_text::{fault_of, readable, stray_line};
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Properties of a vertex that are understood.
-const PLACE: [&str; 3] = ["x", "y", "z"];
+/// Vertex properties that are read.
+const POSITION: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOR: [&str; 3] = ["red", "green", "blue"];
-/// Ends a strip, and stands for what is no vertex.
+/// Ends a strip; also marks values that are not valid vertex indices.
 const NO_VERTEX: u32 = u32::MAX;
-/// The list of a face's vertices has one of two names.
+/// Both names of the list of a face's vertices are in use.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// An element of any kind, as far as it is understood.
+/// An element of any kind, with the supported properties.
 #[derive(Default)]
 struct Element {
     place: [f64; 3],
     normal: [f32; 3],
     color: [u8; 3],
     corners: Vec<u32>,
-    /// The first of the corners that can be no vertex, as written.
+    /// First corner that is not a valid index, as written.
     odd: Option<f64>,
 }
 
@@ -40,7 +40,7 @@ impl PropertyAccess for Element {
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
         let of = |names: [&str; 3]| names.iter().position(|&n| n == name);
-        let set = if let Some(k) = of(PLACE) {
+        let set = if let Some(k) = of(POSITION) {
             place(&property).map(|x| self.place[k] = x)
         } else if let Some(k) = of(COLOR) {
             color(&property).map(|x| self.color[k] = x)
@@ -55,11 +55,11 @@ impl PropertyAccess for Element {
     fn get_float(&self, name: &str) -> Option<f32> {
         let find =
             |names: [&str; 3], values: [f32; 3]| names.iter().position(|&n| n == name).map(|k| values[k]);
-        find(PLACE, self.place.map(|x| x as f32)).or_else(|| find(NORMAL, self.normal))
+        find(POSITION, self.place.map(|x| x as f32)).or_else(|| find(NORMAL, self.normal))
     }
 
     fn get_double(&self, name: &str) -> Option<f64> {
-        PLACE.iter().position(|&n| n == name).map(|k| self.place[k])
+        POSITION.iter().position(|&n| n == name).map(|k| self.place[k])
     }
 
     fn get_uchar(&self, name: &str) -> Option<u8> {
@@ -71,7 +71,7 @@ impl PropertyAccess for Element {
     }
 }
 
-/// A coordinate.
+/// Parses a coordinate.
 fn place(property: &Property) -> Option<f64> {
     match property {
         Property::Double(x) => Some(*x),
@@ -81,7 +81,7 @@ fn place(property: &Property) -> Option<f64> {
     }
 }
 
-/// Vertices of a list of any numbers; [`NO_VERTEX`] for those that are none, and the first of these.
+/// Corners from a list of any numeric type, with [`NO_VERTEX`] for invalid indices, and the first invalid one.
 fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     let of = |numbers: &mut dyn Iterator<Item = f64>| {
         let whole = |x: f64| x >= 0.0 && x < f64::from(NO_VERTEX) && x.fract() == 0.0;
@@ -102,7 +102,7 @@ fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     }
 }
 
-/// A share of a colour: of bytes, of 65,535, or of 1.
+/// Colour channel as a byte, from bytes, 16-bit integers or floats in 0 to 1.
 fn color(property: &Property) -> Option<u8> {
     match property {
         Property::UShort(x) => Some((x >> 8) as u8),
@@ -112,14 +112,14 @@ fn color(property: &Property) -> Option<u8> {
     }
 }
 
-/// Triangles of strips, each of which ends where there is no vertex; every second one is turned round.
+/// Triangles of strips, separated by [`NO_VERTEX`]. Every second triangle of a strip has the opposite orientation.
 fn unstrip(strips: &[Element]) -> Vec<Element> {
     let strips = strips.iter().flat_map(|strip| strip.corners.split(|&v| v == NO_VERTEX));
     let triangles = strips.flat_map(|strip| strip.windows(3).enumerate()).map(|(k, of)| {
         let [a, b, c] = [of[0], of[1 + k % 2], of[2 - k % 2]];
         Element { corners: vec![a, b, c], ..Element::default() }
     });
-    // Stitches have a corner twice.
+    // Strips are joined by triangles with a repeated corner.
     triangles
         .filter(|t| {
             t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2] && t.corners[2] != t.corners[0]
@@ -127,7 +127,7 @@ fn unstrip(strips: &[Element]) -> Vec<Element> {
         .collect()
 }
 
-/// Reads a file within `memory_limit` bytes.
+/// Reads a file using at most `memory_limit` bytes. `near`: store positions relative to an origin near them.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let original = bytes;
     let wrong = |_| fault_of(original);
@@ -140,9 +140,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let count = |name: &str| header.elements.get(name).map_or(0, |e| e.count as u64);
     let mut claimed = 0_u64;
     for element in header.elements.values() {
-        // An element takes a byte at least, if only that of its line's end. One without properties takes none in a binary
-        // file, so that many kinds of them could keep the reader busy for ever: all together may be as many as the bytes.
-        // A face takes four: the number of its corners, and three corners.
+        // Elements take at least one byte, faces four (corner count and three corners). Binary elements
+        // without properties take none, so huge counts of them would stall the reader: limit the sum of all
+        // counts by the file size.
         let least = if element.name == "face" { 4 } else { 1 };
         claimed = claimed.saturating_add(least * element.count as u64);
         if claimed > n_bytes {
@@ -150,7 +150,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
             return Err(PolygonsError::Count { name, count: element.count as u64, bytes: n_bytes });
         }
     }
-    // A corner takes a byte at least, and each element is held until all of its kind are read.
+    // A corner takes at least one byte. The elements of one kind are in memory together.
     let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
     let corners = if count("face") + count("tristrips") > 0 { n_bytes } else { 0 };
     let elements = others * size_of::<Element>() as u64;
@@ -166,18 +166,18 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         ..Polygons::default()
     };
     if let Some(line) = stray_line(original) {
-        read.notices.push(format!("{line} of the header is no statement of PLY: left out"));
+        read.notices.push(format!("{line} is not a statement of a PLY header: ignored"));
     }
     let mut left_out = Vec::new();
     let mut faces: Vec<Element> = Vec::new();
     for (name, element) in &header.elements {
         let elements = parser.read_payload_for_element(&mut reader, element, &header).map_err(wrong)?;
         let has = |names: &[&str]| names.iter().all(|&n| element.properties.contains_key(n));
-        let known: Vec<&str> = [&PLACE[..], &NORMAL, &COLOR].concat();
+        let known: Vec<&str> = [&POSITION[..], &NORMAL, &COLOR].concat();
         match name.as_str() {
             "vertex" => {
-                if !has(&PLACE) {
-                    return Err(PolygonsError::Syntax("its vertices lack x, y or z".into()));
+                if !has(&POSITION) {
+                    return Err(PolygonsError::Syntax("its vertices have no x, y or z".into()));
                 }
                 let places: Vec<DVec3> = elements.iter().map(|e| DVec3::from_array(e.place)).collect();
                 read.place(&places, near);
@@ -201,16 +201,16 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     }
     if !left_out.is_empty() {
         let names = shown_start(&left_out.join(", "), MAX_NAME_CHARS);
-        read.notices.push(format!("'{names}' of the PLY file are not kept"));
+        read.notices.push(format!("PLY data that is not supported is ignored: {names}"));
     }
     Ok(read)
 }
 
-/// What is written: vertices, with normals and colours if there are any, and polygons.
-pub(crate) struct Written<'a> {
+/// Contents of a PLY file.
+pub(crate) struct PlyContents<'a> {
     pub(crate) positions: &'a [Vec3],
     pub(crate) origin: DVec3,
-    /// For normals.
+    /// For computing normals.
     pub(crate) triangles: &'a [[u32; 3]],
     pub(crate) faces: Vec<Vec<u32>>,
     pub(crate) color: &'a dyn Fn(u32) -> Option<[f32; 3]>,
@@ -219,9 +219,9 @@ pub(crate) struct Written<'a> {
     pub(crate) encoding: Encoding,
 }
 
-/// As a file.
-pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
-    let Written { positions, origin, triangles, faces, color, has_colors, has_normals, encoding } = given;
+/// Writes a PLY file.
+pub(crate) fn write(given: PlyContents<'_>) -> Vec<u8> {
+    let PlyContents { positions, origin, triangles, faces, color, has_colors, has_normals, encoding } = given;
     let normals = if has_normals { vertex_normals(positions, triangles) } else { Vec::new() };
     let mut header = Header::new();
     header.encoding = match encoding {
@@ -240,7 +240,7 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
         |names: [&'static str; 3], kind: ScalarType| names.map(|n| (n, PropertyType::Scalar(kind.clone())));
     let is_near = origin == DVec3::ZERO;
     let mut properties =
-        scalars(PLACE, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
+        scalars(POSITION, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
     if has_normals {
         properties.extend(scalars(NORMAL, ScalarType::Float));
     }
@@ -248,7 +248,7 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
         properties.extend(scalars(COLOR, ScalarType::UChar));
     }
     element("vertex", properties);
-    // A list of few corners counts them in a byte, as most programs expect.
+    // Many programs expect 8-bit corner counts, so use them if they suffice.
     let is_small = faces.iter().all(|face| face.len() < 256);
     let counter = if is_small { ScalarType::UChar } else { ScalarType::UInt };
     element("face", vec![(CORNERS[0], PropertyType::List(counter, ScalarType::UInt))]);

@@ -1,5 +1,5 @@
-//! PLY files as they are met, brought to what the reader takes: headers with comments in any encoding, line ends of old programs,
-//! empty lines, odd names or lines of no statement, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
+//! Rewrites PLY files for the strict parser: non-ASCII comments, CR line ends, empty lines, property names
+//! with special characters, unknown header lines and, in text files, numbers such as `.5`, `1.` and `nan`.
 
 use std::borrow::Cow;
 
@@ -7,14 +7,14 @@ use crate::obj::{lines, shown_token};
 use crate::polygons::{PolygonsError, fault};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// A number of a text that is not finite, as the reader takes it: it becomes infinite.
-const NO_NUMBER: &[u8] = b"1e999";
+/// Replacement for non-finite numbers of text files. The parser reads it as infinity.
+const INFINITY_TEXT: &[u8] = b"1e999";
 
-/// First words of the lines of a header.
+/// Keywords of header lines.
 const STATEMENTS: [&[u8]; 7] =
     [b"ply", b"format", b"comment", b"obj_info", b"element", b"property", b"end_header"];
 
-/// The first line of the header that begins with no word of PLY, such as a comment of Blender 2.47, for a message.
+/// First header line with an unknown keyword, for a notice. Blender 2.47 wrote a comment without keyword.
 pub(crate) fn stray_line(bytes: &[u8]) -> Option<String> {
     for line in lines(bytes) {
         let text = &bytes[line.range];
@@ -30,7 +30,7 @@ pub(crate) fn stray_line(bytes: &[u8]) -> Option<String> {
     None
 }
 
-/// Why the reader does not take a file: the first line that is no statement of a header, or no numbers.
+/// Explains why the parser rejected a file: the first invalid header statement or number.
 pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
     const TYPES: [&[u8]; 16] = [
         b"char", b"uchar", b"short", b"ushort", b"int", b"uint", b"float", b"double", b"int8", b"uint8",
@@ -68,18 +68,16 @@ pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
         };
         if !is_statement {
             let text = shown_start(&String::from_utf8_lossy(&words.join(&b' ')), MAX_NAME_CHARS);
-            return fault(line.number, &format!("'{text}' is no statement of a PLY header"));
+            return fault(line.number, &format!("'{text}' is not a statement of a PLY header"));
         }
     }
-    PolygonsError::Syntax(
-        "it ends before all that its header names, or its elements are not as the header says".into(),
-    )
+    PolygonsError::Syntax("it ends early, or its elements do not match the header".into())
 }
 
-/// The file without what the reader stumbles over. What needs no change is not copied.
+/// The file in the form that the parser accepts. Borrows if nothing has to change.
 pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    // Lines end as the first one does.
+    // Use the line end of the first line.
     let is_old = bytes
         .iter()
         .position(|b| b"\r\n".contains(b))
@@ -107,8 +105,8 @@ pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     out.into()
 }
 
-/// The header in the words of the reader's grammar: lines end in `\n`, none is empty, all is ASCII, and properties with other
-/// signs in their names, which nobody here knows, have others.
+/// The header in the parser's grammar: `\n` line ends, no empty lines, ASCII only. Property names with other
+/// characters are replaced; none of them is read.
 fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     let mut out = Vec::with_capacity(header.len());
     for (number, line) in header.split(|&b| b == line_end).enumerate() {
@@ -122,7 +120,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
             out.extend(before.join(&b' '));
             out.push(b' ');
             out.extend(name.iter().map(|b| if is_plain(b) { *b } else { b'_' }));
-            // Names that become alike are still two.
+            // The line number keeps sanitised names distinct.
             out.extend(format!("-{number}").into_bytes());
         } else {
             out.extend(line.iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
@@ -132,7 +130,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     out
 }
 
-/// Where the body begins.
+/// Offset of the body.
 fn end_of_header(bytes: &[u8], line_end: u8) -> Option<usize> {
     const END: &[u8] = b"end_header";
     let is_end = |word: &[u8]| word[0] == line_end && word[1..] == *END;
@@ -144,7 +142,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Whether the reader takes a line as it is. The last one may be empty.
+/// Whether the parser accepts a line of numbers. The last line may be empty.
 fn is_readable(line: &[u8]) -> bool {
     let is_number = |word: &[u8]| {
         let digits = word.strip_prefix(b"-").or_else(|| word.strip_prefix(b"+")).unwrap_or(word);
@@ -155,11 +153,11 @@ fn is_readable(line: &[u8]) -> bool {
     words(line).next().is_some() && words(line).all(is_number)
 }
 
-/// A number in the words of the reader's grammar.
+/// Appends a number in the parser's grammar.
 fn tidy(word: &[u8], out: &mut Vec<u8>) {
     let lower = word.to_ascii_lowercase();
     if lower.windows(3).any(|part| part == b"nan" || part == b"inf") {
-        return out.extend(NO_NUMBER);
+        return out.extend(INFINITY_TEXT);
     }
     let mut before = b' ';
     for (k, &b) in word.iter().enumerate() {

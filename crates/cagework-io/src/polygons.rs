@@ -1,5 +1,6 @@
-//! What PLY, STL and OFF files have in common: polygons of vertices, and little else.
+//! Polygon meshes as read from PLY, STL and OFF files.
 
+use cagework_core::words::counted;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -10,50 +11,52 @@ use crate::memory::MemoryError;
 use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
 use crate::origin::{origin_near, relative};
 
-/// Bytes that a vertex takes in the table of different positions.
+/// Bytes per vertex in the weld table.
 const WELD_BYTES: u64 = 36;
 
-/// Why a PLY, STL or OFF file could not be read.
+/// Error of reading a PLY, STL or OFF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PolygonsError {
-    /// Its own grammar is not kept.
+    /// A syntax error.
     #[error("the file is damaged: {0}")]
     Syntax(String),
-    /// It says that there is more than it has bytes for.
-    #[error("it says that it has {count} of '{name}', but the file has {bytes} bytes")]
+    /// A count is too large for the size of the file.
+    #[error(
+        "its header counts {count} of '{name}', too many for a file of {bytes} bytes: it is damaged or cut off"
+    )]
     Count {
-        /// What it counts.
+        /// Name of the element.
         name: String,
-        /// How many there are to be.
+        /// Declared number of elements.
         count: u64,
-        /// Bytes of the file.
+        /// Size of the file in bytes.
         bytes: u64,
     },
-    /// No vertex at all.
+    /// The file has no vertices.
     #[error("it has no vertices")]
     Empty,
-    /// A vertex is no place.
+    /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} has a coordinate that is not finite")]
     NotFinite {
-        /// The vertex, from 0.
+        /// Vertex index, from 0.
         vertex: usize,
     },
-    /// A face names a vertex that does not exist.
-    #[error("face {face} names vertex {index}, but there are {vertices}, numbered from 0")]
+    /// A face has a vertex index out of range.
+    #[error("face {face} refers to vertex {index}, but there are {vertices}, counted from 0")]
     Vertex {
-        /// The face, from 0.
+        /// Face index, from 0.
         face: usize,
-        /// What it names, as written.
+        /// Index as written.
         index: String,
-        /// Vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
-    /// More memory than is allowed.
+    /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
 }
 
-/// How the numbers of a file are written.
+/// Encoding of numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Text,
@@ -62,20 +65,20 @@ pub(crate) enum Encoding {
     BigEndian,
 }
 
-/// A file that was read.
+/// Polygon mesh as read from a file.
 #[derive(Debug, Default)]
 pub(crate) struct Polygons {
     pub(crate) positions: Vec<Vec3>,
-    /// What they are seen from: zero unless they are far away.
+    /// Origin of `positions`: zero unless they are far from the world origin.
     pub(crate) origin: DVec3,
-    /// Corners of all faces, one after another, and where each face starts. `[n_faces + 1]`
+    /// Vertex indices of all faces, concatenated, and the start of each face. `[n_faces + 1]`
     pub(crate) corners: Vec<u32>,
     pub(crate) face_starts: Vec<u32>,
-    /// Faces that are no surfaces.
+    /// Number of faces with fewer than three corners, which are ignored.
     pub(crate) n_left_out: usize,
-    /// Of each vertex, sRGB from 0 to 1; empty if the file has none.
+    /// Vertex colours, sRGB from 0 to 1; empty if the file has none.
     pub(crate) colors: Vec<[f32; 3]>,
-    /// Names of runs of faces, such as solids.
+    /// Named ranges of faces, such as STL solids.
     pub(crate) groups: Vec<Group>,
     pub(crate) has_normals: bool,
     pub(crate) encoding: Encoding,
@@ -83,10 +86,10 @@ pub(crate) struct Polygons {
 }
 
 impl Polygons {
-    /// Bytes that a file of so many vertices and corners takes with the `bytes` of its file, about; faces are triangles.
+    /// Approximate memory of a mesh of triangles, plus the `bytes` of its file.
     ///
     /// # Errors
-    /// When they are above a limit.
+    /// [`MemoryError`] if it exceeds `limit`.
     pub(crate) fn check_memory(
         bytes: u64,
         vertices: u64,
@@ -97,7 +100,7 @@ impl Polygons {
         MemoryError::check(needed, limit).map(|()| needed)
     }
 
-    /// Sets the positions; with `near`, as seen from an origin near them.
+    /// Stores the positions; with `near`, relative to an origin near them.
     pub(crate) fn place(&mut self, positions: &[DVec3], near: bool) {
         self.positions = positions.iter().map(|p| p.as_vec3()).collect();
         self.origin = if near { origin_near(&self.positions) } else { DVec3::ZERO };
@@ -106,11 +109,11 @@ impl Polygons {
         }
     }
 
-    /// Ends a face that began where the last one ended; one of fewer than three corners is left out. `odd`: a corner that
-    /// cannot be an index.
+    /// Ends the face that consists of the corners since the last call. Faces with fewer than three corners
+    /// are ignored. `odd`: a corner that is not a valid index, as written.
     ///
     /// # Errors
-    /// When it is none.
+    /// [`PolygonsError::Vertex`] if an index is out of range.
     pub(crate) fn end_face(&mut self, odd: Option<f64>) -> Result<(), PolygonsError> {
         let start = self.face_starts.last().map_or(0, |&start| start as usize);
         let face = self.face_starts.len().saturating_sub(1) + self.n_left_out;
@@ -128,10 +131,10 @@ impl Polygons {
         Ok(())
     }
 
-    /// As a document of polygons.
+    /// Converts the mesh to an OBJ document without texture coordinates and normals.
     ///
     /// # Errors
-    /// When a vertex is no place, or there is none.
+    /// If there is no vertex, or one is not finite.
     pub(crate) fn document(&mut self) -> Result<ObjDocument, PolygonsError> {
         if self.positions.is_empty() {
             return Err(PolygonsError::Empty);
@@ -141,7 +144,8 @@ impl Polygons {
         }
         if self.n_left_out > 0 {
             let n = self.n_left_out;
-            self.notices.push(format!("{n} faces of fewer than three corners are no surfaces: left out"));
+            self.notices
+                .push(format!("{} with fewer than three corners: ignored", counted(n, "face", "faces")));
         }
         let mut document = ObjDocument {
             corners: self.corners.iter().map(|&v| Corner { v, vt: NONE, vn: NONE }).collect(),
@@ -156,15 +160,15 @@ impl Polygons {
     }
 }
 
-/// A fault in a line of a text.
+/// A syntax error in a line.
 pub(crate) fn fault(line: usize, problem: &str) -> PolygonsError {
     PolygonsError::Syntax(format!("line {line}: {problem}"))
 }
 
-/// The next numbers of a line, as the words that follow; infinite ones too, which are refused with the vertex they belong to.
+/// Parses the first N words. Non-finite numbers are accepted here and rejected with their vertex.
 ///
 /// # Errors
-/// When one is missing or does not parse.
+/// If a number is missing or invalid.
 pub(crate) fn numbers<T: std::str::FromStr, const N: usize>(
     bytes: &[u8],
     line: &Line,
@@ -179,5 +183,5 @@ pub(crate) fn numbers<T: std::str::FromStr, const N: usize>(
     });
     let parsed = parsed.collect::<Result<Vec<T>, _>>()?;
     let found = parsed.len();
-    parsed.try_into().map_err(|_| fault(line.number, &format!("has {found} numbers of {N}")))
+    parsed.try_into().map_err(|_| fault(line.number, &format!("has only {found} of {N} numbers")))
 }

@@ -1,49 +1,49 @@
-//! A pose in few bytes, for a link: offsets from rest in 16 bits each.
+//! Poses as short byte strings for links: 16-bit offsets from rest.
 
 use glam::Vec3;
 use thiserror::Error;
 
-/// Bytes before the offsets: number of vertices, then the largest offset.
-const HEADER: usize = 8;
+/// Bytes before the offsets: number of vertices and largest offset.
+const HEADER_BYTES: usize = 8;
 
-/// Bytes of each vertex.
-const PER_VERTEX: usize = 6;
+/// Bytes per vertex.
+const VERTEX_BYTES: usize = 6;
 
-/// Why bytes are no pose of a cage.
+/// Error of decoding a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum PoseCodeError {
-    /// Bytes are missing, or there are too many.
-    #[error("the pose is cut off or damaged: {given} bytes instead of {expected}")]
+    /// The length is wrong.
+    #[error("the pose is cut off or damaged: it has {given} bytes instead of {expected}")]
     Length {
-        /// Bytes given.
+        /// Number of bytes.
         given: usize,
-        /// Bytes there should be.
+        /// Expected number of bytes.
         expected: usize,
     },
-    /// It was made for another cage.
+    /// The pose belongs to a cage with another number of vertices.
     #[error(
         "the pose is for a cage of {given} vertices, but this one has {expected}: open the model it was made with"
     )]
     OtherCage {
-        /// Vertices it was made for.
+        /// Vertices in the pose.
         given: usize,
-        /// Vertices of the cage.
+        /// Vertices in the cage.
         expected: usize,
     },
 }
 
-/// A pose as 8 bytes and 6 more for each cage vertex, little endian: number of vertices (u32), largest offset from rest
-/// along an axis (f32, object units), then offsets as i16 of which 32,767 are the largest.
+/// Encodes a pose, little-endian: number of vertices (u32), largest absolute offset along an axis (f32, object units),
+/// then three i16 per vertex in units of largest / 32,767. 8 + 6 n bytes. `rest`, `pose`: `[n_cage]`, object units.
 ///
 /// # Panics
-/// If the pose has not one position per vertex of `rest`.
+/// If the lengths differ.
 #[must_use]
 pub fn encode_pose(rest: &[Vec3], pose: &[Vec3]) -> Vec<u8> {
     assert_eq!(rest.len(), pose.len(), "one position per vertex");
     let offset = |(r, p): (&Vec3, &Vec3)| *p - *r;
     let largest = rest.iter().zip(pose).map(offset).map(|d| d.abs().max_element()).fold(0.0, f32::max);
     let unit = if largest > 0.0 { f32::from(i16::MAX) / largest } else { 0.0 };
-    let mut bytes = Vec::with_capacity(HEADER + PER_VERTEX * rest.len());
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + VERTEX_BYTES * rest.len());
     bytes.extend((rest.len() as u32).to_le_bytes());
     bytes.extend(largest.to_le_bytes());
     for d in rest.iter().zip(pose).map(offset) {
@@ -52,27 +52,34 @@ pub fn encode_pose(rest: &[Vec3], pose: &[Vec3]) -> Vec<u8> {
     bytes
 }
 
-/// The pose that [`encode_pose`] wrote, to half of 1/32,767 of its largest offset.
+/// Decodes a pose of [`encode_pose`]. The error is at most 1/65,534 of the largest offset. `rest`: `[n_cage]`.
 ///
 /// # Errors
-/// [`PoseCodeError`] when the bytes are damaged or belong to a cage of another size.
+/// [`PoseCodeError`] if the bytes are damaged or the cage has another number of vertices.
 pub fn decode_pose(rest: &[Vec3], bytes: &[u8]) -> Result<Vec<Vec3>, PoseCodeError> {
     let word = |at: usize| bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
     let (Some(count), Some(largest)) = (word(0).map(u32::from_le_bytes), word(4).map(f32::from_le_bytes))
     else {
-        return Err(PoseCodeError::Length { given: bytes.len(), expected: HEADER + PER_VERTEX * rest.len() });
+        return Err(PoseCodeError::Length {
+            given: bytes.len(),
+            expected: HEADER_BYTES + VERTEX_BYTES * rest.len(),
+        });
     };
     if count as usize != rest.len() {
         return Err(PoseCodeError::OtherCage { given: count as usize, expected: rest.len() });
     }
-    let expected = HEADER + PER_VERTEX * rest.len();
+    let expected = HEADER_BYTES + VERTEX_BYTES * rest.len();
     if bytes.len() != expected || !largest.is_finite() {
         return Err(PoseCodeError::Length { given: bytes.len(), expected });
     }
     let unit = largest / f32::from(i16::MAX);
     let number = |b: &[u8]| f32::from(i16::from_le_bytes([b[0], b[1]]));
     let offset = |b: &[u8]| unit * Vec3::new(number(b), number(&b[2..]), number(&b[4..]));
-    Ok(rest.iter().zip(bytes[HEADER..].chunks_exact(PER_VERTEX)).map(|(&r, b)| r + offset(b)).collect())
+    Ok(rest
+        .iter()
+        .zip(bytes[HEADER_BYTES..].chunks_exact(VERTEX_BYTES))
+        .map(|(&r, b)| r + offset(b))
+        .collect())
 }
 
 #[cfg(test)]
@@ -94,7 +101,7 @@ mod tests {
         let bytes = encode_pose(&rest, &pose);
         assert_eq!(bytes.len(), 8 + 6 * 50);
         let again = decode_pose(&rest, &bytes).unwrap();
-        // Half of 3 / 32,767, and the rounding of f32 at 100.
+        // Half a quantisation step, 3 / 32,767, plus the rounding of f32 at 100.
         let step = 0.5 * 3.0 / 32_767.0 + 100.0 * f32::EPSILON;
         for (a, b) in again.iter().zip(&pose) {
             assert!((*a - *b).abs().max_element() <= step);
@@ -107,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_bytes_and_other_cages_are_named() {
+    fn damaged_bytes_and_poses_of_other_cages_are_errors() {
         let bytes = encode_pose(&rest(), &rest());
         let cut = decode_pose(&rest(), &bytes[..100]);
         assert_eq!(cut, Err(PoseCodeError::Length { given: 100, expected: 308 }));

@@ -1,10 +1,10 @@
-//! A project in one file: model, cage, poses and settings as a GLB that any viewer opens.
+//! Projects: model, cage, poses and settings in one GLB that any viewer opens.
 //!
-//! The visible part is the model at rest, its document unchanged, and the cage as lines. What only we read is in the
-//! extension [`EXTENSION`] of the document: buffer views with the cage's positions, its faces (for each the number of
-//! corners, then the corners) and the poses, all little endian and in the model's axes, and which of them points up. A model that is no
-//! glTF travels as a file in a buffer view, and what viewers see is made from it; so do further models in the same cage, which
-//! viewers do not see. Weights are not kept: they are made again from the same settings.
+//! Viewers show the model at rest, its document unchanged, and the cage as lines. The rest is in the document
+//! extension [`EXTENSION`]: the up axis, and buffer views with cage positions, cage faces (for each the
+//! number of corners, then the corners) and poses, all little-endian and in the model's axes. A model that is
+//! not a glTF is stored as its file, and the visible mesh is built from it. Further models of the same cage
+//! are stored as files and not visible. Weights are not stored; they are recomputed from the settings.
 
 use cagework_core::PolygonMesh;
 use glam::{DVec3, Vec3};
@@ -19,56 +19,59 @@ use crate::origin::translation;
 use crate::shown::shown;
 use crate::up::UpAxis;
 
-/// Version that is written for one model. Older programs cannot read the next two: those of several models, and of models far
-/// from the origin.
+/// Format version of projects with one model near the origin. Older readers reject the other two: projects
+/// with several models, and with models far from the origin.
 const VERSION: u64 = 1;
-const VERSION_OF_SEVERAL: u64 = 2;
-const VERSION_OF_FAR: u64 = 3;
+const VERSION_MULTIPLE_MODELS: u64 = 2;
+const VERSION_FAR_ORIGIN: u64 = 3;
 
-/// What a project holds.
+/// Contents of a project.
 #[derive(Clone, Debug)]
 pub struct Project {
-    /// The models, one at least.
+    /// At least one model. All share the up axis and the origin.
     pub models: Vec<Model>,
-    /// The cage, as it was: it may not be closed yet.
+    /// The cage; may be open or otherwise invalid.
     pub cage: PolygonMesh,
     /// Names and cage positions of the poses. `[n_cage]` each
     pub poses: Vec<(String, Vec<Vec3>)>,
-    /// What the program that wrote it wants to remember.
+    /// Settings of the program that wrote the project, opaque to this crate.
     pub settings: String,
 }
 
-/// Why a project could not be read.
+/// Error of reading a project.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ProjectError {
-    /// The model in it.
+    /// The model in the project cannot be read.
     #[error(transparent)]
     Model(#[from] ReadError),
-    /// From another version of this program.
+    /// Written by a newer version.
     #[error(
-        "{} is a project of version {found}, but this program reads versions up to {VERSION_OF_FAR}: update it",
+        "{} is a project of version {found}, but this program reads versions up to {VERSION_FAR_ORIGIN}: update the program",
         shown(name)
     )]
     Version {
-        /// Name the caller gave.
+        /// Name given by the caller.
         name: String,
-        /// Its version.
+        /// Version of the project.
         found: u64,
     },
-    /// A part of it is not what it should be.
+    /// A part of the project is missing or invalid.
     #[error("{} is a damaged project: {what}", shown(name))]
     Damaged {
-        /// Name the caller gave.
+        /// Name given by the caller.
         name: String,
         /// What is wrong.
         what: &'static str,
     },
 }
 
-/// Everything as one GLB. `models`: in one cage, all with the same axis up and the same origin, which cage and poses share; `poses`: cage positions, `[n_cage]` each.
+/// Writes a project as one GLB.
+///
+/// `models`: all with the same up axis and origin, which cage and poses share. `poses`: names and cage
+/// positions, `[n_cage]` each.
 ///
 /// # Errors
-/// [`WriteError`] when there is no model, a document cannot be written or the file would be too large.
+/// [`WriteError`] if there is no model, a document cannot be written or the file would be too large.
 pub fn write_project(
     models: &[&Model],
     cage: &PolygonMesh,
@@ -78,7 +81,7 @@ pub fn write_project(
     let (model, more) =
         models.split_first().ok_or_else(|| WriteError::Document("there is no model".into()))?;
     let built;
-    // What viewers see of another format.
+    // Other formats get a GLB of the model for viewers.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
@@ -96,11 +99,11 @@ pub fn write_project(
     let node = add_cage(&mut json, &mut pack, cage, model.origin);
     let mut view =
         |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
-    let version = if more.is_empty() { VERSION } else { VERSION_OF_SEVERAL };
-    let version = if model.origin == DVec3::ZERO { version } else { VERSION_OF_FAR };
+    let version = if more.is_empty() { VERSION } else { VERSION_MULTIPLE_MODELS };
+    let version = if model.origin == DVec3::ZERO { version } else { VERSION_FAR_ORIGIN };
     let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
     project["up"] = up.name().into();
-    if version == VERSION_OF_FAR {
+    if version == VERSION_FAR_ORIGIN {
         project["origin"] = json!(model.origin.to_array());
     }
     if let Some(source) = source {
@@ -121,7 +124,7 @@ pub fn write_project(
         pose["name"] = name.as_str().into();
         push(&mut project, "poses", pose);
     }
-    // An object of extensions may be there already, or anything else.
+    // `extensions` may be missing or malformed.
     if !json["extensions"].is_object() {
         json["extensions"] = json!({});
     }
@@ -130,12 +133,12 @@ pub fn write_project(
     pack.finish(json)
 }
 
-/// Reads a project within `memory_limit` bytes; `None` when the file is no project.
+/// Reads a project using at most `memory_limit` bytes. `None` if the file is not a project.
 ///
 /// # Errors
-/// [`ProjectError`] when it is one that cannot be read.
+/// [`ProjectError`] if the project cannot be read.
 pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Option<Project>, ProjectError> {
-    // A search is cheaper than a parse of every GLB that is opened. Its first chunk is the JSON.
+    // Search the JSON chunk for the extension's name, to avoid parsing every GLB twice.
     let json = match bytes {
         [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, _, _, _, _, rest @ ..] => {
             &rest[..rest.len().min(u32::from_le_bytes([*a, *b, *c, *d]) as usize)]
@@ -150,7 +153,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         .map_err(|source| ReadError::Gltf { name: name.into(), source })?;
     let Some(project) = take_project(&mut json) else { return Ok(None) };
     let found = project["version"].as_u64().unwrap_or(0);
-    if !(VERSION..=VERSION_OF_FAR).contains(&found) {
+    if !(VERSION..=VERSION_FAR_ORIGIN).contains(&found) {
         return Err(ProjectError::Version { name: name.into(), found });
     }
     let views = json["bufferViews"].clone();
@@ -160,9 +163,9 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
     };
     let model_name = project["name"].as_str().unwrap_or(name);
-    // Projects from before the choice have none.
+    // The first projects have no up axis.
     let up = project["up"].as_str().and_then(UpAxis::named).unwrap_or_default();
-    // Projects of models near the origin have none.
+    // Only projects far from the origin store it.
     let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
         .map_err(|_| damaged("its origin is not three numbers"))?;
     let origin = DVec3::from_array(origin.unwrap_or_default());
@@ -188,7 +191,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         Model::read_within(model_name, source, &mut |_| None, memory_limit)?
     } else {
         drop_cage(&mut json, project["node"].as_u64());
-        let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("it cannot be put together again"))?;
+        let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("its model cannot be restored"))?;
         Model::read_within(model_name, &plain, &mut |_| None, memory_limit)?
     };
     place(&mut model)?;
@@ -206,7 +209,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     Ok(Some(Project { models, cage: PolygonMesh { positions, faces }, poses, settings }))
 }
 
-/// A model as a file of its own format that needs no other file.
+/// The model as a self-contained file of its own format.
 fn file_of(model: &Model) -> Result<Vec<u8>, WriteError> {
     match (&model.document, model.format()) {
         (Document::Gltf(document), _) => {
@@ -215,12 +218,12 @@ fn file_of(model: &Model) -> Result<Vec<u8>, WriteError> {
             pack.finish(json)
         }
         (Document::Obj(document), ModelFormat::Obj) => Ok(document.bytes.clone()),
-        // Of them nothing but what is written is kept.
+        // PLY, STL and OFF documents do not keep the original bytes.
         (_, format) => model.write(format, &model.positions),
     }
 }
 
-/// Takes the extension out of the document.
+/// Removes the project extension from the document and returns it.
 fn take_project(json: &mut Value) -> Option<Value> {
     let extensions = json.get_mut("extensions")?.as_object_mut()?;
     let project = extensions.shift_remove(EXTENSION)?;
@@ -236,9 +239,9 @@ fn take_project(json: &mut Value) -> Option<Value> {
     Some(project)
 }
 
-/// The cage as lines at a node of its own; the node.
+/// Adds the cage as lines in a new node; returns the node.
 fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: DVec3) -> Option<usize> {
-    /// Mode of a primitive: lines.
+    /// glTF primitive mode.
     const LINES: u32 = 1;
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for face in &cage.faces {
@@ -249,7 +252,7 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     }
     edges.sort_unstable();
     edges.dedup();
-    // A document without nodes shows all its meshes; a node for the cage would hide them.
+    // Without nodes, viewers show all meshes; adding a node would hide them.
     if edges.is_empty() || json["nodes"].as_array().is_none_or(Vec::is_empty) {
         return None;
     }
@@ -273,7 +276,7 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     Some(node)
 }
 
-/// Removes the node that [`add_cage`] added, if the file still has it at the end of its list.
+/// Removes the cage's node and mesh, if they are still the last ones.
 fn drop_cage(json: &mut Value, node: Option<u64>) {
     let Some(node) = node else { return };
     let is_cage = |list: &Value, index: u64| {

@@ -1,48 +1,50 @@
-//! What rigged models have besides a shape.
+//! Rigged models: skeleton, morph targets and clips.
 
 use cagework_core::skin::skin_vertices;
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::{self, Clip, JointPoint, Named, Played, Player, ReshapeOptions, ReshapeReport, Rig};
+use crate::gltf::{
+    self, Clip, JointPoint, Player, PoseDisplacements, PoseTiming, ReshapeOptions, ReshapeReport, Rig,
+};
 use crate::model::{Document, Model};
 use crate::origin::relative;
 use crate::shown::shown;
 
-/// Most frames of a clip that a cage is made around, and most vertices of all of them: fewer frames of a large model.
-const FRAMES: usize = 32;
-const MOST_FRAME_VERTICES: usize = 1 << 24;
+/// Limits on the frames of a clip that a generated cage encloses: frames, and vertices of all frames together.
+const MAX_CLIP_FRAMES: usize = 32;
+const MAX_FRAME_VERTICES: usize = 1 << 24;
 
-/// Frames of a clip that are baked: for each second, and at most; engines struggle with more morph targets.
-const BAKED_PER_SECOND: f32 = 30.0;
-const MOST_BAKED: f32 = 60.0;
-/// Bytes of all frames of a baked clip.
-const MOST_BAKED_BYTES: u64 = 512 << 20;
+/// Sampling rate of baked clips, and limit on their frames: game engines struggle with more morph targets.
+const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
+const MAX_BAKED_FRAMES: f32 = 60.0;
+/// Limit on positions and normals of all baked frames, bytes.
+const MAX_BAKED_BYTES: u64 = 512 << 20;
 
-/// There is no clip of a name.
+/// No clip has the requested name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("there is no clip '{}'; the model has {}", shown(asked), if names.is_empty() { "none".to_owned() } else { shown(&names.join(", ")) })]
-pub struct NoClip {
-    /// Name asked for.
+pub struct UnknownClip {
+    /// Requested name.
     pub asked: String,
-    /// Names there are.
+    /// Names of all clips.
     pub names: Vec<String>,
 }
 
 impl Clip {
-    /// The number of the first clip of a name. One without a name of its own is called by its number, "clip 0".
+    /// Index of the first clip with this name. Unnamed clips have labels such as "clip 0".
     ///
     /// # Errors
-    /// [`NoClip`].
-    pub fn named(clips: &[Self], name: &str) -> Result<usize, NoClip> {
+    /// [`UnknownClip`] if there is none.
+    pub fn named(clips: &[Self], name: &str) -> Result<usize, UnknownClip> {
         let own = clips.iter().position(|clip| clip.name.as_deref() == Some(name));
         let names: Vec<String> = clips.iter().enumerate().map(|(k, clip)| clip.label(k)).collect();
         let found = own.or_else(|| names.iter().position(|label| label == name));
-        found.ok_or_else(|| NoClip { asked: name.to_owned(), names })
+        found.ok_or_else(|| UnknownClip { asked: name.to_owned(), names })
     }
 
-    /// What the clip with a number is called: its name, or its number if it has none.
+    /// Name of the clip; "clip `number`" if it has none.
     #[must_use]
     pub fn label(&self, number: usize) -> String {
         self.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("clip {number}"))
@@ -50,37 +52,37 @@ impl Clip {
 }
 
 impl Model {
-    /// Whether it has skins, morph targets or nodes that follow the cage: what [`Self::write_glb`] leaves out or as it is, and
-    /// [`Self::write_reshaped`] brings to the new shape.
+    /// Whether the model has skins, morph targets or nodes that follow the cage. [`Self::write_reshaped`]
+    /// fits them to the new shape; [`Self::write_glb`] does not.
     #[must_use]
     pub fn is_rigged(&self) -> bool {
         matches!(&self.document, Document::Gltf(document) if Rig::is_needed(document))
     }
 
-    /// Points that move besides the vertices when a rigged model is reshaped: ends of morph targets, joints and other nodes that
-    /// follow, offsets of a VRM.
-    /// They are bound after the vertices. Empty without a rig.
+    /// Points to bind after the vertices when a rigged model is reshaped: ends of morph targets, joints and
+    /// other moving nodes, and offsets stored in a VRM. Empty without a rig. Object units, `[n_points]`.
     ///
     /// # Errors
-    /// [`WriteError`] when a part of the rig cannot be read.
+    /// [`WriteError`] if a part of the rig cannot be read.
     pub fn extra_points(&self) -> Result<Vec<Vec3>, WriteError> {
         let bound = self.rig()?.map_or_else(Vec::new, |rig| rig.bound());
         let extras: Vec<Vec3> = bound.iter().map(|&p| relative(p, self.origin)).collect();
         Ok(self.up.turned(&extras).into_owned())
     }
 
-    /// Joints and nodes below them: what a picture shows of the skeleton.
+    /// Joints and the nodes below them, for drawing the skeleton.
     ///
     /// # Errors
-    /// [`WriteError`] when a part of the rig cannot be read.
+    /// [`WriteError`] if a part of the rig cannot be read.
     pub fn joints(&self) -> Result<Vec<JointPoint>, WriteError> {
         Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.joints()))
     }
 
-    /// Names of what hangs on joints, or on nodes that clips move, without a skin and can be kept rigid: buckles, eyes, weapons.
+    /// Names of unskinned parts attached to joints or animated nodes, such as buckles, eyes and weapons. They
+    /// can be kept rigid.
     ///
     /// # Errors
-    /// [`WriteError`] when a part of the rig cannot be read.
+    /// [`WriteError`] if a part of the rig cannot be read.
     pub fn props(&self) -> Result<Vec<String>, WriteError> {
         Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.props()))
     }
@@ -94,12 +96,11 @@ impl Model {
         }
     }
 
-    /// The model with its skeleton, morph targets and clips, to be played; its vertices have the file's axes and this model's
-    /// [`Self::origin`]. None of a format
-    /// without any.
+    /// Player for the model's skeleton, morph targets and clips. Its vertices are in the file's axes,
+    /// relative to [`Self::origin`]. `None` if the model is not a glTF.
     ///
     /// # Errors
-    /// [`WriteError`] when a part of them cannot be read.
+    /// [`WriteError`] if a part of the rig cannot be read.
     pub fn player(&self) -> Result<Option<Player>, WriteError> {
         match &self.document {
             Document::Gltf(document) => Ok(Some(Player::new(document, document, self.origin)?)),
@@ -107,17 +108,17 @@ impl Model {
         }
     }
 
-    /// A player of an export of this model, with the vertices in this model's order.
+    /// Player for an export of this model, with vertices in this model's order.
     ///
     /// # Errors
-    /// [`WriteError`] when it is none.
+    /// [`WriteError`] if `export` is not an export of this model.
     pub fn player_of(&self, export: &[u8]) -> Result<Player, WriteError> {
         let Document::Gltf(like) = &self.document else { return Err(WriteError::NoRig) };
         let read = gltf::read("export.glb", export, &mut |_| None, u64::MAX, Some(self.origin))?;
         Ok(Player::new(&read.document, like, self.origin)?)
     }
 
-    /// The animation clips of the file.
+    /// Animation clips of the file.
     #[must_use]
     pub fn clips(&self) -> Vec<Clip> {
         match &self.document {
@@ -126,13 +127,14 @@ impl Model {
         }
     }
 
-    /// A rigged model reshaped, with its skeleton, morph targets and animations; or, with `poses`, the model at rest with a
-    /// morph target more for each.
+    /// Exports a rigged model in its deformed shape, with skeleton, morph targets and animations fitted to
+    /// it. With `poses`, the shape stays at rest and each pose becomes an additional morph target.
     ///
-    /// `by`: how far each vertex, then each of [`Self::extra_points`], moves. `outside`: those of them outside the cage.
+    /// `by`: displacements of the vertices, then of [`Self::extra_points`]. `outside`: indices of those
+    /// points that are outside the cage.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite displacement for each point, or the document cannot be written.
+    /// [`WriteError`] unless there is one finite displacement per point, or if the document cannot be written.
     pub fn write_reshaped(
         &self,
         by: &[DVec3],
@@ -156,8 +158,8 @@ impl Model {
         let all_moved = |by: &[DVec3]| Ok(rig.held(&options.parts, &rest, rig.all_moved(turned(by)?)));
         let by: Vec<DVec3> = all_moved(by)?;
         let by_poses = poses.iter().map(|(_, by)| all_moved(by)).collect::<Result<Vec<_>, WriteError>>()?;
-        let poses: Vec<Named<'_>> =
-            poses.iter().zip(&by_poses).map(|((name, _), by)| Named { name, by }).collect();
+        let poses: Vec<PoseDisplacements<'_>> =
+            poses.iter().zip(&by_poses).map(|((name, _), by)| PoseDisplacements { name, by }).collect();
         let mut is_outside = vec![false; n];
         for &point in outside {
             if let Some(is_outside) = is_outside.get_mut(point as usize) {
@@ -169,12 +171,12 @@ impl Model {
         gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
     }
 
-    /// The vertices at rest, those that morph targets move with each target at 0 and at 1, and frames of a clip: what a cage should
-    /// enclose.
+    /// Vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
+    /// weights 0 and 1, and frames of a clip.
     ///
     /// # Errors
-    /// [`NoClip`]; the rig's own faults only leave it at the rest shape.
-    pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), NoClip> {
+    /// [`UnknownClip`] if there is no such clip. A faulty rig is no error; the result is then the rest shape.
+    pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), UnknownClip> {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         if let Ok(Some(rig)) = self.rig() {
             let ends: Vec<Vec3> = rig.shown_ends().filter(|end| end.is_finite()).collect();
@@ -186,7 +188,7 @@ impl Model {
             return Ok((positions, triangles));
         };
         let number = Clip::named(player.clips(), asked)?;
-        let n = (MOST_FRAME_VERTICES / self.positions.len().max(1)).clamp(2, FRAMES);
+        let n = (MAX_FRAME_VERTICES / self.positions.len().max(1)).clamp(2, MAX_CLIP_FRAMES);
         for at in self.frames_of(&player, number, n) {
             if at.iter().all(|p| p.is_finite()) {
                 let first = positions.len() as u32;
@@ -213,32 +215,32 @@ impl Model {
         (0..n).map(move |frame| self.shown_at(player, Some(clip), frame as f32 * step, &[]))
     }
 
-    /// The vertices at equal distances of time, from a clip's beginning to its end: as many frames as [`Self::write_baked`] bakes.
+    /// Positions at equal time steps from the start of a clip to its end: the frames that
+    /// [`Self::write_baked`] exports. `[n_frames][n_vertices]`
     ///
     /// # Errors
-    /// [`WriteError`] when there is none of this number, or it cannot be played or is too large to be baked.
+    /// [`WriteError`] if there is no such clip, it cannot be played, or its frames exceed the memory limit.
     pub fn frames(&self, clip: usize) -> Result<Vec<Vec<Vec3>>, WriteError> {
         let player = self.player()?.ok_or(WriteError::NoRig)?;
         let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
-        let n = (found.seconds * BAKED_PER_SECOND).ceil().clamp(1.0, MOST_BAKED) as usize + 1;
-        // Positions and normals of each frame.
+        let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(1.0, MAX_BAKED_FRAMES) as usize + 1;
+        // Bytes of a position and a normal.
         let needed = (n * self.positions.len() * 24) as u64;
-        if needed > MOST_BAKED_BYTES {
+        if needed > MAX_BAKED_BYTES {
             return Err(WriteError::Document(format!(
-                "{n} frames of {} vertices are {} MB, above the limit of {} MB for a baked clip: export it without the cage \
-                 bending the moving model",
+                "{n} frames of {} vertices are {} MB, above the limit of {} MB for a baked clip: export the clip without \
+                 dynamic bending",
                 self.positions.len(),
                 needed >> 20,
-                MOST_BAKED_BYTES >> 20
+                MAX_BAKED_BYTES >> 20
             )));
         }
         Ok(self.frames_of(&player, clip, n).collect())
     }
 
-    /// A clip as morph targets, one for each of its frames, without skeleton: what moves in a way that no skeleton can. `rest` and
-    /// each frame: `[n_vertices]`.
+    /// Exports a clip without skeleton, as one morph target per frame. Used for motion that skinning cannot
+    /// represent. `rest` and each frame: `[n_vertices]`.
     ///
-    /// # Errors
     /// As [`Self::write_glb`], and [`WriteError::NoClip`].
     pub fn write_baked(
         &self,
@@ -252,6 +254,6 @@ impl Model {
         let step = seconds / (frames.len().max(2) - 1) as f32;
         let named = |(k, at)| (format!("{:.3} s", k as f32 * step), at);
         let frames: Vec<(String, Vec<Vec3>)> = frames.into_iter().enumerate().map(named).collect();
-        self.glb(rest, &frames, Played::Frames { clip, seconds: *seconds })
+        self.glb(rest, &frames, PoseTiming::Frames { clip, seconds: *seconds })
     }
 }

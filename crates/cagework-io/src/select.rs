@@ -1,4 +1,4 @@
-//! Parts of a model by the names that its file gives them.
+//! Selection of model parts by their names in the file.
 
 use cagework_core::deform::deform_bound;
 use cagework_core::{Frames, Weights};
@@ -12,32 +12,32 @@ use crate::model::{Document, Model};
 use crate::part_kind::PartKind;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Names that an error lists.
-const LISTED: usize = 20;
+/// Limit on the names in an error message.
+const MAX_LISTED_NAMES: usize = 20;
 
-/// Why a name selects nothing.
+/// Error of selecting a part by name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SelectError {
-    /// Nothing is called so.
-    #[error("no part is called '{}'; there are {}", name(asked), listed(names))]
+    /// No part has this name.
+    #[error("no part is called '{}'; the model has {}", name(asked), listed(names))]
     Unknown {
-        /// Name asked for.
+        /// Requested name.
         asked: String,
-        /// Names there are, each with its kind.
+        /// Names of all parts, each with its kind.
         names: Vec<String>,
     },
-    /// Things of several kinds are.
+    /// Parts of several kinds have this name.
     #[error("several parts are called '{}': write {}", name(asked), choices.join(" or "))]
     Ambiguous {
-        /// Name asked for.
+        /// Requested name.
         asked: String,
-        /// What may be meant.
+        /// Unambiguous names, with kinds.
         choices: Vec<String>,
     },
-    /// Vertices of a part cannot be read.
+    /// The vertices of a part cannot be read.
     #[error(transparent)]
     Gltf(#[from] GltfError),
-    /// Its rig cannot be.
+    /// The rig cannot be read.
     #[error(transparent)]
     Rig(#[from] WriteError),
 }
@@ -48,20 +48,21 @@ fn name(text: &str) -> String {
 
 fn listed(names: &[String]) -> String {
     if names.is_empty() {
-        return "none: the file names no part".into();
+        return "no named parts".into();
     }
-    let mut text = names.iter().take(LISTED).map(|n| name(n)).collect::<Vec<_>>().join(", ");
-    if names.len() > LISTED {
-        text += &format!(" and {} more", names.len() - LISTED);
+    let mut text = names.iter().take(MAX_LISTED_NAMES).map(|n| name(n)).collect::<Vec<_>>().join(", ");
+    if names.len() > MAX_LISTED_NAMES {
+        text += &format!(" and {} more", names.len() - MAX_LISTED_NAMES);
     }
     text
 }
 
 impl Model {
-    /// Where the vertices go with a posed cage, and `parts` as they are held; exactly where they are if no control has moved, which
-    /// sums of weighted controls are not.
+    /// Deformed vertices, with `parts` held in place or rigid. Returns the exact rest positions if `posed`
+    /// equals `rest`; the weighted sums would add rounding.
     ///
-    /// `weights`, `frames` of the vertices; `rest`, `posed`: `[n_controls]`, object units. Returns `[n_vertices]`.
+    /// `weights`, `frames`: of the model's vertices. `rest`, `posed`: `[n_controls]`, object units. Returns
+    /// `[n_vertices]`, object units.
     ///
     /// # Panics
     /// As [`deform_bound`].
@@ -79,11 +80,11 @@ impl Model {
         if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
     }
 
-    /// Vertices of what the file calls `name`, ascending: `material:skin`, `node:Buckle`, `joint:Head`, `group:eyes`, or the name
-    /// alone where only one kind of thing is called so.
+    /// Vertices of the parts called `name`, ascending. `name` has a kind, as in `material:skin`,
+    /// `node:Buckle`, `joint:Head` or `group:eyes`, or is unique without one.
     ///
     /// # Errors
-    /// [`SelectError`], with the names there are.
+    /// [`SelectError`], listing the available names.
     pub fn select(&self, name: &str) -> Result<Vec<u32>, SelectError> {
         let kinds = PartKind::ALL.into_iter();
         let prefixed =
@@ -93,7 +94,7 @@ impl Model {
             found.push((kind, self.vertices_of(kind, name)?));
         }
         if found.iter().all(|(_, vertices)| vertices.is_empty()) {
-            // Names may have colons of their own.
+            // Names may contain colons.
             for kind in kinds {
                 found.push((kind, self.vertices_of(kind, name)?));
             }
@@ -109,7 +110,7 @@ impl Model {
         }
     }
 
-    /// Names that [`Self::select`] takes, each with its kind.
+    /// Names for [`Self::select`], each with its kind.
     #[must_use]
     pub fn part_names(&self) -> Vec<String> {
         let names = match &self.document {
@@ -119,10 +120,10 @@ impl Model {
         names.into_iter().map(|(kind, name)| format!("{}:{name}", kind.word())).collect()
     }
 
-    /// What the cage does not bend, by the names of what stays, with how much of it, and of what keeps its shape, piece by piece.
+    /// Parts that stay in place, with amounts from 0 to 1, and parts that stay rigid, split into connected pieces.
     ///
     /// # Errors
-    /// [`SelectError`]
+    /// [`SelectError`] if a name selects nothing.
     pub fn parts(&self, stay: &[(String, f32)], rigid: &[String]) -> Result<Parts, SelectError> {
         let mut parts = Parts::default();
         for (name, amount) in stay {

@@ -1,4 +1,4 @@
-//! The files that a model names.
+//! External files that a model refers to.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -8,75 +8,75 @@ use thiserror::Error;
 use crate::look::sniff_image;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Fetches a file that a model names by a relative path, percent-decoded. `None`: there is none. An error says why it is
-/// not read, as what follows its name: "is a folder".
+/// Callback that returns an external file by relative path, percent-decoded. `None` if it does not exist; an
+/// error is the reason as a predicate, such as "is a folder".
 pub type Resolve<'a> = dyn FnMut(&str) -> Option<Result<Vec<u8>, String>> + 'a;
 
-/// Most bytes of all files that one model names: as many as the model itself may have.
+/// Limit on the external files of one model, bytes: the limit on the model itself.
 const MAX_BYTES: u64 = 2 << 30;
 
-/// An encoded image, known by its content to be one.
+/// An encoded image, recognised by its content.
 #[derive(Clone, Debug)]
 pub(crate) struct Image {
-    /// What the model calls it, shortened.
+    /// Name in the model, shortened.
     pub(crate) name: Arc<str>,
     pub(crate) bytes: Arc<Vec<u8>>,
     pub(crate) mime: &'static str,
 }
 
-/// Why there is no file or image of a name, as what follows it.
+/// Why a file or image is unavailable, as a predicate.
 #[derive(Clone, Debug, Error)]
-pub(crate) enum Absent {
-    /// Nobody has it.
-    #[error("is not there")]
+pub(crate) enum SiblingError {
+    #[error("is missing")]
     Missing,
-    /// It is there.
+    /// The file exists but cannot be used.
     #[error("{0}")]
     Refused(String),
 }
 
-/// The files that one model names, each asked for once and shared by all that name it.
+/// Cache of a model's external files. Each is requested once.
 pub(crate) struct Siblings<'a> {
     resolve: &'a mut Resolve<'a>,
-    files: BTreeMap<String, Result<Arc<Vec<u8>>, Absent>>,
+    files: BTreeMap<String, Result<Arc<Vec<u8>>, SiblingError>>,
     images: HashMap<String, Option<Image>>,
-    /// Bytes that were read, of the same file under several names each time.
+    /// Bytes of all files read. A file with two names counts twice.
     bytes: u64,
-    /// Most of them.
+    /// Limit for `bytes`.
     limit: u64,
 }
 
 impl Image {
     /// # Errors
-    /// That the bytes are no image.
-    pub(crate) fn new(name: &str, bytes: Arc<Vec<u8>>) -> Result<Self, Absent> {
+    /// [`SiblingError`] if the bytes are not an image.
+    pub(crate) fn new(name: &str, bytes: Arc<Vec<u8>>) -> Result<Self, SiblingError> {
         match sniff_image(&bytes) {
             Some(mime) => Ok(Self { name: shown_start(name, MAX_NAME_CHARS).into(), bytes, mime }),
-            None => Err(Absent::Refused(NO_IMAGE.into())),
+            None => Err(SiblingError::Refused(NOT_AN_IMAGE.into())),
         }
     }
 }
 
-/// What follows the name of what should be an image.
-pub(crate) const NO_IMAGE: &str = "is no PNG, JPEG, WebP or KTX2 image";
+/// Predicate for a file that is not an image.
+pub(crate) const NOT_AN_IMAGE: &str = "is not a PNG, JPEG, WebP or KTX2 image";
 
 impl<'a> Siblings<'a> {
-    /// Files that `resolve` fetches, as far as they fit into `memory_limit` bytes.
+    /// Cache of files from `resolve`, up to `memory_limit` bytes.
     pub(crate) fn new(resolve: &'a mut Resolve<'_>, memory_limit: u64) -> Self {
         let limit = memory_limit.min(MAX_BYTES);
         Self { resolve, files: BTreeMap::new(), images: HashMap::new(), bytes: 0, limit }
     }
 
-    /// Bytes of all files that were read.
+    /// Bytes of all files read.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The file of this name. Names that differ in `.` and doubled slashes alone are one; files with the same bytes are held once.
+    /// The file of this name. Paths are compared without `.` and empty components; files with equal content
+    /// share memory.
     ///
     /// # Errors
-    /// Why there is none.
-    pub(crate) fn file(&mut self, name: &str) -> Result<Arc<Vec<u8>>, Absent> {
+    /// [`SiblingError`] with the reason.
+    pub(crate) fn file(&mut self, name: &str) -> Result<Arc<Vec<u8>>, SiblingError> {
         let parts: Vec<&str> = name
             .split('/')
             .enumerate()
@@ -88,12 +88,12 @@ impl<'a> Siblings<'a> {
             return known.clone();
         }
         let found = match (self.resolve)(name) {
-            None => Err(Absent::Missing),
-            Some(Err(reason)) => Err(Absent::Refused(reason)),
+            None => Err(SiblingError::Missing),
+            Some(Err(reason)) => Err(SiblingError::Refused(reason)),
             Some(Ok(bytes)) if bytes.len() as u64 > self.limit - self.bytes => {
                 let limit = self.limit >> 20;
-                Err(Absent::Refused(format!(
-                    "is too large: all files that a model names may have {limit} MiB"
+                Err(SiblingError::Refused(format!(
+                    "exceeds the limit of {limit} MiB for all files of a model"
                 )))
             }
             Some(Ok(bytes)) => {
@@ -106,7 +106,7 @@ impl<'a> Siblings<'a> {
         found
     }
 
-    /// The image of this name. Where there is none the notices say so, once, and what becomes of it: `otherwise`.
+    /// The image of this name. If it is unavailable, adds a notice with the consequence `otherwise`, once per name.
     pub(crate) fn image(&mut self, name: &str, otherwise: &str, notices: &mut Vec<String>) -> Option<Image> {
         if let Some(known) = self.images.get(name) {
             return known.clone();
@@ -126,16 +126,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spellings_of_a_name_are_one_file_and_equal_files_are_held_once() {
-        let mut asked = Vec::new();
+    fn equivalent_paths_are_one_request_and_equal_files_share_memory() {
+        let mut requested = Vec::new();
         let mut resolve = |name: &str| {
-            asked.push(name.to_owned());
+            requested.push(name.to_owned());
             Some(Ok(vec![7; 100]))
         };
         let mut siblings = Siblings::new(&mut resolve, 1 << 20);
         let files = ["h.mtl", "./h.mtl", "././h.mtl", "a/../h.mtl", "a//b/./c.mtl", "a/b/c.mtl"]
-            .map(|name| siblings.file(name).expect("it is there"));
+            .map(|name| siblings.file(name).expect("the file exists"));
         assert!(files.iter().all(|file| Arc::ptr_eq(file, &files[0])));
-        assert_eq!(asked, ["h.mtl", "a/../h.mtl", "a/b/c.mtl"]);
+        assert_eq!(requested, ["h.mtl", "a/../h.mtl", "a/b/c.mtl"]);
     }
 }

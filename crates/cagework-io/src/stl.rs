@@ -1,8 +1,10 @@
-//! STL in and out: triangles without vertices of their own.
+//! STL reader and writer.
 //!
-//! Corners at one place are one vertex, in order of first occurrence, so that a bind has no place twice and a cage is closed.
+//! STL stores triangles without shared vertices. Coincident corners are welded, in order of first occurrence,
+//! so that cages are closed.
 
 use cagework_core::mesh::weld;
+use cagework_core::words::counted;
 use glam::{DVec3, Vec3};
 use stl_io::{Normal, Triangle, Vertex};
 
@@ -10,23 +12,24 @@ use crate::obj::{Group, lines, rest_of, shown_token, tokens};
 use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
-/// Bytes of the header with the number of triangles, and of each triangle, in a binary file.
-const HEADER: usize = 84;
-const TRIANGLE: usize = 50;
+/// Sizes in a binary file, bytes: header with triangle count, and one triangle.
+const HEADER_BYTES: usize = 84;
+const TRIANGLE_BYTES: usize = 50;
 
-/// Bytes that a triangle takes at least in a text.
-const SHORTEST: usize = 60;
+/// Lower bound on the size of a triangle in a text file, bytes.
+const MIN_TEXT_TRIANGLE_BYTES: usize = 60;
 
-/// Whether the bytes can be nothing else: a binary file has the length that it says, a text begins with two words.
+/// Whether the content identifies an STL: a binary file whose length matches its triangle count, or a text
+/// with `solid` and `facet`.
 pub(crate) fn is_stl(bytes: &[u8]) -> bool {
     is_binary(bytes) || is_text(bytes)
 }
 
 fn is_binary(bytes: &[u8]) -> bool {
-    let count = bytes.get(HEADER - 4..HEADER).and_then(|count| <[u8; 4]>::try_from(count).ok());
+    let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES).and_then(|count| <[u8; 4]>::try_from(count).ok());
     count.is_some_and(|count| {
         let count = u32::from_le_bytes(count) as u64;
-        count > 0 && bytes.len() as u64 == HEADER as u64 + count * TRIANGLE as u64
+        count > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + count * TRIANGLE_BYTES as u64
     })
 }
 
@@ -34,15 +37,16 @@ fn is_text(bytes: &[u8]) -> bool {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let start = &bytes[..bytes.len().min(4096)];
     bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
-        // A binary file may have both words in its header, and bytes after its triangles; but it has zeros.
+        // A binary file can have both words in its header and bytes after its triangles, but it contains zeros.
         && !start.contains(&0)
         && start.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
 }
 
-/// Reads a file within `memory_limit` bytes.
+/// Reads a file using at most `memory_limit` bytes. `near`: store positions relative to an origin near them.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let is_text = is_text(bytes) && !is_binary(bytes);
-    let most = if is_text { bytes.len() / SHORTEST } else { bytes.len() / TRIANGLE } as u64;
+    let most =
+        if is_text { bytes.len() / MIN_TEXT_TRIANGLE_BYTES } else { bytes.len() / TRIANGLE_BYTES } as u64;
     Polygons::check_memory(2 * bytes.len() as u64, 3 * most, 3 * most, memory_limit)?;
     let mut read = Polygons {
         face_starts: vec![0],
@@ -76,52 +80,56 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         read.groups.clear();
     }
     if collapsed > 0 {
-        read.notices.push(format!("{collapsed} triangles have two corners at one place: left out"));
+        read.notices.push(format!(
+            "{} with coincident corners: ignored",
+            counted(collapsed, "triangle", "triangles")
+        ));
     }
     Ok(read)
 }
 
 /// Corners of the triangles of a binary file.
 fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, PolygonsError> {
-    let count = bytes.get(HEADER - 4..HEADER).and_then(|count| <[u8; 4]>::try_from(count).ok());
+    let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES).and_then(|count| <[u8; 4]>::try_from(count).ok());
     let Some(count) = count.map(|count| u64::from(u32::from_le_bytes(count))) else {
-        return Err(PolygonsError::Syntax(
-            "it has no facets of text, and is too short for a binary file".into(),
-        ));
+        return Err(PolygonsError::Syntax("it has no text facets and is too short for a binary file".into()));
     };
-    let (length, follow) = (bytes.len() as u64, (bytes.len() - HEADER) as u64);
-    if count * TRIANGLE as u64 > follow {
+    let (length, follow) = (bytes.len() as u64, (bytes.len() - HEADER_BYTES) as u64);
+    if count * TRIANGLE_BYTES as u64 > follow {
         return Err(PolygonsError::Count { name: "triangle".into(), count, bytes: length });
     }
     if count == 0 && follow > 0 {
         let problem = format!("its header counts 0 facets, but {follow} bytes follow");
         return Err(PolygonsError::Syntax(problem));
     }
-    let (triangles, rest) = bytes[HEADER..].split_at(count as usize * TRIANGLE);
+    let (triangles, rest) = bytes[HEADER_BYTES..].split_at(count as usize * TRIANGLE_BYTES);
     if !rest.is_empty() {
         let n = rest.len();
-        notices.push(format!("its header counts {count} facets: {n} bytes after them are left out"));
+        notices.push(format!("its header counts {count} facets: the {n} bytes after them are ignored"));
     }
-    let is_colored = triangles.chunks(TRIANGLE).any(|triangle| triangle[TRIANGLE - 2..] != [0, 0]);
-    if is_colored || bytes[..HEADER - 4].windows(6).any(|word| word == b"COLOR=") {
-        notices.push("colours of an STL (attributes of facets, COLOR= in the header) are not kept".into());
+    let is_colored =
+        triangles.chunks(TRIANGLE_BYTES).any(|triangle| triangle[TRIANGLE_BYTES - 2..] != [0, 0]);
+    if is_colored || bytes[..HEADER_BYTES - 4].windows(6).any(|word| word == b"COLOR=") {
+        notices.push(
+            "STL colours (attributes of facets, COLOR= in the header) are not supported: ignored".into(),
+        );
     }
     let number = |bytes: &[u8; 4]| f32::from_le_bytes(*bytes);
-    let corners = triangles.chunks(TRIANGLE).flat_map(|triangle| {
+    let corners = triangles.chunks(TRIANGLE_BYTES).flat_map(|triangle| {
         let numbers: Vec<f32> = triangle[12..48].as_chunks().0.iter().map(number).collect();
         [0, 3, 6].map(|k| Vec3::from_slice(&numbers[k..]).as_dvec3())
     });
     Ok(corners.collect())
 }
 
-/// Names of solids, with the first triangle of each.
+/// Names of solids, with the index of their first triangle.
 type Solids = Vec<(String, usize)>;
 
-/// Corners of the triangles of a text, and its solids. Normals are not read, which some programs write as "nan".
+/// Corners and solids of a text file. Normals are ignored; some programs write them as "nan".
 fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Solids), PolygonsError> {
     let (mut corners, mut solids, mut has_ended) = (Vec::new(), Solids::new(), true);
     let mut unknown = None;
-    // First corner of a facet that has not ended.
+    // First corner of the current facet.
     let mut open: Option<usize> = None;
     let mut end =
         |line: usize, corners: &[DVec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
@@ -161,19 +169,18 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
         return Err(PolygonsError::Syntax("it has no facets".into()));
     }
     if !corners.len().is_multiple_of(3) {
-        return Err(fault(last, "corners are of no facet"));
+        return Err(fault(last, "vertices outside a facet"));
     }
     if !has_ended {
-        notices.push("the text does not end with 'endsolid': it may be cut off".into());
+        notices.push("the file does not end with 'endsolid': it may be cut off".into());
     }
     if let Some(word) = unknown {
-        notices.push(format!("lines of other words than those of STL, such as '{word}', are not kept"));
+        notices.push(format!("lines with unknown keywords, such as '{word}', are ignored"));
     }
     Ok((corners, solids))
 }
 
-/// Triangles as a file, with the normals of their planes.
-/// `solids`: names, and the first triangle of each; a text has them.
+/// Writes triangles with flat normals. `solids`: names and first triangles, for text files.
 pub(crate) fn write(
     positions: &[Vec3],
     origin: DVec3,
@@ -212,7 +219,7 @@ pub(crate) fn write(
         }
         return (text + &format!("endsolid {name}\n")).into_bytes();
     }
-    let mut bytes = Vec::with_capacity(HEADER + TRIANGLE * triangles.len());
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + TRIANGLE_BYTES * triangles.len());
     let all = all.map(|(normal, corners)| Triangle {
         normal: Normal::new(normal.to_array()),
         vertices: corners.map(|p| Vertex::new((origin + p.as_dvec3()).as_vec3().to_array())),

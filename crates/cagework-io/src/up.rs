@@ -1,12 +1,12 @@
-//! Which axis of a file points up.
+//! Up axis of files.
 
 use std::borrow::Cow;
 
 use cagework_core::PolygonMesh;
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
-/// The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
-/// degrees about x when it is read, and back when it is written. Both are exact.
+/// The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
+/// read and back when written. Both rotations are exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -19,7 +19,7 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// The axis as files and the page call it.
+    /// Name in files and on the page.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -28,13 +28,13 @@ impl UpAxis {
         }
     }
 
-    /// The axis of that name.
+    /// Parses [`Self::name`].
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         [Self::Y, Self::Z].into_iter().find(|up| up.name() == name)
     }
 
-    /// Positions of a file with Y up.
+    /// Converts positions from the file's axes to Y up.
     #[must_use]
     pub fn turned(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {
         match self {
@@ -43,7 +43,7 @@ impl UpAxis {
         }
     }
 
-    /// Positions with Y up as they are in a file.
+    /// Converts positions from Y up to the file's axes.
     #[must_use]
     pub fn turned_back(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {
         match self {
@@ -52,7 +52,7 @@ impl UpAxis {
         }
     }
 
-    /// A vector of a file with Y up.
+    /// Converts a vector from the file's axes to Y up.
     #[must_use]
     pub fn vector_turned(self, v: DVec3) -> DVec3 {
         match self {
@@ -61,7 +61,7 @@ impl UpAxis {
         }
     }
 
-    /// A vector with Y up as it is in a file.
+    /// Converts a vector from Y up to the file's axes.
     pub(crate) fn vector_turned_back(self, v: DVec3) -> DVec3 {
         match self {
             Self::Y => v,
@@ -69,7 +69,7 @@ impl UpAxis {
         }
     }
 
-    /// From a file's axes to Y up.
+    /// Rotation from the file's axes to Y up.
     #[must_use]
     pub fn turn(self) -> Mat4 {
         match self {
@@ -78,7 +78,7 @@ impl UpAxis {
         }
     }
 
-    /// A mesh with Y up as it is in a file.
+    /// Converts a mesh from Y up to the file's axes.
     #[must_use]
     pub fn mesh_turned_back(self, mesh: &PolygonMesh) -> PolygonMesh {
         PolygonMesh { positions: self.turned_back(&mesh.positions).into_owned(), faces: mesh.faces.clone() }

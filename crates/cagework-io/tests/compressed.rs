@@ -1,4 +1,4 @@
-//! glTF files compressed by Draco or meshopt.
+//! glTF files compressed with Draco or meshopt.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -35,7 +35,7 @@ fn cube_mesh() -> Mesh {
     mesh
 }
 
-/// A Draco stream of the cube.
+/// The cube as a Draco stream.
 fn draco_stream() -> Vec<u8> {
     stream_of(cube_mesh())
 }
@@ -48,7 +48,7 @@ fn stream_of(mesh: Mesh) -> Vec<u8> {
     out.data().to_vec()
 }
 
-/// The cube with accessors that have no bytes of their own.
+/// The cube with accessors that have no buffer views.
 fn draco(stream: &[u8]) -> Builder {
     let mut b = plain_cube();
     let view = b.view(stream);
@@ -61,7 +61,7 @@ fn draco(stream: &[u8]) -> Builder {
     b
 }
 
-/// The cube as two streams, for views of a second buffer that has no bytes.
+/// The cube as two meshopt streams. Its buffer views refer to a second buffer without bytes.
 fn meshopt(extension: &str) -> Builder {
     let mut b = plain_cube();
     let workspace = &mut Workspace::default();
@@ -90,14 +90,14 @@ fn meshopt(extension: &str) -> Builder {
     b
 }
 
-/// A GLB with a second buffer for programs without a decoder, whose bytes are not there.
+/// A GLB with a missing fallback buffer for programs without decoder.
 fn with_fallback(b: &Builder) -> Vec<u8> {
     let mut json = b.json.clone();
     json["buffers"] = json!([{ "byteLength": b.bin.len() }, { "byteLength": 1000, "uri": "fallback.bin" }]);
     common::glb(&json, Some(&b.bin))
 }
 
-/// An export is a plain GLB, and the file itself where nothing has moved.
+/// An unmoved export equals the input; a moved export is not compressed.
 fn assert_plain(model: &Model, bytes: &[u8]) {
     assert!(model.write_glb(&model.positions).unwrap() == bytes);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::X).collect();
@@ -110,7 +110,7 @@ fn assert_plain(model: &Model, bytes: &[u8]) {
 fn draco_is_decoded_and_written_plain() {
     let bytes = draco(&draco_stream()).glb();
     let model = read("x.glb", &bytes).unwrap();
-    // Draco numbers vertices anew, but no quantisation was asked for.
+    // Draco reorders vertices. The stream is not quantised.
     let sorted = |mut positions: Vec<Vec3>| {
         positions.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
         positions
@@ -122,9 +122,9 @@ fn draco_is_decoded_and_written_plain() {
     assert_plain(&model, &bytes);
 }
 
-/// A page decodes files before they are read; what it exports where nothing has moved is the file that came.
+/// The page decompresses files before reading them. An unmoved export must return the compressed file.
 #[test]
-fn model_that_was_decoded_before_is_written_as_it_came() {
+fn unmoved_export_is_the_compressed_file() {
     let plain = plain_cube();
     let mut model = read("x.glb", &plain.glb()).unwrap();
     let packed = draco(&draco_stream()).glb();
@@ -132,14 +132,14 @@ fn model_that_was_decoded_before_is_written_as_it_came() {
     assert!(model.write_glb(&model.positions).unwrap() == packed);
     let moved: Vec<Vec3> = model.positions.iter().map(|p| *p + Vec3::X).collect();
     assert!(model.write_glb(&moved).unwrap() != packed);
-    // One that is no GLB has its streams in other files.
+    // A file that is not a GLB stores its streams in other files.
     model.set_packed(b"{}".to_vec());
     assert!(model.write_glb(&model.positions).unwrap() == plain.glb());
 }
 
-/// What a coder rounds and renumbers is not what the document says of it.
+/// Encoders quantise and reorder vertices, so the document's bounds do not match the decoded values.
 #[test]
-fn bounds_and_weights_are_those_of_what_was_decoded() {
+fn bounds_and_weights_match_the_decoded_values() {
     let mut weights = [[0.5_f32, 0.49, 0.0, 0.0]; 8];
     weights[3] = [1.0, 0.0, 0.0, 0.0];
     let weights: Vec<u8> = weights.as_flattened().iter().flat_map(|w| w.to_le_bytes()).collect();
@@ -190,7 +190,7 @@ fn bounds_and_weights_are_those_of_what_was_decoded() {
     let weights: Vec<f32> = weights.as_chunks().0.iter().map(|&w| f32::from_le_bytes(w)).collect();
     for (weights, joints) in weights.chunks(4).zip(data(names[1]).chunks(8)) {
         assert!((weights.iter().sum::<f32>() - 1.0).abs() <= f32::EPSILON, "{weights:?}");
-        // 16 bits each.
+        // 16 bits per joint index.
         let is_free = |k: usize| weights[k] > 0.0 || joints[2 * k] == 0;
         assert!((0..4).all(is_free), "{weights:?} of {joints:?}");
     }
@@ -222,7 +222,7 @@ fn damaged_streams_are_errors() {
             stream.len()
         );
     }
-    // Any byte may be wrong: that is an error or another shape, and no panic.
+    // Flipped bits cause an error or another shape, never a panic.
     for at in 0..stream.len() {
         for bit in 0..8 {
             let mut wrong = stream.clone();
@@ -238,7 +238,10 @@ fn damaged_streams_are_errors() {
     }
     let message = read("x.glb", &with_fallback(&b)).unwrap_err().to_string();
     assert!(message.contains("could not be decoded"), "{message}");
-    // In our own words.
+    // The message does not quote the decoder's error.
     let message = read("x.glb", &draco(&stream[..stream.len() / 2]).glb()).unwrap_err().to_string();
-    assert!(message.contains("could not be decoded: its stream is damaged, or of a version"), "{message}");
+    assert!(
+        message.contains("could not be decoded: its stream is damaged or has an unsupported version"),
+        "{message}"
+    );
 }

@@ -1,4 +1,4 @@
-//! Models far from the origin.
+//! Models far from the world origin.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -8,20 +8,20 @@ use cagework_io::{Model, ModelFormat};
 use common::{Builder, CUBE, cube, json_of, plain_cube, read};
 use glam::{DVec3, Vec3};
 
-/// Where a unit cube may be on a map; 32-bit floats have steps of 0.5 there.
+/// Position of a unit cube in map coordinates, where f32 has steps of 0.5.
 const PLACE: DVec3 = DVec3::new(500_000.25, 0.125, 4_500_000.5);
 
-/// Of the extent: half a step of a 32-bit float below 1.
+/// Half an f32 step below 1.
 const TOLERANCE: f64 = 1e-7;
 
-/// The corners, to six decimals as exporters write them.
+/// Cube corners with six decimals, as exporters write them.
 fn corners() -> Vec<DVec3> {
     let micro = |x: f64| (1e6 * x).round() / 1e6;
     let corner = |p: [f32; 3]| (PLACE + 0.987_654 * DVec3::from_array(p.map(f64::from))).map(micro);
     CUBE.map(corner).to_vec()
 }
 
-/// The cube in a format of text, with coordinates of any length.
+/// The cube in a text format, with decimals.
 fn file(format: ModelFormat) -> String {
     let near = read("x.obj", common::CUBE_OBJ.as_bytes()).unwrap();
     let line = |start: &str, p: &DVec3| format!("{start}{:.6} {:.6} {:.6}\n", p.x, p.y, p.z);
@@ -57,7 +57,7 @@ fn read_near(name: &str, bytes: &[u8]) -> Model {
     Model::read(name, bytes, &mut |_| None).unwrap()
 }
 
-/// Places of all corners of triangles, in 64 bits.
+/// Positions of all triangle corners in f64.
 fn places(model: &Model) -> Vec<DVec3> {
     let place = |&v: &u32| model.origin() + model.positions[v as usize].as_dvec3();
     model.triangles.iter().flatten().map(place).collect()
@@ -82,7 +82,11 @@ fn texts_far_from_the_origin_are_read_and_written_without_loss() {
         assert_near(&places(&model), &expected, TOLERANCE);
         let again = model.write(format, &model.positions).unwrap();
         if format == ModelFormat::Obj {
-            assert_eq!(String::from_utf8(again.clone()).unwrap(), text, "what did not move keeps its digits");
+            assert_eq!(
+                String::from_utf8(again.clone()).unwrap(),
+                text,
+                "unmoved coordinates keep their digits"
+            );
         }
         assert_near(&places(&read_near("again", &again)), &expected, 2.0 * TOLERANCE);
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::splat(0.25)).collect();
@@ -91,7 +95,7 @@ fn texts_far_from_the_origin_are_read_and_written_without_loss() {
             let written = read_near("moved", &model.write(to, &moved).unwrap());
             assert_near(&places(&written), &expected, 3.0 * TOLERANCE);
         }
-        // Seen from far away it is rounded, and the steps are named.
+        // Relative to the world origin, positions are rounded and a notice gives the step.
         let mut rounded = read_near("x", text.as_bytes());
         rounded.see_from(DVec3::ZERO);
         assert_eq!(
@@ -101,12 +105,15 @@ fn texts_far_from_the_origin_are_read_and_written_without_loss() {
     }
     let binary = read_near("x.obj", file(ModelFormat::Obj).as_bytes());
     let lost = binary.lost_in(ModelFormat::Stl).unwrap();
-    assert_eq!(lost, "the stl file does not keep: places as exact as they were read, so far from the origin");
+    assert_eq!(
+        lost,
+        "the stl file does not keep: the full precision of positions, as the model is far from the origin"
+    );
 }
 
-/// A pose, a cage or another model is seen from the origin of its model.
+/// Poses, cages and further models use the origin of the model.
 #[test]
-fn models_are_seen_from_the_origin_of_another_one() {
+fn positions_can_be_relative_to_another_models_origin() {
     let model = read_near("x.obj", file(ModelFormat::Obj).as_bytes());
     let mut cage = read_near(
         "x.obj",
@@ -117,7 +124,7 @@ fn models_are_seen_from_the_origin_of_another_one() {
     cage.see_from(model.origin());
     let after: Vec<DVec3> = cage.positions.iter().map(|p| model.origin() + p.as_dvec3()).collect();
     assert_near(&after, &before, TOLERANCE);
-    // What is near stays as it is, to the bit.
+    // Models near the world origin stay unchanged.
     let near = read_near("x.obj", common::CUBE_OBJ.as_bytes());
     assert_eq!((near.origin(), &near.positions), (DVec3::ZERO, &cube()));
 }
@@ -140,7 +147,7 @@ fn positions_of_a_node_far_away_are_kept() {
         (&accessor["min"], &accessor["max"]),
         (&serde_json::json!([0.0, 0.0, 0.0]), &serde_json::json!([1.0, 1.0, 1.0]))
     );
-    // One whose transform flattens it gets a node of its own, there.
+    // A mesh under a singular transform gets a new node at the model's origin.
     b.json["nodes"][0]["scale"] = serde_json::json!([1.0, 1.0, 0.0]);
     let flat = read_near("x.glb", &b.glb());
     let written = flat.write_glb(&flat.positions).unwrap();

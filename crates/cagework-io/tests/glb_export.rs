@@ -1,4 +1,4 @@
-//! GLB out: the deformed shape in the original document.
+//! GLB export: the deformed shape in the original document.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -12,7 +12,7 @@ use common::{
 use glam::Vec3;
 use serde_json::{Value, json};
 
-/// An f32 through a transform and back.
+/// Rounding of an f32 transformed back and forth.
 const ROUND_TRIP: f32 = 1e-6;
 
 fn deformed(model: &Model) -> Vec<Vec3> {
@@ -61,7 +61,7 @@ fn materials_textures_names_and_nodes_survive() {
     assert_eq!((&image["mimeType"], &image["uri"]), (&json!("image/png"), &Value::Null));
     let view = &after["bufferViews"][image["bufferView"].as_u64().unwrap() as usize];
     assert_eq!(view["byteLength"], PNG.len());
-    // Four attributes and an image; what they replaced is gone.
+    // Four attributes and an image. Replaced data is dropped.
     assert_eq!(after["accessors"].as_array().unwrap().len(), 4);
     assert_eq!(after["bufferViews"].as_array().unwrap().len(), 5);
 }
@@ -69,7 +69,7 @@ fn materials_textures_names_and_nodes_survive() {
 #[test]
 fn missing_texture_is_a_notice_and_keeps_its_reference() {
     let model = read("x.glb", &textured_square().glb()).unwrap();
-    assert!(model.notices[0].contains("'red dot.png' is not there"), "{:?}", model.notices);
+    assert!(model.notices[0].contains("'red dot.png' is missing"), "{:?}", model.notices);
     let after = json_of(&model.write_glb(&model.positions).unwrap());
     assert_eq!(after["images"][0]["uri"], "red%20dot.png");
 }
@@ -101,7 +101,7 @@ fn normals_and_tangents_turn_with_the_surface() {
     let mut b = textured_square();
     b.json["nodes"] = json!([{ "mesh": 0 }]);
     let model = read("x.glb", &b.glb()).unwrap();
-    // A quarter turn about x: y becomes z.
+    // A rotation by 90 degrees about x: y becomes z.
     let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect();
     let glb = model.write_glb(&turned).unwrap();
     for (normal, tangent) in attribute(&glb, "NORMAL", 3).iter().zip(attribute(&glb, "TANGENT", 4)) {
@@ -115,10 +115,10 @@ fn seams_stay_smooth() {
     let mut b = textured_square();
     b.json["nodes"] = json!([{ "mesh": 0 }]);
     let model = read("x.glb", &b.glb()).unwrap();
-    // Fold along the diagonal, where the two triangles have vertices of their own.
+    // Fold along the diagonal, where the triangles have separate vertices.
     let folded: Vec<Vec3> = model.positions.iter().map(|p| p.with_z((p.x - p.y).abs())).collect();
     let normals = attribute(&model.write_glb(&folded).unwrap(), "NORMAL", 3);
-    // Vertices 0 and 3 are one corner of the square, 2 and 4 the opposite one.
+    // Vertices 0 and 3, and 2 and 4, are coincident.
     assert_eq!((&normals[0], &normals[2]), (&normals[3], &normals[4]));
     assert!((normals[0][2] - 1.0).abs() < 1e-6, "two mirrored slopes average to upright: {:?}", normals[0]);
 }
@@ -140,7 +140,7 @@ fn each_instance_gets_its_own_mesh() {
 }
 
 #[test]
-fn skin_and_its_attributes_are_gone_but_the_joints_stay() {
+fn static_export_drops_the_skin_and_keeps_the_joints() {
     let model = read("x.glb", &skinned().glb()).unwrap();
     let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
     let (node, names) = (&after["nodes"][3], [0, 1, 2].map(|n| after["nodes"][n]["name"].clone()));
@@ -155,11 +155,15 @@ fn skin_and_its_attributes_are_gone_but_the_joints_stay() {
     assert_eq!(mesh["primitives"][0]["attributes"].as_object().unwrap().len(), 1);
     assert_eq!(mesh["primitives"][0]["targets"], Value::Null);
     assert_eq!(mesh["extras"], json!({ "kept": 7 }));
-    assert_eq!(after["animations"].as_array().unwrap().len(), 1, "the morph's animation went with it");
+    assert_eq!(
+        after["animations"].as_array().unwrap().len(),
+        1,
+        "the animation of the morph target is removed"
+    );
 }
 
 #[test]
-fn flattening_transform_is_stepped_around() {
+fn mesh_under_a_singular_transform_is_exported() {
     let mut b = plain_cube();
     b.json["nodes"][0]["scale"] = json!([1.0, 1.0, 0.0]);
     let model = read("x.glb", &b.glb()).unwrap();
@@ -249,7 +253,7 @@ fn states_of_a_pose_are_the_keys_of_its_clip_or_its_morph_targets() {
     for (state, (_, expected)) in states.iter().zip(&poses) {
         assert!(relative_error(expected, &state.positions) < ROUND_TRIP, "{}", state.name);
     }
-    // Without the clip they are shape keys.
+    // Without the clip, the states are morph targets.
     let mut json = json_of(&glb);
     json.as_object_mut().unwrap().remove("animations");
     let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
@@ -275,7 +279,7 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     assert_eq!(materials, ["red", "blue"]);
     assert!(primitives.iter().all(|p| p["attributes"]["TEXCOORD_0"].is_u64()));
     let again = read("y.glb", &glb).unwrap();
-    // Four vertices a face: each has its own normal.
+    // Four vertices per face, with the face's normal.
     assert_eq!((again.positions.len(), again.triangles.len()), (24, 12));
     assert!(again.positions.iter().all(|p| expected.contains(p)));
     let mut before = model.clone();
@@ -285,7 +289,7 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     assert!(no_faces.write_glb(&no_faces.positions).unwrap_err().to_string().contains("no faces"));
 }
 
-/// Several poses can only be written as GLB: colour, texture and opacity of the materials and colours of vertices come along.
+/// GLB exports of several poses keep colours, textures and opacity of materials, and vertex colours.
 #[test]
 fn obj_and_ply_become_a_glb_with_materials_and_colours() {
     let mtl = "newmtl red\nKd 1 0.5 0\nd 0.25\nnewmtl blue\nKd 0 0 0\nmap_Kd t.png\n";
@@ -309,7 +313,7 @@ fn obj_and_ply_become_a_glb_with_materials_and_colours() {
             .map(|x| x.as_f64().unwrap())
             .collect::<Vec<_>>()
     };
-    // 0.5 of sRGB is 0.214 of linear light (IEC 61966-2-1).
+    // sRGB 0.5 is linear 0.214 (IEC 61966-2-1).
     let red = material("red");
     assert!(color(&red).iter().zip([1.0, 0.214_04, 0.0, 0.25]).all(|(a, b)| (a - b).abs() < 1e-5));
     assert_eq!(
@@ -330,7 +334,7 @@ fn obj_and_ply_become_a_glb_with_materials_and_colours() {
     let model = read("box.obj", colored.collect::<String>().as_bytes()).unwrap();
     for model in [read("box.ply", &model.write_ply(&model.positions).unwrap()).unwrap(), model] {
         let glb = model.write_glb(&model.positions).unwrap();
-        // A byte of a PLY holds 128 / 255.
+        // A byte of the PLY stores 128 / 255.
         let close = |c: &Vec<f32>| (c[0], c[2]) == (1.0, 0.0) && (c[1] - 0.214).abs() < 2e-3;
         let colors = attribute(&glb, "COLOR_0", 3);
         assert!(colors.len() >= 8 && colors.iter().all(close), "{colors:?}");

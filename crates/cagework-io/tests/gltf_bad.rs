@@ -1,4 +1,4 @@
-//! Damaged and unreadable glTF files: each ends in an error that says what and where.
+//! Damaged glTF files: each is an error with cause and location.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -12,7 +12,7 @@ fn fault(bytes: &[u8]) -> String {
     read("x.glb", bytes).unwrap_err().to_string()
 }
 
-/// The plain cube after `change`, read: its error.
+/// Error of reading the cube after `change`.
 fn fault_of(change: impl FnOnce(&mut Builder)) -> String {
     let mut b = plain_cube();
     change(&mut b);
@@ -37,27 +37,27 @@ fn damaged_headers_are_errors() {
     };
     assert!(fault(&with(0, 0)).contains("not a GLB"));
     assert!(fault(&with(4, 1)).contains("version 1"));
-    assert!(fault(&with(8, 3)).contains("says it has 3 bytes"));
+    assert!(fault(&with(8, 3)).contains("its header declares 3 bytes"));
     let half = &plain_cube().glb()[..400];
     let all = u32::from_le_bytes(half[8..12].try_into().expect("four bytes"));
-    assert!(fault(half).contains(&format!("it is cut off: 400 of {all} bytes are there. Export")));
-    assert!(fault(&with(8, 236_008)).contains(&format!("cut off: {} of 236 kB", good.len() / 1000)));
-    assert!(fault(&with(8, u32::MAX)).contains("cut off: 0 of 4294 MB"));
+    assert!(fault(half).contains(&format!("it is cut off: it has 400 of {all} bytes. Export")));
+    assert!(fault(&with(8, 236_008)).contains(&format!("cut off: it has {} of 236 kB", good.len() / 1000)));
+    assert!(fault(&with(8, u32::MAX)).contains("cut off: it has 0 of 4294 MB"));
     assert!(fault(&with(12, u32::MAX)).contains("not a readable GLB"));
     assert!(fault(&with(16, 0)).contains("not a readable GLB"));
-    assert!(fault(&with(12, u32::MAX)).contains("one of its chunks ends after the file"));
+    assert!(fault(&with(12, u32::MAX)).contains("a chunk extends beyond the end of the file"));
     assert!(fault(&with(16, 0)).contains("its first chunk must be JSON"));
     assert!(
-        fault(b"{\"asset\": {\n \"version\"").contains("its JSON ends too early: it is cut off, at line 2")
+        fault(b"{\"asset\": {\n \"version\"")
+            .contains("the JSON ends too early: the file is cut off, at line 2")
     );
-    assert!(fault(b"{\"asset\" {}}").contains("its JSON is damaged, at line 1, column 10"));
+    assert!(fault(b"{\"asset\" {}}").contains("the JSON is damaged, at line 1, column 10"));
     let of_type = fault_of(|b| b.json["bufferViews"][1]["byteLength"] = "long".into());
     assert!(
-        of_type
-            .contains("item 1 of 'bufferViews' lacks a value, or has one of another type than glTF 2.0 says"),
+        of_type.contains("item 1 of 'bufferViews' has a missing value or a value of the wrong type"),
         "{of_type}"
     );
-    // Some writers fill up the JSON with zeros.
+    // Some writers pad the JSON chunk with zeros.
     let mut padded = good.clone();
     let end = 20 + padded[12] as usize + 256 * padded[13] as usize;
     padded.splice(end..end, [0; 4]);
@@ -71,57 +71,60 @@ fn damaged_headers_are_errors() {
 }
 
 #[test]
-fn indices_out_of_range_are_named() {
+fn indices_out_of_range_are_errors() {
     for (message, expected) in [
-        (fault_of(|b| b.json["nodes"][0]["mesh"] = 5.into()), "node 0 names mesh 5, but there are 1"),
-        (fault_of(|b| b.json["nodes"][0]["children"] = json!([9])), "node 0 names child node 9"),
-        (fault_of(|b| b.json["scene"] = 3.into()), "names scene 3, but there are 1"),
-        (fault_of(|b| b.json["scenes"][0]["nodes"] = json!([4])), "scene 0 names node 4"),
-        (fault_of(|b| b.json["nodes"][0]["skin"] = 0.into()), "node 0 names skin 0, but there are 0"),
+        (fault_of(|b| b.json["nodes"][0]["mesh"] = 5.into()), "node 0 refers to mesh 5, but there are 1"),
+        (fault_of(|b| b.json["nodes"][0]["children"] = json!([9])), "node 0 refers to child node 9"),
+        (fault_of(|b| b.json["scene"] = 3.into()), "refers to scene 3, but there are 1"),
+        (fault_of(|b| b.json["scenes"][0]["nodes"] = json!([4])), "scene 0 refers to node 4"),
+        (fault_of(|b| b.json["nodes"][0]["skin"] = 0.into()), "node 0 refers to skin 0, but there are 0"),
         (
             fault_of(|b| b.primitive(0)["attributes"]["POSITION"] = 77.into()),
-            "names accessor 77, but there are 2",
+            "refers to accessor 77, but there are 2",
         ),
-        (fault_of(|b| b.primitive(0)["indices"] = 77.into()), "names accessor 77"),
-        (fault_of(|b| b.json["accessors"][0]["bufferView"] = 9.into()), "accessor 0 names buffer view 9"),
-        (fault_of(|b| b.json["bufferViews"][0]["buffer"] = 9.into()), "buffer view 0 names buffer 9"),
+        (fault_of(|b| b.primitive(0)["indices"] = 77.into()), "refers to accessor 77"),
+        (fault_of(|b| b.json["accessors"][0]["bufferView"] = 9.into()), "accessor 0 refers to buffer view 9"),
+        (fault_of(|b| b.json["bufferViews"][0]["buffer"] = 9.into()), "buffer view 0 refers to buffer 9"),
         (
             fault_of(|b| {
                 let indices = b.indices(&[0, 1, 8]);
                 b.primitive(0)["indices"] = indices.into();
             }),
-            "accessor 2: a triangle names vertex 8, but there are 8",
+            "accessor 2: a triangle refers to vertex 8, but there are 8",
         ),
     ] {
-        assert!(message.contains(expected), "{message} should say {expected}");
+        assert!(message.contains(expected), "{message} should contain {expected}");
     }
     let mut b = skinned();
     b.json["skins"][0]["joints"] = json!([1]);
-    assert!(fault(&b.glb()).contains("skin 0 names joint 1, but there are 1"));
+    assert!(fault(&b.glb()).contains("skin 0 refers to joint 1, but there are 1"));
     b.json["skins"][0]["joints"] = json!([1, 99]);
-    assert!(fault(&b.glb()).contains("skin 0 names joint node 99"));
+    assert!(fault(&b.glb()).contains("skin 0 refers to joint node 99"));
 }
 
 #[test]
 fn accessors_that_do_not_fit_are_errors() {
     for (message, expected) in [
-        (fault_of(|b| b.json["accessors"][0]["count"] = 9.into()), "accessor 0 needs 9 elements"),
+        (fault_of(|b| b.json["accessors"][0]["count"] = 9.into()), "accessor 0 has 9 elements"),
         (
             fault_of(|b| b.json["accessors"][0]["count"] = json!(1_u64 << 40)),
             "more than the limit of 16777216",
         ),
-        (fault_of(|b| b.json["accessors"][0]["byteOffset"] = json!(u64::MAX)), "accessor 0 needs 8 elements"),
+        (fault_of(|b| b.json["accessors"][0]["byteOffset"] = json!(u64::MAX)), "accessor 0 has 8 elements"),
         (
             fault_of(|b| b.json["bufferViews"][0]["byteStride"] = json!(1_u64 << 62)),
-            "accessor 0 needs 8 elements",
+            "accessor 0 has 8 elements",
         ),
-        (fault_of(|b| b.json["bufferViews"][0]["byteLength"] = 10_000.into()), "longer than its buffer"),
-        (fault_of(|b| b.json["bufferViews"][0]["byteOffset"] = json!(u64::MAX)), "longer than its buffer"),
-        (fault_of(|b| b.json["accessors"][0]["type"] = "VEC2".into()), "is vec2, but position needs vec3"),
+        (fault_of(|b| b.json["bufferViews"][0]["byteLength"] = 10_000.into()), "extends beyond its buffer"),
+        (fault_of(|b| b.json["bufferViews"][0]["byteOffset"] = json!(u64::MAX)), "extends beyond its buffer"),
+        (
+            fault_of(|b| b.json["accessors"][0]["type"] = "VEC2".into()),
+            "has type vec2, but position needs vec3",
+        ),
         (fault_of(|b| b.json["accessors"][0]["componentType"] = 1.into()), "unknown component type"),
-        (fault_of(|b| b.json["accessors"][1]["componentType"] = 5126.into()), "not unsigned integers"),
+        (fault_of(|b| b.json["accessors"][1]["componentType"] = 5126.into()), "must have unsigned integers"),
     ] {
-        assert!(message.contains(expected), "{message} should say {expected}");
+        assert!(message.contains(expected), "{message} should contain {expected}");
     }
     let message = fault_of(|b| {
         let (places, values) = (b.view(&[8]), b.view(&floats(&[0.0; 3])));
@@ -134,9 +137,9 @@ fn accessors_that_do_not_fit_are_errors() {
     assert!(message.contains("sparse value for element 8"), "{message}");
 }
 
-/// Eighteen kilobytes of a file were read for hours: a thousand morph targets of zeros that no buffer holds.
+/// A thousand morph targets of implicit zeros in an 18 KB file must be rejected before they are decoded.
 #[test]
-fn attributes_of_another_count_than_the_vertices_name_both() {
+fn attribute_counts_must_match_the_vertices() {
     let zeros = |b: &mut Builder, kind: &str| {
         b.push("accessors", json!({ "componentType": F32, "count": 1 << 20, "type": kind }))
     };
@@ -147,8 +150,8 @@ fn attributes_of_another_count_than_the_vertices_name_both() {
             let many = zeros(b, kind);
             b.primitive(0)["attributes"][name] = many.into();
         });
-        let said = format!("accessor 2 has 1048576 elements for {name}, but there are 8 vertices");
-        assert!(message.contains(&said), "{message}");
+        let expected = format!("accessor 2 has 1048576 elements for {name}, but there are 8 vertices");
+        assert!(message.contains(&expected), "{message}");
     }
     let message = fault_of(|b| {
         let many = zeros(b, "VEC3");
@@ -161,16 +164,16 @@ fn attributes_of_another_count_than_the_vertices_name_both() {
     let message = fault_of(|b| {
         b.json["accessors"][0] = json!({ "componentType": F32, "count": 1 << 24, "type": "VEC3" });
     });
-    assert!(message.contains("accessor 0 has 16777216 elements that no byte of the file holds"), "{message}");
+    assert!(message.contains("accessor 0 has 16777216 elements without data in the file"), "{message}");
     let mut b = skinned();
     let many = zeros(&mut b, "MAT4");
     b.json["skins"][0]["inverseBindMatrices"] = many.into();
     assert!(fault(&b.glb()).contains("1048576 elements for inverse bind matrices, but there are 2 joints"));
 }
 
-/// What nodes and primitives ask for together was allocated, whatever it was.
+/// Memory for all nodes and primitives together is checked.
 #[test]
-fn what_a_document_becomes_is_counted_before_it_is_allocated() {
+fn memory_is_checked_before_allocation() {
     let mut b = plain_cube();
     let nodes = 100_000;
     b.json["nodes"] = vec![json!({ "mesh": 0 }); nodes].into();
@@ -178,14 +181,14 @@ fn what_a_document_becomes_is_counted_before_it_is_allocated() {
     let within = |b: &Builder, limit| Model::read_within("x.glb", &b.glb(), &mut |_| None, limit);
     let message = within(&b, 128 << 20).unwrap_err().to_string();
     assert!(message.contains("MiB of memory, more than the limit of 128 MiB"), "{message}");
-    // Base64 that is decoded would be refused for another reason: it is damaged.
+    // Decoding this base64 would give another error, because it is damaged.
     let mut embedded = plain_cube().json;
     embedded["buffers"] =
         json!([{ "byteLength": 72, "uri": format!("data:;base64,{}", "!".repeat(4 << 20)) }]);
     let text = serde_json::to_vec(&embedded).unwrap();
     let message = Model::read_within("x.gltf", &text, &mut |_| None, 14 << 20).unwrap_err().to_string();
     assert!(message.contains("needs about 16 MiB of memory"), "{message}");
-    // A thousand primitives at each node; no more of them are looked at than there are.
+    // A thousand primitives at each of 100,000 nodes.
     let primitive = b.primitive(0).clone();
     b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
     let message = within(&b, u64::MAX).unwrap_err().to_string();
@@ -208,7 +211,7 @@ fn what_a_document_becomes_is_counted_before_it_is_allocated() {
 }
 
 #[test]
-fn nodes_that_are_no_tree_are_errors() {
+fn nodes_with_cycles_or_two_parents_are_errors() {
     let nodes = |nodes| fault_of(move |b| b.json["nodes"] = nodes);
     let cycle = json!([{ "mesh": 0 }, { "children": [2] }, { "children": [1] }]);
     assert!(nodes(cycle).contains("node 1 is its own ancestor"));
@@ -226,7 +229,7 @@ fn deep_trees_need_no_stack() {
     nodes.push(json!({ "mesh": 0 }));
     b.json["nodes"] = nodes.clone().into();
     assert_eq!(read("x.glb", &b.glb()).unwrap().positions.len(), 8);
-    // One look at each: going up from each to the scene's top took a minute.
+    // Linear time: walking from each node to the root would take a minute.
     for node in &mut nodes {
         node["mesh"] = 0.into();
     }
@@ -235,23 +238,23 @@ fn deep_trees_need_no_stack() {
 }
 
 #[test]
-fn numbers_that_are_not_finite_are_named() {
+fn non_finite_numbers_are_errors() {
     let message = fault_of(|b| {
         let position = b.vec3(&[[0.0; 3], [0.0, f32::NAN, 0.0], [1.0; 3]]);
         b.json["accessors"][position].as_object_mut().unwrap().remove("min");
         *b.primitive(0) = json!({ "attributes": { "POSITION": position } });
     });
-    assert!(message.contains("accessor 2: the position of its vertex 1 is not a finite number"), "{message}");
+    assert!(message.contains("accessor 2: the position of vertex 1 is not finite"), "{message}");
     let message = fault_of(|b| b.json["nodes"][0]["scale"] = json!([1e39, 1.0, 1.0]));
     assert!(message.contains("not finite"), "{message}");
     let far =
         json!([{ "scale": [1e38, 1.0, 1.0], "children": [1] }, { "scale": [10.0, 1.0, 1.0], "mesh": 0 }]);
     let message = fault_of(|b| b.json["nodes"] = far);
-    assert!(message.contains("accessor 0: the position of its vertex 1"), "{message}");
+    assert!(message.contains("accessor 0: the position of vertex 1"), "{message}");
 }
 
 #[test]
-fn compressed_geometry_that_cannot_be_decoded_says_how_to_convert() {
+fn error_of_compressed_geometry_gives_the_conversion_command() {
     for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
         let in_view = |b: &mut Builder| b.json["bufferViews"][0]["extensions"] = json!({ extension: {} });
         assert_convertible(&fault_of(in_view), extension);
@@ -267,24 +270,24 @@ fn assert_convertible(message: &str, extension: &str) {
 }
 
 #[test]
-fn missing_files_are_named() {
+fn missing_buffer_file_is_an_error() {
     let mut b = plain_cube();
     b.json["buffers"] = json!([{ "byteLength": 100, "uri": "far%20away.bin" }]);
     let text = serde_json::to_vec(&b.json).unwrap();
     let error = read("x.gltf", &text).unwrap_err();
-    let expected = GltfError::MissingFile { uri: "far away.bin".into(), problem: "is not there".into() };
+    let expected = GltfError::MissingFile { uri: "far away.bin".into(), problem: "is missing".into() };
     assert_eq!(error, ReadError::Gltf { name: "x.gltf".into(), source: expected });
     let short = Model::read("x.gltf", &text, &mut |_| Some(Ok(vec![0; 10]))).unwrap_err().to_string();
-    assert!(short.contains("buffer 0 is cut off: 10 of 100 bytes are there"), "{short}");
+    assert!(short.contains("buffer 0 is cut off: it has 10 of 100 bytes"), "{short}");
 }
 
-/// Found by the fuzz test: lists that are there but empty.
+/// Found by fuzzing.
 #[test]
-fn empty_lists_are_as_good_as_missing_ones() {
+fn empty_lists_are_treated_as_missing() {
     let mut b = skinned();
     b.json["scenes"] = json!([]);
     let model = read("x.glb", &b.glb()).unwrap();
     let again = read("y.glb", &model.write_glb(&model.positions).unwrap()).unwrap();
     assert_eq!(again.positions, model.positions);
-    assert!(fault_of(|b| b.json["nodes"] = json!([])).contains("scene 0 names node 0, but there are 0"));
+    assert!(fault_of(|b| b.json["nodes"] = json!([])).contains("scene 0 refers to node 0, but there are 0"));
 }

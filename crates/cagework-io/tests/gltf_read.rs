@@ -1,4 +1,4 @@
-//! glTF in: every way a mesh may be stored.
+//! glTF reader: all ways to store a mesh.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -12,14 +12,14 @@ use common::{
 use glam::Vec3;
 use serde_json::json;
 
-/// One or two roundings to f32 in coordinates near 1.
+/// Rounding to f32, once or twice, of coordinates near 1.
 const ROUNDING: f32 = 1e-6;
 
 fn read_glb(b: &Builder) -> Model {
     read("x.glb", &b.glb()).unwrap()
 }
 
-/// Reads as the outward unit cube.
+/// Checks positions and number of triangles of a cube.
 fn assert_cube(model: &Model, expected: &[Vec3]) {
     assert!(relative_error(expected, &model.positions) < ROUNDING, "{:?}", model.positions);
     assert_eq!(model.triangles.len(), 12);
@@ -37,7 +37,7 @@ fn plain_glb_and_gltf_with_files_read_the_same() {
     let text = [b"\xef\xbb\xbf \n", serde_json::to_vec(&json).unwrap().as_slice()].concat();
     let with_file =
         Model::read("x.gltf", &text[..], &mut |uri| (uri == "my cube.bin").then(|| Ok(b.bin.clone())));
-    // A byte order mark is not JSON, but some exporters write it; blanks after it are JSON.
+    // A byte order mark is invalid in JSON, but some exporters write it.
     assert_eq!(with_file.unwrap().positions, cube());
     let hex: String = b.bin.iter().map(|byte| format!("%{byte:02x}")).collect();
     json["buffers"][0]["uri"] = format!("data:application/octet-stream,{hex}").into();
@@ -96,7 +96,7 @@ fn strips_and_fans_keep_their_winding() {
     let indices = b.indices(&[0, 1, 2, 3, 3, 5]);
     b.primitive(0)["indices"] = indices.into();
     b.primitive(0)["mode"] = 5.into();
-    // glTF 2.0, section 3.7.2.1: p_i = (v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)); the stitch (3, 3) is dropped.
+    // glTF 2.0, section 3.7.2.1: p_i = (v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)). The degenerate triangle is dropped.
     assert_eq!(read_glb(&b).triangles, [[0, 1, 2], [1, 3, 2]]);
 }
 
@@ -122,7 +122,7 @@ fn interleaved_attributes_are_read() {
         b.push("accessors", json!({ "bufferView": view, "componentType": 5126, "count": 8, "type": "VEC3" }));
     b.primitive(0)["attributes"]["POSITION"] = accessor.into();
     assert_cube(&read_glb(&b), &cube());
-    // The same, starting at the second column: positions (y, z, 7).
+    // Starting at the second column, positions are (y, z, 7).
     b.json["accessors"][accessor]["byteOffset"] = 4.into();
     let expected: Vec<Vec3> = CUBE.iter().map(|p| Vec3::new(p[1], p[2], 7.0)).collect();
     assert_eq!(read_glb(&b).positions, expected);
@@ -153,9 +153,9 @@ fn sparse_values_replace_zeros_and_data() {
 }
 
 #[test]
-fn nested_transforms_are_baked() {
+fn nested_transforms_are_applied() {
     let mut b = plain_cube();
-    // Scale by (2, 1, 1), then a quarter turn about z, then a shift: (x, y, z) -> (-y, 2x, z) + (10, 0, 0).
+    // Scale by (2, 1, 1), rotate by 90 degrees about z, translate: (x, y, z) -> (-y, 2x, z) + (10, 0, 0).
     let half = std::f32::consts::FRAC_1_SQRT_2;
     b.json["nodes"] = json!([
         { "translation": [10.0, 0.0, 0.0], "children": [1] },
@@ -186,14 +186,14 @@ fn only_the_default_scene_is_read() {
     assert_eq!(model.notices.len(), 1);
     b.json["scene"] = 2.into();
     let model = read_glb(&b);
-    assert_eq!(model.positions.len(), 16, "an empty scene shows nothing, so everything is used");
+    assert_eq!(model.positions.len(), 16, "all meshes are used if the scene is empty");
 }
 
 #[test]
-fn vertices_come_by_mesh_then_node_then_primitive() {
+fn vertices_are_ordered_by_mesh_then_node_then_primitive() {
     let mut b = Builder::new();
     let (first, second) = (b.cube_mesh("a"), b.cube_mesh("b"));
-    // The tree shows the second mesh first, and the first mesh twice.
+    // The second mesh comes first in the hierarchy, and the first mesh is shown twice.
     b.json["nodes"] = json!([
         { "mesh": second, "translation": [30.0, 0.0, 0.0], "children": [2] },
         { "mesh": first, "translation": [10.0, 0.0, 0.0] },
@@ -214,7 +214,7 @@ fn file_without_nodes_shows_its_meshes() {
 }
 
 #[test]
-fn skinned_mesh_stands_in_its_rest_pose() {
+fn skinned_mesh_is_read_in_its_rest_pose() {
     let model = read_glb(&skinned());
     let expected: Vec<Vec3> =
         cube().iter().map(|p| *p + Vec3::Z * if p.z > 0.5 { 2.0 } else { 0.0 }).collect();
@@ -237,7 +237,7 @@ fn inverse_bind_matrices_undo_the_joints() {
 }
 
 #[test]
-fn morph_targets_count_at_their_default_weights() {
+fn morph_targets_apply_at_default_weights() {
     let mut b = plain_cube();
     let delta = b.vec3(&[[0.0, 2.0, 0.0]; 8]);
     b.primitive(0)["targets"] = json!([{ "POSITION": delta }]);
@@ -249,7 +249,7 @@ fn morph_targets_count_at_their_default_weights() {
 }
 
 #[test]
-fn unknown_required_extensions_of_materials_are_no_obstacle() {
+fn unknown_required_material_extensions_are_accepted() {
     let mut b = plain_cube();
     b.json["extensionsRequired"] = json!(["KHR_texture_basisu", "VENDOR_paint"]);
     b.json["materials"] = json!([{ "alphaMode": "UNHEARD_OF" }]);
@@ -257,7 +257,7 @@ fn unknown_required_extensions_of_materials_are_no_obstacle() {
 }
 
 #[test]
-fn points_and_lines_are_left_alone() {
+fn points_and_lines_are_skipped() {
     let mut b = instanced();
     let lines = b.cube_mesh("lines");
     b.primitive(lines)["mode"] = 1.into();
@@ -293,12 +293,12 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
     let expected: Vec<Vec3> =
         cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
-    // Blender cuts a square along its other diagonal, and takes other vertices at the same places for it.
+    // Blender cuts a quad along its other diagonal, using other coincident vertices.
     let mut indices: Vec<u32> = (0..36).collect();
     let place = |v: u32| corners[v as usize];
     let ends = [indices[0], indices[1], indices[2]].map(place);
     let other = (3..6).find(|&v| !ends.contains(&place(v))).unwrap();
-    // The first two triangles are the square 0 2 3 1, cut from 0 to 3; now from 2 to 1.
+    // The first two triangles are the quad 0 2 3 1, cut from 0 to 3; now from 2 to 1.
     let at = |p: [f32; 3]| (6..36).find(|&v| place(v) == p).unwrap();
     let [a, b0, c] = ends;
     indices[..6].copy_from_slice(&[at(a), at(b0), other, at(b0), at(c), other]);
@@ -307,13 +307,13 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
 }
 
-/// Written as it was, the attribute would name one of the accessors that are added: the fuzzer's input 2817 of seed 1795420617.
+/// Found by fuzzing: an export that kept the attribute would refer to an added accessor.
 #[test]
-fn attribute_without_an_accessor_is_left_out_and_named() {
+fn attribute_without_accessor_is_ignored_with_a_notice() {
     let mut b = plain_cube();
     b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 9.into();
     let model = read("x.glb", &b.glb()).unwrap();
-    assert!(model.notices[0].contains("TEXCOORD_0 of mesh 0, accessor 9"), "{:?}", model.notices);
+    assert!(model.notices[0].contains("TEXCOORD_0 of mesh 0 refers to accessor 9"), "{:?}", model.notices);
     let poses = [("a".into(), model.positions.clone()), ("b".into(), model.positions.clone())];
     let written = model.write_glb_poses(&model.positions, &poses).unwrap();
     assert_eq!(read("y.glb", &written).unwrap().positions, model.positions);
@@ -350,7 +350,7 @@ fn extras_of_any_type_are_read_and_kept() {
     }
 }
 
-/// glTF 2.0, section 2.7: integers should be written without a fraction, and so they may be written with one.
+/// glTF 2.0, section 2.7, allows integers with a fraction of zero.
 #[test]
 fn integers_may_have_a_fraction_of_zero() {
     fn with_fractions(value: &mut serde_json::Value) {

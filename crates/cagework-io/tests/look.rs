@@ -1,4 +1,4 @@
-//! How models look: texture coordinates, colours, materials.
+//! Appearance of models: texture coordinates, colours and materials.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -8,7 +8,7 @@ use cagework_io::{Look, LookAlpha, LookWrap, Model};
 use common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 use serde_json::json;
 
-/// Numbers that went through sRGB and back.
+/// Rounding of an sRGB round trip.
 const COLOUR_TOLERANCE: f32 = 1e-4;
 
 fn look(builder: &Builder) -> Look {
@@ -49,18 +49,18 @@ fn missing_texture_leaves_the_colour() {
 }
 
 #[test]
-fn image_in_a_buffer_view_is_cut_out() {
+fn image_in_a_buffer_view_is_read() {
     let mut b = textured_square();
     let view = b.view(&PNG);
     b.json["images"] = json!([{ "bufferView": view, "mimeType": "image/jpeg" }]);
     let look = look(&b);
-    // The content says what it is.
+    // The media type is detected from the content, not taken from the document.
     assert_eq!((look.images[0].bytes.as_slice(), look.images[0].mime.as_str()), (&PNG[..], "image/png"));
 }
 
 #[test]
 fn seams_share_a_vertex_and_hard_edges_do_not() {
-    // Vertices 0 and 3, 2 and 4 of the square are split at the seam; normals agree.
+    // Vertices 0 and 3, and 2 and 4, are split at the seam with equal normals.
     let sources = |look: &Look| look.vertices.iter().map(|v| v.source).collect::<Vec<_>>();
     assert_eq!(sources(&look(&textured_square())), [0, 1, 2, 0, 2, 5]);
     let mut b = textured_square();
@@ -70,7 +70,7 @@ fn seams_share_a_vertex_and_hard_edges_do_not() {
     assert_eq!(sources(&look(&b)), [0, 1, 2, 3, 4, 5]);
 }
 
-/// KHR_texture_transform's example matrix: offset * rotation * scale.
+/// KHR_texture_transform: offset * rotation * scale.
 #[test]
 fn texture_transform_is_applied() {
     let mut b = textured_square();
@@ -78,13 +78,13 @@ fn texture_transform_is_applied() {
         "KHR_texture_transform": { "offset": [0.1, 0.2], "rotation": std::f32::consts::FRAC_PI_2, "scale": [2.0, 4.0] }
     });
     let look = look(&b);
-    // (0.5, 1) scaled is (1, 4); turned by 90 degrees (4, -1); moved (4.1, -0.8).
+    // (0.5, 1) scales to (1, 4), rotates by 90 degrees to (4, -1) and moves to (4.1, -0.8).
     let [u, v] = look.vertices[2].uv;
     assert!((u - 4.1).abs() < 1e-5 && (v + 0.8).abs() < 1e-5, "{u} {v}");
 }
 
 #[test]
-fn colours_of_vertices_are_read_in_every_encoding() {
+fn vertex_colours_are_read_in_every_encoding() {
     let mut b = plain_cube();
     let bytes: Vec<u8> = (0..8).flat_map(|v| [255, 0, 17 * v, 128]).collect();
     let colors = b.accessor(&bytes, U8, 8, "VEC4");
@@ -100,7 +100,7 @@ fn colours_of_vertices_are_read_in_every_encoding() {
 }
 
 #[test]
-fn alpha_and_sides_are_kept_and_no_material_is_no_group() {
+fn alpha_mode_and_double_sided_are_read_and_no_material_means_no_group() {
     assert!(look(&plain_cube()).groups.is_empty());
     for (material, alpha) in [
         (json!({ "alphaMode": "MASK" }), LookAlpha::Mask { cutoff: 0.5 }),
@@ -117,9 +117,9 @@ fn alpha_and_sides_are_kept_and_no_material_is_no_group() {
     }
 }
 
-/// Nothing about looks may refuse a file.
+/// Errors in materials never reject a file.
 #[test]
-fn damaged_looks_are_left_out() {
+fn invalid_materials_are_ignored() {
     let mut b = textured_square();
     b.primitive(0)["attributes"]["COLOR_0"] = json!(9_999);
     b.primitive(0)["material"] = json!(7);
@@ -139,14 +139,14 @@ const SQUARE: &str = "mtllib paint box.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n
 fn obj_gets_the_colours_of_its_materials() {
     let mtl = b"# by hand\nnewmtl blue\nKd 0.5 0 1\nd 0.5\nnewmtl unused\nKd 1 1 1\n";
     let look = obj(SQUARE, &[("paint box.mtl", mtl)]);
-    // Triangles of one material come together; those without one have no group.
+    // Triangles are grouped by material; those without a material have no group.
     assert_eq!((look.triangles.len(), look.groups.len()), (3, 1));
     let group = &look.groups[0];
     assert_eq!((group.triangles.clone(), group.alpha), (0..2, LookAlpha::Blend));
     // sRGB 0.5 is linear 0.2140 (IEC 61966-2-1).
     let expected = [0.2140, 0.0, 1.0, 0.5];
     assert!(group.base_color.iter().zip(expected).all(|(a, b)| (a - b).abs() < COLOUR_TOLERANCE));
-    // v 1 is drawn with two texture coordinates; v points down.
+    // The first vertex has two texture coordinates; v points down.
     let first: Vec<_> = look.vertices.iter().filter(|v| v.source == 0).map(|v| v.uv).collect();
     assert_eq!(first, [[0.0, 1.0], [1.0, 1.0]]);
 }
@@ -162,13 +162,13 @@ fn obj_texture_is_found_and_replaces_a_grey() {
     assert_eq!(
         tinted.groups[0].base_color,
         [0.0, 0.0, 1.0, 1.0],
-        "a colour that is no grey is multiplied with it"
+        "a colour that is not grey is kept as a factor"
     );
-    assert!(obj(SQUARE, &[]).groups.is_empty(), "no file, no materials");
+    assert!(obj(SQUARE, &[]).groups.is_empty(), "without the file there are no materials");
 }
 
 #[test]
-fn obj_colours_after_coordinates_are_the_vertices() {
+fn obj_colours_after_coordinates_are_vertex_colours() {
     let look = obj("v 0 0 0 1 0 0.5\nv 1 0 0 1 1 1\nv 0 1 0 0 0 0\nf 1 2 3\n", &[]);
     let color = look.vertices[0].color;
     assert!(color.iter().zip([1.0, 0.0, 0.2140, 1.0]).all(|(a, b)| (a - b).abs() < COLOUR_TOLERANCE));
@@ -177,19 +177,19 @@ fn obj_colours_after_coordinates_are_the_vertices() {
     assert!(obj("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", &[]).groups.is_empty());
 }
 
-/// A cube of eight vertices that its six faces share, with the normals that `normals` gives each corner of a face.
+/// A cube of eight shared vertices. `normals`: index of the normal at a face and vertex, 0 for none.
 fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
     smoothed_cube(normals, |_| "")
 }
 
-/// The same with the lines that `before` puts before each face.
+/// The same, with lines from `before` preceding each face.
 fn smoothed_cube(normals: impl Fn(usize, usize) -> usize, before: impl Fn(usize) -> &'static str) -> Look {
     let mut text = String::new();
     for k in 0..8 {
         let p = [k & 1, k >> 1 & 1, k >> 2].map(|bit| 2 * bit - 1);
         text += &format!("v {} {} {}\nvn {} {} {}\n", p[0], p[1], p[2], p[0], p[1], p[2]);
     }
-    // Normals 1 to 8 point to the corners, 9 to 14 out of the faces.
+    // Normals 1 to 8 point to the corners; 9 to 14 are face normals.
     let faces = [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]];
     for normal in ["0 0 -1", "0 0 1", "0 -1 0", "0 1 0", "-1 0 0", "1 0 0"] {
         text += &format!("vn {normal}\n");
@@ -204,7 +204,7 @@ fn smoothed_cube(normals: impl Fn(usize, usize) -> usize, before: impl Fn(usize)
     obj(&text, &[])
 }
 
-/// Vertices and copies as the sources of a face's two triangles.
+/// Sources of the corners of a face's two triangles.
 fn sources(look: &Look, face: usize) -> Vec<u32> {
     look.triangles[2 * face..2 * face + 2]
         .iter()
@@ -213,11 +213,11 @@ fn sources(look: &Look, face: usize) -> Vec<u32> {
         .collect()
 }
 
-/// An OBJ's vertices belong to all faces around them; `vn` alone says where an edge is hard. It was drawn smooth.
+/// In an OBJ, faces share vertices, and only `vn` indices mark hard edges.
 #[test]
 fn hard_edges_of_an_obj_split_its_vertices() {
     let hard = shared_cube(|face, _| 9 + face);
-    // Three faces meet in each of eight vertices: one of them has the vertex, two a copy each.
+    // Three faces meet at each of eight vertices: one uses the vertex, two use a duplicate each.
     assert_eq!(hard.copies.len(), 16);
     for v in 0..8 {
         assert_eq!(hard.copies.iter().filter(|&&c| c == v).count(), 2, "vertex {v}");
@@ -241,21 +241,21 @@ fn smooth_obj_keeps_its_vertices() {
     let bare = shared_cube(|_, _| 0);
     assert_eq!((smooth.copies.len(), bare.copies.len()), (0, 0));
     assert_eq!(smooth, bare);
-    // A lid with an edge around it, everything else smooth: its four vertices are there twice.
+    // Face 3 has a hard border: its four vertices are duplicated.
     let lid = shared_cube(|face, v| if face == 3 { 12 } else { v });
     assert_eq!(lid.copies.len(), 4);
     let lone = shared_cube(|face, v| if face == 3 { 0 } else { v });
-    assert!(lone.copies.is_empty(), "corners without a normal stay with the vertex");
+    assert!(lone.copies.is_empty(), "corners without a normal keep their vertex");
 }
 
-/// An OBJ without normals was drawn smooth, although it said `s off`.
+/// Without normals, `s off` makes faces flat.
 #[test]
 fn faces_without_smoothing_are_flat() {
     let hard = shared_cube(|face, _| 9 + face);
     for off in ["s off\n", "s 0\n"] {
         assert_eq!(smoothed_cube(|_, _| 0, |face| if face == 0 { off } else { "" }), hard, "{off}");
     }
-    // What stands before the first line has the format's default, which is off.
+    // Faces before the first `s` line use the default, off.
     assert_eq!(smoothed_cube(|_, _| 0, |face| if face == 5 { "s off\n" } else { "" }), hard);
 }
 
@@ -263,13 +263,13 @@ fn faces_without_smoothing_are_flat() {
 fn smoothing_groups_share_no_normal() {
     let smooth = shared_cube(|_, _| 0);
     assert_eq!(smoothed_cube(|_, _| 0, |_| "s 1\n"), smooth);
-    // Face 3 alone in a group: its four vertices are there twice.
+    // Face 3 has its own group: its four vertices are duplicated.
     let lid = smoothed_cube(|_, _| 0, |face| if face == 3 { "s 2\n" } else { "s 1\n" });
     let mut twice = lid.copies.clone();
     twice.sort_unstable();
     assert_eq!(twice, [2, 3, 6, 7], "the corners of face 3");
-    // A group goes on where its number comes again, and a normal says more than a group.
+    // Equal group numbers are one group, and normals override groups.
     let again = smoothed_cube(|_, _| 0, |face| ["s 1\n", "s 2\n"][face % 2]);
-    assert_eq!(again.copies.len(), 6, "all faces around two opposite corners are of one group");
+    assert_eq!(again.copies.len(), 6, "all faces around two opposite corners belong to one group");
     assert_eq!(smoothed_cube(|_, v| v, |_| "s off\n"), smooth);
 }

@@ -1,4 +1,4 @@
-//! Weights to NPZ and back.
+//! NPZ reader and writer.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -11,10 +11,11 @@ use glam::Vec3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-/// Of memory, bytes.
+/// Memory limit, bytes.
 const LIMIT: u64 = 1 << 20;
 
-/// Two rows of five controls; offsets in three columns that do not turn, three of the cage and six of a bone's ends; a row outside.
+/// Two rows of five controls; offsets in three columns that do not rotate, three of the cage and six of bone
+/// ends; one row outside.
 fn sample() -> (Weights, Frames, Vec<OutsideVertex>) {
     let indices = vec![0, 6, 1, 2, 3, 16];
     let weights =
@@ -42,10 +43,10 @@ fn points_of_a_rig_are_the_last_rows() {
     let message = read_weights_npz(&write_weights_npz(&weights, &frames, &[], &too_many, &[]), LIMIT)
         .unwrap_err()
         .to_string();
-    assert_eq!(message, "array 'extra_points': has 4 points, but there are 3 rows");
+    assert_eq!(message, "array 'extra_points': has 4 points, but the matrix has 3 rows");
 }
 
-/// The file with each array passed through `change`; deflated, as SciPy writes it.
+/// The file with `change` applied to each array; deflated, as SciPy writes it.
 fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
     let (weights, frames, outside) = sample();
     let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);
@@ -135,16 +136,15 @@ fn faults_are_named() {
         Some(if n == "indices.npy" { [&d[..d.len() - 4], &(-1_i32).to_le_bytes()].concat() } else { d })
     });
     assert!(message(&negative).contains("negative"));
-    // Columns 1, 2, 3 of the last row become 1, 2, 1, which do not ascend.
+    // Columns 1, 2, 3 of the last row become 1, 2, 1, which is not ascending.
     let twice = rewritten(|n, d| {
         Some(if n == "indices.npy" { [&d[..d.len() - 4], &1_i32.to_le_bytes()].concat() } else { d })
     });
     assert!(message(&twice).contains("row 2 names column 1 twice"));
 }
 
-/// The shape in an array's header was not looked at.
 #[test]
-fn shapes_that_the_data_do_not_have_are_refused() {
+fn shapes_that_do_not_match_the_data_are_rejected() {
     for (name, from, to) in [
         ("indices.npy", "(4,), }", "(6,), }"),
         ("data.npy", "(4,), }", "(3,), }"),
@@ -153,7 +153,7 @@ fn shapes_that_the_data_do_not_have_are_refused() {
         ("shape.npy", "(2,), }", "(), }  "),
         ("frame_bones.npy", "(1, 2), }", "(2, 1), }"),
         ("frame_plain.npy", "(2, 4), }", "(8,), }  "),
-        // Whose product is 4 again in 64 bits.
+        // The product overflows to 4 in 64 bits.
         ("indptr.npy", "(4,), }                               ", "(4611686018427387905, 4), }           "),
     ] {
         let wrong = rewritten(|n, d| {
@@ -168,13 +168,13 @@ fn shapes_that_the_data_do_not_have_are_refused() {
     }
 }
 
-/// Entries were unpacked as far as they went, and 4 GB of zeros take 4 MB of a file.
+/// A small deflated file can unpack to gigabytes.
 #[test]
-fn entries_are_unpacked_as_far_as_their_shapes_need() {
+fn entries_are_unpacked_up_to_the_size_of_their_shapes() {
     let endless = rewritten(|n, d| Some(if n == "format.npy" { [d, vec![0; 9 << 20]].concat() } else { d }));
     let message = read_weights_npz(&endless, LIMIT).unwrap_err().to_string();
-    assert!(message.contains("'format': has more than the 3 bytes"), "{message}");
-    // 40 MB of an honest shape; the header keeps its length.
+    assert!(message.contains("'format': is longer than the 3 bytes"), "{message}");
+    // 40 MB with a matching shape.
     let honest = rewritten(|n, d| {
         let header =
             String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("(4,), }       ", "(10000000,), }");

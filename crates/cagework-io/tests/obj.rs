@@ -1,4 +1,4 @@
-//! OBJ in and out.
+//! OBJ reader and writer.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -24,7 +24,7 @@ fn every_v_line_is_a_vertex_in_file_order() {
 }
 
 #[test]
-fn all_spellings_of_a_face_mean_the_same() {
+fn all_notations_of_a_face_are_equivalent() {
     let head = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
     for face in [
         "f 1 2 3",
@@ -64,7 +64,7 @@ fn cage_keeps_its_polygons() {
 }
 
 #[test]
-fn pose_without_faces_is_read_and_is_no_mesh() {
+fn file_without_faces_is_a_pose_but_not_a_mesh() {
     let cage = read("cage.obj", CUBE_OBJ.as_bytes()).unwrap();
     let pose =
         read("pose.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 2 2 2").unwrap();
@@ -76,10 +76,10 @@ fn pose_without_faces_is_read_and_is_no_mesh() {
     assert!(message.contains("has 1 vertices, but cage cage.obj has 8"), "{message}");
 }
 
-/// Blender cuts quads and n-gons along diagonals that depend on the shape: a pose has the vertices of the cage, and other diagonals.
+/// Exporters cut polygons along shape-dependent diagonals, so a pose can have other diagonals than the cage.
 #[test]
 fn pose_may_cut_polygons_along_other_diagonals_but_not_swap_vertices() {
-    // A prism over a hexagon: vertices 0 to 5 below, 6 to 11 above.
+    // A hexagonal prism: vertices 0 to 5 below, 6 to 11 above.
     let prism = |sides: &dyn Fn(usize) -> [usize; 6], caps: &[[usize; 3]], names: &dyn Fn(usize) -> usize| {
         let mut faces: Vec<Vec<usize>> = Vec::new();
         for k in 0..6 {
@@ -110,7 +110,7 @@ fn pose_may_cut_polygons_along_other_diagonals_but_not_swap_vertices() {
     for pose in [prism(&down, &zigzag, &same), prism(&down, &corner, &same), prism(&up, &corner, &same)] {
         assert_eq!(cage.pose_positions(&pose).unwrap(), pose.positions);
     }
-    // Two vertices have each other's number: in any of these the order is another one.
+    // With two vertices swapped, the order differs for each triangulation.
     for (a, b) in [(0, 9), (2, 11), (4, 8)] {
         let names = |v: usize| {
             if v == a {
@@ -134,9 +134,9 @@ fn pose_may_cut_polygons_along_other_diagonals_but_not_swap_vertices() {
 #[test]
 fn errors_name_the_line() {
     let cases = [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: names vertex 99, but there are 3"),
-        ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: names vertex -3, but there are 2"),
-        ("v 0 0 0\nf 0 1 1", "line 2: names vertex 0, but there are 1"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: refers to vertex 99, but there are 3"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: refers to vertex -3, but there are 2"),
+        ("v 0 0 0\nf 0 1 1", "line 2: refers to vertex 0, but there are 1"),
         ("v 0 0 0\nf 1 x 1", "line 2: corner 'x' is not an index"),
         ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: corner '1/1/1/1'"),
         ("# c\nv 0 nan 0", "line 2: y coordinate is 'nan'"),
@@ -147,24 +147,24 @@ fn errors_name_the_line() {
     ];
     for (text, expected) in cases {
         let message = fault(text);
-        assert!(message.contains(expected), "{message} should say {expected}");
+        assert!(message.contains(expected), "{message} should contain {expected}");
     }
 }
 
 #[test]
-fn other_formats_are_named_with_a_way_out() {
+fn unsupported_formats_are_named_with_a_hint() {
     for (name, bytes, expected) in [
         ("a.obj", &b""[..], "empty"),
         ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
         ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY, STL or OFF"),
-        ("a.stl", b"solid x", "damaged: it has no facets"),
+        ("a.stl", b"solid x", "damaged: it has no text facets"),
         ("a.glb", b"glXF", "not a GLB"),
         ("a.ply", b"solid", "not a PLY"),
-        ("a.obj", b"\xff\xfev\0 \0", "is a text in UTF-16: save it as UTF-8"),
-        ("a.obj", b"v\0 \x000\0", "is a text in UTF-16: save it as UTF-8"),
+        ("a.obj", b"\xff\xfev\0 \0", "is a UTF-16 text: save it as UTF-8"),
+        ("a.obj", b"v\0 \x000\0", "is a UTF-16 text: save it as UTF-8"),
         ("a.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "`git lfs pull`"),
         ("a.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "is a Git LFS pointer"),
-        ("a.obj", b"<!DOCTYPE html>", "is an XML or HTML text"),
+        ("a.obj", b"<!DOCTYPE html>", "is an XML or HTML file"),
     ] {
         let message = read(name, bytes).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
@@ -180,16 +180,16 @@ fn forward_references_and_dangling_attributes_are_tolerated() {
     assert_eq!(model.notices.len(), 1);
 }
 
-/// Exporters leave them behind where edges were merged.
+/// Exporters write such faces after merging edges.
 #[test]
-fn faces_of_fewer_than_three_corners_are_left_as_they_are() {
+fn faces_with_fewer_than_three_corners_are_kept_unchanged() {
     let short = "f 3//3 1//2\n";
     let at = CUBE_OBJ.rfind("f ").unwrap();
     let with = [&CUBE_OBJ[..at], short, "f # none\n", &CUBE_OBJ[at..]].concat();
     let [plain, model] = [CUBE_OBJ, &with].map(|text| read("x.obj", text.as_bytes()).unwrap());
     assert_eq!((&model.triangles, model.n_faces()), (&plain.triangles, plain.n_faces()));
-    assert!(model.notices[0].starts_with("2 lines, points, curves or faces of fewer than three corners"));
-    // Normals get other numbers: those of the faces after it are their own.
+    assert!(model.notices[0].starts_with("2 lines, points, curves or faces with fewer than three corners"));
+    // Renumbered normals of later faces stay consistent.
     let bent: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
     let [expected, out] =
         [&plain, &model].map(|model| String::from_utf8(model.write_obj(&bent).unwrap()).unwrap());
@@ -208,7 +208,7 @@ fn concave_polygon_keeps_its_area() {
 
 #[test]
 fn patched_file_at_rest_is_the_same_text() {
-    // Numbers written the way Rust writes them, so that nothing else can differ.
+    // Numbers are formatted as Rust formats them.
     let text = "# c\r\nmtllib a.mtl\no x\nv  0.5 0 0 0.1 0.2 0.3 # red\n\tv 1 0 0\nv 0 1 0\nvt 0.25 1\nusemtl m\ns 1\nf 1/1 2/1 3/1\nl 1 2\n";
     let model = read("x.obj", text.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), text);
@@ -225,9 +225,9 @@ fn patched_file_moves_vertices_and_keeps_the_rest() {
 }
 
 #[test]
-fn patched_normals_turn_with_the_surface() {
+fn patched_normals_rotate_with_the_surface() {
     let model = read("x.obj", CUBE_OBJ.as_bytes()).unwrap();
-    // A quarter turn about z: x becomes y, y becomes -x.
+    // A rotation by 90 degrees about z: x becomes y, y becomes -x.
     let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(-p.y, p.x, p.z)).collect();
     let out = String::from_utf8(model.write_obj(&turned).unwrap()).unwrap();
     let normals: Vec<Vec3> = out
@@ -235,7 +235,7 @@ fn patched_normals_turn_with_the_surface() {
         .filter_map(|l| l.strip_prefix("vn "))
         .map(|l| Vec3::from_slice(&l.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f32>>()))
         .collect();
-    // Four corners shared each of the six lines.
+    // Four corners shared each of the six `vn` lines.
     assert_eq!(normals.len(), 24);
     let expected = [-Vec3::Z, Vec3::Z, Vec3::X, -Vec3::X, -Vec3::Y, Vec3::Y];
     for (k, n) in normals.iter().enumerate() {
@@ -247,22 +247,22 @@ fn patched_normals_turn_with_the_surface() {
 }
 
 #[test]
-fn wrong_positions_are_refused() {
+fn invalid_positions_are_rejected() {
     let model = read("x.obj", CUBE_OBJ.as_bytes()).unwrap();
     let message = model.write_obj(&[Vec3::ZERO]).unwrap_err().to_string();
-    assert!(message.contains("1 positions for a model of 8 vertices"), "{message}");
+    assert!(message.contains("1 position for a model of 8 vertices"), "{message}");
     let message = model.write_glb(&[Vec3::NAN; 8]).unwrap_err().to_string();
     assert!(message.contains("vertex 0 is not a finite number"), "{message}");
 }
 
 #[test]
-fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
+fn smoothing_is_kept_in_obj_and_split_in_glb_exports() {
     let cube = read("x.obj", CUBE_OBJ.as_bytes()).unwrap().cage_mesh();
     let smooth = String::from_utf8(write_cage_obj(&cube, DVec3::ZERO)).unwrap();
     let flat = smooth.replacen("f ", "s off\nf ", 1);
     let model = read("x.obj", flat.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), flat);
-    // Three flat faces at each of eight corners.
+    // Three flat faces meet at each of eight vertices.
     let vertices = |text: &str| {
         let model = read("x.obj", text.as_bytes()).unwrap();
         read("x.glb", &model.write_glb(&model.positions).unwrap()).unwrap().positions.len()
@@ -271,12 +271,12 @@ fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
 }
 
 #[test]
-fn model_with_z_up_stands_upright_and_is_written_as_it_lay() {
+fn model_with_z_up_is_rotated_to_y_up_and_exported_with_z_up() {
     for bytes in [CUBE_OBJ.as_bytes().to_vec(), plain_cube().glb()] {
         let lying = read("x", &bytes).unwrap();
         let mut upright = lying.clone();
         upright.set_up(UpAxis::Z);
-        // A turn by -90 degrees about x: what was up is y, and what was behind is -z.
+        // A rotation by -90 degrees about x: up becomes y, and behind becomes -z.
         for (p, q) in lying.positions.iter().zip(&upright.positions) {
             assert_eq!(*q, Vec3::new(p.x, p.z, -p.y));
         }
@@ -311,10 +311,10 @@ proptest! {
     }
 }
 
-/// Each became a primitive: a gigabyte and minutes for a million of them.
+/// Each material becomes a primitive; a million of them would take a gigabyte.
 #[test]
 fn materials_have_a_limit() {
     let text: String = (0..20_000).map(|i| format!("usemtl m{i}\n")).collect();
     let error = read("x.obj", format!("v 0 0 0\n{text}").as_bytes()).unwrap_err().to_string();
-    assert_eq!(error, "x.obj: line 16386: more than 16384 different materials: join some");
+    assert_eq!(error, "x.obj: line 16386: more than 16384 materials: merge some");
 }

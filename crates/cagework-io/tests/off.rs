@@ -1,4 +1,4 @@
-//! OFF in and out.
+//! OFF reader and writer.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -7,7 +7,7 @@ mod common;
 use cagework_io::{Model, ModelFormat};
 use common::{CUBE_OBJ, cube, read, twist};
 
-/// The cube of quads, with `after` behind each vertex and each face.
+/// The cube of quads; `after` follows each vertex and each face.
 fn off(header: &str, after: [&str; 2]) -> String {
     let vertices =
         cube().iter().map(|p| format!("{} {} {}{}\n", p.x, p.y, p.z, after[0])).collect::<String>();
@@ -23,11 +23,11 @@ fn quads() -> Model {
     read("cube.obj", CUBE_OBJ.as_bytes()).unwrap()
 }
 
-/// Headers as Geomview, CGAL, libigl and MeshLab write them, with colours as bytes and as shares, and without the word OFF.
+/// Headers of Geomview, CGAL, libigl and MeshLab, with colours in 0 to 255 and in 0 to 1, and without the keyword.
 #[test]
 fn off_files_are_read_with_polygons_and_colours() {
     let faces = quads().cage_mesh().faces;
-    let colors = "colours of faces of the OFF file are not kept";
+    let colors = "face colours in an OFF file are not supported: ignored";
     for (header, after, color, notices) in [
         ("OFF\n8 6 12\n", ["", ""], None, vec![]),
         ("# by hand\n\nOFF 8 6 0 # counts\n", ["", " 3 0.5 0.5 0.5"], None, vec![colors]),
@@ -40,13 +40,13 @@ fn off_files_are_read_with_polygons_and_colours() {
             "NCOFF\n8 6 0\n",
             [" 0 0 1 255 0 51", ""],
             Some([1.0, 0.0, 0.2]),
-            vec!["normals beside colours of the OFF file are not kept"],
+            vec!["normals together with colours in an OFF file are not supported: ignored"],
         ),
         (
             "STOFF\n8 6 0\n",
             [" 0.5 0.5", ""],
             None,
-            vec!["further numbers of vertices of the OFF file are not kept"],
+            vec!["additional vertex values in an OFF file are not supported: ignored"],
         ),
     ] {
         let text = off(header, after);
@@ -57,13 +57,13 @@ fn off_files_are_read_with_polygons_and_colours() {
             "{text}"
         );
         assert_eq!(model.notices, notices, "{text}");
-        // Linear by the sRGB curve (IEC 61966-2-1).
+        // sRGB to linear (IEC 61966-2-1).
         let expected = color.map_or([1.0; 3], |c| {
             c.map(|x: f32| if x == 0.0 { 0.0 } else { ((x + 0.055) / 1.055).powf(2.4) })
         });
         let found = model.look().vertices[0].color;
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
-        // What is written is read again, colours and normals included, in the same order.
+        // Exports can be read again, with colours, normals and order.
         let moved: Vec<_> = cube().into_iter().map(twist).collect();
         let written = model.write_off(&moved).unwrap();
         let first = if header.contains('C') {
@@ -83,27 +83,27 @@ fn off_files_are_read_with_polygons_and_colours() {
 }
 
 #[test]
-fn what_is_wrong_with_an_off_file_is_said() {
+fn damaged_off_files_are_errors() {
     let good = off("OFF\n8 6 12\n", ["", ""]);
-    for (from, to, said) in [
-        ("OFF\n8", "OFF\n800", "it says that it has 800 of 'vertex', but the file has"),
-        ("OFF\n8 6", "OFF\n8 7", "damaged: line 16: the text ends after 6 of 7 faces"),
+    for (from, to, expected) in [
+        ("OFF\n8", "OFF\n800", "its header counts 800 of 'vertex', too many for a file of"),
+        ("OFF\n8 6", "OFF\n8 7", "damaged: line 16: the file ends after 6 of 7 faces"),
         ("OFF\n8 6", "OFF\n8 x", "damaged: line 2: 'x' is not a number such as 1.25"),
         ("\n1 0 0\n", "\n1,5 0 0\n", "damaged: line 4: '1,5' is not a number such as 1.25"),
-        ("\n1 0 0\n", "\n1 0\n", "damaged: line 4: has 2 numbers of 3"),
+        ("\n1 0 0\n", "\n1 0\n", "damaged: line 4: has only 2 of 3 numbers"),
         ("\n1 0 0\n", "\ninf 0 0\n", "vertex 1 has a coordinate that is not finite"),
-        ("4 0 2 3 1", "4 0 2 8 1", "face 0 names vertex 8, but there are 8"),
-        ("4 0 2 3 1", "4 0 2 -3 1", "face 0 names vertex -3, but there are 8"),
-        ("4 0 2 3 1", "4 0 2 1.5 1", "line 11: '1.5' is not a vertex, which have numbers from 0"),
+        ("4 0 2 3 1", "4 0 2 8 1", "face 0 refers to vertex 8, but there are 8"),
+        ("4 0 2 3 1", "4 0 2 -3 1", "face 0 refers to vertex -3, but there are 8"),
+        ("4 0 2 3 1", "4 0 2 1.5 1", "line 11: '1.5' is not a vertex index; indices count from 0"),
         ("4 0 2 3 1", "5 0 2 3 1", "line 11: has 4 corners of 5"),
-        ("OFF\n8 6 12\n", "OFF\n8\n", "damaged: line 2: has 1 numbers of 2"),
-        ("OFF\n", "4OFF\n", "its vertices are not of three dimensions"),
-        ("OFF\n", "OFF BINARY\n", "it is binary; only OFF files of text are read"),
+        ("OFF\n8 6 12\n", "OFF\n8\n", "damaged: line 2: has only 1 of 2 numbers"),
+        ("OFF\n", "4OFF\n", "only three-dimensional vertices are supported"),
+        ("OFF\n", "OFF BINARY\n", "it is a binary OFF file: save it as text"),
     ] {
         let text = good.replacen(from, to, 1);
         assert!(text != good, "{from}");
         let message = read("x.off", text.as_bytes()).unwrap_err().to_string();
-        assert!(message.contains(said), "{to}: {message}");
+        assert!(message.contains(expected), "{to}: {message}");
     }
     let tight = Model::read_within("x.off", good.as_bytes(), &mut |_| None, 1000);
     assert!(tight.unwrap_err().to_string().contains("memory"));

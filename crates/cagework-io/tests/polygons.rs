@@ -1,4 +1,4 @@
-//! PLY and STL in and out.
+//! PLY and STL readers and writers.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -16,7 +16,7 @@ fn obj() -> Model {
     read("cube.obj", CUBE_OBJ.as_bytes()).unwrap()
 }
 
-/// The cube of quads as a PLY, with a colour, a number that nobody knows, and edges.
+/// The cube of quads as a PLY with colours, an unknown property and edges.
 fn ply_text() -> String {
     let mut text = "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 8\nproperty double x\nproperty double y\n\
         property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n\
@@ -35,24 +35,24 @@ fn ply_text() -> String {
 }
 
 #[test]
-fn a_ply_is_read_with_polygons_and_colours_and_says_what_it_leaves_out() {
+fn ply_is_read_with_polygons_and_colours_and_lists_ignored_data() {
     let model = read("cube.ply", ply_text().as_bytes()).unwrap();
     assert_eq!((model.format(), model.n_faces(), model.triangles.len()), (ModelFormat::Ply, 6, 12));
     assert_eq!(model.positions, cube());
     assert_eq!(model.cage_mesh().faces, obj().cage_mesh().faces);
     assert!((volume(&model) - volume(&obj())).abs() < 1e-6);
-    // The seventh vertex is 60 / 255 red and 51 / 255 = 0.2 blue; linear by the sRGB curve.
+    // The seventh vertex has red 60 / 255 and blue 51 / 255; linear by the sRGB curve (IEC 61966-2-1).
     let look = model.look();
     let corner = look.vertices.iter().find(|v| v.source == 6).unwrap();
     let linear = |c: f32| ((c + 0.055) / 1.055).powf(2.4);
     assert!(
         (corner.color[0] - linear(60.0 / 255.0)).abs() < 1e-5 && (corner.color[2] - linear(0.2)).abs() < 1e-5
     );
-    assert_eq!(model.notices, ["'quality, edge' of the PLY file are not kept"]);
+    assert_eq!(model.notices, ["PLY data that is not supported is ignored: quality, edge"]);
 }
 
 #[test]
-fn ply_and_stl_come_back_from_what_is_written() {
+fn written_ply_and_stl_can_be_read() {
     let moved: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let from_text = read("cube.ply", ply_text().as_bytes()).unwrap();
     let written = from_text.write_ply(&moved).unwrap();
@@ -61,7 +61,7 @@ fn ply_and_stl_come_back_from_what_is_written() {
     assert_eq!((&again.positions, again.cage_mesh().faces), (&moved, from_text.cage_mesh().faces));
     assert_eq!(again.look().vertices, from_text.look().vertices, "colours stay");
 
-    // From an OBJ both are binary.
+    // Exports of an OBJ are binary.
     for format in [ModelFormat::Ply, ModelFormat::Stl] {
         let bytes = obj().write(format, &moved).unwrap();
         let again = read("again", &bytes).unwrap();
@@ -71,7 +71,7 @@ fn ply_and_stl_come_back_from_what_is_written() {
         if format == ModelFormat::Ply {
             assert_eq!(again.positions, moved);
         } else {
-            // Corners in another order, at the same places.
+            // STL orders corners by triangle; positions agree.
             let places = |model: &Model| -> Vec<Vec3> {
                 model.triangles.iter().flatten().map(|&v| model.positions[v as usize]).collect()
             };
@@ -97,7 +97,7 @@ fn both_byte_orders_of_a_ply_are_read_and_kept() {
         big.push(face[0]);
         face[1..].chunks(4).for_each(|v| big.extend(v.iter().rev()));
     }
-    // A word of a comment does not make it a text.
+    // The word ascii in a comment does not make it a text file.
     let commented = header.replacen("element", "comment converted from ascii\nelement", 1).into_bytes();
     assert_eq!(read("x.ply", &[&commented, &little[end..]].concat()).unwrap().positions, cube());
     let model = read("big.ply", &big).unwrap();
@@ -106,7 +106,7 @@ fn both_byte_orders_of_a_ply_are_read_and_kept() {
 }
 
 #[test]
-fn an_stl_of_text_may_have_several_solids_in_any_letters() {
+fn text_stl_can_have_several_solids_in_any_case() {
     let triangle = |x: f32| {
         format!(
             "FACET NORMAL 0 0 1\r\n OUTER LOOP\r\n VERTEX {x} 0 0\r\n VERTEX {} 0 0\r\n vertex {x} 1e0 0\r\n endloop\r\nendfacet\r\n",
@@ -121,7 +121,7 @@ fn an_stl_of_text_may_have_several_solids_in_any_letters() {
     );
     let model = read("x.stl", text.as_bytes()).unwrap();
     assert_eq!((model.format(), model.triangles.len()), (ModelFormat::Stl, 3));
-    // The second triangle's first corner is the first one's second.
+    // The first corner of the second triangle is the second corner of the first one.
     assert_eq!(model.positions.len(), 8);
     assert_eq!(model.triangles[1], [1, 3, 4]);
     let again = model.write_stl(&model.positions).unwrap();
@@ -130,7 +130,7 @@ fn an_stl_of_text_may_have_several_solids_in_any_letters() {
 }
 
 #[test]
-fn a_binary_stl_may_begin_like_a_text_and_has_normals_of_its_planes() {
+fn binary_stl_can_begin_with_solid_and_has_flat_normals() {
     let mut bytes = obj().write_stl(&cube()).unwrap();
     assert_eq!(bytes.len(), 84 + 12 * 50);
     let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -142,11 +142,11 @@ fn a_binary_stl_may_begin_like_a_text_and_has_normals_of_its_planes() {
     bytes[..12].copy_from_slice(b"solid facets");
     assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12);
     bytes.extend(b"\0\0");
-    assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12, "more after the last triangle");
+    assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12, "trailing bytes");
 }
 
 #[test]
-fn solids_keep_their_names_and_what_an_stl_loses_is_said() {
+fn solids_keep_their_names_and_ignored_data_is_listed() {
     let triangle = |z: f32| {
         format!(
             "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
@@ -162,9 +162,9 @@ fn solids_keep_their_names_and_what_an_stl_loses_is_said() {
 
     let mut bytes = obj().write_stl(&cube()).unwrap();
     assert_eq!(read("x.stl", &bytes).unwrap().notices, [""; 0]);
-    // Blue in 15 bits, as VisCAM and Materialise have it.
+    // Blue in 15 bits, as in VisCAM and Materialise Magics.
     bytes[84 + 48] = 0x1f;
-    let colors = "colours of an STL (attributes of facets, COLOR= in the header) are not kept";
+    let colors = "STL colours (attributes of facets, COLOR= in the header) are not supported: ignored";
     assert_eq!(read("x.stl", &bytes).unwrap().notices, [colors]);
     bytes[84 + 48] = 0;
     bytes[..6].copy_from_slice(b"COLOR=");
@@ -172,56 +172,60 @@ fn solids_keep_their_names_and_what_an_stl_loses_is_said() {
     bytes[..6].fill(0);
     bytes[80] = 7;
     let short = read("x.stl", &bytes).unwrap();
-    assert_eq!(short.notices, ["its header counts 7 facets: 250 bytes after them are left out"]);
+    assert_eq!(short.notices, ["its header counts 7 facets: the 250 bytes after them are ignored"]);
     bytes[80] = 0;
     assert!(fault("x.stl", &bytes).ends_with("its header counts 0 facets, but 600 bytes follow"));
 }
 
-/// A line of the file and its word, and never the words of a library.
+/// Errors give line and word, and do not quote the parser library.
 #[test]
-fn faults_of_texts_name_the_line() {
+fn errors_in_text_files_name_the_line() {
     let stl = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n";
     let ply = ply_text();
-    for (name, text, said) in [
+    for (name, text, expected) in [
         ("x.stl", stl.replace("vertex 1 0", "vertex 1,5 0"), "line 5: '1,5' is not a number such as 1.25"),
         ("x.stl", stl.replace("vertex 1 0 0\n", ""), "line 7: the facet that ends here has 2 corners, not 3"),
-        ("x.stl", stl.replace("vertex 1 0 0", "vertex 1 0"), "line 5: has 2 numbers of 3"),
+        ("x.stl", stl.replace("vertex 1 0 0", "vertex 1 0"), "line 5: has only 2 of 3 numbers"),
         ("x.ply", ply.replacen("\n1 0 0 ", "\n1,5 0 0 ", 1), "line 19: '1,5' is not a number such as 1.25"),
         (
             "x.ply",
             ply.replacen("double y", "duble y", 1),
-            "line 6: 'property duble y' is no statement of a PLY header",
+            "line 6: 'property duble y' is not a statement of a PLY header",
         ),
-        ("x.ply", ply.replacen("4 0 2", "5 0 2", 1), "it ends before all that its header names"),
+        (
+            "x.ply",
+            ply.replacen("4 0 2", "5 0 2", 1),
+            "it ends early, or its elements do not match the header",
+        ),
     ] {
         let message = fault(name, text.as_bytes());
-        assert!(message.contains(&format!("the file is damaged: {said}")), "{message}");
+        assert!(message.contains(&format!("the file is damaged: {expected}")), "{message}");
     }
-    // Blender 2.47 forgot the word 'comment'.
+    // Blender 2.47 omitted the keyword 'comment'.
     let old = ply.replace("comment by hand", "Created by hand");
     let model = read("x.ply", old.as_bytes()).unwrap();
     assert_eq!(model.positions, cube());
-    assert_eq!(model.notices[0], "line 3 'Created by hand' of the header is no statement of PLY: left out");
+    assert_eq!(model.notices[0], "line 3 'Created by hand' is not a statement of a PLY header: ignored");
 }
 
 #[test]
-fn what_is_wrong_with_them_is_said() {
+fn damaged_ply_and_stl_files_are_errors() {
     let ply = ply_text();
-    for (from, to, said) in [
+    for (from, to, expected) in [
         (
             "element vertex 8",
             "element vertex 80000",
-            "it says that it has 80000 of 'vertex', but the file has",
+            "its header counts 80000 of 'vertex', too many for a file of",
         ),
         ("element vertex 8", "element vertex 9", "damaged"),
-        ("property double x\n", "", "its vertices lack x, y or z"),
-        ("\n0 1\n4 0", "\n0 1\n4 8", "face 0 names vertex 8, but there are 8, numbered from 0"),
+        ("property double x\n", "", "its vertices have no x, y or z"),
+        ("\n0 1\n4 0", "\n0 1\n4 8", "face 0 refers to vertex 8, but there are 8, counted from 0"),
         ("format ascii 1.0", "format braille 1.0", "damaged"),
     ] {
         let broken = ply.replacen(from, to, 1);
         assert!(broken != ply, "{from}");
         let message = fault("x.ply", broken.as_bytes());
-        assert!(message.contains(said), "{to}: {message}");
+        assert!(message.contains(expected), "{to}: {message}");
     }
     let short = read(
         "x.ply",
@@ -231,21 +235,21 @@ fn what_is_wrong_with_them_is_said() {
     );
     let short = short.unwrap();
     assert_eq!(short.triangles, read("x.ply", ply.as_bytes()).unwrap().triangles);
-    assert!(short.notices.iter().any(|said| said.starts_with("1 faces of fewer than three corners")));
+    assert!(short.notices.contains(&"1 face with fewer than three corners: ignored".to_owned()));
     let alone = b"ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1 2\n";
     let message = fault("x.ply", alone);
-    assert!(message.contains("face 0 names vertex 0, but there are 0"), "{message}");
-    // Elements of no bytes: each kind may be as many as there are bytes, but not all together.
+    assert!(message.contains("face 0 refers to vertex 0, but there are 0"), "{message}");
+    // Elements without properties take no bytes, so the sum of their counts is limited.
     let mut idle = String::from("ply\nformat binary_little_endian 1.0\n");
     (0..2000).for_each(|k| idle += &format!("element a{k} 20000\n"));
     let message = fault("x.ply", (idle + "end_header\n").as_bytes());
-    assert!(message.contains("it says that it has 20000 of 'a"), "{message}");
+    assert!(message.contains("its header counts 20000 of 'a"), "{message}");
     let mut stl = obj().write_stl(&cube()).unwrap();
-    assert!(!stl.starts_with(b"solid"), "others take that for text");
+    assert!(!stl.starts_with(b"solid"), "other programs would read it as text");
     stl.truncate(300);
     let message = fault("x.stl", &stl);
     assert!(
-        message.contains("it says that it has 12 of 'triangle', but the file has 300 bytes"),
+        message.contains("its header counts 12 of 'triangle', too many for a file of 300 bytes"),
         "{message}"
     );
     assert!(fault("x.stl", b"solid x\nfacet normal 0 0\n").contains("damaged"));
@@ -257,9 +261,9 @@ fn what_is_wrong_with_them_is_said() {
     assert!(tight.unwrap_err().to_string().contains("memory"));
 }
 
-/// As other programs write them: normals that are no numbers, no end, tabs, a byte order mark, lines of nobody's format.
+/// Variants written by other programs: non-numeric normals, a missing end, tabs, a byte order mark, unknown keywords.
 #[test]
-fn texts_of_stl_as_they_are_met() {
+fn variants_of_text_stl_are_read() {
     let triangle = |x: f32, normal: &str| {
         format!(
             "facet normal {normal}\n outer loop\n vertex {x} 0 0\n vertex {} 0 0\n vertex {x} 1 0\n endloop\n endfacet\n",
@@ -285,15 +289,15 @@ fn texts_of_stl_as_they_are_met() {
             "{text}"
         );
         let is_cut =
-            model.notices.iter().any(|n| n == "the text does not end with 'endsolid': it may be cut off");
+            model.notices.iter().any(|n| n == "the file does not end with 'endsolid': it may be cut off");
         assert_eq!(is_cut, text == cut, "{text}");
     }
 }
 
-/// As other programs write them: comments of any encoding, empty lines, numbers without a digit before or after the point, numbers
-/// that are none where nobody looks, vertices of faces as numbers with a point, strips.
+/// Variants written by other programs: non-ASCII comments, empty lines, numbers such as `.5`, `1.` and `nan`
+/// in ignored properties, float vertex indices, triangle strips.
 #[test]
-fn texts_of_ply_as_they_are_met() {
+fn variants_of_text_ply_are_read() {
     let plain = ply_text();
     let expected = read("x.ply", plain.as_bytes()).unwrap();
     let with = |from: &str, to: &[u8]| {
@@ -304,7 +308,7 @@ fn texts_of_ply_as_they_are_met() {
         with("comment by hand", b"comment M\xf6bel"),
         with("end_header\n", b"end_header\n\n"),
         with("element edge", b"\nelement edge"),
-        // CloudCompare
+        // Written by CloudCompare.
         with("float quality", b"float scalar_Illuminance_(PCV)"),
         plain.replace("0.5\n", ".5\n").into_bytes(),
         plain.replace("0.5\n", "-.5e1\n\n").into_bytes(),
@@ -329,9 +333,9 @@ fn texts_of_ply_as_they_are_met() {
     let no_place = plain.replacen("\n1 0 0 ", "\nnan 0 0 ", 1);
     assert!(fault("x.ply", no_place.as_bytes()).contains("vertex 1 has a coordinate that is not finite"));
     let negative = plain.replacen("\n0 1\n4 0", "\n0 1\n4 -1", 1);
-    assert!(fault("x.ply", negative.as_bytes()).contains("face 0 names vertex -1, but there are 8"));
+    assert!(fault("x.ply", negative.as_bytes()).contains("face 0 refers to vertex -1, but there are 8"));
 
-    // Two strips in one list: a square and, behind a stitch, a triangle.
+    // Two strips in one list, joined by degenerate triangles: a quad and two triangles.
     let strips =
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
         element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
@@ -342,9 +346,9 @@ fn texts_of_ply_as_they_are_met() {
     assert_eq!(model.triangles, [[0, 1, 2], [1, 3, 2], [4, 6, 5], [5, 6, 7]]);
 }
 
-/// Shares of colours as bytes, as 16 bits, and from 0 to 1.
+/// Colours in 8 bits, 16 bits, and from 0 to 1.
 #[test]
-fn colours_of_a_ply_may_be_numbers_of_other_kinds() {
+fn ply_colours_can_have_any_numeric_type() {
     let of = |kind: &str, red: &str| {
         let text = ply_text()
             .replace("property uchar", &format!("property {kind}"))

@@ -1,4 +1,4 @@
-//! Project files: what goes in comes out, and the file is a plain GLB to everybody else.
+//! Projects can be read again, and are plain GLBs for other programs.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -23,7 +23,6 @@ fn models() -> Vec<Model> {
         [plain_cube(), instanced(), skinned(), quantized()].map(|b| read("x.glb", &b.glb()).unwrap()),
     );
     models.push(read("box.obj", CUBE_OBJ.as_bytes()).unwrap());
-    // Once their files were lost on the way, and the project could not be opened again.
     for name in ["box.ply", "box.stl"] {
         let cube = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
         let format = ModelFormat::of_export(name).unwrap();
@@ -50,14 +49,14 @@ fn reopened(bytes: &[u8]) -> Project {
     read_project("saved.glb", bytes, u64::MAX).unwrap().unwrap()
 }
 
-/// A texture that was a file has the image's name when it is embedded.
+/// An embedded texture gets the name of the image.
 fn without_names(mut look: Look) -> Look {
     look.images.iter_mut().for_each(|image| image.name.clear());
     look
 }
 
 #[test]
-fn everything_comes_back_as_it_was() {
+fn project_round_trip_is_exact() {
     for model in models() {
         let project = reopened(&written(&model));
         assert_eq!(project.models[0].name, model.name);
@@ -74,7 +73,7 @@ fn everything_comes_back_as_it_was() {
 }
 
 #[test]
-fn several_models_in_one_cage_come_back_in_their_order() {
+fn several_models_keep_their_order() {
     let models = models();
     let all: Vec<&Model> = models.iter().collect();
     let cage = cage(&models[0]);
@@ -87,7 +86,7 @@ fn several_models_in_one_cage_come_back_in_their_order() {
         assert_eq!(without_names(back.look()), without_names(model.look()), "{}", model.name);
     }
     assert_eq!((project.cage, project.poses), (cage.clone(), poses(&cage)));
-    // Programs that know of one model only must not lose the others silently.
+    // Older readers must reject projects with several models, or they would lose some.
     assert_eq!(json_of(&once)["extensions"]["CAGEWORK_project"]["version"], json!(2));
     assert_eq!(json_of(&written(&models[0]))["extensions"]["CAGEWORK_project"]["version"], json!(1));
     let again: Vec<&Model> = project.models.iter().collect();
@@ -95,7 +94,7 @@ fn several_models_in_one_cage_come_back_in_their_order() {
     assert!(twice.len() <= once.len() + 64, "{} then {}", once.len(), twice.len());
 }
 
-/// Cage and poses are kept as seen from the models' origin, without rounding; other programs see the cage around the model.
+/// Cage and poses are stored relative to the models' origin, and a node places the cage for other programs.
 #[test]
 fn projects_far_from_the_origin_keep_their_origin() {
     let place = DVec3::new(500_000.25, 0.0, -4_500_000.5);
@@ -127,7 +126,7 @@ fn projects_far_from_the_origin_keep_their_origin() {
 }
 
 #[test]
-fn what_points_up_is_kept_and_others_see_the_files_own_axes() {
+fn up_axis_is_kept_and_other_programs_see_the_files_axes() {
     for mut model in models() {
         let lying = model.positions.clone();
         model.set_up(UpAxis::Z);
@@ -153,7 +152,7 @@ fn bounds(positions: &[Vec3]) -> cagework_core::Bounds {
 }
 
 #[test]
-fn saving_again_and_again_does_not_grow_the_file() {
+fn saving_repeatedly_does_not_grow_the_file() {
     for model in models() {
         let once = written(&model);
         let twice = written(&reopened(&once).models[0]);
@@ -164,7 +163,7 @@ fn saving_again_and_again_does_not_grow_the_file() {
 }
 
 #[test]
-fn others_see_the_model_and_the_cage_as_lines() {
+fn other_programs_see_the_model_and_the_cage_as_lines() {
     let model = models().remove(0);
     let bytes = written(&model);
     let seen = read("seen.glb", &bytes).unwrap();
@@ -176,14 +175,14 @@ fn others_see_the_model_and_the_cage_as_lines() {
 }
 
 #[test]
-fn other_files_are_no_projects() {
+fn other_files_are_not_projects() {
     for bytes in [plain_cube().glb(), CUBE_OBJ.as_bytes().to_vec(), Vec::new(), b"glTF".to_vec()] {
         assert!(read_project("x.glb", &bytes, u64::MAX).unwrap().is_none());
     }
 }
 
 #[test]
-fn damage_and_other_versions_are_named() {
+fn damaged_and_newer_projects_are_errors() {
     let bytes = written(&models()[1]);
     let mut json = json_of(&bytes);
     let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];

@@ -1,4 +1,4 @@
-//! Parts of a model by the names of its file.
+//! Selection of parts by name.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -8,7 +8,7 @@ use cagework_io::SelectError;
 use common::{instanced, read, rigged};
 use serde_json::json;
 
-/// Five triangles; the fourth is of the first object and no group of its own, the fifth of another object.
+/// Five triangles. The fourth belongs to the first object but to no group, the fifth to another object.
 const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\n\
     o body\ng left arm\nusemtl skin\nf 1 2 3\ng left leg\nusemtl cloth\nf 2 3 4\nf 1 3 4\n\
     g\nf 1 2 4\no hat\nusemtl skin\nf 4 3 2\n";
@@ -36,22 +36,18 @@ fn nodes_joints_and_materials_of_a_gltf_are_selected_by_name() {
     let model = read("x.glb", &rig.glb()).unwrap();
     let all: Vec<u32> = (0..20).collect();
     assert_eq!(model.select("bar").unwrap(), all);
-    assert_eq!(
-        model.select("joint:root").unwrap(),
-        [0, 1, 2, 3, 4, 5, 6, 7],
-        "the lower of two that are equal"
-    );
+    assert_eq!(model.select("joint:root").unwrap(), [0, 1, 2, 3, 4, 5, 6, 7], "the first joint wins ties");
     let error = model.select("middle").unwrap_err().to_string();
     assert_eq!(error, "several parts are called 'middle': write 'material:middle' or 'joint:middle'");
     assert_eq!(model.select("material:middle").unwrap(), all);
     assert_eq!(model.select("joint:middle").unwrap(), all[8..]);
     let error = model.select("nose").unwrap_err().to_string();
     let names = "material:middle, node:bar, joint:root, joint:middle, joint:tip";
-    assert_eq!(error, format!("no part is called 'nose'; there are {names}"));
+    assert_eq!(error, format!("no part is called 'nose'; the model has {names}"));
 }
 
 #[test]
-fn a_node_is_all_that_hangs_below_it_and_what_has_no_name_its_number() {
+fn nodes_include_descendants_and_unnamed_parts_are_called_by_index() {
     let model = read("x.glb", &instanced().glb()).unwrap();
     let names = model.part_names();
     assert!(names.len() > 1, "{names:?}");
@@ -67,7 +63,7 @@ fn a_node_is_all_that_hangs_below_it_and_what_has_no_name_its_number() {
 }
 
 #[test]
-fn amounts_add_up_to_the_largest_and_pieces_are_apart() {
+fn largest_amount_wins_and_pieces_are_separate() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\ng a\nf 1 2 3\ng a b\nf 4 5 6\n";
     let model = read("x.obj", text.as_bytes()).unwrap();
     let parts = model.parts(&[("a".into(), 0.5), ("b".into(), 1.0)], &["a".into()]).unwrap();

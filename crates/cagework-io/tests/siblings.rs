@@ -1,4 +1,4 @@
-//! Files that a model names.
+//! External files of a model.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -10,13 +10,13 @@ use cagework_io::Model;
 use common::{PNG, json_of, read, textured_square};
 use serde_json::json;
 
-/// A thousand images, buffers or materials of one file of 10 MB took 10 GB.
+/// Files with many references are requested and stored once.
 #[test]
-fn file_that_is_named_often_is_asked_for_and_kept_once() {
+fn file_with_many_references_is_requested_and_stored_once() {
     const TIMES: usize = 1000;
-    let mut asked: HashMap<String, usize> = HashMap::new();
+    let mut requests: HashMap<String, usize> = HashMap::new();
     let mut files = |name: &str| {
-        *asked.entry(name.to_owned()).or_default() += 1;
+        *requests.entry(name.to_owned()).or_default() += 1;
         Some(Ok(if name == "dot.png" { PNG.to_vec() } else { b"newmtl a\nmap_Kd dot.png\n".repeat(TIMES) }))
     };
     let mut b = textured_square();
@@ -48,12 +48,12 @@ fn file_that_is_named_often_is_asked_for_and_kept_once() {
     let obj = "mtllib paint.mtl\n".repeat(TIMES) + "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
     let obj = Model::read("x.obj", obj.as_bytes(), &mut files).unwrap();
     assert_eq!(obj.look().images.len(), 1);
-    // Once for each model.
-    assert_eq!(asked, HashMap::from([("dot.png".to_owned(), 2), ("paint.mtl".to_owned(), 1)]));
+    // Once per model.
+    assert_eq!(requests, HashMap::from([("dot.png".to_owned(), 2), ("paint.mtl".to_owned(), 1)]));
 }
 
 #[test]
-fn what_is_wrong_with_a_file_is_said_once() {
+fn unavailable_file_causes_one_notice() {
     let mut b = textured_square();
     b.json["images"] = json!(vec![json!({ "uri": "a.png" }); 3]);
     let mut refuse = |_: &str| Some(Err("is a folder".to_owned()));
@@ -61,28 +61,27 @@ fn what_is_wrong_with_a_file_is_said_once() {
     assert_eq!(model.notices, ["texture 'a.png' is a folder: exports keep the reference"]);
     let obj = "mtllib a.mtl\nmtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let model = Model::read("x.obj", obj.as_bytes(), &mut refuse).unwrap();
-    assert_eq!(model.notices, ["material file 'a.mtl' is a folder: it is left out"]);
+    assert_eq!(model.notices, ["material file 'a.mtl' is a folder: its materials are not drawn"]);
 }
 
-/// One file was limited, but not how many a model has of them.
 #[test]
-fn all_files_of_a_model_have_a_limit() {
-    // Three are more than 2 GiB. They are zeros that nobody touches: they take no memory.
+fn external_files_have_a_total_limit() {
+    // Three files exceed 2 GiB. Untouched zeros take no memory.
     const BYTES: usize = 800 << 20;
     let mut b = textured_square();
     b.json["images"] = json!([{ "uri": "a" }, { "uri": "b" }, { "uri": "c" }]);
     let model = Model::read("x.glb", &b.glb(), &mut |_| Some(Ok(vec![0; BYTES]))).unwrap();
-    assert!(model.notices[1].contains("'b' is no PNG"), "{:?}", model.notices);
-    let said = "'c' is too large: all files that a model names may have 2048 MiB";
-    assert!(model.notices[2].contains(said), "{:?}", model.notices);
+    assert!(model.notices[1].contains("'b' is not a PNG"), "{:?}", model.notices);
+    let expected = "'c' exceeds the limit of 2048 MiB for all files of a model";
+    assert!(model.notices[2].contains(expected), "{:?}", model.notices);
 }
 
 #[test]
-fn image_in_a_buffer_view_that_is_none_is_a_notice() {
+fn invalid_image_in_a_buffer_view_is_a_notice() {
     let mut b = textured_square();
     let view = b.view(b"TOP-SECRET");
     b.json["images"] = json!([{ "bufferView": view, "mimeType": "image/png" }]);
     let model = read("x.glb", &b.glb()).unwrap();
-    assert_eq!(model.notices, ["image 0 is no PNG, JPEG, WebP or KTX2 image: it is not drawn"]);
+    assert_eq!(model.notices, ["image 0 is not a PNG, JPEG, WebP or KTX2 image: it is not drawn"]);
     assert_eq!(model.look().images.len(), 0);
 }

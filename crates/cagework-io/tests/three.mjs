@@ -1,9 +1,9 @@
-// Plays GLBs with three.js and compares the vertices with those that `export_samples` has written beside them.
+// Plays GLBs with three.js and compares the vertices with those written by `export_samples`.
 //
 // usage: node three.mjs DIRECTORY
 //
-// NAME.played.json: for each of some times of the first clip `seconds` and `positions`, three numbers a vertex of the only primitive,
-// as seen from `origin`.
+// NAME.played.json: array of `seconds` and `positions` in the first clip, three numbers per vertex of the only
+// primitive, relative to `origin`.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";

@@ -1,4 +1,5 @@
-// Validates every .glb in a directory with the Khronos glTF validator; exits 1 on any error. Warnings are printed.
+// Validates all .glb files in a directory with the Khronos glTF validator. Prints errors and warnings; exits
+// with 1 on errors.
 //
 // usage: node validate.mjs DIRECTORY
 
@@ -30,5 +31,5 @@ for (const name of names) {
   }
 }
 console.log(`${names.length} files, ${errors} errors`);
-// An empty directory means that the samples were not written.
+// An empty directory means that no samples were written.
 process.exit(errors > 0 || names.length === 0 ? 1 : 0);

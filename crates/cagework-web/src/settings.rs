@@ -258,7 +258,7 @@ mod tests {
             ("bind", "tau", json!(0), "a number above 0"),
             // Above 0 in 64 bits; in the 32 of the solver it is not.
             ("bind", "tau", json!(1e-60), "a number above 0"),
-            ("bind", "max_iterations", json!(1e300), "is of another kind"),
+            ("bind", "max_iterations", json!(1e300), "has the wrong type"),
             ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),
             ("bind", "solver", json!("gauss"), "one of jacobi"),
             ("bind", "backend", json!({ "gpu": null }), "is taken instead"),

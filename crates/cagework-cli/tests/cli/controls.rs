@@ -102,7 +102,7 @@ fn invalid_inner_controls_are_rejected() {
         ("", "is empty"),
         ("# nothing\n", "no vertices"),
         ("v 0 0 0\n", "there is no control inside: give points (p), polylines (l) or faces (f)"),
-        ("v 0 0 0\np 2\n", "line 2: names vertex 2, but there are 1"),
+        ("v 0 0 0\np 2\n", "line 2: refers to vertex 2, but there are 1"),
         ("v 0 0 5\np 1\n", "control 0 is outside the cage: move it in"),
         ("v 0 0 0\nv 0 0 0.01\np 1 2\n", "point 0 and point 1 inside the cage overlap"),
         (

@@ -56,8 +56,8 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
 fn invalid_jobs_are_rejected_and_write_nothing() {
     let sandbox = bound();
     for (job, message) in [
-        ("grab it", "job.json: not a job: its JSON is damaged, at line 1, column 1, after 'g'"),
-        ("[]", "job.json: not a job: a value is of another kind"),
+        ("grab it", "job.json: not a job: the JSON is damaged, at line 1, column 1, after 'g'"),
+        ("[]", "job.json: not a job: a value has the wrong type"),
         (
             "{\"grabs\": [],\n \"pin\": []}",
             "'pin' is not known; it must be one of grabs, pins, reach, start, relax, frames, at line 2, column 6, after '\"pin\"'",

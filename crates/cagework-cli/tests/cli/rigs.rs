@@ -60,10 +60,9 @@ fn rig_is_kept_and_an_unmoved_model_is_byte_identical() {
 #[test]
 fn missing_parts_clips_and_rig_points_are_reported() {
     let sandbox = bound();
-    sandbox
-        .run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb"))
-        .failure()
-        .stderr(contains("no part is called 'hat'; there are material:humanoid, node:humanoid, joint:hips"));
+    sandbox.run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb")).failure().stderr(contains(
+        "no part is called 'hat'; the model has material:humanoid, node:humanoid, joint:hips",
+    ));
     sandbox
         .run("cage humanoid.glb --around-clip Run -o run.obj")
         .failure()

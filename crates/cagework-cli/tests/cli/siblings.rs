@@ -106,9 +106,9 @@ fn files_that_are_not_images_are_not_embedded() {
         .run("bind model/m.gltf --cage box -g 8 -o out.glb")
         .success()
         .stdout(contains(
-            "texture 'notes.txt' is no PNG, JPEG, WebP or KTX2 image: exports keep the reference",
+            "texture 'notes.txt' is not a PNG, JPEG, WebP or KTX2 image: exports keep the reference",
         ))
-        .stdout(contains("texture 'data:image/png,TOP-SECRET' is no PNG"));
+        .stdout(contains("texture 'data:image/png,TOP-SECRET' is not a PNG"));
     let json = glb_json(&sandbox.read("out.glb"));
     let uris: Vec<_> = json["images"].as_array().unwrap().iter().map(|image| &image["uri"]).collect();
     assert_eq!(uris, ["notes.txt", "data:image/png,TOP-SECRET"]);
@@ -120,8 +120,8 @@ fn buffer_outside_the_models_folder_is_an_error_that_names_it() {
     for (uri, message) in [
         ("../secret.png", "it needs the file '../secret.png', which leads out of the model's folder"),
         ("textures", "it needs the file 'textures', which is a folder"),
-        ("gone.bin", "it needs the file 'gone.bin', which is not there"),
-        ("data:;base64,???", "which is no valid data: URI"),
+        ("gone.bin", "it needs the file 'gone.bin', which is missing"),
+        ("data:;base64,???", "which is not a valid data: URI"),
     ] {
         let mut model = gltf(&[]);
         model["buffers"][0] = json!({ "byteLength": 18, "uri": uri });
@@ -143,9 +143,11 @@ fn materials_of_an_obj_come_from_its_folder() {
     sandbox
         .run("info model/m.obj")
         .success()
-        .stdout(contains("material file '../paint.mtl' leads out of the model's folder: it is left out"))
-        .stdout(contains("texture '../secret.png' leads out of the model's folder: it is left out"))
-        .stdout(contains("texture 'own.mtl' is no PNG, JPEG, WebP or KTX2 image: it is left out"));
+        .stdout(contains(
+            "material file '../paint.mtl' leads out of the model's folder: its materials are not drawn",
+        ))
+        .stdout(contains("texture '../secret.png' leads out of the model's folder: it is not drawn"))
+        .stdout(contains("texture 'own.mtl' is not a PNG, JPEG, WebP or KTX2 image: it is not drawn"));
 }
 
 #[test]
@@ -196,8 +198,8 @@ fn control_characters_in_files_are_printed_as_escapes() {
         .run("info model/m\u{1b}.gltf")
         .success()
         .stdout(contains(r"model/m\u{1b}.gltf"))
-        .stdout(contains(r"texture 'gone\u{1b}[2J\nerror: mine' is not there"))
-        .stdout(contains(r"texture '\u{202e}gnp.exe' is not there"))
+        .stdout(contains(r"texture 'gone\u{1b}[2J\nerror: mine' is missing"))
+        .stdout(contains(r"texture '\u{202e}gnp.exe' is missing"))
         .stdout(escape().not());
     model["buffers"][0]["uri"] = "gone%1b.bin".into();
     sandbox.write("model/m\u{1b}.gltf", model.to_string());

@@ -1,7 +1,7 @@
-//! Accessors: typed views into buffers, decoded with every bound checked.
+//! Accessors: typed, bounds-checked views into buffers.
 //!
-//! Own decoder: that of the crate `gltf` asserts `f32` positions (so it panics on KHR_mesh_quantization) and slices
-//! unchecked. No count is believed before the bytes behind it are there.
+//! Not read with the accessors of the crate `gltf`, which assume `f32` positions, panic on
+//! KHR_mesh_quantization and slice unchecked. No count is trusted before the bytes behind it are found.
 
 use std::sync::Arc;
 
@@ -11,20 +11,20 @@ use ::gltf::json::validation::Checked;
 
 use super::{GltfError, get};
 
-/// Most elements of one accessor, and most vertices of a model: with what is needed to read and weld them, a gigabyte.
+/// Limit on the elements of an accessor and on the vertices of a model: about 1 GB to read and weld.
 pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 
-/// Most elements of an accessor that no byte of the file holds: zeros without a buffer view, besides its sparse values.
-const MAX_ABSENT: u64 = 1 << 20;
+/// Limit on implicit zeros: elements of an accessor without buffer view that sparse values do not set.
+const MAX_IMPLICIT_ZEROS: u64 = 1 << 20;
 
-/// What accessors are read from.
+/// Data that accessors refer to.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) root: &'a Root,
     pub(crate) buffers: &'a [Arc<Vec<u8>>],
 }
 
-/// One component as a number: `f32`, or an integer that is kept or normalised.
+/// Type of a component: `f32`, or an integer that is converted as is or normalised.
 #[derive(Clone, Copy)]
 struct Component {
     kind: ComponentType,
@@ -32,7 +32,7 @@ struct Component {
 }
 
 impl Component {
-    /// Value of one component; `bytes` has its size. Normalisation as glTF 2.0, section 3.6.2.2.
+    /// Decodes a component from bytes of its size. Normalisation follows glTF 2.0, section 3.6.2.2.
     fn float(self, bytes: &[u8]) -> f32 {
         let (value, unit): (f32, f32) = match (self.kind, bytes) {
             (ComponentType::I8, &[a]) => (f32::from(a as i8), 127.0),
@@ -55,7 +55,7 @@ fn unsigned(kind: ComponentType, bytes: &[u8]) -> u32 {
     }
 }
 
-/// Elements `offset + i * stride .. + size` of a buffer.
+/// Strided elements of a buffer.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -69,7 +69,7 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Vectors of `N` numbers; `what` names the attribute in errors.
+    /// Reads vectors of `N` floats. `what` names the attribute in errors.
     pub(crate) fn floats<const N: usize>(
         self,
         accessor: u32,
@@ -77,12 +77,12 @@ impl<'a> Source<'a> {
     ) -> Result<Vec<[f32; N]>, GltfError> {
         let component = self.component(accessor)?;
         if component.kind == ComponentType::U32 {
-            return Err(fault(accessor, format!("has 32-bit integers, which {what} cannot have")));
+            return Err(fault(accessor, format!("has 32-bit integers, which are not allowed for {what}")));
         }
         self.read(accessor, what, component.kind, 0.0, |bytes| component.float(bytes))
     }
 
-    /// Vectors of `N` unsigned integers: indices, joints.
+    /// Reads vectors of `N` unsigned integers, such as indices and joints.
     pub(crate) fn unsigned<const N: usize>(
         self,
         accessor: u32,
@@ -90,36 +90,33 @@ impl<'a> Source<'a> {
     ) -> Result<Vec<[u32; N]>, GltfError> {
         let kind = self.component(accessor)?.kind;
         if !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
-            return Err(fault(
-                accessor,
-                format!("has components that are not unsigned integers, as {what} needs"),
-            ));
+            return Err(fault(accessor, format!("must have unsigned integers for {what}")));
         }
         self.read(accessor, what, kind, 0, |bytes| unsigned(kind, bytes))
     }
 
-    /// Elements of an accessor.
+    /// Number of elements.
     ///
     /// # Errors
-    /// There is no such accessor, or too many of its elements are zeros that the file does not hold.
+    /// If the accessor does not exist or has too many implicit zeros.
     pub(crate) fn count(self, accessor: u32) -> Result<u64, GltfError> {
         let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
         let absent = match a.buffer_view {
             Some(_) => 0,
             None => a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)),
         };
-        if absent > MAX_ABSENT {
+        if absent > MAX_IMPLICIT_ZEROS {
             return Err(fault(
                 accessor,
                 format!(
-                    "has {absent} elements that no byte of the file holds; at most {MAX_ABSENT} are read"
+                    "has {absent} elements without data in the file, more than the limit of {MAX_IMPLICIT_ZEROS}"
                 ),
             ));
         }
         Ok(a.count.0)
     }
 
-    /// At most how many elements of an accessor differ from zero; nothing is allocated.
+    /// Upper bound on the number of non-zero elements, without allocating.
     pub(crate) fn count_nonzero(self, accessor: u32) -> Result<u64, GltfError> {
         let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
         let sparse = a.sparse.as_ref().map_or(0, |sparse| sparse.count.0);
@@ -156,7 +153,7 @@ impl<'a> Source<'a> {
         if found != type_of(N) {
             return Err(fault(
                 accessor,
-                format!("is {found:?}, but {what} needs {:?}", type_of(N)).to_ascii_lowercase(),
+                format!("has type {found:?}, but {what} needs {:?}", type_of(N)).to_ascii_lowercase(),
             ));
         }
         let count = self.count(accessor)?;
@@ -172,7 +169,7 @@ impl<'a> Source<'a> {
             element
         };
         let mut values = match a.buffer_view {
-            // Zeros, to be changed by sparse values.
+            // Zeros, overridden by sparse values.
             None => vec![[zero; N]; count],
             Some(view) => {
                 let offset = a.byte_offset.map_or(0, |o| o.0);
@@ -184,12 +181,12 @@ impl<'a> Source<'a> {
             if sparse.count.0 > a.count.0 {
                 return Err(fault(
                     accessor,
-                    format!("has {} sparse values for {count} elements", sparse.count.0),
+                    format!("has {} sparse values for only {count} elements", sparse.count.0),
                 ));
             }
             let n = sparse.count.0 as usize;
             let Checked::Valid(index_kind) = sparse.indices.component_type else {
-                return Err(fault(accessor, "has sparse indices of an unknown type".into()));
+                return Err(fault(accessor, "has sparse indices of an unknown component type".into()));
             };
             let index_kind = index_kind.0;
             let (places, offset) = (&sparse.indices, sparse.indices.byte_offset.0);
@@ -210,7 +207,7 @@ impl<'a> Source<'a> {
         Ok(values)
     }
 
-    /// The bytes of `count` elements of `size` bytes, all of them checked to be there.
+    /// The bytes of `count` elements of `size` bytes, bounds-checked.
     fn elements(
         self,
         accessor: u32,
@@ -228,13 +225,13 @@ impl<'a> Source<'a> {
         let Some(view_end) = view_end else {
             return Err(fault(
                 accessor,
-                format!("lies in buffer view {view}, which is longer than its buffer"),
+                format!("is in buffer view {view}, which extends beyond its buffer"),
             ));
         };
         let start = view_start.checked_add(offset);
         let length = match count {
             0 => Some(0),
-            // At most 2^24 elements, but a stride may be anything.
+            // `count` is limited, but the stride is not.
             _ => (stride as u64).checked_mul(count as u64 - 1).and_then(|n| n.checked_add(size as u64)),
         };
         let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
@@ -242,7 +239,7 @@ impl<'a> Source<'a> {
             (Some(start), Some(end)) if end <= view_end => {
                 Ok(Elements { bytes: &buffer[start as usize..end as usize], stride, size })
             }
-            _ => Err(fault(accessor, format!("needs {count} elements, more than buffer view {view} has"))),
+            _ => Err(fault(accessor, format!("has {count} elements, more than fit into buffer view {view}"))),
         }
     }
 }

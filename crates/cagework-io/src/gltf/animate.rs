@@ -1,17 +1,17 @@
-//! Morph targets and animations of an export.
+//! Morph targets and animations of exports.
 
 use std::collections::HashSet;
 
 use serde_json::{Value, json};
 
 use super::pack::{Pack, push};
-use super::patch::{Place, Pose};
+use super::patch::{MeshPlacement, Pose};
 
-/// Seconds from one pose to the next.
+/// Time between poses in the animation, seconds.
 pub(super) const SECONDS_PER_POSE: f32 = 1.0;
 
-/// Removes all that drove the original's morph targets: weights, their names, their animation.
-pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {
+/// Removes the weights, names and animation channels of the original morph targets.
+pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
     for place in places {
         for node in [Some(place.node), place.original].into_iter().flatten() {
             if let Some(node) = json["nodes"][node].as_object_mut() {
@@ -42,24 +42,24 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {
     }
 }
 
-/// When poses are shown.
+/// Times of poses in the animation of an export.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Played<'a> {
-    /// Rest, each in turn, rest; beside the animations that there are.
-    InTurn,
-    /// Each at its time, seconds; beside the animations that there are.
+pub(crate) enum PoseTiming<'a> {
+    /// One pose per second, starting and ending at rest. Keeps the document's animations.
+    EverySecond,
+    /// Ascending times in seconds. Keeps the document's animations.
     At(&'a [f32]),
-    /// The frames of a clip, which lasts so many seconds, instead of all animations that there are.
+    /// Equally spaced frames of a clip of this duration. Replaces the document's animations.
     Frames { clip: &'a str, seconds: f32 },
 }
 
-/// Names the targets and plays them.
+/// Names the morph targets and adds the animation that plays them.
 pub(crate) fn play_poses(
     json: &mut Value,
     pack: &mut Pack<'_>,
-    places: &[Place],
+    places: &[MeshPlacement],
     poses: &[Pose<'_>],
-    played: Played<'_>,
+    timing: PoseTiming<'_>,
 ) {
     let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
     for place in places {
@@ -71,11 +71,11 @@ pub(crate) fn play_poses(
         mesh["extras"]["targetNames"] = json!(names);
     }
     let every = |n: usize, step: f32| (0..n).map(|k| k as f32 * step).collect::<Vec<f32>>();
-    // Times of keys, and how many are before the first pose.
-    let (name, times, before) = match played {
-        Played::InTurn => ("poses", every(poses.len() + 2, SECONDS_PER_POSE), 1),
-        Played::At(times) => ("poses", times.to_vec(), 0),
-        Played::Frames { clip, seconds } => {
+    // Key times, and number of keys before the first pose.
+    let (name, times, before) = match timing {
+        PoseTiming::EverySecond => ("poses", every(poses.len() + 2, SECONDS_PER_POSE), 1),
+        PoseTiming::At(times) => ("poses", times.to_vec(), 0),
+        PoseTiming::Frames { clip, seconds } => {
             json["animations"] = json!([]);
             (clip, every(poses.len(), seconds / (poses.len().max(2) - 1) as f32), 0)
         }

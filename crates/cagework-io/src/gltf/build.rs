@@ -1,4 +1,4 @@
-//! A new GLB from an OBJ file.
+//! Converts OBJ documents and meshes to GLB.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,11 +16,11 @@ use crate::obj::{NONE, ObjDocument};
 use crate::origin::translation;
 use crate::siblings::Image;
 
-/// A GLB with the OBJ's shape at rest, as seen from an origin, where its node is, and for each of its vertices the `v` line it came from.
+/// Builds a GLB of an OBJ at rest, placed at `origin` by its node. Also returns the OBJ vertex of each GLB vertex.
 ///
-/// One node, one mesh, one primitive for each `usemtl`; a vertex for each different corner (position, texture
-/// coordinate, normal). Without `vn` lines the normals are area-weighted, over a smoothing group where the file has any. Materials have
-/// names, base colour and texture; vertices their colours.
+/// One node and mesh, one primitive per `usemtl`, one vertex per distinct corner (position, texture
+/// coordinate, normal). Without `vn` lines, normals are area-weighted within smoothing groups. Keeps names,
+/// base colours and textures of materials, and vertex colours.
 pub(crate) fn build_from_obj(
     name: &str,
     document: &ObjDocument,
@@ -43,7 +43,7 @@ pub(crate) fn build_from_obj(
     let mut sources = Vec::new();
     let mut textures = HashMap::new();
     for (material, triangles) in document.by_material() {
-        let mut part = Part::default();
+        let mut part = PrimitiveBuilder::default();
         for corner in triangles.into_iter().flatten() {
             let (pair, vt) = (pairs.of_corner[corner as usize], document.corners[corner as usize].vt);
             part.add(pair, vt);
@@ -101,7 +101,7 @@ pub(crate) fn build_from_obj(
     Ok((pack.finish(json)?, sources))
 }
 
-/// A texture with its image embedded.
+/// Adds a texture with an embedded image; returns its index.
 fn push_texture(json: &mut Value, pack: &mut Pack<'_>, image: &Image) -> usize {
     let view = pack.push_view(json, image.bytes.to_vec(), None);
     let mut shown = json!({ "bufferView": view, "mimeType": image.mime });
@@ -122,10 +122,11 @@ fn push_texture(json: &mut Value, pack: &mut Pack<'_>, image: &Image) -> usize {
     push(json, "textures", json!({ "extensions": { extension: { "source": source } } }))
 }
 
-/// A GLB of one mesh with colours (sRGB and opacity for each vertex, 0 to 255, or none at all) and a rig.
+/// Writes a mesh as a GLB. `colours`: sRGB and opacity per vertex, 0 to 255, or empty. `rig`: optional
+/// skeleton and clip.
 ///
 /// # Errors
-/// [`WriteError::NoFaces`] without triangles, [`WriteError::TooLarge`].
+/// [`WriteError::NoFaces`] without triangles, [`WriteError::TooLarge`] above 4 GiB.
 pub fn write_mesh_glb(
     name: &str,
     mesh: &TriMesh,
@@ -149,7 +150,7 @@ pub fn write_mesh_glb(
         "NORMAL": pack.push_vec3(&mut json, &normals, false),
     });
     if colours.len() == mesh.positions.len() {
-        // glTF's colours are linear.
+        // glTF vertex colours are linear.
         let linear: Vec<f32> = colours
             .iter()
             .flat_map(|&[r, g, b, a]| [to_linear(r), to_linear(g), to_linear(b), f32::from(a) / 255.0])
@@ -165,7 +166,7 @@ pub fn write_mesh_glb(
     pack.finish(json)
 }
 
-/// Skeleton, skin and clip; `attributes` get the vertices' joints.
+/// Adds skeleton, skin and clip. `attributes` receives joints and weights.
 fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Value) {
     const U16: u32 = 5123;
     let first = json["nodes"].as_array().map_or(0, Vec::len);
@@ -190,7 +191,7 @@ fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Va
     push(json, "skins", json!({ "joints": joints, "inverseBindMatrices": bind }));
     json["nodes"][0]["skin"] = 0.into();
 
-    // A joint of no weight is joint 0, as validators want it.
+    // glTF requires joint 0 where the weight is 0.
     let of_vertex = |all: &[(u32, f32); 4]| all.map(|(j, w)| if w > 0.0 { j as u16 } else { 0 });
     let bytes = rig.influences.iter().flat_map(of_vertex).flat_map(u16::to_le_bytes).collect();
     let view = pack.push_view(json, bytes, Some(VERTICES));
@@ -215,26 +216,26 @@ fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Va
     push(json, "animations", json!({ "name": rig.clip, "samplers": samplers, "channels": channels }));
 }
 
-/// Linear light of an sRGB value (IEC 61966-2-1).
+/// Converts 8-bit sRGB to linear (IEC 61966-2-1).
 fn to_linear(value: u8) -> f32 {
     let value = f32::from(value) / 255.0;
     if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
-/// glTF's default is a rough mirror, which no OBJ means.
+/// A rough, non-metallic material. glTF's default is metallic, unlike OBJ materials.
 fn plain(name: &str) -> Value {
     json!({ "name": name, "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 } })
 }
 
-/// Vertices of one primitive: (pair, texture coordinate), and triangle corners.
+/// Vertices of a primitive as (pair, texture coordinate), and its indices.
 #[derive(Default)]
-struct Part {
+struct PrimitiveBuilder {
     numbers: HashMap<(u32, u32), u32>,
     vertices: Vec<(u32, u32)>,
     indices: Vec<u32>,
 }
 
-impl Part {
+impl PrimitiveBuilder {
     fn add(&mut self, pair: u32, vt: u32) {
         let next = self.vertices.len() as u32;
         let number = *self.numbers.entry((pair, vt)).or_insert(next);

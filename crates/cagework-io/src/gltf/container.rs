@@ -1,5 +1,6 @@
-//! From bytes to JSON, buffers and images.
+//! Loads a glTF file: JSON, buffers and images.
 
+use cagework_core::words::counted;
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,46 +15,46 @@ use super::GltfError;
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
-use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
+use crate::siblings::{Image, NOT_AN_IMAGE, Resolve, SiblingError, Siblings};
 
-/// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
+/// Compression extensions that need a decoder. Both meshopt names stand for the same streams.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
-/// Most items of each of [`LISTS`]: one takes up to a kilobyte while a file is written.
+/// Limit on the items of each of [`LISTS`]. One takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
 /// Lists of a document whose items take no bytes elsewhere in the file.
 const LISTS: [&str; 9] =
     ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
-/// Bytes of a GLB's header.
-const GLB_HEADER: usize = 12;
-/// Parts of the document that geometry does not need: a fault in one of them must not refuse the file.
-const NOT_GEOMETRY: [&str; 8] =
+/// Size of the GLB header, bytes.
+const GLB_HEADER_BYTES: usize = 12;
+/// Members of the document that geometry does not need. Errors in them are ignored.
+const OPTIONAL_MEMBERS: [&str; 8] =
     ["animations", "cameras", "extras", "images", "materials", "samplers", "textures", "extensions"];
 
-pub(crate) struct Loaded {
+pub(crate) struct GltfContents {
     pub(crate) json: Value,
-    /// The JSON chunk of a GLB whose buffers are in it.
+    /// JSON chunk of a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
-    /// Whether its geometry was compressed.
+    /// Whether compressed geometry was decoded.
     pub(crate) is_decoded: bool,
     pub(crate) root: Root,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
-    /// Bytes that all of it takes, about.
+    /// Approximate memory, bytes.
     pub(crate) bytes: u64,
 }
 
-/// JSON and binary chunk.
+/// JSON and binary chunk of a GLB.
 type Chunks<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
 
-/// Loads the document and everything it refers to.
+/// Loads a document with its buffers and images.
 pub(crate) fn load(
     name: &str,
     bytes: &[u8],
     resolve: &mut Resolve<'_>,
     memory_limit: u64,
     notices: &mut Vec<String>,
-) -> Result<Loaded, GltfError> {
+) -> Result<GltfContents, GltfError> {
     let (json, bin) = split(bytes)?;
     let of_json = bytes_of_json(&json);
     MemoryError::check(of_json + decoded_bytes(&json) + bytes.len() as u64, memory_limit)?;
@@ -87,16 +88,16 @@ pub(crate) fn load(
     drop_missing(&mut json, notices);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
-    // The caller still holds the file itself; buffers and images of one file share its bytes.
+    // The caller still holds the file. Buffers and images can share bytes; count them once.
     let mut seen = HashSet::new();
     let loaded = buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes));
     let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
     let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
     MemoryError::check(held, memory_limit)?;
-    Ok(Loaded { json, text, is_decoded, root, buffers, images, bytes: held })
+    Ok(GltfContents { json, text, is_decoded, root, buffers, images, bytes: held })
 }
 
-/// Names of the buffers and images outside the file, none if it cannot be read.
+/// Names of external buffers and images; empty if the file cannot be read.
 pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     let Ok((json, _)) = split(bytes) else { return Vec::new() };
     let fits = MemoryError::check(bytes_of_json(&json) + bytes.len() as u64, memory_limit).is_ok();
@@ -106,8 +107,8 @@ pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     uris.map(|uri| decoded(uri).into_owned()).collect()
 }
 
-/// Takes out attributes that only pictures need and whose accessor is not there. Accessors that are written later would take
-/// its number.
+/// Removes optional vertex attributes whose accessor does not exist. Otherwise, accessors appended by an
+/// export could take their index.
 fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
     let n_accessors = json["accessors"].as_array().map_or(0, Vec::len) as u64;
     let mut missing = Vec::new();
@@ -119,34 +120,35 @@ fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
                 let is_drawn = ["TEXCOORD_", "COLOR_", "_"].iter().any(|start| name.starts_with(start));
                 let is_missing = is_drawn && accessor.as_u64().is_some_and(|number| number >= n_accessors);
                 if is_missing {
-                    missing.push(format!("{} of mesh {mesh}, accessor {accessor}", shown(name)));
+                    missing.push(format!("{} of mesh {mesh} refers to accessor {accessor}", shown(name)));
                 }
                 !is_missing
             });
         }
     }
     if let Some(first) = missing.first() {
-        notices
-            .push(format!("attributes without an accessor are left out ({} in all): {first}", missing.len()));
+        notices.push(format!(
+            "ignored {}: {first}",
+            counted(missing.len(), "attribute without data", "attributes without data; the first is")
+        ));
     }
 }
 
-/// Bytes that JSON takes once it is read: its text, twice for a while, and every value in it as a value of any kind and
-/// as one of the document's own.
+/// Approximate memory of parsed JSON: its text twice, and per value a `serde_json::Value` and a typed copy.
 fn bytes_of_json(text: &[u8]) -> u64 {
     const VALUE_BYTES: u64 = 140;
-    // Those in strings are counted too: names have few, and data of a buffer has one.
+    // Also counts separators inside strings, which are rare.
     let values = text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64;
     2 * text.len() as u64 + VALUE_BYTES * values
 }
 
-/// Bytes that base64 in JSON will have once it is decoded.
+/// Size of the document's base64 after decoding, bytes.
 fn decoded_bytes(text: &[u8]) -> u64 {
     let strings = text.split(|&b| b == b'"').filter(|string| string.starts_with(b"data:"));
     strings.map(|uri| uri.len() as u64 / 4 * 3).sum()
 }
 
-/// JSON and binary chunk of a GLB; a file without the GLB magic is JSON itself.
+/// Splits a GLB into JSON and binary chunk. Without GLB magic, the file is JSON.
 fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).into(), None));
@@ -157,17 +159,22 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
         Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
-        return Err(fault(format!("it has {} bytes; the header alone has {GLB_HEADER}", bytes.len())));
+        return Err(fault(format!(
+            "it has {} bytes, but the header alone takes {GLB_HEADER_BYTES}",
+            bytes.len()
+        )));
     };
     if version != 2 {
         return Err(fault(format!(
-            "version {version}, but only version 2 is read: export it anew as glTF 2.0"
+            "it has version {version}, but only version 2 is supported: export it as glTF 2.0"
         )));
     }
-    // The library subtracts the header's length without a check, and stumbles over bytes after the end.
+    // `Glb::from_slice` subtracts the header's length unchecked and rejects trailing bytes.
     let length = length as usize;
-    if length < GLB_HEADER {
-        return Err(fault(format!("it says it has {length} bytes; the header alone has {GLB_HEADER}")));
+    if length < GLB_HEADER_BYTES {
+        return Err(fault(format!(
+            "its header declares {length} bytes, but the header alone takes {GLB_HEADER_BYTES}"
+        )));
     }
     if length > bytes.len() {
         return Err(GltfError::CutOff { declared: length as u64, found: bytes.len() as u64 });
@@ -176,12 +183,12 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
         use ::gltf::binary::Error::{ChunkType, UnknownChunkType};
         fault(match e {
             ::gltf::Error::Binary(ChunkType(_) | UnknownChunkType(_)) => {
-                "its first chunk must be JSON, and the one after it binary data".into()
+                "its first chunk must be JSON and its second chunk binary data".into()
             }
-            _ => "one of its chunks ends after the file: it is cut off or damaged".to_owned(),
+            _ => "a chunk extends beyond the end of the file: it is cut off or damaged".to_owned(),
         })
     })?;
-    // Some writers fill up the chunk with zeros instead of spaces.
+    // Some writers pad the JSON chunk with zeros instead of spaces.
     let json = match glb.json {
         Cow::Borrowed(json) => Cow::Borrowed(unpadded(json)),
         Cow::Owned(json) => unpadded(&json).to_vec().into(),
@@ -200,7 +207,7 @@ fn parsed(json: &[u8]) -> Result<Value, GltfError> {
     serde_json::from_slice(json).map_err(|e| GltfError::Json(json_fault(json, &e)))
 }
 
-/// JSON and binary chunk of a GLB, nothing resolved.
+/// JSON and binary chunk of a GLB, without loading external files.
 pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u8>), GltfError> {
     let (json, bin) = split(bytes)?;
     MemoryError::check(bytes_of_json(&json) + 2 * bytes.len() as u64, memory_limit)?;
@@ -209,7 +216,7 @@ pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u
     Ok((json, bin.map(Cow::into_owned).unwrap_or_default()))
 }
 
-/// A GLB of what [`glb_parts`] took apart.
+/// Builds a GLB from the parts returned by [`glb_parts`].
 pub(crate) fn glb_of(json: &Value, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
     let json = serde_json::to_vec(json).map_err(|e| GltfError::Json(e.to_string()))?;
     let header = Header { magic: *b"glTF", version: 2, length: 0 };
@@ -220,7 +227,7 @@ pub(crate) fn glb_of(json: &Value, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
 fn check_version(json: &Value) -> Result<(), GltfError> {
     match json["asset"]["version"].as_str() {
         Some(v) if v.starts_with("2.") => Ok(()),
-        Some(v) => Err(GltfError::Json(format!("its version is {v:?}, but only 2.x is read"))),
+        Some(v) => Err(GltfError::Json(format!("its version is {v:?}, but only 2.x is supported"))),
         None => Err(GltfError::Json("it has no asset version".into())),
     }
 }
@@ -242,23 +249,23 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
             mesh["primitives"].as_array().into_iter().flatten().any(|primitive| has(primitive, extension))
         });
         if required || in_views || in_meshes {
-            return Err(compressed(name, extension, "there is no decoder here".into()));
+            return Err(compressed(name, extension, "no decoder is available".into()));
         }
     }
     Ok(())
 }
 
-/// Typed view of what geometry needs.
+/// Parses the members that geometry needs.
 pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
     let Value::Object(object) = json else {
         return Err(GltfError::Json("the JSON is not an object".into()));
     };
-    let is_geometry = |key: &str, value: &Value| !NOT_GEOMETRY.contains(&key) && !value.is_null();
+    let is_geometry = |key: &str, value: &Value| !OPTIONAL_MEMBERS.contains(&key) && !value.is_null();
     let of_geometry = object.iter().filter(|(key, value)| is_geometry(key, value));
     let mut geometry: Map<String, Value> =
         of_geometry.map(|(key, value)| (key.clone(), strict(value))).collect();
     geometry.insert("asset".into(), json!({ "version": "2.0" }));
-    // The specification lets a scene have no nodes; the library does not.
+    // `nodes` of a scene is optional in glTF but required by the crate.
     for scene in geometry.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| json!([]));
@@ -273,12 +280,12 @@ pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
         let at = items.find(|(key, _, item)| {
             serde_json::from_value::<Root>(json!({ "asset": whole["asset"], *key: [item] })).is_err()
         });
-        let place = at.map_or("a part of it".into(), |(key, k, _)| format!("item {k} of '{}'", shown(key)));
-        GltfError::Json(format!("{place} lacks a value, or has one of another type than glTF 2.0 says"))
+        let place = at.map_or("the document".into(), |(key, k, _)| format!("item {k} of '{}'", shown(key)));
+        GltfError::Json(format!("{place} has a missing value or a value of the wrong type"))
     })
 }
 
-/// A value as the library wants it: `extras`, which may have any type, and extensions are left out, and so is `null`.
+/// A value in the form that the crate accepts, without `null`, extensions and `extras`, which can have any type.
 fn strict(value: &Value) -> Value {
     let is_read = |key: &str, value: &Value| !matches!(key, "extras" | "extensions") && !value.is_null();
     match value {
@@ -291,7 +298,7 @@ fn strict(value: &Value) -> Value {
     }
 }
 
-/// Writes integers as such: glTF 2.0 (section 2.7) lets a file write 24 as 24.0.
+/// Rewrites integers written as floats, such as 24.0, which glTF 2.0 allows (section 2.7).
 fn write_integers(value: &mut Value, is_integer: bool) {
     const MEMBERS: [&str; 26] = [
         "attributes",
@@ -371,7 +378,7 @@ fn load_buffers(
     Ok(buffers)
 }
 
-/// Buffers that only compressed views name: they are for programs without a decoder, and may not be there.
+/// Fallback buffers of meshopt, which only compressed views refer to. They may be missing.
 fn fallbacks(json: &Value) -> Vec<u64> {
     let views = || json["bufferViews"].as_array().into_iter().flatten();
     let is_packed = |view: &Value| MESHOPT.iter().any(|name| view["extensions"].get(name).is_some());
@@ -384,7 +391,7 @@ fn fallbacks(json: &Value) -> Vec<u64> {
     named(true).filter(|buffer| !used.contains(buffer)).collect()
 }
 
-/// Images that are not in a buffer view; the notices name each that is not there or no image.
+/// Loads images that are not in buffer views. Missing files and non-images become notices.
 fn load_images(
     json: &Value,
     root: &Root,
@@ -400,7 +407,7 @@ fn load_images(
             let Some(uri) = image["uri"].as_str() else {
                 let view = image["bufferView"].as_u64().and_then(|view| view_bytes(root, buffers, view));
                 if view.is_some_and(|bytes| sniff_image(bytes).is_none()) {
-                    notices.push(format!("image {number} {NO_IMAGE}: it is not drawn"));
+                    notices.push(format!("image {number} {NOT_AN_IMAGE}: it is not drawn"));
                 }
                 return None;
             };
@@ -419,7 +426,7 @@ fn load_images(
         .collect()
 }
 
-/// The bytes of a buffer view; nothing where the buffer is too short.
+/// Bytes of a buffer view; `None` if it extends beyond the buffer.
 pub(super) fn view_bytes<'a>(root: &Root, buffers: &'a [Arc<Vec<u8>>], view: u64) -> Option<&'a [u8]> {
     let view = root.buffer_views.get(usize::try_from(view).ok()?)?;
     let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).ok()?;
@@ -431,29 +438,33 @@ fn is_data(uri: &str) -> bool {
     uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
-/// The bytes of a `data:` URI; nothing for any other URI.
+/// Decodes a `data:` URI; `None` for other URIs.
 ///
 /// # Errors
-/// That it cannot be decoded.
-fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, Absent>> {
+/// If the URI cannot be decoded.
+fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, SiblingError>> {
     if !is_data(uri) {
         return None;
     }
-    // Of base64; growing by doubling would take as much again.
+    // Size of base64 data. Growing by doubling could take twice the memory.
     let mut bytes = Vec::with_capacity(uri.len() / 4 * 3);
     let append = |part: &[u8]| {
         bytes.extend_from_slice(part);
         Ok::<(), std::convert::Infallible>(())
     };
     let decoded = DataUrl::process(uri).is_ok_and(|url| url.decode(append).is_ok());
-    Some(if decoded { Ok(Arc::new(bytes)) } else { Err(Absent::Refused("is no valid data: URI".into())) })
+    Some(if decoded {
+        Ok(Arc::new(bytes))
+    } else {
+        Err(SiblingError::Refused("is not a valid data: URI".into()))
+    })
 }
 
 fn decoded(uri: &str) -> Cow<'_, str> {
     percent_decode_str(uri).decode_utf8_lossy()
 }
 
-/// A URI for a message: a `data:` URI may have megabytes.
+/// A URI for a message, shortened: `data:` URIs can be megabytes long.
 fn shown_uri(uri: &str) -> String {
     shown_start(&decoded(uri), MAX_NAME_CHARS)
 }

@@ -1,4 +1,4 @@
-//! Draco and meshopt: compressed geometry becomes plain buffer views before anything else looks at the document.
+//! Decompresses Draco and meshopt geometry into plain buffer views, before the document is interpreted.
 
 use std::sync::Arc;
 
@@ -17,20 +17,20 @@ use super::accessor::{MAX_ELEMENTS, Source};
 use super::container::{DRACO, MESHOPT, typed};
 use super::pack::{INDICES, VERTICES, bounds, push};
 
-/// Most bytes that all streams become; a few hundred bytes may claim anything.
-const MAX_BYTES: u64 = 1 << 30;
+/// Limit on the decompressed size of all streams, bytes. A few hundred bytes can claim any size.
+const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
 
-/// Sums of four weights in 32 bits are off by less.
-const ROUNDED: f64 = 1e-6;
+/// Rounding error of the sum of four f32 weights.
+const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
 
-/// Decodes all that is compressed; buffers are added to `buffers` and to the document.
+/// Decodes all compressed geometry, appending buffers to `buffers` and the document.
 ///
 /// # Errors
-/// The extension and what is wrong with its stream.
+/// Name of the extension and problem of its stream.
 pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
-    let (mut left, n_in_file) = (MAX_BYTES, buffers.len());
+    let (mut left, n_in_file) = (MAX_DECOMPRESSED_BYTES, buffers.len());
     for extension in MESHOPT {
         for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
             let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
@@ -53,7 +53,7 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
         }
     }
     if buffers.len() > n_in_file {
-        // What is wrong with the document itself is said later.
+        // Errors in the document itself are reported later.
         if let Ok(root) = typed(json) {
             correct_bounds(json, &root, buffers, n_in_file);
             normalise_weights(json, &root, buffers, n_in_file);
@@ -70,7 +70,7 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
     Ok(())
 }
 
-/// The accessors whose values were decoded, and that need no sparse ones: those of buffers from `first` on.
+/// Accessors with decoded values, in buffers from index `first` on, and without sparse values.
 fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)> {
     let is_decoded = move |accessor: &Accessor| {
         let view = accessor.buffer_view.and_then(|view| root.buffer_views.get(view.value()));
@@ -79,7 +79,8 @@ fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)
     root.accessors.iter().enumerate().filter(move |(_, accessor)| is_decoded(accessor))
 }
 
-/// Bounds are of the values before a coder rounded them, and Draco renumbers vertices. Positions and times must have bounds.
+/// Recomputes min and max, which described the values before quantisation and with Draco's vertex order. glTF
+/// requires bounds for positions and times.
 fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize) {
     let mut plain = root.clone();
     plain.accessors.iter_mut().for_each(|accessor| accessor.normalized = false);
@@ -100,7 +101,7 @@ fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize
     }
 }
 
-/// Lets the weights of each vertex sum to 1, and names no joints of weight 0: a coder's rounding has changed both.
+/// Normalises joint weights to sum 1 and resets joints of weight 0, after rounding by the encoder.
 fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first: usize) {
     let decoded: Vec<usize> = decoded(root, first).map(|(number, _)| number).collect();
     let mut done = Vec::new();
@@ -121,7 +122,7 @@ fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first
         let (mut is_off, mut is_named) = (false, false);
         for v in 0..values.iter().map(|(joints, _)| joints.len()).min().unwrap_or(0) {
             let sum: f64 = values.iter().flat_map(|(_, weights)| weights[v]).map(f64::from).sum();
-            let changes = sum.is_finite() && sum > 0.0 && (sum - 1.0).abs() > ROUNDED;
+            let changes = sum.is_finite() && sum > 0.0 && (sum - 1.0).abs() > MAX_WEIGHT_SUM_ERROR;
             is_off |= changes;
             for (joints, weights) in &mut values {
                 for (joint, weight) in joints[v].iter_mut().zip(&mut weights[v]) {
@@ -149,7 +150,7 @@ fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first
     }
 }
 
-/// Gives an accessor of four components for each of `n` vertices new values.
+/// Replaces the values of a four-component accessor of `n` vertices.
 fn put_vertices(
     json: &mut Value,
     buffers: &mut Buffers,
@@ -168,7 +169,7 @@ fn put_vertices(
     }
 }
 
-/// Takes an extension away from the object at `place`.
+/// Removes an extension from the object at `place` and returns it.
 fn take(json: &mut Value, place: &str, extension: &str) -> Option<Value> {
     let object = json.pointer_mut(place)?.as_object_mut()?;
     let extensions = object.get_mut("extensions")?.as_object_mut()?;
@@ -185,7 +186,7 @@ fn push_buffer(json: &mut Value, buffers: &mut Buffers, bytes: Vec<u8>) -> usize
     buffer
 }
 
-/// The bytes that a buffer view, or meshopt's extension of one, names.
+/// Bytes of a buffer view or of a meshopt extension.
 fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
     let number = |key: &str| view[key].as_u64().and_then(|n| usize::try_from(n).ok());
     let start = number("byteOffset").unwrap_or(0);
@@ -193,10 +194,11 @@ fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
 }
 
 fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, String> {
-    let number = |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_BYTES).map_or(0, |n| n as usize);
+    let number =
+        |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_DECOMPRESSED_BYTES).map_or(0, |n| n as usize);
     let source = bytes_of(packed, buffers).ok_or("its stream is cut off")?;
     if (number("count") as u64).saturating_mul(number("byteStride") as u64) > left {
-        return Err(format!("all streams together become more than {} MiB", MAX_BYTES >> 20));
+        return Err(format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20));
     }
     let decode = || {
         let mode = Mode::parse(packed["mode"].as_str().unwrap_or_default())?;
@@ -204,10 +206,10 @@ fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, Stri
         BufferView::new(mode, filter, number("count"), number("byteStride"))?
             .decode(source, &mut Workspace::default())
     };
-    decode().map_err(|_| "its stream is damaged, or of a mode that is not known".to_owned())
+    decode().map_err(|_| "its stream is damaged or has an unknown mode".to_owned())
 }
 
-/// Puts the mesh of a Draco stream into the accessors of its primitive.
+/// Decodes a Draco stream into the accessors of its primitive.
 fn draco(
     json: &mut Value,
     buffers: &mut Buffers,
@@ -224,8 +226,10 @@ fn draco(
     let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
     let mut mesh = Mesh::new();
     MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| match error.kind() {
-        ErrorKind::LimitExceeded => format!("all streams together become more than {} MiB", MAX_BYTES >> 20),
-        _ => "its stream is damaged, or of a version that is not read".to_owned(),
+        ErrorKind::LimitExceeded => {
+            format!("the decompressed geometry exceeds {} MiB", MAX_DECOMPRESSED_BYTES >> 20)
+        }
+        _ => "its stream is damaged or has an unsupported version".to_owned(),
     })?;
 
     let primitive = json.pointer(place).and_then(Value::as_object).cloned().unwrap_or_default();
@@ -234,10 +238,10 @@ fn draco(
         let id = id.as_u64().and_then(|id| u32::try_from(id).ok());
         let attribute = id.and_then(|id| mesh.attribute_by_unique_id(id));
         let (Some(accessor), Some(attribute)) = (accessor, attribute) else {
-            return Err(format!("it has no attribute for {name}"));
+            return Err(format!("its stream has no attribute for {name}"));
         };
         let (kind, element) = layout(attribute).ok_or_else(|| format!("{name} has an unknown type"))?;
-        // Elements of vertex attributes are aligned.
+        // Vertex attributes are aligned to 4 bytes.
         let stride = element.next_multiple_of(4);
         let mut bytes = Vec::with_capacity(stride * mesh.num_points());
         for point in 0..mesh.num_points() as u32 {
@@ -256,16 +260,16 @@ fn draco(
         None => push(json, "accessors", json!({ "type": "SCALAR" })),
     };
     fill(json, buffers, indices, bytes, json!({ "target": INDICES }), UNSIGNED_INT, 3 * mesh.num_faces())?;
-    json.pointer_mut(place).ok_or("its primitive is not there")?["indices"] = indices.into();
+    json.pointer_mut(place).ok_or("its primitive does not exist")?["indices"] = indices.into();
     Ok(())
 }
 
-/// glTF's component types.
+/// glTF component types.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
 
-/// Component type and bytes of an element; nothing for what glTF does not have.
+/// Component type and element size; `None` for types that glTF lacks.
 fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
     let kind = match attribute.data_type() {
         DataType::Int8 => 5120,
@@ -279,7 +283,7 @@ fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
     Some((kind, attribute.data_type().byte_length() * usize::from(attribute.num_components())))
 }
 
-/// Lets an accessor read `bytes`: `count` components or vectors of a component type.
+/// Makes an accessor refer to `bytes`. `count`: its number of elements.
 fn fill(
     json: &mut Value,
     buffers: &mut Buffers,
@@ -295,7 +299,7 @@ fn fill(
     let accessor: &mut Map<String, Value> = json["accessors"]
         .get_mut(accessor)
         .and_then(Value::as_object_mut)
-        .ok_or_else(|| format!("accessor {accessor} is not there"))?;
+        .ok_or_else(|| format!("accessor {accessor} does not exist"))?;
     accessor.shift_remove("byteOffset");
     accessor.insert("bufferView".into(), view.into());
     accessor.insert("componentType".into(), component_type.into());

@@ -1,4 +1,4 @@
-//! glTF in, OBJ out.
+//! Converts glTF documents to OBJ.
 
 use ::gltf::json::mesh::Semantic;
 use glam::Vec3;
@@ -9,10 +9,10 @@ use super::scene::name_of;
 use super::{GltfDocument, Slot};
 use crate::error::WriteError;
 use crate::normals::Shading;
-use crate::obj::{ObjPart, write_new};
+use crate::obj::{ObjGroup, write_new};
 
-/// A new OBJ file: vertices in the model's order, an `o` for each primitive, texture coordinates and normals where the
-/// document has them, materials by name.
+/// Writes a new OBJ file: vertices in the model's order, one object per primitive, texture coordinates and
+/// normals if the document has them, and material names.
 pub(crate) fn write_obj(
     document: &GltfDocument,
     rest: Rest<'_>,
@@ -25,7 +25,7 @@ pub(crate) fn write_obj(
         if let Some(normals) = &normals {
             original[range(slot)].copy_from_slice(normals);
         }
-        parts.push(ObjPart {
+        parts.push(ObjGroup {
             name: part_name(document, slot),
             material: material(document, slot),
             start: slot.start,
@@ -65,7 +65,7 @@ fn material(document: &GltfDocument, slot: &Slot) -> Option<String> {
     Some(name_of(&document.json, "materials", material.value() as u32, "material"))
 }
 
-/// Texture coordinates, v upwards as OBJ has it; none if they are missing or damaged: the shape matters more.
+/// Texture coordinates, v upwards as in OBJ. Empty if missing or invalid.
 fn texcoords(document: &GltfDocument, slot: &Slot) -> Vec<[f32; 2]> {
     attribute(document.primitive(slot).1, Semantic::TexCoords(0))
         .and_then(|accessor| document.source().floats::<2>(accessor, "TEXCOORD_0").ok())

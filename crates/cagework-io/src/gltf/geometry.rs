@@ -1,5 +1,6 @@
-//! Primitives: positions in world space, triangles, normals and tangents.
+//! Primitives: world-space positions, triangles, normals and tangents.
 
+use cagework_core::words::counted;
 use std::collections::BTreeMap;
 
 use ::gltf::json::Index;
@@ -24,7 +25,7 @@ impl GltfDocument {
         Source { root: &self.root, buffers: &self.buffers }
     }
 
-    /// Default weights of an instance's morph targets.
+    /// Default morph target weights of an instance.
     pub(super) fn default_weights(&self, instance: &Instance) -> Option<&[f32]> {
         let node = instance.node.and_then(|n| self.root.nodes[n as usize].weights.as_ref());
         node.or(self.root.meshes[instance.mesh as usize].weights.as_ref()).map(Vec::as_slice)
@@ -36,7 +37,7 @@ impl GltfDocument {
     }
 }
 
-/// Reads the vertices, as seen from an origin, and triangles of all instances.
+/// Reads vertices and triangles of all instances. Positions are relative to `origin`.
 pub(crate) fn read(
     document: &GltfDocument,
     origin: DVec3,
@@ -99,36 +100,42 @@ pub(crate) fn read(
     }
     for (skin, n) in loose {
         notices.push(format!(
-            "skin {skin} has no weight above zero for {n} vertices: they go with the mesh's node"
+            "skin {skin} has no positive weight for {}: they follow the mesh's node",
+            counted(n, "vertex", "vertices")
         ));
     }
     if let Some(node) = repeated.first() {
         let others = others(repeated.len());
         notices.push(format!(
-            "node {node}{others} draws its mesh many times over: only the one at the node is bound"
+        "node {node}{others} draws instances of its mesh (EXT_mesh_gpu_instancing): only one of them is bound"
         ));
     }
     if geometry.positions.is_empty() {
         return Err(GltfError::NoTriangles);
     }
     if skipped > 0 {
-        notices.push(format!("{skipped} primitives are points or lines: they are not shown"));
+        notices
+            .push(format!("{} of points or lines: not shown", counted(skipped, "primitive", "primitives")));
     }
     if morphed > 0 {
-        notices.push(format!("{morphed} morph targets: bound at their default weights"));
+        notices
+            .push(format!("{} bound at default weights", counted(morphed, "morph target", "morph targets")));
     }
     if ragged > 0 {
-        notices.push(format!("{ragged} indices are left over after the last whole triangle: ignored"));
+        notices.push(format!(
+            "{} after the last complete triangle: ignored",
+            counted(ragged, "index", "indices")
+        ));
     }
     Ok(geometry)
 }
 
-/// What stands after the first of `n` names.
+/// Suffix for a notice that names only the first of `n` items.
 fn others(n: usize) -> String {
     if n > 1 { format!(" (and {} more)", n - 1) } else { String::new() }
 }
 
-/// What an export will need must not fail only then, after a long bind.
+/// Validates the attributes that exports need, before a long bind.
 fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<(), GltfError> {
     if let Some(normals) = attribute(primitive, Semantic::Normals) {
         document.source().floats::<3>(normals, "NORMAL")?;
@@ -139,7 +146,7 @@ fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<()
     Ok(())
 }
 
-/// Accessor of the positions and mode of a primitive of triangles; nothing for points and lines.
+/// Position accessor and mode of a triangle primitive; `None` for points and lines.
 pub(super) fn surface(primitive: &Primitive) -> Option<(u32, Mode)> {
     let position = attribute(primitive, Semantic::Positions)?;
     match primitive.mode {
@@ -154,14 +161,14 @@ pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<u32
     primitive.attributes.get(&Checked::Valid(semantic)).map(|a| a.value() as u32)
 }
 
-/// World from mesh, for a whole primitive or for each vertex.
+/// Transform from mesh to world space, of a primitive or per vertex.
 pub(super) enum Frame {
     Rigid(DMat4),
     Skinned(Vec<DMat4>),
 }
 
 impl Frame {
-    /// Of a primitive, and how many of its vertices a skin does not hold.
+    /// Transform of a primitive, and its number of vertices without weights.
     pub(super) fn of(
         document: &GltfDocument,
         instance: &Instance,
@@ -182,7 +189,7 @@ impl Frame {
     }
 }
 
-/// Mesh-local positions with morph targets at their default weights, and how many targets there are.
+/// Positions in mesh space with default morph weights, and the number of targets.
 fn positions(
     document: &GltfDocument,
     instance: &Instance,
@@ -224,7 +231,7 @@ fn add_morphs(
     Ok(())
 }
 
-/// Triangles of the own vertices of a primitive; none of points and lines.
+/// Triangles with the primitive's own vertex indices; empty for points and lines.
 pub(super) fn triangles_of(
     document: &GltfDocument,
     primitive: &Primitive,
@@ -237,7 +244,7 @@ pub(super) fn triangles_of(
     Ok(all)
 }
 
-/// Appends the triangles of a primitive; returns how many indices are left over.
+/// Appends the triangles of a primitive. Returns the number of leftover indices.
 fn triangles(
     document: &GltfDocument,
     primitive: &Primitive,
@@ -271,13 +278,13 @@ fn triangles(
     for k in 0..n {
         let [a, b, c] = match mode {
             Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
-            // Every second triangle of a strip turns the other way (glTF 2.0, section 3.7.2.1).
+            // Strips alternate orientation (glTF 2.0, section 3.7.2.1).
             Mode::TriangleStrip => [k, k + 1 + k % 2, k + 2 - k % 2],
             _ => [k + 1, k + 2, 0],
         }
         .map(|i| start + indices[i]);
         if a == b || b == c || c == a {
-            // Stitches of strips.
+            // Degenerate triangles join strips.
             continue;
         }
         all.push(if flip { [a, c, b] } else { [a, b, c] });
@@ -285,7 +292,7 @@ fn triangles(
     Ok(if mode == Mode::Triangles { indices.len() % 3 } else { 0 })
 }
 
-/// Original unit normals of a slot in world space; none if the primitive has none.
+/// Original unit normals of a slot in world space; `None` if the primitive has no normals.
 pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Option<Vec<Vec3>>, GltfError> {
     let (instance, primitive) = document.primitive(slot);
     let Some(accessor) = attribute(primitive, Semantic::Normals) else { return Ok(None) };
@@ -294,7 +301,7 @@ pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Opti
     let (frame, _) = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &n)| {
         let m = DMat3::from_mat4(frame.world(v));
-        // The cofactor matrix: the inverse transpose times the determinant, and it exists for flattened models too.
+        // The cofactor matrix is the inverse transpose times the determinant, and also defined for singular transforms.
         let cofactor =
             DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
         let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
@@ -303,7 +310,7 @@ pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Opti
     Ok(Some(world.collect()))
 }
 
-/// Original tangents of a slot in world space, with their handedness; none if the primitive has none.
+/// Original tangents of a slot in world space, with handedness; `None` if the primitive has no tangents.
 pub(super) fn world_tangents(
     document: &GltfDocument,
     slot: &Slot,

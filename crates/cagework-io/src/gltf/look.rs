@@ -1,4 +1,4 @@
-//! Materials of a glTF: base colour and its texture.
+//! Materials of a glTF: base colours and their textures.
 
 use std::collections::HashMap;
 
@@ -15,15 +15,15 @@ use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, s
 use crate::normals::Shading;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Images of a document that materials ask for, each once, whatever number the document gives it.
+/// Images used by materials, without duplicates.
 struct Images<'a> {
     document: &'a GltfDocument,
-    /// By where the bytes are.
+    /// By address and length of the bytes.
     numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
 }
 
-/// How a document looks. `positions`, `triangles`: the model's.
+/// Appearance of a document. `positions`, `triangles`: of the model.
 pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
     let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();
     let mut images = Images { document, numbers: HashMap::new(), found: Vec::new() };
@@ -68,7 +68,7 @@ fn material_of<'a>(document: &'a GltfDocument, slot: &Slot) -> Option<&'a Value>
     document.json["materials"].get(index as usize)
 }
 
-/// Where base colour and its texture stand: in the core's material, or in the older extension.
+/// Base colour and its texture, from the core material or KHR_materials_pbrSpecularGlossiness.
 struct Texture {
     factor: [f32; 4],
     image: Option<usize>,
@@ -110,7 +110,7 @@ impl Texture {
         }
     }
 
-    /// KHR_texture_transform: scale, then rotate counter-clockwise (v points down), then move.
+    /// KHR_texture_transform: scale, rotate counter-clockwise (v points down), translate.
     fn transformed(&self, uv: [f32; 2]) -> [f32; 2] {
         let (sin, cos) = self.rotation.sin_cos();
         let scaled = self.scale * Vec2::from(uv);
@@ -147,7 +147,7 @@ fn colours(document: &GltfDocument, slot: &Slot, vertices: &mut [LookVertex]) {
     }
 }
 
-/// Lets vertices that are one surface at one place name one of them.
+/// Gives coincident vertices of one smooth surface the same source vertex.
 fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], vertices: &mut [LookVertex]) {
     let all = (0..positions.len() as u32).collect();
     let shading = Shading::new(positions, all, normals, &[], triangles.to_vec());
@@ -158,7 +158,7 @@ fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], 
 }
 
 impl Images<'_> {
-    /// Number of an image among those found; nothing if its bytes are not there or no image.
+    /// Index of an image in the output; `None` if it is missing or not an image.
     fn number(&mut self, image: usize) -> Option<u32> {
         let document = self.document;
         let (name, bytes) = match document.images.get(image)? {

@@ -1,10 +1,10 @@
 //! glTF 2.0 and GLB.
 //!
-//! The crate `gltf` reads the container and the typed JSON; its validation and its accessors stay unused, since the
-//! first refuses every required extension and the second panics on quantised or damaged files. The document itself is
-//! kept as plain JSON, so that an export keeps what nobody here knows about.
+//! The crate `gltf` parses the container and the typed JSON. Its validation, which rejects all required
+//! extensions, and its accessors, which panic on quantised or damaged files, are not used. The document is
+//! kept as untyped JSON, so exports preserve unknown members.
 //!
-//! What becomes vertices, and in which order, is said at the crate's root; [`scene`] and [`geometry`] do it.
+//! [`scene`] and [`geometry`] define vertices and their order, as documented in the crate root.
 
 mod accessor;
 mod animate;
@@ -37,7 +37,7 @@ use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
 
-pub(crate) use animate::Played;
+pub(crate) use animate::PoseTiming;
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts, named_files};
@@ -47,10 +47,10 @@ pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Pose, Rest, embed_images, patch};
 pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
-pub(crate) use rig::{Named, Rig, clips, reshape};
+pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape};
 
-/// "30 of 236 kB", in the largest unit that tells the two apart.
-fn there(found: u64, declared: u64) -> String {
+/// Formats "30 of 236 kB" with the largest unit in which the sizes differ.
+fn size_of_total(found: u64, declared: u64) -> String {
     let (unit, name) = [(1_000_000, "MB"), (1000, "kB")]
         .into_iter()
         .find(|(unit, _)| declared / unit >= 10 && found / unit < declared / unit)
@@ -58,24 +58,25 @@ fn there(found: u64, declared: u64) -> String {
     format!("{} of {} {name}", found / unit, declared / unit)
 }
 
-/// Why a glTF file could not be read.
+/// Error of reading a glTF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum GltfError {
-    /// The binary container is damaged.
+    /// The GLB container is damaged.
     #[error("not a readable GLB: {}", shown(.0))]
     Container(String),
-    /// The file is shorter than its header says.
-    #[error("it is cut off: {} are there. Export or download it again", there(*.found, *.declared))]
+    /// The file is shorter than its header declares.
+    #[error("it is cut off: it has {}. Export or download it again", size_of_total(*.found, *.declared))]
     CutOff {
-        /// Bytes that its header says.
+        /// Declared size in bytes.
         declared: u64,
-        /// Bytes it has.
+        /// Actual size in bytes.
         found: u64,
     },
     /// The JSON is damaged or not glTF 2.0.
     #[error("not readable as glTF 2.0: {}", shown(.0))]
     Json(String),
-    /// Compressed geometry that could not be decoded; without the feature `decompress`, any.
+    /// Geometry is compressed and cannot be decoded. Without the feature `decompress`, this applies to all
+    /// compressed geometry.
     #[error(
         "its geometry is compressed ({extension}), and {}; convert it first: \
          npx @gltf-transform/cli copy {} {}",
@@ -84,133 +85,133 @@ pub enum GltfError {
         shown(output)
     )]
     Compressed {
-        /// The extension.
+        /// Name of the extension.
         extension: String,
-        /// Why it was not decoded.
+        /// Why decoding failed.
         problem: String,
         /// Name of the file.
         name: String,
-        /// Name to convert to.
+        /// Suggested name for the converted file.
         output: String,
     },
-    /// A buffer's file was not read.
+    /// An external buffer cannot be read.
     #[error("it needs the file '{uri}', which {problem}: keep it beside the .gltf, or use a .glb")]
     MissingFile {
-        /// Its URI, decoded and as [`shown`].
+        /// Decoded URI, shortened.
         uri: String,
-        /// Why not.
+        /// Reason, as a predicate.
         problem: String,
     },
-    /// A buffer has too few bytes.
-    #[error("buffer {buffer} is cut off: {} are there. Export or download it again", there(*.found, *.declared))]
+    /// A buffer is shorter than declared.
+    #[error("buffer {buffer} is cut off: it has {}. Export or download it again", size_of_total(*.found, *.declared))]
     Buffer {
-        /// The buffer.
+        /// Buffer index.
         buffer: usize,
-        /// Bytes it says.
+        /// Declared size in bytes.
         declared: u64,
-        /// Bytes it has.
+        /// Actual size in bytes.
         found: u64,
     },
-    /// An index out of range.
-    #[error("{from} names {what} {index}, but there are {count}")]
+    /// An index is out of range.
+    #[error("{from} refers to {what} {index}, but there are {count}")]
     Index {
-        /// Who names it.
+        /// Object with the index.
         from: String,
-        /// Kind of thing.
+        /// Kind of the referenced object.
         what: &'static str,
-        /// Index named.
+        /// The index.
         index: u64,
-        /// Things there are.
+        /// Number of objects of that kind.
         count: usize,
     },
-    /// An accessor that cannot be decoded.
+    /// An accessor cannot be decoded.
     #[error("accessor {accessor} {problem}")]
     Accessor {
-        /// The accessor.
+        /// Accessor index.
         accessor: u32,
-        /// What is wrong with it.
+        /// Problem, as a predicate.
         problem: String,
     },
-    /// An accessor has another number of elements than what it is for.
+    /// An accessor has the wrong number of elements.
     #[error(
-        "accessor {accessor} has {count} elements for {what}, but there are {expected} {of}: export it anew"
+        "accessor {accessor} has {count} elements for {what}, but there are {expected} {of}: export the model again"
     )]
     Count {
-        /// The accessor.
+        /// Accessor index.
         accessor: u32,
-        /// What it is for.
+        /// Attribute.
         what: String,
-        /// Elements it has.
+        /// Number of elements.
         count: u64,
-        /// Elements it must have.
+        /// Required number of elements.
         expected: u64,
-        /// What they are for.
+        /// What the attribute belongs to: vertices or joints.
         of: &'static str,
     },
-    /// A position that is not a finite number.
-    #[error("accessor {accessor}: the position of its vertex {vertex} is not a finite number")]
+    /// A position is NaN or infinite.
+    #[error("accessor {accessor}: the position of vertex {vertex} is not finite")]
     NotFinite {
-        /// The accessor.
+        /// Accessor index.
         accessor: u32,
-        /// The vertex within it.
+        /// Element index.
         vertex: usize,
     },
-    /// The nodes are no tree.
+    /// The nodes do not form a forest.
     #[error("node {node} {problem}")]
     Node {
-        /// The node.
+        /// Node index.
         node: u32,
-        /// What is wrong with it.
+        /// Problem, as a predicate.
         problem: &'static str,
     },
-    /// No triangles at all.
+    /// There are no triangles.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
-    /// More memory than is allowed.
+    /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
-    /// More elements than are read.
+    /// A count exceeds its limit.
     #[error("{what}: {count}, more than the limit of {limit}: use a smaller model")]
     TooLarge {
-        /// What there is too much of.
+        /// Elements counted.
         what: &'static str,
-        /// How much.
+        /// Number of elements.
         count: u64,
-        /// The limit.
+        /// Maximum number.
         limit: u64,
     },
 }
 
-/// A glTF file as it was read.
+/// A parsed glTF file.
 #[derive(Clone, Debug)]
 pub(crate) struct GltfDocument {
-    /// The JSON without the URIs of buffers.
+    /// JSON without buffer URIs.
     pub(crate) json: Value,
-    /// The parts of it that geometry needs, typed.
+    /// Typed members needed by geometry.
     pub(crate) root: Root,
-    /// Bytes of each buffer.
+    /// Contents of each buffer.
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
-    /// Images that came by URI and were found.
+    /// Images with URIs that could be loaded.
     pub(crate) images: Vec<Option<Image>>,
-    /// The JSON chunk of a GLB whose buffers are in it, as it was.
+    /// Original JSON chunk of a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
-    /// The GLB that the caller decoded this one from, if its buffers are in it.
+    /// Compressed GLB that the caller decoded this document from, if self-contained.
     pub(crate) packed: Option<Vec<u8>>,
-    /// Whether its geometry was compressed; the first buffer is still that of the file.
+    /// Whether compressed geometry was decoded. The first buffer is still that of the file.
     pub(crate) is_decoded: bool,
-    /// Meshes shown, in vertex order.
+    /// Meshes of the default scene, in vertex order.
     instances: Vec<Instance>,
-    /// Meshes that are not shown: levels of detail, other scenes.
+    /// Meshes outside the default scene, such as levels of detail.
     elsewhere: Vec<Instance>,
-    /// World from bind space for each joint of the skins that are shown. `[n_skins][n_joints]`
+    /// World from bind space per joint of the skins in use. `[n_skins][n_joints]`
     joints: Vec<Vec<DMat4>>,
-    /// Bytes that it and its geometry take, about.
+    /// Approximate memory with geometry, bytes.
     pub(crate) bytes: u64,
-    /// Where their primitives' vertices and triangles are.
+    /// Vertex and triangle ranges of the primitives.
     slots: Vec<Slot>,
 }
 
-/// Where one primitive of one instance lies in the model's vertices and triangles.
+/// Vertex and triangle range of one primitive of one instance.
 #[derive(Clone, Debug)]
 struct Slot {
     instance: u32,
@@ -220,9 +221,9 @@ struct Slot {
     triangles: std::ops::Range<usize>,
 }
 
-/// A file that was read.
+/// Result of reading a glTF file.
 pub(crate) struct GltfModel {
-    /// What the positions are seen from.
+    /// Origin of the positions.
     pub(crate) origin: DVec3,
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -231,7 +232,8 @@ pub(crate) struct GltfModel {
     pub(crate) notices: Vec<String>,
 }
 
-/// Reads a glTF or GLB file within `memory_limit` bytes, with positions from an origin: near the model unless said; `resolve` fetches sibling files by their decoded relative URI.
+/// Reads a glTF or GLB file using at most `memory_limit` bytes. `resolve` returns external files by decoded
+/// relative URI. `origin`: origin of the positions; `None` chooses one near the model.
 pub(crate) fn read(
     name: &str,
     bytes: &[u8],
@@ -257,7 +259,7 @@ pub(crate) fn read(
         bytes: loaded.bytes,
         slots: Vec::new(),
     };
-    // The file is the caller's, and gone when it has been read.
+    // The caller frees the file after reading.
     let model = size::check(&document, loaded.bytes, memory_limit)?;
     document.bytes = loaded.bytes - bytes.len() as u64 + model;
     document.joints = skin::shown_joints(&document, &worlds)?;
@@ -283,7 +285,7 @@ pub(crate) fn read(
     })
 }
 
-/// `list[index]`, or the error that says who named it.
+/// `list[index]`, or an error naming the object with the index.
 fn get<'a, T>(
     list: &'a [T],
     index: usize,

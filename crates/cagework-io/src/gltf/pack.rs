@@ -1,4 +1,4 @@
-//! The binary side of an export: new accessors in, unused ones out, one GLB.
+//! Buffer of an export: adds accessors, drops unused ones and writes the GLB.
 
 use std::borrow::Cow;
 
@@ -16,14 +16,14 @@ const U16: u32 = 5123;
 /// Buffer view targets.
 pub(super) const VERTICES: u32 = 34962;
 pub(super) const INDICES: u32 = 34963;
-/// Every component type's size divides it.
+/// Multiple of all component sizes, bytes.
 const ALIGN: usize = 4;
 
-/// Name of the extension of a document that holds a project.
+/// Name of the glTF extension that stores a project.
 pub const PROJECT_EXTENSION: &str = "CAGEWORK_project";
 
-/// Extensions that refer to accessors nowhere but in the places [`each_accessor`] visits. With any other extension
-/// nothing is thrown away: an index nobody here knows of must not move.
+/// Extensions whose accessor references [`each_accessor`] visits. If a document uses others, unused items are
+/// kept, since renumbering could break unknown references.
 const KNOWN_EXTENSIONS: [&str; 9] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -36,9 +36,9 @@ const KNOWN_EXTENSIONS: [&str; 9] = [
     PROJECT_EXTENSION,
 ];
 
-/// Bytes of all buffer views of a document under way.
+/// Buffer views of a document being written.
 pub(crate) struct Pack<'a> {
-    /// In the order of `bufferViews`: bytes, and where they lay modulo [`ALIGN`]; none if they are not there.
+    /// Bytes of each buffer view and their offset modulo [`ALIGN`]; `None` if out of bounds.
     views: Vec<Option<(Cow<'a, [u8]>, usize)>>,
 }
 
@@ -48,7 +48,7 @@ impl<'a> Pack<'a> {
         Self { views: Vec::new() }
     }
 
-    /// The views of a document.
+    /// Buffer views of a document.
     pub(crate) fn of(document: &'a GltfDocument) -> Self {
         let views = (0u64..).zip(&document.root.buffer_views).map(|(number, view)| {
             let bytes = view_bytes(&document.root, &document.buffers, number)?;
@@ -58,7 +58,7 @@ impl<'a> Pack<'a> {
         Self { views: views.collect() }
     }
 
-    /// The views of one buffer, which holds all of them.
+    /// Buffer views of a document whose only buffer is `bin`.
     pub(crate) fn of_bytes(json: &Value, bin: &'a [u8]) -> Self {
         let views = json["bufferViews"].as_array().into_iter().flatten().map(|view| {
             let [start, length] =
@@ -68,7 +68,7 @@ impl<'a> Pack<'a> {
         Self { views: views.collect() }
     }
 
-    /// A new buffer view.
+    /// Adds a buffer view.
     pub(crate) fn push_view(&mut self, json: &mut Value, bytes: Vec<u8>, target: Option<u32>) -> usize {
         let mut view = json!({ "buffer": 0, "byteLength": bytes.len() });
         if let Some(target) = target {
@@ -78,7 +78,7 @@ impl<'a> Pack<'a> {
         push(json, "bufferViews", view)
     }
 
-    /// A new accessor of 32-bit floats, `components` a piece; `bounds` adds minimum and maximum.
+    /// Adds an f32 accessor with `components` numbers per element; `bounds` adds min and max.
     pub(crate) fn push_floats(
         &mut self,
         json: &mut Value,
@@ -103,18 +103,18 @@ impl<'a> Pack<'a> {
         push(json, "accessors", accessor)
     }
 
-    /// A new accessor of vectors as a vertex attribute.
+    /// Adds a vertex attribute of vectors.
     pub(crate) fn push_vec3(&mut self, json: &mut Value, values: &[Vec3], bounds: bool) -> usize {
         let flat: Vec<f32> = values.iter().flat_map(Vec3::to_array).collect();
         self.push_floats(json, &flat, 3, true, bounds)
     }
 
-    /// A new accessor of the ends of lines.
+    /// Adds an index accessor of line segments.
     pub(crate) fn push_lines(&mut self, json: &mut Value, lines: &[[u32; 2]]) -> usize {
         self.push_indices(json, lines.iter().flatten().copied())
     }
 
-    /// A new accessor of triangle corners; 16 bits where they suffice (0xffff is a strip's restart value).
+    /// Adds an index accessor, 16-bit if possible. 0xffff is reserved for primitive restart.
     pub(crate) fn push_indices(
         &mut self,
         json: &mut Value,
@@ -136,7 +136,7 @@ impl<'a> Pack<'a> {
         )
     }
 
-    /// Drops what is no longer used, lays out the buffer and writes the GLB.
+    /// Drops unused accessors and views, lays out the buffer and writes the GLB.
     pub(crate) fn finish(mut self, mut json: Value) -> Result<Vec<u8>, WriteError> {
         if only_known_extensions(&json) {
             drop_unused(&mut json, "accessors", each_accessor);
@@ -169,7 +169,7 @@ impl<'a> Pack<'a> {
             let Some((bytes, phase)) = view else {
                 return Err(WriteError::Document(format!("buffer view {number} is longer than its buffer")));
             };
-            // Accessors are aligned within the buffer, not within their view: keep where the view lay.
+            // Accessors are aligned relative to the buffer, so preserve the original offset modulo 4.
             bin.resize(bin.len().next_multiple_of(ALIGN) + phase, 0);
             json["bufferViews"][number]["buffer"] = 0.into();
             json["bufferViews"][number]["byteOffset"] = bin.len().into();
@@ -180,7 +180,7 @@ impl<'a> Pack<'a> {
     }
 }
 
-/// Smallest and largest of each component.
+/// Component-wise minimum and maximum.
 pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
     let fold = |f: fn(f32, f32) -> f32, start: f32| {
         values.iter().fold([start; N], |all, value| std::array::from_fn(|k| f(all[k], value[k])))
@@ -188,7 +188,7 @@ pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
     [fold(f32::min, f32::INFINITY), fold(f32::max, f32::NEG_INFINITY)].map(|all| all.to_vec().into())
 }
 
-/// A GLB of a document whose only buffer is `bin`.
+/// GLB of a document whose only buffer is `bin`.
 pub(super) fn write_glb(json: &Value, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
     let text = serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))?;
     write_chunks(&text, bin)
@@ -205,7 +205,7 @@ fn write_chunks(text: &[u8], bin: &[u8]) -> Result<Vec<u8>, WriteError> {
 }
 
 impl GltfDocument {
-    /// Takes the file that this document was decoded from, if it is a GLB that holds its buffers.
+    /// Stores the compressed source file, if it is a self-contained GLB.
     pub(crate) fn set_packed(&mut self, file: Vec<u8>) {
         let json =
             Glb::from_slice(&file).ok().and_then(|glb| serde_json::from_slice::<Value>(&glb.json).ok());
@@ -214,7 +214,7 @@ impl GltfDocument {
         self.packed = is_whole.then_some(file);
     }
 
-    /// The file as it was read, byte for byte; none if it was not a GLB that holds its buffers.
+    /// The original file, byte for byte; `None` unless it was a self-contained GLB.
     pub(super) fn as_read(&self) -> Option<Result<Vec<u8>, WriteError>> {
         if let Some(packed) = &self.packed {
             return Some(Ok(packed.clone()));
@@ -223,12 +223,12 @@ impl GltfDocument {
     }
 }
 
-/// Appends to a list of the document and returns the index.
+/// Appends an item to a list of the document; returns its index.
 pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
     if !json[list].is_array() {
         json[list] = json!([]);
     }
-    let list = json[list].as_array_mut().expect("it was made an array above");
+    let list = json[list].as_array_mut().expect("an array was stored above");
     list.push(item);
     list.len() - 1
 }
@@ -243,7 +243,7 @@ fn only_known_extensions(json: &Value) -> bool {
 
 pub(super) type Visit<'v> = &'v mut dyn FnMut(&mut Value);
 
-/// Removes the items of `list` that `each` finds no reference to, and renumbers the references. Returns what was kept.
+/// Removes items of `list` without references and renumbers the references. Returns whether each item is kept.
 fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) -> Vec<bool> {
     let n = json[list].as_array().map_or(0, Vec::len);
     let mut used = vec![false; n];
@@ -272,7 +272,7 @@ fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) ->
     used
 }
 
-/// Visits every reference to an accessor.
+/// Visits all references to accessors.
 pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
     fn items<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {
         value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
@@ -301,7 +301,7 @@ pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
     }
 }
 
-/// Visits every reference to a buffer view: all members of that name outside `extras`.
+/// Visits all references to buffer views: members named `bufferView` outside `extras`.
 fn each_view(json: &mut Value, visit: Visit<'_>) {
     match json {
         Value::Object(object) => {

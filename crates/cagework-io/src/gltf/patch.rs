@@ -1,12 +1,11 @@
-//! glTF out: the original document with the deformed shape in it.
+//! Writes deformed shapes into the original glTF document.
 //!
-//! What becomes of the parts that know where vertices are:
-//! * POSITION is written back through the inverse of the node's world transform; NORMAL and TANGENT turn with the
-//!   surface ([`crate::normals`]); a primitive without normals gets none (viewers shade it flat, as before).
-//! * A mesh shown by several nodes becomes a mesh for each, since the nodes deform differently.
-//! * A skinned mesh loses its skin and moves to a new node at the top of the scene: joints and node transforms would
-//!   move vertices that are already where they belong. So does a mesh under a transform that flattens it.
-//! * Morph targets were bound at their default weights and are dropped, with the animations of those weights.
+//! * POSITION is transformed back by the inverse of the node's world transform. NORMAL and TANGENT rotate
+//!   with the surface ([`crate::normals`]). Primitives without normals get none; viewers shade them flat.
+//! * A mesh shown by several nodes is duplicated, since each node deforms it differently.
+//! * A skinned mesh loses its skin and moves to a new root node, because the deformed vertices are already in
+//!   world space. The same applies to a mesh under a singular transform.
+//! * Morph targets were bound at default weights. They and the animations of their weights are removed.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,7 +13,7 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
-use super::animate::{self, Played};
+use super::animate::{self, PoseTiming};
 use super::geometry::{Frame, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
@@ -23,21 +22,21 @@ use crate::error::WriteError;
 use crate::normals::Shading;
 use crate::origin::translation;
 
-/// A determinant this small against its columns' lengths cannot be undone in f32.
-const FLAT: f64 = 1e-9;
+/// Threshold for |det| / product of column lengths, below which a transform counts as singular in f32.
+const MIN_RELATIVE_DETERMINANT: f64 = 1e-9;
 
-/// One named shape.
+/// A named shape.
 #[derive(Clone, Copy)]
 pub(crate) struct Pose<'a> {
     pub(crate) name: &'a str,
     pub(crate) positions: &'a [Vec3],
 }
 
-/// The model at rest: what the document says.
+/// The undeformed model.
 #[derive(Clone, Copy)]
 pub(crate) struct Rest<'a> {
     pub(crate) positions: &'a [Vec3],
-    /// What all positions are seen from, in world space.
+    /// Origin of all positions, in world space.
     pub(crate) origin: DVec3,
     pub(crate) triangles: &'a [[u32; 3]],
 }
@@ -50,13 +49,13 @@ impl From<GltfError> for WriteError {
 
 /// Writes the document with `base` as its shape and `poses` as morph targets with an animation.
 ///
-/// All positions are in world space, as seen from the origin, in the model's vertex order; counts are the caller's to check.
+/// Positions are in world space, relative to the origin, in the model's vertex order. The caller checks their counts.
 pub(crate) fn patch(
     document: &GltfDocument,
     rest: Rest<'_>,
     base: &[Vec3],
     poses: &[Pose<'_>],
-    played: Played<'_>,
+    timing: PoseTiming<'_>,
 ) -> Result<Vec<u8>, WriteError> {
     let is_at_rest = base == rest.positions && poses.is_empty() && !Rig::has_skin_or_targets(document);
     if let Some(file) = document.as_read().filter(|_| is_at_rest) {
@@ -103,28 +102,28 @@ pub(crate) fn patch(
     }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
-        animate::play_poses(&mut json, &mut pack, &places, poses, played);
+        animate::play_poses(&mut json, &mut pack, &places, poses, timing);
     }
     pack.finish(json)
 }
 
-/// Where an instance's mesh is in the new document.
-pub(crate) struct Place {
+/// Mesh and node of an instance in the exported document.
+pub(crate) struct MeshPlacement {
     pub(crate) mesh: usize,
     pub(crate) node: usize,
-    /// Node it was at in the original, if any.
+    /// Node in the original, if any.
     pub(crate) original: Option<usize>,
-    /// At a node of its own without a transform.
+    /// Whether the mesh has a new root node.
     detached: bool,
-    /// From world space as seen from the origin.
+    /// Mesh from world space, relative to the origin.
     mesh_from_world: DMat4,
 }
 
-/// Gives every instance a mesh that is its own, at a node that can be undone.
-fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec<Place> {
+/// Gives every instance its own mesh, at a node with an invertible transform.
+fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec<MeshPlacement> {
     let mut users = vec![0_usize; document.root.meshes.len()];
     for mesh in document.root.nodes.iter().filter_map(|n| n.mesh) {
-        // Nodes outside the scene may name meshes that are not there.
+        // Unused nodes may refer to missing meshes.
         if let Some(users) = users.get_mut(mesh.value()) {
             *users += 1;
         }
@@ -135,10 +134,10 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
         }
     }
     let mut kept = vec![false; document.root.meshes.len()];
-    let mut places: Vec<Place> = Vec::with_capacity(document.instances.len());
+    let mut places: Vec<MeshPlacement> = Vec::with_capacity(document.instances.len());
     for instance in &document.instances {
         let m = instance.mesh as usize;
-        // The first one keeps the mesh, unless a node outside the scene shows it too.
+        // The first user keeps the mesh, unless a node outside the scene also shows it.
         let keeps = users[m] == 0 && !std::mem::replace(&mut kept[m], true);
         let mesh = if keeps {
             instance.mesh as usize
@@ -164,7 +163,7 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
                 json["nodes"][node]["translation"] = json!(at);
             }
         }
-        places.push(Place { mesh, node, original, detached, mesh_from_world });
+        places.push(MeshPlacement { mesh, node, original, detached, mesh_from_world });
     }
     places
 }
@@ -172,10 +171,10 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
 pub(super) fn is_flat(world: DMat4) -> bool {
     let m = DMat3::from_mat4(world);
     let size = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-    m.determinant().abs() <= FLAT * size || !world.inverse().is_finite()
+    m.determinant().abs() <= MIN_RELATIVE_DETERMINANT * size || !world.inverse().is_finite()
 }
 
-/// Takes the mesh off its node and makes a node for it at the top of the scene.
+/// Moves a mesh from its node to a new root node of the scene; returns the node.
 fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usize {
     let name = match instance.node {
         Some(node) => name_of(&document.json, "nodes", node, "node"),
@@ -189,7 +188,7 @@ fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usi
     let node = push(json, "nodes", json!({ "name": name }));
     if document.root.scenes.is_empty() {
         if document.root.nodes.is_empty() {
-            // Meshes without nodes are a library of parts; to be seen they need a scene.
+            // A file of meshes without nodes needs a scene to be visible.
             if json["scenes"].as_array().is_none_or(Vec::is_empty) {
                 json["scenes"] = json!([{}]);
                 json["scene"] = 0.into();
@@ -205,7 +204,7 @@ fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usi
 
 struct Normals {
     shading: Shading,
-    /// Whether each slot has normals in the original.
+    /// Whether each slot has original normals.
     present: Vec<bool>,
 }
 
@@ -226,7 +225,7 @@ impl Normals {
     }
 }
 
-/// A primitive's deformed vertices in its mesh's own space.
+/// Deformed vertices of a primitive in mesh space.
 struct Shape {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -235,7 +234,7 @@ struct Shape {
 impl Shape {
     fn new(
         slot: &Slot,
-        place: &Place,
+        place: &MeshPlacement,
         has_normals: bool,
         shading: &Shading,
         positions: &[Vec3],
@@ -259,11 +258,11 @@ fn unit(v: DVec3) -> DVec3 {
     v.normalize_or(DVec3::Z)
 }
 
-/// Tangents that turned with the surface, at right angles to the new normals; none without original ones.
+/// Tangents rotated with the surface and orthogonal to the new normals; `None` without original tangents.
 fn tangents(
     document: &GltfDocument,
     slot: &Slot,
-    place: &Place,
+    place: &MeshPlacement,
     shape: &Shape,
     rotations: &[Quat],
 ) -> Result<Option<Vec<f32>>, WriteError> {
@@ -282,7 +281,7 @@ fn tangents(
     Ok(Some(out))
 }
 
-/// Whether the original winding was turned round when the model was read.
+/// Whether reading reversed the winding, because of a mirroring transform.
 fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError> {
     let (instance, primitive) = document.primitive(slot);
     let (frame, _) = Frame::of(document, instance, primitive, slot.count as usize)?;
@@ -316,18 +315,18 @@ fn patch_primitive(
     }
 }
 
-/// Moves images that came by URI into the file: a GLB travels alone.
+/// Embeds external images in the GLB.
 pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
     embed_images_by(document, json, &mut |json, bytes| pack.push_view(json, bytes, None));
 }
 
-/// The same with another way to make a buffer view.
+/// Like [`embed_images`], with a callback that adds buffer views.
 pub(crate) fn embed_images_by(
     document: &GltfDocument,
     json: &mut Value,
     push_view: &mut dyn FnMut(&mut Value, Vec<u8>) -> usize,
 ) {
-    // Images of one file share its bytes.
+    // Images from one file share its bytes.
     let mut views = HashMap::new();
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };

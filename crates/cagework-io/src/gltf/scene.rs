@@ -1,5 +1,6 @@
-//! The node tree: world transforms, and which mesh is shown where.
+//! Node hierarchy: world transforms and mesh instances.
 
+use cagework_core::words::counted;
 use std::collections::HashSet;
 
 use ::gltf::json::Root;
@@ -10,28 +11,28 @@ use serde_json::Value;
 use super::{GltfDocument, GltfError, get};
 use crate::counts::Counts;
 
-/// World transform of every node, in f64: a transform and its inverse must give back an f32.
+/// World transforms of all nodes, in f64 so that transforming back and forth preserves f32.
 #[derive(Clone, Debug)]
 pub(crate) struct Worlds {
     pub(crate) world: Vec<DMat4>,
-    /// Every node after its parent, with its parent.
+    /// Nodes with their parents, parents first.
     pub(super) order: Vec<(u32, Option<u32>)>,
 }
 
-/// One mesh shown by one node.
+/// A mesh shown by a node.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
-    /// The node; none in a file that has meshes but no nodes.
+    /// Node; `None` in a file without nodes.
     pub(crate) node: Option<u32>,
     pub(crate) mesh: u32,
     pub(crate) skin: Option<u32>,
-    /// World from mesh.
+    /// World from mesh space.
     pub(crate) world: DMat4,
 }
 
 impl Worlds {
     /// # Errors
-    /// An index out of range, a node with two parents, a cycle, a transform that is not finite.
+    /// If an index is out of range, a node has two parents, there is a cycle, or a transform is not finite.
     pub(crate) fn new(root: &Root) -> Result<Self, GltfError> {
         let n = root.nodes.len();
         let mut parent = vec![None; n];
@@ -76,7 +77,7 @@ impl Worlds {
         }
     }
 
-    /// Marks what hangs below marked nodes (a flag for each node).
+    /// Marks the descendants of marked nodes. `nodes`: `[n_nodes]`.
     pub(super) fn mark_below(&self, nodes: &mut [bool]) {
         for &(node, parent) in &self.order {
             nodes[node as usize] |= parent.is_some_and(|p| nodes[p as usize]);
@@ -100,11 +101,10 @@ pub(super) fn local(node: &Node) -> DMat4 {
     )
 }
 
-/// Meshes of the default scene, and those that only other scenes show, or none; both by ascending mesh, then by ascending
-/// node.
+/// Mesh instances inside and outside the default scene, each ordered by mesh, then node. If the scene has no
+/// mesh, all instances are used.
 ///
-/// This is the order of the file's meshes, not of a walk through the tree: for a file that shows each mesh once it is
-/// the order of its primitives, which other programs see too.
+/// Mesh order equals primitive order for files that show each mesh once, as other programs number them.
 pub(crate) fn instances(
     root: &Root,
     worlds: &Worlds,
@@ -145,16 +145,16 @@ pub(crate) fn instances(
         if in_scene[i] { shown.push(instance) } else { elsewhere.push(instance) }
     }
     if shown.is_empty() && !elsewhere.is_empty() {
-        notices.push(format!("scene {scene} shows no mesh: the meshes of all nodes are used"));
+        notices.push(format!("scene {scene} has no mesh: using the meshes of all nodes"));
         std::mem::swap(&mut shown, &mut elsewhere);
     }
     if !elsewhere.is_empty() {
         notices.push(format!(
-            "{} nodes with a mesh are not in scene {scene}: they are not shown",
-            elsewhere.len()
+            "{} not in scene {scene}: not shown",
+            counted(elsewhere.len(), "node with a mesh is", "nodes with a mesh are")
         ));
     }
-    // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
+    // Sort integer arrays: reusing this instantiation of sort keeps the wasm module small.
     let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
     Ok([shown, elsewhere].map(|list| {
         let mut order: Vec<[u32; 3]> = (0u32..).zip(&list).map(key).collect();
@@ -163,7 +163,7 @@ pub(crate) fn instances(
     }))
 }
 
-/// What the document has of everything.
+/// Statistics of the document.
 pub(crate) fn counts(document: &GltfDocument) -> Counts {
     let count = |key: &str| document.json[key].as_array().map_or(0, Vec::len);
     let targets = document.root.meshes.iter().map(|mesh| {
@@ -185,7 +185,7 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
     }
 }
 
-/// `name` of an object, or its kind and number.
+/// Name of an object, or its kind and index.
 pub(crate) fn name_of(json: &Value, list: &str, index: u32, kind: &str) -> String {
     json[list][index as usize]["name"].as_str().map_or_else(|| format!("{kind} {index}"), str::to_owned)
 }

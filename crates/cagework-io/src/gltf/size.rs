@@ -1,7 +1,7 @@
-//! The cost of a document: bytes and work of reading, playing and reshaping it, added up before anything is decoded.
+//! Limits on a document's memory and work, checked before anything is decoded.
 //!
-//! Counts in a file are not bounded by its bytes: accessors may overlap, be zeros without bytes, and a mesh may be shown by any
-//! number of nodes.
+//! File size does not bound the counts: accessors can overlap or consist of implicit zeros, and any number of
+//! nodes can show a mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,43 +16,41 @@ use super::scene::Instance;
 use super::{GltfDocument, GltfError};
 use crate::memory::MemoryError;
 
-/// Most triangles of a model.
+/// Limit on triangles.
 const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
-/// Most primitives, and most morph targets, of all nodes: each takes some kilobytes of a document that is written.
+/// Limit on primitives and on morph targets of all nodes. Each takes several KB in an export.
 const MAX_PRIMITIVES: u64 = 1 << 17;
 
-/// Most elements that are decoded: vertices times attributes and morph targets, corners of triangles, keys of clips. A second
-/// or two.
-const MAX_DECODED: u64 = 1 << 28;
+/// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Takes 1 to 2 s.
+const MAX_DECODED_VALUES: u64 = 1 << 28;
 
-/// Bytes of a vertex and of a triangle in a model, and of a primitive of one node.
+/// Memory of a model, bytes: per vertex, per triangle, and per primitive of a node.
 const VERTEX_BYTES: u64 = 12;
 const TRIANGLE_BYTES: u64 = 12;
 const PRIMITIVE_BYTES: u64 = 300;
 
-/// Bytes that a vertex takes besides while a model is read and welded: its position in the mesh and in the world, and its
-/// place in the table of different positions.
+/// Additional memory per vertex while reading: local and world position, and entry in the weld table, bytes.
 const VERTEX_READ_BYTES: u64 = 52;
 
-/// Bytes that a triangle takes besides: its indices as the file has them.
+/// Additional memory per triangle while reading: its indices, bytes.
 const TRIANGLE_READ_BYTES: u64 = 12;
 
-/// Bytes of a vertex of a mesh with morph targets or a skin in a player and while it is reshaped; and what a skin adds: two
-/// matrices, and joints with weights.
-const RIGGED_BYTES: u64 = 100;
-const SKINNED_BYTES: u64 = 300;
+/// Memory for playing and reshaping, bytes: per vertex of a mesh with morph targets or skin, and additionally
+/// for a skin (two matrices, joints and weights).
+const RIG_VERTEX_BYTES: u64 = 100;
+const SKIN_VERTEX_BYTES: u64 = 300;
 
-/// Bytes of a vertex that a morph target moves: in a player, and with both ends of the target while it is reshaped.
-const MOVED_BYTES: u64 = 96;
+/// Memory per vertex moved by a morph target: in a player, and both ends while reshaping, bytes.
+const MORPHED_VERTEX_BYTES: u64 = 96;
 
-/// Bytes of a joint of a skin: matrices.
+/// Memory of the matrices of a joint, bytes.
 const JOINT_BYTES: u64 = 400;
 
-/// Bytes of a number of a clip: decoded, and as it is kept.
+/// Memory of a number in a clip, decoded and stored, bytes.
 const KEY_BYTES: u64 = 8;
 
-/// Counts of which the cost is made.
+/// Counts that determine memory and work.
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     primitives: u64,
@@ -73,8 +71,8 @@ impl Size {
     }
 }
 
-/// Checks that a document can be read, played and reshaped within `limit` bytes, `held` of which are in use, and that the
-/// attributes of each vertex are all there. Returns the bytes of the model alone.
+/// Checks that reading, playing and reshaping the document need at most `limit` bytes, including `held` bytes
+/// already in use, and that attribute counts match. Returns the bytes of the model.
 ///
 /// # Errors
 /// [`GltfError::Memory`], [`GltfError::TooLarge`], [`GltfError::Count`], [`GltfError::Accessor`].
@@ -84,7 +82,7 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
         model.add(shown.len() as u64, of_mesh(document, shown[0].mesh)?);
     }
     for hidden in by_mesh(&document.elsewhere) {
-        // A fault in what no scene shows does not refuse the file.
+        // Errors in meshes outside the scene are ignored.
         unseen.add(hidden.len() as u64, of_mesh(document, hidden[0].mesh).unwrap_or_default());
     }
     let keys = keys_of(document);
@@ -94,7 +92,7 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
         ("triangles", model.triangles, MAX_TRIANGLES),
         ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
         ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
-        ("values of attributes, morph targets and clips", decoded, MAX_DECODED),
+        ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
     ] {
         if count > limit {
             return Err(GltfError::TooLarge { what, count, limit });
@@ -113,7 +111,7 @@ fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
     instances.chunk_by(|a, b| a.mesh == b.mesh)
 }
 
-/// Bytes of skins and morph targets; what is decoded was checked. Vertices that cannot be read count as if they could.
+/// Memory of skins and morph targets. Unreadable accessors count as if they were readable.
 fn rig_bytes(document: &GltfDocument) -> u64 {
     let mut moved: BTreeMap<u32, u64> = BTreeMap::new();
     let mut moved_by = |accessor: u32| {
@@ -130,14 +128,14 @@ fn rig_bytes(document: &GltfDocument) -> u64 {
             let targets = || primitive.targets.iter().flatten();
             let moved: u64 = targets().filter_map(|t| t.positions).map(|a| moved_by(a.value() as u32)).sum();
             let rigged = if targets().next().is_some() { shown.len() as u64 } else { n_skinned };
-            bytes += vertices * (RIGGED_BYTES * rigged + SKINNED_BYTES * n_skinned)
-                + MOVED_BYTES * moved * shown.len() as u64;
+            bytes += vertices * (RIG_VERTEX_BYTES * rigged + SKIN_VERTEX_BYTES * n_skinned)
+                + MORPHED_VERTEX_BYTES * moved * shown.len() as u64;
         }
     }
     bytes
 }
 
-/// Numbers of the accessors that clips are made of, each once.
+/// Numbers in the accessors of clips, each accessor counted once.
 fn keys_of(document: &GltfDocument) -> u64 {
     let animations = document.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| animation["samplers"].as_array().into_iter().flatten());
@@ -175,8 +173,7 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
     Ok(size)
 }
 
-/// Checks that all attributes and morph targets of a primitive have as many values as it has vertices; returns how many
-/// attributes there are.
+/// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes.
 fn check_counts(document: &GltfDocument, primitive: &Primitive, vertices: u64) -> Result<u64, GltfError> {
     let check = |what: &dyn Fn() -> String, index: &Index<Accessor>| {
         let accessor = index.value() as u32;

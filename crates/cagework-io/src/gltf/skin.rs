@@ -1,4 +1,4 @@
-//! Skins: where joints hold a mesh's vertices at rest.
+//! Skins: skinning matrices at rest.
 
 use ::gltf::json::mesh::{Primitive, Semantic};
 use ::gltf::json::validation::Checked;
@@ -8,12 +8,11 @@ use super::accessor::Source;
 use super::scene::Worlds;
 use super::{GltfDocument, GltfError, get};
 
-/// Most sets `JOINTS_n` that are read: 32 joints for a vertex.
+/// Limit on sets `JOINTS_n`: 32 joints per vertex.
 const MAX_SETS: u32 = 8;
 
-/// World from bind space for each joint: `world_j * inverse_bind_j`, of the skins that are shown; others stay empty.
-///
-/// The joints stand where the node tree puts them, which is what viewers show with no animation playing.
+/// World from bind space per joint, `world_j * inverse_bind_j`; empty for unused skins. Joints are at their
+/// positions in the node hierarchy, as in viewers without animation.
 pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<Vec<Vec<DMat4>>, GltfError> {
     let skins = &document.root.skins;
     let mut all = vec![Vec::new(); skins.len()];
@@ -25,7 +24,7 @@ pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<V
     Ok(all)
 }
 
-/// The same for one skin.
+/// World from bind space per joint of one skin.
 pub(crate) fn joints(
     document: &GltfDocument,
     skin: u32,
@@ -40,7 +39,7 @@ pub(crate) fn joints(
     joints.map(joint).collect()
 }
 
-/// The inverse bind matrices of a skin's joints. There may be more in the file, but not of zeros that no buffer holds.
+/// Inverse bind matrices of a skin's joints. Excess matrices are allowed unless they are implicit zeros.
 pub(crate) fn inverse_binds(document: &GltfDocument, number: u32) -> Result<Vec<DMat4>, GltfError> {
     let skin = &document.root.skins[number as usize];
     let Some(accessor) = skin.inverse_bind_matrices.map(|a| a.value() as u32) else {
@@ -58,21 +57,19 @@ pub(crate) fn inverse_binds(document: &GltfDocument, number: u32) -> Result<Vec<
     let all = (0..skin.joints.len()).map(bind).collect::<Result<Vec<DMat4>, GltfError>>()?;
     match all.iter().position(|bind| !bind.is_finite()) {
         Some(joint) => {
-            let problem = format!(
-                "holds the inverse bind matrix of joint {joint} of skin {number}, which is not finite"
-            );
+            let problem = format!("has a non-finite inverse bind matrix for joint {joint} of skin {number}");
             Err(GltfError::Accessor { accessor, problem })
         }
         None => Ok(all),
     }
 }
 
-/// Calls `hear` with a vertex, a joint of the skin and its weight, for all weights above zero.
+/// Calls `visit` with vertex, joint of the skin and weight, for all positive weights.
 pub(crate) fn each_influence(
     source: Source<'_>,
     primitive: &Primitive,
     count: usize,
-    mut hear: impl FnMut(usize, u32, f64),
+    mut visit: impl FnMut(usize, u32, f64),
 ) -> Result<(), GltfError> {
     for set in 0..MAX_SETS {
         let attribute =
@@ -87,7 +84,7 @@ pub(crate) fn each_influence(
             let weights = get(&weights, v, "element", || format!("accessor {w}: a vertex"))?;
             for (&joint, &weight) in joints.iter().zip(weights) {
                 if weight.is_finite() && weight > 0.0 {
-                    hear(v, joint, f64::from(weight));
+                    visit(v, joint, f64::from(weight));
                 }
             }
         }
@@ -95,10 +92,10 @@ pub(crate) fn each_influence(
     Ok(())
 }
 
-/// World from mesh for each vertex of a skinned primitive: `sum_j w_j * joint_j`; `world` for a vertex without weights, or with
-/// none that is a number above zero. Also returns how many of these there are.
+/// World from mesh space per vertex of a skinned primitive, `sum_j w_j * joint_j`; `world` for vertices
+/// without positive weight, and the number of those.
 ///
-/// The transform of the mesh's own node plays no part (glTF 2.0, section 3.7.3.3).
+/// The transform of the mesh's node is ignored (glTF 2.0, section 3.7.3.3).
 pub(crate) fn matrices(
     source: Source<'_>,
     (skin, joints): (u32, &[DMat4]),
@@ -118,7 +115,7 @@ pub(crate) fn matrices(
     if let Some(joint) = wrong {
         get(joints, joint as usize, "joint", || format!("a vertex of skin {skin}"))?;
     }
-    // Weights need not sum to one after quantisation.
+    // Weights may not sum to one after quantisation.
     let n_loose = sum.iter().filter(|(_, w)| *w <= 0.0).count();
     Ok((sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect(), n_loose))
 }

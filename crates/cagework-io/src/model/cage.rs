@@ -1,4 +1,4 @@
-//! A model as a cage, and poses of that cage.
+//! Models as cages, and poses of those cages.
 
 use std::collections::HashSet;
 
@@ -12,23 +12,24 @@ use crate::format::ModelFormat;
 use crate::gltf::Clip;
 use crate::memory::MemoryError;
 
-/// Bytes of all states of a pose's file.
-const MOST_STATES_BYTES: u64 = 512 << 20;
+/// Limit for all states of one pose file, bytes.
+const MAX_STATES_BYTES: u64 = 512 << 20;
 
-/// One of the states that the file of a pose holds.
+/// One state of a pose file: a key of its clip, or a morph target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseState {
-    /// Name of the morph target, or the time.
+    /// Name of the morph target, or the time of the key as text.
     pub name: String,
-    /// When the clip is there.
+    /// Time in the clip; `None` for a morph target.
     pub seconds: Option<f32>,
-    /// Of the cage's vertices, object units. `[n_cage]`
+    /// Positions of the cage's vertices, object units. `[n_cage]`
     pub positions: Vec<Vec3>,
 }
 
 impl Model {
-    /// The model as a cage: an OBJ's `v` lines and polygons as they are; a glTF's triangles, welded by position in order
-    /// of first occurrence (vertices split at seams would make the cage look open), without those that collapse.
+    /// The model as a cage. Vertices and polygons are kept, except for glTF: its triangles are welded by
+    /// position, in order of first occurrence, because vertices split at seams would leave the cage open.
+    /// Triangles that collapse are dropped.
     #[must_use]
     pub fn cage_mesh(&self) -> PolygonMesh {
         match &self.document {
@@ -53,19 +54,19 @@ impl Model {
 
     /// Positions of `pose` for each vertex of this model's [`Self::cage_mesh`].
     ///
-    /// A glTF cage is welded at rest; its pose has either the same vertices before welding, or as many as after.
+    /// A glTF cage is welded at rest. Its pose has the vertex count of the cage before or after welding.
     ///
     /// # Errors
-    /// [`PoseError`] when the numbers of vertices do not agree, or the pose's faces say that they are in another order.
+    /// [`PoseError`] if vertex counts differ, or the pose's faces show that its vertices are in another order.
     pub fn pose_positions(&self, pose: &Self) -> Result<Vec<Vec3>, PoseError> {
         Ok(self.order_of(pose)?.into_iter().map(|v| pose.positions[v as usize]).collect())
     }
 
-    /// The states that the file of a pose holds: keys of its first clip, with their times, or, without a clip, each of its morph
-    /// targets alone. Empty if it holds one state, which is [`Self::pose_positions`].
+    /// States in a pose file: the keys of its first clip with their times or, without a clip, each morph
+    /// target at weight 1. Empty for a single state, which [`Self::pose_positions`] returns.
     ///
     /// # Errors
-    /// [`PoseError`] as of [`Self::pose_positions`], and when a clip cannot be read.
+    /// [`PoseError`], as for [`Self::pose_positions`] or if a clip cannot be read.
     pub fn pose_states(&self, pose: &Self) -> Result<Vec<PoseState>, PoseError> {
         let order = self.order_of(pose)?;
         let faulty = |source| PoseError::States { pose: pose.name.clone(), source };
@@ -81,7 +82,7 @@ impl Model {
         let (names, defaults) = player.targets();
         let n = if times.is_empty() { names.len() } else { times.len() };
         let needed = (n * order.len() * size_of::<Vec3>()) as u64;
-        MemoryError::check(needed, MOST_STATES_BYTES)
+        MemoryError::check(needed, MAX_STATES_BYTES)
             .map_err(|e| faulty(WriteError::Document(e.to_string())))?;
         if !times.is_empty() {
             return Ok(times.iter().map(|&at| state(format!("{at:.3} s"), Some(at), Some(0), &[])).collect());
@@ -94,7 +95,7 @@ impl Model {
         Ok((0..n).map(alone).collect())
     }
 
-    /// The vertex of a pose for each vertex of this cage.
+    /// Vertex of the pose for each vertex of this cage.
     fn order_of(&self, pose: &Self) -> Result<Vec<u32>, PoseError> {
         let welded = matches!(self.document, Document::Gltf(_)).then(|| weld(&self.positions));
         let (n, given) = (self.positions.len(), pose.positions.len());
@@ -109,7 +110,7 @@ impl Model {
             Document::Gltf(_) => pose.triangles.iter().map(|t| t.to_vec()).collect(),
         };
         if let Some(welded) = welded.filter(|_| is_unwelded) {
-            // Which of the vertices at one place a triangle has depends on how its polygon is cut.
+            // Exporters choose among coincident vertices when they triangulate, so compare welded indices.
             posed.iter_mut().flatten().for_each(|v| *v = welded.unique_of[*v as usize]);
         }
         if let Some(edge) = foreign_edge(&self.cage_mesh().faces, &posed, first.len()) {
@@ -122,18 +123,17 @@ impl Model {
         Ok(if is_unwelded { first } else { (0..given as u32).collect() })
     }
 
-    /// Whether a pose of this model as a cage that is written in `format` has its vertices in this model's order when it is read again.
+    /// Whether a pose of this cage, exported as `format` and read again, keeps this cage's vertex order.
     #[must_use]
     pub fn keeps_order_in(&self, format: ModelFormat) -> bool {
         match format {
             ModelFormat::Obj | ModelFormat::Ply | ModelFormat::Off => true,
-            // Their vertices are in the order of faces.
+            // glTF and STL number vertices in the order of faces.
             ModelFormat::Gltf | ModelFormat::Stl => self.format == format,
         }
     }
 
-    /// Positions of the file's vertices in a pose of the cage that it is, `[n_cage]`: the way back from
-    /// [`Self::pose_positions`].
+    /// Positions of the file's vertices in a cage pose. Inverse of [`Self::pose_positions`]. `pose`: `[n_cage]`.
     #[must_use]
     pub fn posed_as_cage(&self, pose: &[Vec3]) -> Vec<Vec3> {
         match self.document {
@@ -143,11 +143,12 @@ impl Model {
     }
 }
 
-/// An edge of `pose` that cannot be one of the mesh `cage`. `n`: vertices of both.
+/// Finds an edge of `pose` that cannot belong to the mesh `cage`. `n`: number of vertices of both.
 ///
-/// Exporters cut polygons along diagonals that depend on the shape. So cage faces are joined across the edges that `pose` lacks,
-/// and an edge may join any two corners of a polygon that results. A connected set of T triangles with T + 2 vertices is a polygon;
-/// if one has fewer, a vertex inside it has lost its edges, and what it joins is in another order.
+/// Exporters cut polygons along shape-dependent diagonals, so an edge missing from `pose` may only be a
+/// removed diagonal. Cage faces are joined across missing edges into regions, and an edge between two corners
+/// of a polygonal region is accepted. A connected region of T triangles is a polygon if it has T + 2
+/// vertices. With fewer, a vertex inside it lost all its edges, so the order differs.
 fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 2]> {
     let edges_of = |face: &[u32]| -> Vec<[u32; 2]> {
         let ends = face.iter().zip(face.iter().cycle().skip(1));
@@ -171,7 +172,7 @@ fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 
         region[a.max(b)] = a.min(b);
     }
     let mut regions = vec![(0, 0); cage.len()];
-    // Both ascending: faces of each vertex, and their regions.
+    // Faces and regions of each vertex, ascending.
     let mut faces_of = vec![Vec::new(); n];
     for (f, face) in cage.iter().enumerate() {
         regions[root(&mut region, f)].0 += face.len() - 2;

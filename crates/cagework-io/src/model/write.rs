@@ -1,4 +1,4 @@
-//! A model with new positions, as a file.
+//! Export of a model with new positions.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -11,15 +11,15 @@ use glam::{DVec3, Vec3};
 use super::{Document, Model};
 use crate::error::WriteError;
 use crate::format::ModelFormat;
-use crate::gltf::{self, Played, Pose, Rest};
+use crate::gltf::{self, Pose, PoseTiming, Rest};
 use crate::polygons::Encoding;
 use crate::{obj, off, ply, stl};
 
 impl Model {
-    /// The model with new positions as a file of `format`.
+    /// Exports the model with new positions as `format`.
     ///
     /// # Errors
-    /// Those of [`Self::write_obj`] and [`Self::write_glb`].
+    /// Those of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         match format {
             ModelFormat::Obj => self.write_obj(positions),
@@ -30,7 +30,7 @@ impl Model {
         }
     }
 
-    /// What the model has and a file of `format` does not keep, a sentence; nothing if it keeps all.
+    /// Sentence listing what an export to `format` loses; `None` if nothing.
     #[must_use]
     pub fn lost_in(&self, format: ModelFormat) -> Option<String> {
         let is_same = self.format == format;
@@ -54,7 +54,7 @@ impl Model {
                 };
                 colors = !is_same && has("COLOR_");
                 texcoords = has("TEXCOORD_") && !keeps(&[ModelFormat::Obj]);
-                // An OBJ gets their names.
+                // An OBJ export keeps material names.
                 materials = !is_same && self.counts.materials > 0;
                 names = !keeps(&[ModelFormat::Obj]) && self.counts.nodes > 1;
                 rig = !is_same && self.is_rigged();
@@ -68,7 +68,7 @@ impl Model {
             (rig, "skeleton, morph targets and animations"),
             (
                 is_binary && self.origin != DVec3::ZERO,
-                "places as exact as they were read, so far from the origin",
+                "the full precision of positions, as the model is far from the origin",
             ),
         ];
         let lost: Vec<&str> = all.into_iter().filter_map(|(is_lost, what)| is_lost.then_some(what)).collect();
@@ -76,13 +76,13 @@ impl Model {
             .then(|| format!("the {} file does not keep: {}", format.export_extension(), lost.join(", ")))
     }
 
-    /// The model with new positions as an OBJ file.
+    /// Exports the model with new positions as an OBJ file.
     ///
-    /// An OBJ keeps everything but its coordinates and normals byte for byte; others become a new OBJ with their vertices
-    /// in the same order. `positions`: world space, one for each vertex.
+    /// An OBJ source is patched: coordinates and normals change, all other bytes stay. Other sources become a
+    /// new OBJ with their vertices in the same order. `positions`: world space, `[n_vertices]`.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite position for each vertex.
+    /// [`WriteError`] unless there is one finite position per vertex.
     pub fn write_obj(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
         let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
@@ -104,11 +104,11 @@ impl Model {
         }
     }
 
-    /// The model with new positions as a PLY file: polygons, colours of vertices, and normals if a PLY had them; text if it was a
-    /// text, big-endian if it was, otherwise binary.
+    /// Exports the model with new positions as a PLY file with polygons, vertex colours and, if the source
+    /// was a PLY with normals, normals. A PLY source keeps its encoding; others become binary little-endian.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite position for each vertex.
+    /// [`WriteError`] unless there is one finite position per vertex.
     pub fn write_ply(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
         let (faces, colors) = match &self.document {
@@ -116,7 +116,7 @@ impl Model {
             Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), None),
         };
         let positions = self.up.turned_back(positions);
-        Ok(ply::write(ply::Written {
+        Ok(ply::write(ply::PlyContents {
             positions: &positions,
             origin: self.origin,
             triangles: &self.triangles,
@@ -128,10 +128,11 @@ impl Model {
         }))
     }
 
-    /// The model with new positions as an OFF file: polygons, colours of vertices, or normals if an OFF had them.
+    /// Exports the model with new positions as an OFF file with polygons and vertex colours, or normals if
+    /// the source was an OFF with normals.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite position for each vertex.
+    /// [`WriteError`] unless there is one finite position per vertex.
     pub fn write_off(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
         let positions = self.up.turned_back(positions);
@@ -145,11 +146,11 @@ impl Model {
         Ok(off::write(&positions, self.origin, &faces, colors, &normals))
     }
 
-    /// The model with new positions as an STL file: triangles and the normals of their planes; text if it was a text, otherwise
-    /// binary.
+    /// Exports the model with new positions as an STL file of triangles with flat normals. Text if the source
+    /// was a text STL, binary otherwise.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite position for each vertex, or no triangle.
+    /// [`WriteError`] unless there is one finite position per vertex and at least one triangle.
     pub fn write_stl(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
         if self.triangles.is_empty() {
@@ -157,7 +158,7 @@ impl Model {
         }
         let mut solids = Vec::new();
         if let Document::Obj(document) = &self.document {
-            // Triangles come in the order of faces.
+            // Triangles are in the order of faces.
             let mut t = 0;
             for group in &document.groups {
                 let starts = &document.face_starts;
@@ -169,21 +170,19 @@ impl Model {
         Ok(stl::write(&self.up.turned_back(positions), self.origin, &self.triangles, self.encoding, &solids))
     }
 
-    /// The model with new positions as a GLB file.
+    /// Exports the model with new positions as a GLB file.
     ///
-    /// A glTF keeps its materials, textures (those by URI are embedded), texture coordinates, names and nodes; see
-    /// the notices for what a deformed shape cannot keep. An OBJ becomes one mesh. `positions`: world space, one for
-    /// each vertex.
+    /// A glTF source keeps materials, textures (external ones are embedded), texture coordinates, names and nodes; the
+    /// notices list what a deformed shape loses. An OBJ becomes one mesh. `positions`: world space, `[n_vertices]`.
     ///
     /// # Errors
-    /// [`WriteError`] when there is not one finite position for each vertex, there are no triangles, or the file would
-    /// be too large.
+    /// [`WriteError`] unless there is one finite position per vertex, there are triangles and the file fits into 4 GiB.
     pub fn write_glb(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        self.glb(positions, &[], Played::InTurn)
+        self.glb(positions, &[], PoseTiming::EverySecond)
     }
 
-    /// The model with `rest` as its shape and one morph target for each pose, with an animation that goes from rest
-    /// through all poses back to rest, a second each.
+    /// Exports `rest` with one morph target per pose and an animation from rest through all poses and back,
+    /// one second per step.
     ///
     /// # Errors
     /// As [`Self::write_glb`].
@@ -192,10 +191,10 @@ impl Model {
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
-        self.glb(rest, poses, Played::InTurn)
+        self.glb(rest, poses, PoseTiming::EverySecond)
     }
 
-    /// As [`Self::write_glb_poses`], with each pose at its time: seconds, ascending, one for each pose.
+    /// Like [`Self::write_glb_poses`], with each pose at a given time. `seconds`: ascending, one per pose.
     ///
     /// # Errors
     /// As [`Self::write_glb`].
@@ -209,14 +208,14 @@ impl Model {
         if seconds.len() != n {
             return Err(WriteError::Count { given: seconds.len(), expected: n });
         }
-        self.glb(rest, poses, Played::At(seconds))
+        self.glb(rest, poses, PoseTiming::At(seconds))
     }
 
     pub(crate) fn glb(
         &self,
         base: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
-        played: Played<'_>,
+        timing: PoseTiming<'_>,
     ) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
         poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
@@ -229,18 +228,18 @@ impl Model {
         let document = match &self.document {
             Document::Gltf(document) => {
                 let rest = Rest { positions: &at_rest, origin: self.origin, triangles: &self.triangles };
-                return gltf::patch(document, rest, &base, &named(poses, &turned), played);
+                return gltf::patch(document, rest, &base, &named(poses, &turned), timing);
             }
             Document::Obj(document) => document,
         };
-        // One way to deform a GLB: make one of the shape at rest, then patch that.
+        // Deforming a GLB means patching it, so build one of the rest shape first.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
         let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, Some(self.origin))?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, origin: self.origin, triangles: &built.triangles };
-        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), played)
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), timing)
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {
@@ -254,7 +253,7 @@ impl Model {
     }
 }
 
-/// Poses by the names of `poses`.
+/// Pairs the names of `poses` with positions.
 fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
     poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
 }

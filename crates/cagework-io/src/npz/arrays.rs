@@ -1,8 +1,7 @@
-//! Arrays of an `.npz` archive, in and out.
+//! Arrays of an `.npz` archive.
 //!
-//! Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same values give the same bytes. The array
-//! headers are read here and not by a library: `npyz` parses any Python literal, recursively, and a header of nested
-//! brackets would overflow the stack.
+//! Written uncompressed, like `numpy.savez`, with a fixed time stamp, so equal values give equal bytes. Headers are
+//! parsed here because `npyz` parses Python literals recursively, and nested brackets would overflow its stack.
 
 use std::io::{Cursor, Read as _, Write as _};
 
@@ -15,49 +14,49 @@ use super::NpzError;
 use crate::memory::MemoryError;
 use crate::shown::shown;
 
-/// Most bytes of an array's header: NumPy's have a hundred or two.
-const MAX_HEADER: u64 = 1 << 16;
-/// NumPy aligns the data to this.
+/// Limit of an array header, bytes. NumPy's are 100 to 200.
+const MAX_HEADER_BYTES: u64 = 1 << 16;
+/// Alignment of array data in NumPy's format, bytes.
 const NPY_ALIGN: usize = 64;
 const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// Bytes of all headers of an archive, more than enough: so that its memory does not grow by doubling.
-const ROOM_FOR_HEADERS: usize = 4096;
+/// Preallocated bytes for all headers of an archive.
+const HEADERS_BYTES: usize = 4096;
 
-/// Archives with longer arrays, bytes, get zip's longer headers: half of what the short ones can say.
-const LARGE: usize = (u32::MAX / 2) as usize;
+/// Arrays above this size get zip64 headers, bytes. Half of the 32-bit limit.
+const MAX_ZIP32_ARRAY_BYTES: usize = (u32::MAX / 2) as usize;
 
-/// An archive that is being written.
+/// Archive writer.
 pub(super) struct NpzWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
     options: SimpleFileOptions,
 }
 
 impl NpzWriter {
-    /// With room for `bytes` of arrays, the longest of `longest` bytes.
+    /// `bytes`: total size of the arrays; `longest`: size of the longest one.
     pub(super) fn new(bytes: usize, longest: usize) -> Self {
         Self {
-            zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + ROOM_FOR_HEADERS))),
-            // The zip epoch, 1980: no clock.
+            zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + HEADERS_BYTES))),
+            // A fixed time, the zip epoch 1980.
             options: SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Stored)
                 .last_modified_time(DateTime::default())
-                .large_file(longest > LARGE),
+                .large_file(longest > MAX_ZIP32_ARRAY_BYTES),
         }
     }
 
-    /// The archive.
+    /// Returns the archive.
     pub(super) fn finish(self) -> Vec<u8> {
         self.zip.finish().expect("writing to memory does not fail").into_inner()
     }
 
-    /// Adds points as `[n, 3]` values of 32 bits.
+    /// Adds points as a float32 array `[n, 3]`.
     pub(super) fn put_points(&mut self, name: &str, points: &[Vec3]) {
         let values = points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
         self.put(name, "<f4", &[points.len(), 3], values);
     }
 
-    /// Adds an array, a run of its values at a time: there is no second copy of it.
+    /// Adds an array, converting a few values at a time to avoid a second copy.
     pub(super) fn put<const N: usize>(
         &mut self,
         name: &str,
@@ -65,14 +64,14 @@ impl NpzWriter {
         shape: &[usize],
         values: impl IntoIterator<Item = [u8; N]>,
     ) {
-        /// Values written at a time.
-        const RUN: usize = 1 << 14;
+        /// Values converted at a time.
+        const VALUES_PER_WRITE: usize = 1 << 14;
         let name = format!("{name}.npy");
         self.zip.start_file(name, self.options).expect("names are distinct, memory does not fail");
         self.zip.write_all(&npy_header(dtype, shape)).expect("writing to memory does not fail");
         let mut values = values.into_iter().peekable();
         while values.peek().is_some() {
-            let run: Vec<u8> = values.by_ref().take(RUN).flatten().collect();
+            let run: Vec<u8> = values.by_ref().take(VALUES_PER_WRITE).flatten().collect();
             self.zip.write_all(&run).expect("writing to memory does not fail");
         }
     }
@@ -94,22 +93,21 @@ fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     out
 }
 
-/// An archive that is being read.
+/// Archive reader.
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
-    /// Bytes of the arrays so far, as they are in the file and as they are used.
+    /// Total bytes of the arrays read so far, counting raw and converted values.
     unpacked: u64,
     memory_limit: u64,
 }
 
 impl<'a> Archive<'a> {
     /// # Errors
-    /// When it is none.
+    /// [`NpzError::Zip`] if the bytes are not a zip archive.
     pub(super) fn new(bytes: &'a [u8], memory_limit: u64) -> Result<Self, NpzError> {
         Ok(Self { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit })
     }
 
-    /// Whether there is an array of this name.
     pub(super) fn has(&self, name: &str) -> bool {
         self.zip.index_for_name(&format!("{name}.npy")).is_some()
     }
@@ -127,7 +125,7 @@ pub(super) fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyA
     array(zip, name)?.ok_or(NpzError::Missing(name))
 }
 
-/// Unpacks an array as far as its shape needs: neither the archive's directory nor its streams are believed.
+/// Unpacks an array, up to the size of its shape: the sizes in the archive's directory are not trusted.
 pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
     let mut entry = match archive.zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
@@ -140,39 +138,38 @@ pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Opt
         unpacked.map_err(|_| fault("cannot be unpacked: the file is damaged".into()))
     };
     let mut bytes = Vec::new();
-    unpack(START_BYTES, &mut bytes)?;
-    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER).ok_or_else(bad)?;
-    unpack(end.saturating_sub(START_BYTES), &mut bytes)?;
-    let text = bytes.get(TEXT..end as usize).ok_or_else(bad)?;
+    unpack(PREAMBLE_BYTES, &mut bytes)?;
+    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER_BYTES).ok_or_else(bad)?;
+    unpack(end.saturating_sub(PREAMBLE_BYTES), &mut bytes)?;
+    let text = bytes.get(HEADER_TEXT_OFFSET..end as usize).ok_or_else(bad)?;
     let text = std::str::from_utf8(text).map_err(|_| bad())?;
     let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
     if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
         return Err(fault("is in Fortran order; save it in C order".into()));
     }
     let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
-    // Other types are refused by whoever wants their values.
+    // The element size; unknown types are rejected when their values are converted.
     let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
     let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
-    let needed = needed.ok_or_else(|| {
-        fault(format!("is of shape {}, which no memory holds", shown(&format!("{shape:?}"))))
-    })?;
+    let needed = needed
+        .ok_or_else(|| fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}")))))?;
     archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
     MemoryError::check(archive.unpacked, archive.memory_limit)?;
     let mut data = Vec::new();
-    // One more tells of a stream that does not end where it should.
+    // One byte more than needed detects overlong streams.
     unpack(needed.saturating_add(1), &mut data)?;
     if data.len() as u64 > needed {
-        return Err(fault(format!("has more than the {needed} bytes that its shape {shape:?} takes")));
+        return Err(fault(format!("is longer than the {needed} bytes of its shape {shape:?}")));
     }
     Ok(Some(NpyArray { name, dtype, shape, data }))
 }
 
-/// Bytes that tell a header's length: magic, version, and a length of two bytes or four.
-const START_BYTES: u64 = 12;
-/// Where its text begins, or the upper half of a length of four bytes.
-const TEXT: usize = 10;
+/// Bytes that determine the header's length: magic, version, and a length of 2 or 4 bytes.
+const PREAMBLE_BYTES: u64 = 12;
+/// Offset of the header's text in version 1. Later versions have two more bytes of length here.
+const HEADER_TEXT_OFFSET: usize = 10;
 
-/// Where the header of an `.npy` file ends, versions 1 to 3.
+/// End of the header of an `.npy` file, versions 1 to 3.
 fn header_end(bytes: &[u8]) -> Option<u64> {
     let rest = bytes.strip_prefix(NPY_MAGIC)?;
     match rest.first()? {
@@ -189,7 +186,7 @@ fn quoted(text: &str) -> Option<&str> {
     text.strip_prefix('\'')?.split_once('\'').map(|(inner, _)| inner)
 }
 
-/// The numbers of a tuple such as `(4, 3)`.
+/// Parses a tuple such as `(4, 3)`.
 fn lengths(text: &str) -> Option<Vec<usize>> {
     let (inner, _) = text.strip_prefix('(')?.split_once(')')?;
     inner.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect()
@@ -200,16 +197,16 @@ impl NpyArray {
         NpzError::Array { array: self.name, problem: problem.to_owned() }
     }
 
-    /// The array, if its lengths along all axes but the first are these.
+    /// Checks the lengths of all axes except the first.
     pub(super) fn rows_of(self, lengths: &[usize]) -> Result<Self, NpzError> {
         if self.shape.get(1..) == Some(lengths) {
             return Ok(self);
         }
         let wanted = if lengths.is_empty() { "one axis".to_owned() } else { format!("rows of {lengths:?}") };
-        Err(self.fault(&format!("is of shape {:?}; it must have {wanted}", self.shape)))
+        Err(self.fault(&format!("has shape {:?}; it must have {wanted}", self.shape)))
     }
 
-    /// The points of rows of three.
+    /// Rows of three as points.
     pub(super) fn points(self) -> Result<Vec<Vec3>, NpzError> {
         Ok(self.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect())
     }
@@ -221,11 +218,11 @@ impl NpyArray {
             return Ok(chunks.iter().copied());
         }
         let problem =
-            format!("has {} bytes, which is not what its shape {:?} takes", self.data.len(), self.shape);
+            format!("has {} bytes, which does not match its shape {:?}", self.data.len(), self.shape);
         Err(self.fault(&problem))
     }
 
-    /// Values of an integer array; each must fit 32 bits and not be negative.
+    /// Values of an integer array. Negative values and those above 32 bits are errors.
     pub(super) fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
         let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
         match self.dtype.as_str() {
@@ -235,7 +232,7 @@ impl NpyArray {
             "<u8" => self.chunks()?.map(|b| u32::try_from(u64::from_le_bytes(b)).map_err(range)).collect(),
             other => {
                 Err(self
-                    .fault(&format!("is of type {}; it must be int32 or int64, little-endian", shown(other))))
+                    .fault(&format!("has type {}; it must be int32 or int64, little-endian", shown(other))))
             }
         }
     }
@@ -244,10 +241,8 @@ impl NpyArray {
         match self.dtype.as_str() {
             "<f4" => Ok(self.chunks()?.map(f32::from_le_bytes).collect()),
             "<f8" => Ok(self.chunks()?.map(|b| f64::from_le_bytes(b) as f32).collect()),
-            other => Err(self.fault(&format!(
-                "is of type {}; it must be float32 or float64, little-endian",
-                shown(other)
-            ))),
+            other => Err(self
+                .fault(&format!("has type {}; it must be float32 or float64, little-endian", shown(other)))),
         }
     }
 }

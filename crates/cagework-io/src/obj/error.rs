@@ -1,60 +1,60 @@
-//! Why an OBJ file could not be read.
+//! Errors of reading OBJ files.
 
 use thiserror::Error;
 
 use crate::memory::MemoryError;
 
-/// Why an OBJ file could not be read.
+/// Error of reading an OBJ file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ObjError {
-    /// A coordinate is missing or no number.
+    /// A coordinate is missing or not a finite number.
     #[error("line {line}: {axis} coordinate is {found}; it must be a finite number such as 1.25")]
     Coordinate {
-        /// Line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// Which coordinate.
+        /// Axis: x, y or z.
         axis: char,
-        /// What stands there.
+        /// Text of the coordinate.
         found: String,
     },
-    /// A corner of a face, line or point is no index.
+    /// A corner of a face, line or point is not an index.
     #[error("line {line}: corner '{found}' is not an index such as 7, 7/2, 7//3 or -1")]
     Corner {
-        /// Line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What stands there.
+        /// Text of the corner.
         found: String,
     },
-    /// A face, line or point names a vertex that does not exist.
-    #[error("line {line}: names vertex {index}, but there are {vertices}")]
+    /// A face, line or point has a vertex index out of range.
+    #[error("line {line}: refers to vertex {index}, but there are {vertices}")]
     Vertex {
-        /// Line, from 1.
+        /// Line number, from 1.
         line: usize,
         /// Index as written.
         index: i64,
-        /// Vertices there are (so far, for a relative index).
+        /// Number of vertices; for a relative index, of those before the line.
         vertices: usize,
     },
-    /// No `v` line at all.
+    /// The file has no `v` lines.
     #[error("no vertices: an OBJ file has lines such as 'v 0 1 0'")]
     Empty,
-    /// More memory than is allowed.
+    /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
-    /// More materials than can be drawn, and written as primitives.
-    #[error("line {line}: more than {limit} different materials: join some")]
+    /// Too many materials. Each becomes a draw call and a GLB primitive.
+    #[error("line {line}: more than {limit} materials: merge some")]
     Materials {
-        /// Line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// The limit.
+        /// Maximum number.
         limit: usize,
     },
-    /// More elements than 32-bit indices can name.
-    #[error("line {line}: more than {limit} vertices or corners")]
+    /// Indices exceed 32 bits.
+    #[error("line {line}: more than {limit} vertices or corners: simplify the model")]
     TooLarge {
-        /// Line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// The limit.
+        /// Maximum number.
         limit: u32,
     },
 }

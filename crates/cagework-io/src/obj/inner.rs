@@ -1,4 +1,4 @@
-//! Controls inside a cage, from the elements of an OBJ file: `p` points, `l` polylines, `f` faces of sheets.
+//! Controls inside a cage as OBJ elements: `p` points, `l` polylines, `f` faces of sheets.
 
 use cagework_core::{InnerControls, InnerElement};
 use glam::DVec3;
@@ -9,15 +9,15 @@ use super::read::{check_count, integer, resolve, wide_number};
 use crate::memory::MemoryError;
 use crate::origin::{Coordinate, relative};
 
-/// Bytes that a vertex and an element with its corners take, at most and about.
+/// Approximate upper bounds on the memory of a vertex and of an element, bytes.
 const VERTEX_BYTES: u64 = 24;
 const ELEMENT_BYTES: u64 = 80;
 
-/// Reads controls inside a cage: every `v` line a control, in the file's own axes, as seen from an origin; other lines than `v`, `p`, `l` and `f` are
-/// left out. A `p` line may name several points. The radius is left open.
+/// Reads controls inside a cage. Every `v` line is a control, in the file's axes, relative to `origin`; `p`, `l` and
+/// `f` lines are elements; other lines are ignored. A `p` line can list several points. The radius is not set.
 ///
 /// # Errors
-/// [`ObjError`] when a line cannot be read or names a vertex that does not exist, or the memory does not suffice.
+/// [`ObjError`] if a line cannot be read or an index is out of range, or the memory limit is exceeded.
 pub fn read_inner_controls(
     bytes: &[u8],
     origin: DVec3,
@@ -50,7 +50,7 @@ pub fn read_inner_controls(
                 let corner = |token: std::ops::Range<usize>| {
                     let token = &bytes[token];
                     let bad = || ObjError::Corner { line: line.number, found: shown(token) };
-                    // What follows a slash is a texture coordinate or a normal.
+                    // Texture coordinate and normal follow after slashes.
                     let index = token.split(|&b| b == b'/').next().and_then(integer).ok_or_else(bad)?;
                     let vertices = inner.positions.len();
                     resolve(index, vertices).ok_or(ObjError::Vertex { line: line.number, index, vertices })
@@ -76,7 +76,7 @@ pub fn read_inner_controls(
     if vertices == 0 {
         return Err(ObjError::Empty);
     }
-    // A face may come before its vertices.
+    // Elements may precede their vertices.
     for (element, line) in inner.elements.iter().zip(lines_of) {
         if let Some(&v) = element.corners().iter().find(|&&v| v as usize >= vertices) {
             return Err(ObjError::Vertex { line, index: i64::from(v) + 1, vertices });
@@ -85,7 +85,7 @@ pub fn read_inner_controls(
     Ok(inner)
 }
 
-/// Controls inside a cage, as seen from an origin, as an OBJ file: what [`read_inner_controls`] reads.
+/// Writes controls inside a cage, relative to `origin`, in the format of [`read_inner_controls`].
 #[must_use]
 pub fn write_inner_controls(inner: &InnerControls, origin: DVec3) -> Vec<u8> {
     let vertices = inner.positions.iter().map(|&p| {
@@ -125,16 +125,16 @@ mod tests {
     }
 
     #[test]
-    fn files_that_cannot_be_read_end_in_a_sentence() {
+    fn unreadable_files_are_errors_with_a_reason() {
         for (text, expected) in [
             ("", "no vertices: an OBJ file has lines such as 'v 0 1 0'"),
             ("v 0 0\n", "line 1: z coordinate is missing"),
-            ("v 0 0 0\np 2\n", "line 2: names vertex 2, but there are 1"),
+            ("v 0 0 0\np 2\n", "line 2: refers to vertex 2, but there are 1"),
             ("v 0 0 0\nl 1 x\n", "line 2: corner 'x' is not an index"),
             ("v 0 0 0\np\n", "line 2: corner '' is not an index"),
         ] {
-            let said = read_inner_controls(text.as_bytes(), DVec3::ZERO, LIMIT).unwrap_err().to_string();
-            assert!(said.starts_with(expected), "{said}");
+            let message = read_inner_controls(text.as_bytes(), DVec3::ZERO, LIMIT).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
         }
         let many = "v 0 0 0\n".repeat(10_000);
         assert!(

@@ -1,10 +1,10 @@
-//! Lines and tokens of an OBJ file, as byte ranges, so that reader and writer see the same file.
+//! Lexer for OBJ files: logical lines and tokens as byte ranges, shared by reader and writer.
 
 use std::ops::Range;
 
 use crate::shown::shown_start;
 
-/// One logical line: a physical one, or several joined by backslashes.
+/// A logical line: one physical line, or several joined by backslashes.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
     /// Number of its first physical line, from 1.
@@ -20,9 +20,9 @@ pub(crate) struct Lines<'a> {
     number: usize,
 }
 
-/// Logical lines of a file; ends are LF, CRLF or CR.
+/// Logical lines of a file, terminated by LF, CRLF or CR.
 pub(crate) fn lines(bytes: &[u8]) -> Lines<'_> {
-    // A byte order mark would hide the first keyword.
+    // Skip the byte order mark.
     let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     Lines { bytes, at, number: 1 }
 }
@@ -39,7 +39,7 @@ fn physical_end(bytes: &[u8], at: usize) -> (usize, usize) {
     }
 }
 
-/// Only these may be continued: a comment or a Windows path in `mtllib` may well end in a backslash.
+/// Only these lines may continue after a backslash. Comments and Windows paths in `mtllib` may end in one.
 fn may_continue(line: &[u8]) -> bool {
     let start = line.iter().position(|&b| !is_blank(b)).unwrap_or(line.len());
     let word = line[start..].split(|&b| is_blank(b) || b == b'\\').next().unwrap_or(&[]);
@@ -75,7 +75,7 @@ fn is_blank(b: u8) -> bool {
     matches!(b, b' ' | b'\t' | b'\r' | b'\n' | 0x0b | 0x0c)
 }
 
-/// Tokens of a logical line as ranges of the file; a token that starts with `#` ends the line.
+/// Tokens of a logical line as byte ranges. A token that starts with `#` ends the line.
 pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = Range<usize>> + Clone {
     let mut at = line.start;
     let end = line.end;
@@ -98,9 +98,9 @@ pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = R
     })
 }
 
-/// Text of a token for a message: lossy, short, without control characters.
+/// Text of a token for a message: lossy, short, escaped.
 pub(crate) fn shown(token: &[u8]) -> String {
-    /// Enough to find it in the file, short enough for one line.
+    /// Limit in characters.
     const MAX_CHARS: usize = 40;
     shown_start(&String::from_utf8_lossy(token), MAX_CHARS)
 }

@@ -1,4 +1,4 @@
-//! Materials of an OBJ: its `.mtl` files, as far as colours go.
+//! Materials and appearance of an OBJ: base colours and textures of its `.mtl` files.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -11,18 +11,18 @@ use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from
 use crate::normals::Shading;
 use crate::siblings::{Image, Resolve, Siblings};
 
-/// One material of a `.mtl` file.
+/// A material of an `.mtl` file.
 #[derive(Clone, Debug)]
 pub(crate) struct Material {
-    /// `Kd` with `d` as its alpha, as written.
+    /// `Kd` and, as alpha, `d`; sRGB as written.
     pub(crate) color: [f32; 4],
     /// `map_Kd`.
     pub(crate) image: Option<Image>,
 }
 
 impl Material {
-    /// Factor of the base colour, linear RGBA. A texture is multiplied by it; a grey beside one is a program's default, often black,
-    /// and is replaced.
+    /// Base colour factor, linear RGBA. A grey `Kd` next to a texture is an exporter's default, often black,
+    /// and is replaced by white.
     pub(crate) fn base_color(&self) -> [f32; 4] {
         let [r, g, b, alpha] = self.color;
         let is_default = self.image.is_some() && r == g && g == b;
@@ -31,7 +31,7 @@ impl Material {
     }
 }
 
-/// Reads the materials of a `.mtl` file by name, with their textures.
+/// Adds the materials of an `.mtl` file, with their textures, to `into`.
 pub(crate) fn read_materials(
     bytes: &[u8],
     siblings: &mut Siblings<'_>,
@@ -59,16 +59,16 @@ pub(crate) fn read_materials(
             }
             b"d" => material.color[3] = number().unwrap_or(1.0),
             b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
-            // Options such as -s 1 1 1 stand before the name, which may itself have blanks; only plain names are read.
+            // Only plain file names are read: options such as `-s 1 1 1` precede the name, which may contain blanks.
             b"map_Kd" if !rest.starts_with('-') => {
-                material.image = siblings.image(&rest.replace('\\', "/"), "it is left out", notices);
+                material.image = siblings.image(&rest.replace('\\', "/"), "it is not drawn", notices);
             }
             _ => {}
         }
     }
 }
 
-/// Names of the material files of an OBJ and of their textures.
+/// Names of an OBJ's material files and their textures.
 pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Vec<String> {
     let (mut names, mut libraries) = (Vec::new(), HashSet::new());
     let mut note = |name: &str| {
@@ -91,13 +91,13 @@ pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit:
     names
 }
 
-/// What stands after the keyword: names may have blanks.
+/// Text after the keyword. Names may contain blanks.
 pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
     let rest = line.trim_ascii().strip_prefix(keyword).unwrap_or_default().trim_ascii();
     String::from_utf8_lossy(rest).into_owned()
 }
 
-/// How a document looks: a corner for each different vertex, surface and texture coordinate.
+/// Appearance of a document, with one corner per distinct (surface, texture coordinate) pair.
 pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     let mut look = Look::default();
     let sources = sources(document, positions, &mut look.copies);
@@ -149,8 +149,9 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     look
 }
 
-/// What each corner moves and is shaded with: its vertex, or a copy of it where the file's normals or smoothing groups
-/// say that another surface meets it there. Other corners have nothing to say. `[n_corners]`
+/// Source vertex of each corner: its own vertex or, where normals or smoothing groups put several surfaces at
+/// one vertex, a duplicate appended to `copies`. Corners without normal and smoothing group keep their
+/// vertex. `[n_corners]`
 fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
     let normals: Vec<Vec3> = document.corners.iter().map(|corner| document.normal(corner)).collect();

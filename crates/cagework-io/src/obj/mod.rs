@@ -1,8 +1,8 @@
 //! Wavefront OBJ.
 //!
-//! Own reader: `tobj` numbers vertices anew for each group and drops those that no face uses, and it either splits
-//! polygons or hands them over without their lines; here the row of a weight is the number of a `v` line, cages keep
-//! their polygons, errors name a line, and an export is the user's file with other numbers in it.
+//! Not read with `tobj`, which renumbers vertices per group, drops unused ones and either splits polygons or
+//! loses their line numbers. Here row `v` of the weights is the `v`-th vertex line, cages keep their
+//! polygons, errors name a line, and an export patches the original file.
 
 mod error;
 mod inner;
@@ -20,4 +20,4 @@ pub(crate) use look::{look, named_files, rest_of};
 pub(crate) use read::{Corner, NONE, ObjDocument, positions_near, read};
 pub(crate) use select::Group;
 pub use write::write_cage_obj;
-pub(crate) use write::{ObjPart, patch, write_new};
+pub(crate) use write::{ObjGroup, patch, write_new};

@@ -1,5 +1,6 @@
-//! OBJ in: every `v` line a vertex, every `f` line a polygon, nothing renumbered.
+//! OBJ reader: one vertex per `v` line, one polygon per `f` line, in file order.
 
+use cagework_core::words::counted;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
@@ -13,12 +14,12 @@ use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
 use crate::origin::relative;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
-use crate::siblings::{Absent, Resolve, Siblings};
+use crate::siblings::{Resolve, SiblingError, Siblings};
 
-/// An index that is not there.
+/// Missing index.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// One corner of a face, indices from 0; `vt` and `vn` may be [`NONE`].
+/// Corner of a face. Indices from 0; `vt` and `vn` may be [`NONE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Corner {
     pub(crate) v: u32,
@@ -26,32 +27,32 @@ pub(crate) struct Corner {
     pub(crate) vn: u32,
 }
 
-/// What an export needs of the file.
+/// Parsed OBJ file, as far as exports need it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObjDocument {
-    /// The file itself.
+    /// Original file.
     pub(crate) bytes: Vec<u8>,
-    /// `vt` lines, as written (v upwards).
+    /// `vt` lines as written, v upwards.
     pub(crate) texcoords: Vec<[f32; 2]>,
-    /// `vn` lines; zero where one is no vector.
+    /// Unit normals of `vn` lines; zero if unreadable.
     pub(crate) normals: Vec<Vec3>,
-    /// Corners of all faces, one after another.
+    /// Corners of all faces, concatenated.
     pub(crate) corners: Vec<Corner>,
-    /// Where each face starts in `corners`. `[n_faces + 1]`
+    /// Start of each face in `corners`. `[n_faces + 1]`
     pub(crate) face_starts: Vec<u32>,
     /// Material of each face, an index into `materials`, or [`NONE`].
     pub(crate) face_materials: Vec<u32>,
-    /// Smoothing group of each face, 0 for none; empty if the file has no `s` line.
+    /// Smoothing group of each face, 0 for none. Empty if the file has no `s` line.
     pub(crate) face_smoothing: Vec<u32>,
     /// Names after `usemtl`, in order of first use.
     pub(crate) materials: Vec<String>,
-    /// `o` and `g` lines, but for those that say the same as the one before.
+    /// `o` and `g` lines, without repetitions of the current name.
     pub(crate) groups: Vec<Group>,
-    /// Triangles as indices into `corners`.
+    /// Triangles, indices into `corners`.
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Materials of the `.mtl` files that were found, by name.
     pub(crate) looks: HashMap<String, Material>,
-    /// Colours after the coordinates of `v` lines, as written.
+    /// Vertex colours after the coordinates of `v` lines, sRGB as written.
     pub(crate) colors: HashMap<u32, [f32; 3]>,
 }
 
@@ -61,8 +62,8 @@ impl ObjDocument {
         self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)
     }
 
-    /// For each corner without a normal the surface that its `s` line makes it part of, from 1: a smoothing group, or
-    /// the face alone. 0 where a normal says it, or nothing does. `[n_corners]`
+    /// Smooth surface of each corner without normal, numbered from 1: its smoothing group or, with smoothing
+    /// off, its face. 0 for corners with a normal, or if the file has no `s` line. `[n_corners]`
     pub(crate) fn surfaces(&self) -> Vec<u32> {
         let mut surfaces = vec![0; self.corners.len()];
         let mut first_face = HashMap::new();
@@ -78,7 +79,7 @@ impl ObjDocument {
         surfaces
     }
 
-    /// Cuts all faces into triangles. Returns how many concave faces became a fan, because all together have too many corners.
+    /// Triangulates all faces. Returns the number of concave faces that became fans because the work limit was reached.
     pub(crate) fn triangulate(&mut self, positions: &[Vec3]) -> usize {
         let mut triangulator = Triangulator::new();
         let mut polygon = Vec::new();
@@ -91,13 +92,13 @@ impl ObjDocument {
         triangulator.fans
     }
 
-    /// Triangles (of corners) of each material, in order of first use.
+    /// Triangles (indices of corners) of each material, in order of first use.
     pub(crate) fn by_material(&self) -> Vec<(u32, Vec<[u32; 3]>)> {
         let mut groups: Vec<(u32, Vec<[u32; 3]>)> = Vec::new();
         let mut group_of = HashMap::new();
         let mut face = 0;
         for t in &self.triangles {
-            // Triangles come in the order of their faces, whose corners come one after another.
+            // Triangles are in the order of faces, and face corners are contiguous.
             while self.face_starts[face + 1] <= t[0] {
                 face += 1;
             }
@@ -112,13 +113,13 @@ impl ObjDocument {
     }
 }
 
-/// A file that was read.
+/// Result of reading an OBJ file.
 pub(crate) struct ObjModel {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) document: ObjDocument,
-    /// `o` and `g` lines.
+    /// Number of `o` and `g` lines.
     pub(crate) groups: usize,
-    /// Bytes that it takes, about.
+    /// Approximate memory, bytes.
     pub(crate) bytes: u64,
     pub(crate) notices: Vec<String>,
 }
@@ -129,35 +130,35 @@ struct Reader<'a> {
     document: ObjDocument,
     material_numbers: HashMap<&'a [u8], u32>,
     material: u32,
-    /// Number after the last `s` line; the format's default is off.
+    /// Current smoothing group; 0, off, is the format's default.
     smoothing: u32,
     has_smoothing: bool,
-    /// Corners that name a vertex not yet defined: line and index.
+    /// Forward references: line and vertex index, checked at the end.
     forward: Vec<(usize, u32)>,
     groups: usize,
     group_bytes: u64,
     bad_attributes: usize,
     ignored: usize,
     siblings: Siblings<'a>,
-    /// Names after `mtllib` so far.
+    /// Names of `mtllib` lines read so far.
     libraries: HashSet<String>,
     memory_limit: u64,
     notices: Vec<String>,
 }
 
-/// Bytes that a vertex takes in the table of different positions.
+/// Bytes per vertex in the weld table.
 const WELD_BYTES: u64 = 36;
 
-/// Most materials that `usemtl` names: each is drawn on its own, and a primitive of a GLB.
+/// Limit on `usemtl` names. Each becomes a draw call and a GLB primitive.
 const MAX_MATERIALS: usize = 1 << 14;
 
-/// Corners of a face, at least: others are left as they are, as lines and points are.
+/// Faces with fewer corners are ignored, like lines and points.
 pub(super) const MIN_CORNERS: usize = 3;
 
-/// Lines or corners after which the memory is looked at again.
-const LINES_BETWEEN: usize = 1 << 12;
+/// Lines or corners between checks of the memory limit.
+const MEMORY_CHECK_INTERVAL: usize = 1 << 12;
 
-/// Reads an OBJ file within `memory_limit` bytes; `resolve` fetches its materials and their textures by relative path.
+/// Reads an OBJ file using at most `memory_limit` bytes. `resolve` returns its material files and textures.
 pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Result<ObjModel, ObjError> {
     let mut reader = Reader {
         bytes,
@@ -179,14 +180,14 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -
     };
     for (number, line) in lines(bytes).enumerate() {
         reader.line(&line)?;
-        if number.is_multiple_of(LINES_BETWEEN) {
+        if number.is_multiple_of(MEMORY_CHECK_INTERVAL) {
             reader.check_memory()?;
         }
     }
     reader.finish()
 }
 
-/// Positions of the `v` lines of a file that was read, from an origin.
+/// Reads the `v` lines of a valid file again, relative to `origin`, without rounding in between.
 pub(crate) fn positions_near(bytes: &[u8], origin: DVec3) -> Vec<Vec3> {
     let vertices = lines(bytes).filter_map(|line| {
         let mut words = tokens(bytes, line.range);
@@ -213,7 +214,7 @@ impl<'a> Reader<'a> {
                     })?;
                 }
                 let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).take(4).collect();
-                // Four numbers are a weight, six a colour.
+                // One number is a weight, three are a colour.
                 if let [r, g, b] = after[..] {
                     self.document.colors.insert(self.positions.len() as u32, [r, g, b]);
                 }
@@ -222,7 +223,7 @@ impl<'a> Reader<'a> {
             }
             b"vt" => {
                 let u = words.next().and_then(|t| number(&bytes[t]));
-                // A one-dimensional texture coordinate has no v.
+                // One-dimensional texture coordinates have no v.
                 let v = words.next().map_or(Some(0.0), |t| number(&bytes[t]));
                 self.bad_attributes += usize::from(u.is_none() || v.is_none());
                 self.document.texcoords.push([u.unwrap_or(0.0), v.unwrap_or(0.0)]);
@@ -248,14 +249,15 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Bytes that what was read so far takes with its triangles and until it is welded; lists grow by doubling.
+    /// Memory of the data read so far, including its triangles and the weld table. Counts twice the size of
+    /// lists, which grow by doubling.
     fn check_memory(&self) -> Result<u64, MemoryError> {
         let document = &self.document;
         let lists = [
             (24 + WELD_BYTES, self.positions.len()),
             (16, document.texcoords.len()),
             (24, document.normals.len()),
-            // With one triangle each, both as corners and as vertices.
+            // One triangle per corner, stored as corners and as vertices.
             (24 + 24, document.corners.len()),
             (24, document.face_materials.len()),
             (80, document.colors.len()),
@@ -263,7 +265,7 @@ impl<'a> Reader<'a> {
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
-        // The caller holds the file, and the document a copy of it.
+        // The caller holds the file, and the document a copy.
         let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + self.group_bytes + lists;
         MemoryError::check(needed, self.memory_limit).map(|()| needed)
     }
@@ -271,7 +273,7 @@ impl<'a> Reader<'a> {
     fn face(&mut self, line: usize, words: impl Iterator<Item = Range<usize>>) -> Result<(), ObjError> {
         let (start, forward) = (self.document.corners.len(), self.forward.len());
         for token in words {
-            if self.document.corners.len().is_multiple_of(LINES_BETWEEN) {
+            if self.document.corners.len().is_multiple_of(MEMORY_CHECK_INTERVAL) {
                 self.check_memory()?;
             }
             let token = &self.bytes[token];
@@ -328,7 +330,7 @@ impl<'a> Reader<'a> {
         groups.push(Group { is_object, name, first_face: self.document.face_materials.len() as u32 });
     }
 
-    /// Reads a file of materials, once however often it is named.
+    /// Reads a material file unless it was read before.
     fn library(&mut self, name: &str) {
         let name = name.replace('\\', "/");
         match self.libraries.insert(name.clone()).then(|| self.siblings.file(&name)) {
@@ -336,12 +338,12 @@ impl<'a> Reader<'a> {
                 let looks = &mut self.document.looks;
                 read_materials(&file, &mut self.siblings, &mut self.notices, looks);
             }
-            Some(Err(Absent::Refused(reason))) => {
+            Some(Err(SiblingError::Refused(reason))) => {
                 let name = shown_start(&name, MAX_NAME_CHARS);
-                self.notices.push(format!("material file '{name}' {reason}: it is left out"));
+                self.notices.push(format!("material file '{name}' {reason}: its materials are not drawn"));
             }
-            // Many an OBJ travels alone.
-            Some(Err(Absent::Missing)) | None => {}
+            // A missing material file is common, so there is no notice.
+            Some(Err(SiblingError::Missing)) | None => {}
         }
     }
 
@@ -383,25 +385,38 @@ impl<'a> Reader<'a> {
             self.document.face_smoothing.clear();
         }
         let mut notices = self.notices;
-        let mut notice = |count: usize, text: &str| {
-            if count > 0 {
-                notices.push(format!("{count} {text}"));
+        let mut notice = |n: usize, one: &str, many: &str, text: &str| {
+            if n > 0 {
+                notices.push(format!("{} {text}", counted(n, one, many)));
             }
         };
-        notice(dangling, "face corners name texture coordinates or normals that do not exist: ignored");
+        notice(
+            dangling,
+            "face corner names a texture coordinate or normal that does",
+            "face corners name texture coordinates or normals that do",
+            "not exist: reference ignored",
+        );
         notice(
             fans,
-            "concave faces have too many corners to be cut along their border: each is a fan of triangles around its first \
-             corner; cut them into smaller faces first",
+            "concave face has too many corners and was",
+            "concave faces have too many corners and were",
+            "triangulated as a fan around the first corner: split such faces for a correct shape",
         );
-        notice(self.bad_attributes, "'vt' or 'vn' lines are not numbers: read as zero");
+        notice(
+            self.bad_attributes,
+            "'vt' or 'vn' line is not numeric:",
+            "'vt' or 'vn' lines are not numeric:",
+            "read as zero",
+        );
         notice(
             self.ignored,
-            "lines, points, curves or faces of fewer than three corners are no surfaces: left as they are",
+            "line, point, curve or face with fewer than three corners",
+            "lines, points, curves or faces with fewer than three corners",
+            "not deformed: kept unchanged in OBJ exports",
         );
         self.document.bytes = self.bytes.to_vec();
         let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
-        // The file is the caller's, and gone when it has been read.
+        // The caller frees the file after reading; the weld table is temporary.
         let bytes = reading - bytes - welding;
         Ok(ObjModel {
             positions: self.positions,
@@ -417,12 +432,12 @@ pub(super) fn check_count(count: usize, line: usize) -> Result<(), ObjError> {
     if count >= NONE as usize { Err(ObjError::TooLarge { line, limit: NONE - 1 }) } else { Ok(()) }
 }
 
-/// A finite number, or nothing.
+/// Parses a finite number.
 pub(super) fn number(token: &[u8]) -> Option<f32> {
     std::str::from_utf8(token).ok()?.parse::<f32>().ok().filter(|x| x.is_finite())
 }
 
-/// A number that 32 bits have room for, in 64.
+/// Parses a number within the f32 range with f64 precision.
 pub(super) fn wide_number(token: &[u8]) -> Option<f64> {
     number(token)?;
     std::str::from_utf8(token).ok()?.parse().ok()
@@ -432,12 +447,13 @@ pub(super) fn integer(token: &[u8]) -> Option<i64> {
     std::str::from_utf8(token).ok()?.parse().ok()
 }
 
-/// Smoothing group as written, 0 for `off`; nothing where it is neither.
+/// Smoothing group as written, 0 for `off`; `None` if it is neither a number nor `off`.
 fn smoothing_group(word: &[u8]) -> Option<u32> {
     if word == b"off" { Some(0) } else { u32::try_from(integer(word)?).ok() }
 }
 
-/// Index from 0 of an index as written: from 1, or negative, counted back from the `count` elements so far.
+/// Converts an index as written to one from 0. Positive indices count from 1, negative ones backwards from
+/// the `count` elements read so far.
 pub(super) fn resolve(index: i64, count: usize) -> Option<u32> {
     let from_zero = if index < 0 { i64::try_from(count).ok()?.checked_add(index)? } else { index - 1 };
     u32::try_from(from_zero).ok().filter(|&i| i != NONE)

@@ -1,18 +1,17 @@
-//! Vertices of an OBJ's materials and groups.
+//! Vertices of an OBJ's materials and groups, by name.
 
 use std::collections::HashSet;
 
 use super::read::ObjDocument;
 use crate::part_kind::PartKind;
 
-/// An `o` or `g` line.
+/// An `o` or `g` line. An `o` line is valid until the next `o` line, a `g` line until the next `g` line.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
-    /// An `o` line holds until the next one, a `g` line until the next `g`.
     pub(crate) is_object: bool,
-    /// What it says; a `g` line may have several names.
+    /// Text after the keyword. A `g` line can contain several names.
     pub(crate) name: String,
-    /// The face after it.
+    /// First face after the line.
     pub(crate) first_face: u32,
 }
 
@@ -23,7 +22,7 @@ impl Group {
 }
 
 impl ObjDocument {
-    /// Materials, objects and groups, each once.
+    /// Distinct names of materials, objects and groups.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
         let materials = self.materials.iter().map(|name| (PartKind::Material, name.clone()));
         let mut seen = HashSet::new();
@@ -31,7 +30,7 @@ impl ObjDocument {
         materials.chain(groups.map(|group| (PartKind::Group, group.name.clone()))).collect()
     }
 
-    /// Vertices of what is called so, in no order, some several times.
+    /// Vertices of the parts with this name, unsorted and with duplicates.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Vec<u32> {
         let n_faces = self.face_materials.len();
         let mut is_of = vec![false; n_faces];

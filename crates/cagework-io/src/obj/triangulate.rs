@@ -1,32 +1,32 @@
-//! Triangles of one polygon.
+//! Triangulation of polygons.
 
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Most squares of the corners of all polygons that ears are clipped from: at worst the time grows with the square, and is 5 s
-/// for 60,000 corners.
-const MAX_CLIPPED: u64 = 1 << 28;
+/// Limit on the sum of squared corner counts of all ear-clipped polygons. Ear clipping takes quadratic time
+/// at worst: 5 s for one polygon of 60,000 corners.
+const MAX_CLIP_WORK: u64 = 1 << 28;
 
-/// Scratch memory for many polygons.
+/// Triangulates polygons, reusing its buffers.
 pub(crate) struct Triangulator {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     corners: Vec<u32>,
-    /// Of [`MAX_CLIPPED`].
+    /// Remaining part of [`MAX_CLIP_WORK`].
     left: u64,
-    /// Concave polygons that were cut into a fan because [`MAX_CLIPPED`] was reached.
+    /// Number of concave polygons that became fans because [`MAX_CLIP_WORK`] was used up.
     pub(crate) fans: usize,
 }
 
 impl Triangulator {
     pub(crate) fn new() -> Self {
-        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new(), left: MAX_CLIPPED, fans: 0 }
+        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new(), left: MAX_CLIP_WORK, fans: 0 }
     }
 
-    /// Appends the triangles of `polygon` (its corners' positions, in order) as `base` + corner numbers.
+    /// Appends the n - 2 triangles of `polygon` as `base` + corner numbers. `polygon`: corner positions in order.
     ///
-    /// A fan where that is right, otherwise ear clipping in the polygon's mean plane. A polygon that has no plane,
-    /// crosses itself or is huge, or comes after many such, still gets its n - 2 triangles, as a fan.
+    /// A fan if all its triangles face along the polygon's normal, otherwise ear clipping in the mean plane.
+    /// Degenerate and self-intersecting polygons, and those beyond the work limit, become fans.
     pub(crate) fn triangulate(&mut self, polygon: &[Vec3], base: u32, out: &mut Vec<[u32; 3]>) {
         let n = polygon.len() as u32;
         if n < 3 {
@@ -46,7 +46,7 @@ impl Triangulator {
         out.extend((2..n).map(|k| [base, base + k - 1, base + k]));
     }
 
-    /// Whether there is time for another polygon of `n` corners.
+    /// Reserves the work of clipping a polygon of `n` corners; false if it exceeds the rest.
     fn may_clip(&mut self, n: u64) -> bool {
         let left = self.left.checked_sub(n * n);
         self.fans += usize::from(left.is_none());
@@ -54,7 +54,7 @@ impl Triangulator {
         left.is_some()
     }
 
-    /// Ear clipping in the plane of `normal`; false when it does not cover the polygon.
+    /// Clips ears in the plane with the given normal. False if the triangles do not cover the polygon.
     fn clip_ears(&mut self, p: &[DVec3], normal: DVec3) -> bool {
         let (u, v) = normal.any_orthonormal_pair();
         self.flat.clear();
@@ -63,7 +63,7 @@ impl Triangulator {
         if self.corners.len() != 3 * (p.len() - 2) {
             return false;
         }
-        // The library promises no orientation; the polygon's own is what counts.
+        // `earcut` does not guarantee an orientation, so use the polygon's.
         for t in self.corners.chunks_exact_mut(3) {
             let [a, b, c] = [p[t[0] as usize], p[t[1] as usize], p[t[2] as usize]];
             if (b - a).cross(c - a).dot(normal) < 0.0 {
@@ -74,7 +74,7 @@ impl Triangulator {
     }
 }
 
-/// Newell's normal: twice the area vector of the polygon, right for any planar polygon.
+/// Newell's normal: twice the area vector of the polygon, also for concave polygons.
 fn newell_normal(p: &[DVec3]) -> DVec3 {
     let origin = p[0];
     p.iter().zip(p.iter().cycle().skip(1)).map(|(&a, &b)| (a - origin).cross(b - origin)).sum()

@@ -1,4 +1,4 @@
-//! OBJ out: a patched original, a new file, a cage.
+//! OBJ writer: patches of the original file, new files and cages.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -11,18 +11,18 @@ use super::read::{MIN_CORNERS, NONE, ObjDocument};
 use crate::normals::Shading;
 use crate::origin::Coordinate;
 
-/// Distinct pairs of a vertex and a normal at a file's corners; where there is none, of a vertex and a surface.
+/// Distinct pairs (vertex, normal) at the corners of a file; without normal, (vertex, smooth surface).
 pub(crate) struct Pairs {
-    /// The pairs as vertices for shading.
+    /// Pairs as shading vertices.
     pub(crate) shading: Shading,
-    /// Pair of each corner.
+    /// Pair index of each corner.
     pub(crate) of_corner: Vec<u32>,
-    /// `vn` line of each pair, or [`NONE`].
+    /// Index of the `vn` line of each pair, or [`NONE`].
     pub(crate) vn: Vec<u32>,
 }
 
 impl ObjDocument {
-    /// Pairs in order of first use, with the shape at rest.
+    /// Pairs in order of first use. `rest`: rest positions.
     pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
         let mut numbers = HashMap::new();
         let (mut vertex, mut vn, mut normal, mut surface) = (vec![], vec![], vec![], vec![]);
@@ -45,12 +45,12 @@ impl ObjDocument {
     }
 }
 
-/// The original file with new positions, from an origin: coordinates of `v` lines that are others now, and normals are replaced, all else is kept byte for
-/// byte (comments, vertex colours, materials, groups, line ends).
+/// Patches the original file with new positions, relative to `origin`: changed coordinates and all normals
+/// are replaced; comments, vertex colours, materials, groups and line ends stay byte for byte.
 ///
-/// Each `vn` line becomes one line for each vertex that uses it, since two corners that shared a normal need not share
-/// it after the deformation; only if that changes the numbering are normal indices in faces rewritten. A file without
-/// `vn` lines gets none.
+/// Corners that share a normal at rest may need different normals afterwards, so each `vn` line becomes one
+/// line per vertex that uses it. Normal indices of faces are rewritten only if this changes the numbering. A
+/// file without `vn` lines gets none.
 pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3], origin: DVec3) -> Vec<u8> {
     let normals = (!document.normals.is_empty()).then(|| PatchedNormals::new(document, rest, positions));
     let bytes = &document.bytes;
@@ -98,10 +98,10 @@ pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3], o
 }
 
 struct PatchedNormals {
-    /// New normals that take the place of each `vn` line.
+    /// New normals that replace each `vn` line.
     lines: Vec<Vec<Vec3>>,
     of_corner: Vec<u32>,
-    /// Number, from 1, of each pair's new line; 0 for a pair without a normal.
+    /// Number, from 1, of each pair's new `vn` line; 0 without normal.
     line_of_pair: Vec<u32>,
     renumbered: bool,
 }
@@ -122,7 +122,7 @@ impl PatchedNormals {
             for (k, &pair) in users.iter().enumerate() {
                 line_of_pair[pair as usize] = next + k as u32;
             }
-            // A normal that nobody uses keeps its line, and so its number.
+            // Unused `vn` lines stay, to keep the numbering.
             next += users.len().max(1) as u32;
         }
         Self {
@@ -133,7 +133,7 @@ impl PatchedNormals {
         }
     }
 
-    /// Writes what replaces a `vn` line; false when the line stays.
+    /// Writes the replacement of a `vn` line; false if the line stays.
     fn write_line(&self, vn: usize, end: &[u8], out: &mut Vec<u8>) -> bool {
         for n in &self.lines[vn] {
             out.extend_from_slice(format!("vn {} {} {}", n.x, n.y, n.z).as_bytes());
@@ -143,7 +143,7 @@ impl PatchedNormals {
     }
 }
 
-/// Line end of a line as read; LF for a last line without one.
+/// Line terminator as read; LF for a last line without one.
 fn line_end(line: &[u8]) -> &[u8] {
     match line {
         [.., b'\r', b'\n'] => b"\r\n",
@@ -152,24 +152,24 @@ fn line_end(line: &[u8]) -> &[u8] {
     }
 }
 
-/// A part of a new OBJ file: vertices `start..start + n` of the model and their faces.
-pub(crate) struct ObjPart {
+/// A group of a new OBJ file: contiguous vertices from `start` and their faces.
+pub(crate) struct ObjGroup {
     /// `o` line.
     pub(crate) name: String,
     /// `usemtl` line.
     pub(crate) material: Option<String>,
-    /// First vertex of the part.
+    /// Index of the first vertex.
     pub(crate) start: u32,
-    /// One for each vertex, v upwards, or none.
+    /// Texture coordinates per vertex, v upwards; may be empty.
     pub(crate) texcoords: Vec<[f32; 2]>,
-    /// One for each vertex, or none.
+    /// Normals per vertex; may be empty.
     pub(crate) normals: Vec<Vec3>,
-    /// Of the model's vertices.
+    /// Indices of model vertices.
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
-/// A new OBJ file: all vertices in the model's order, then each part.
-pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjPart]) -> Vec<u8> {
+/// Writes a new OBJ file: all vertices in the model's order, then each group.
+pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjGroup]) -> Vec<u8> {
     let mut text = String::with_capacity(64 * positions.len());
     for p in positions {
         let [x, y, z] = Coordinate::of(origin, *p);
@@ -208,7 +208,7 @@ pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjPart]) ->
     text.into_bytes()
 }
 
-/// A cage, its positions as seen from an origin, as an OBJ file: vertices and polygons in order.
+/// Writes a cage as an OBJ file, vertices and polygons in order. `cage`: positions relative to `origin`.
 #[must_use]
 pub fn write_cage_obj(cage: &PolygonMesh, origin: DVec3) -> Vec<u8> {
     let mut text = String::with_capacity(64 * cage.positions.len());
@@ -231,7 +231,7 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     text.push('\n');
 }
 
-/// A name that cannot break its line.
+/// A name on one line: control characters become spaces.
 fn one_line(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -1,6 +1,6 @@
-//! Small glTF files, made here: a builder, and one model per trap.
+//! Builder of small glTF files, and models with special cases.
 
-#![allow(dead_code, clippy::unwrap_used, reason = "each test file uses its own part, and this is test code")]
+#![allow(dead_code, clippy::unwrap_used, reason = "each test file uses only some of these helpers")]
 
 use cagework_io::{Model, ReadError};
 use glam::{Mat4, Vec3};
@@ -12,7 +12,7 @@ pub(crate) const U16: u32 = 5123;
 pub(crate) const I16: u32 = 5122;
 pub(crate) const U8: u32 = 5121;
 
-/// Corners of the unit cube, x fastest.
+/// Vertices of the unit cube, x fastest.
 pub(crate) const CUBE: [[f32; 3]; 8] = [
     [0., 0., 0.],
     [1., 0., 0.],
@@ -24,7 +24,7 @@ pub(crate) const CUBE: [[f32; 3]; 8] = [
     [1., 1., 1.],
 ];
 
-/// Triangles of the cube, outward.
+/// Outward triangles of the cube.
 pub(crate) const CUBE_TRIANGLES: [[u32; 3]; 12] = [
     [0, 2, 3],
     [0, 3, 1],
@@ -52,7 +52,7 @@ pub(crate) const PNG: [u8; 69] = [
     0x42, 0x60, 0x82,
 ];
 
-/// A glTF under construction: JSON and one binary buffer.
+/// Builds a glTF from JSON and one binary buffer.
 pub(crate) struct Builder {
     pub(crate) json: Value,
     pub(crate) bin: Vec<u8>,
@@ -124,7 +124,7 @@ impl Builder {
     }
 }
 
-/// A GLB of a JSON chunk and a binary chunk.
+/// Builds a GLB from a JSON chunk and an optional binary chunk.
 pub(crate) fn glb(json: &Value, bin: Option<&[u8]>) -> Vec<u8> {
     let mut text = serde_json::to_vec(json).unwrap();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -155,7 +155,7 @@ pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Model, ReadError> {
     Model::read(name, bytes, &mut |_| None)
 }
 
-/// Bytes of 32-bit floats.
+/// Little-endian f32 bytes.
 pub(crate) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
@@ -168,7 +168,8 @@ pub(crate) fn plain_cube() -> Builder {
     b
 }
 
-/// A textured square with normals, tangents and texture coordinates, in two halves with a seam, under a tilted node.
+/// A textured square with normals, tangents and texture coordinates, as two triangles with a seam, under a
+/// rotated node.
 pub(crate) fn textured_square() -> Builder {
     let mut b = Builder::new();
     let corners = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
@@ -212,8 +213,8 @@ pub(crate) fn instanced() -> Builder {
     b
 }
 
-/// A cube on two joints; the upper half hangs on a joint that is raised by 2, the lower half on one at rest. An
-/// animation turns a joint, another drives the morph target.
+/// A skinned cube: its upper half follows a joint raised by 2, its lower half a joint at rest. One animation
+/// rotates a joint, another one drives the morph target.
 pub(crate) fn skinned() -> Builder {
     let mut b = Builder::new();
     let mesh = b.cube_mesh("cube");
@@ -242,7 +243,7 @@ pub(crate) fn skinned() -> Builder {
     let (wave, widen) = (animation(turns, 2, "rotation"), animation(morph, 0, "weights"));
     b.push("animations", wave);
     b.push("animations", widen);
-    // The mesh node's own transform plays no part.
+    // The transform of a skinned mesh's node is ignored.
     b.push("nodes", json!({ "name": "body", "mesh": mesh, "skin": 0, "translation": [100.0, 0.0, 0.0] }));
     b.push("nodes", json!({ "name": "low", "children": [2] }));
     b.push("nodes", json!({ "name": "high", "translation": [0.0, 0.0, 2.0] }));
@@ -284,30 +285,31 @@ pub(crate) const CUBE_OBJ: &str = "# a box\nmtllib box.mtl\no box\n\
     usemtl blue\n\
     f 1/1/3 2/2/3 6/3/3 5/4/3\nf 3/1/4 7/2/4 8/3/4 4/4/4\nf 1/1/5 5/2/5 7/3/5 3/4/5\nf 2/1/6 4/2/6 8/3/6 6/4/6\n";
 
-/// A twist about the z axis with a shift: moves every vertex, each differently.
+/// A twist about the z axis with a translation; moves all vertices differently.
 pub(crate) fn twist(p: Vec3) -> Vec3 {
     let (s, c) = (0.7 * p.z + 0.2).sin_cos();
     Vec3::new(c * p.x - s * p.y + 0.5, s * p.x + c * p.y, 1.5 * p.z - 0.25)
 }
 
-/// Largest distance between two lists of points, over the size of the first.
+/// Largest distance between corresponding points, over the size of the first list.
 pub(crate) fn relative_error(a: &[Vec3], b: &[Vec3]) -> f32 {
     assert_eq!(a.len(), b.len());
     let size = a.iter().map(|p| p.length()).fold(f32::MIN_POSITIVE, f32::max);
     a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) / size
 }
 
-/// Signed volume of a closed mesh: positive when its triangles are outward.
+/// Signed volume of a closed mesh; positive if its triangles face outwards.
 pub(crate) fn volume(model: &Model) -> f32 {
     let p = |i: u32| model.positions[i as usize];
     model.triangles.iter().map(|&[a, b, c]| p(a).dot(p(b).cross(p(c))) / 6.0).sum()
 }
 
-/// A bar of three joints under an armature that moves and doubles: its bind space is four units beside its rest pose. Two targets with
-/// default weights [0.25, 0], and a clip: the root moves, a bone's length is a track, the tip turns, a target changes.
+/// A bar with three joints under an armature that scales by two. Its bind pose is four units away from its
+/// rest pose. Two morph targets with default weights [0.25, 0], and a clip that moves the root, animates a
+/// bone's constant translation, rotates the tip and changes the targets.
 pub(crate) fn rigged() -> Builder {
     let mut rig = Builder::new();
-    // A column of five squares, 0 to 2 high in the world.
+    // A column of five squares, from height 0 to 2 in world space.
     let (mut at, mut triangles) = (Vec::new(), Vec::new());
     for k in 0..5_u32 {
         let y = 0.5 * k as f32;
@@ -318,7 +320,7 @@ pub(crate) fn rigged() -> Builder {
         }
     }
     triangles.extend([0, 1, 2, 0, 2, 3, 16, 18, 17, 16, 19, 18]);
-    // In the mesh's own space, half as large and four units to the right.
+    // In mesh space, scaled by half and moved by four units.
     let local: Vec<[f32; 3]> =
         at.iter().map(|p: &[f32; 3]| [4.0 + 0.5 * p[0], 0.5 * p[1], 0.5 * p[2]]).collect();
     let delta = |d: [f32; 3], from: f32| -> Vec<[f32; 3]> {
@@ -357,7 +359,7 @@ pub(crate) fn rigged() -> Builder {
         { "name": "bar", "mesh": 0, "skin": 0, "translation": [7.0, 7.0, 7.0] },
     ]);
     rig.json["scenes"] = json!([{ "nodes": [0, 4] }]);
-    // World from bind: twice as large, and back by eight units. The joints' worlds double, too.
+    // World from bind space scales by two and moves back by eight units, as the joints' world transforms scale by two.
     let binds: Vec<u8> = [0.0_f32, 0.5, 1.0]
         .iter()
         .flat_map(|y| Mat4::from_translation(Vec3::new(-4.0, -y, 0.0)).to_cols_array())

@@ -1,4 +1,4 @@
-//! Inputs by number: files of every kind that is read, damaged at random.
+//! Numbered fuzz inputs: files of every readable kind, with random damage.
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
@@ -16,7 +16,7 @@ use crate::common::{
     textured_square, twist,
 };
 
-/// Samples that are GLBs come first.
+/// GLB samples come first.
 const N_GLB: usize = 7;
 
 /// All inputs of a seed.
@@ -30,7 +30,7 @@ impl Inputs {
         Self { seed, files: files() }
     }
 
-    /// Input `number`; the others need not have been asked for.
+    /// The input with this number, independent of others.
     pub(crate) fn get(&mut self, number: u64) -> Vec<u8> {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());
@@ -41,27 +41,27 @@ impl Inputs {
     }
 }
 
-/// What is damaged: small files of every kind, so that every byte has its turn.
+/// Undamaged samples: small files of every kind, so that mutations reach most bytes.
 pub(crate) fn samples() -> Vec<Vec<u8>> {
     let builders = [plain_cube(), textured_square(), instanced(), skinned(), quantized(), rigged(), shared()];
     let mut samples: Vec<Vec<u8>> = builders.iter().map(Builder::glb).collect();
-    let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
+    let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("the OBJ is valid");
     let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]);
     let outside = OutsideVertex { vertex: 1, distance: 1.0, share: 0.5 };
     samples.push(CUBE_OBJ.as_bytes().to_vec());
     samples.push(
         write_project(&[&model, &model], &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}")
-            .expect("it fits"),
+            .expect("the project is small"),
     );
     samples.push(write_weights_npz(
-        &weights.expect("they are"),
+        &weights.expect("the matrix is valid"),
         &Frames::default(),
         &[outside],
         &[Vec3::ONE],
         &[Vec3::ONE],
     ));
-    // Eight controls, their frames of one joint with a bone to another, and entries of all kinds.
+    // Eight controls, frames of a joint with a bone, and entries in all kinds of columns.
     let frames = Frames {
         joints: vec![6, 7],
         bones: vec![[0, 1]],
@@ -70,9 +70,9 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     };
     let n = 8 + frames.n_columns() as u32;
     let weights = Weights::new(n, vec![0, 3, 5], vec![0, 8, 11, 7, n - 1], vec![0.5, 0.25, 1.0, 0.75, 0.5]);
-    samples.push(write_weights_npz(&weights.expect("they are"), &frames, &[outside], &[], &[]));
+    samples.push(write_weights_npz(&weights.expect("the matrix is valid"), &frames, &[outside], &[], &[]));
     samples.push(encode_pose(&cube(), &bent));
-    // Controls inside of that cube.
+    // Controls inside the cube.
     samples.push(
         b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
             .to_vec(),
@@ -86,16 +86,16 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
             .to_vec(),
     );
-    samples.push(model.write_ply(&model.positions).expect("it fits"));
+    samples.push(model.write_ply(&model.positions).expect("positions are valid"));
     samples.push(model.write_stl(&model.positions).expect("it has triangles"));
-    samples.push(model.write_off(&model.positions).expect("it fits"));
+    samples.push(model.write_off(&model.positions).expect("positions are valid"));
     samples.push(
         b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
     );
     samples
 }
 
-/// A rig whose data many things use: a second mesh and clip of the same accessors, channels of one sampler, sparse positions.
+/// A rig with shared data: a second mesh and clip with the same accessors, channels with one sampler, sparse positions.
 fn shared() -> Builder {
     let mut rig = rigged();
     let (places, values) = (rig.view(&[0, 7]), rig.view(&[0; 24]));
@@ -118,7 +118,7 @@ fn shared() -> Builder {
     rig
 }
 
-/// Closed meshes: quads, a concave polygon, and a cavity.
+/// Closed meshes: quads, a concave polygon and a cavity.
 pub(crate) fn cages() -> Vec<PolygonMesh> {
     let unit = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     let block = |shrink, divisions| subdivided_box(unit, shrink, [divisions; 3]);
@@ -156,7 +156,7 @@ fn files() -> BoxedStrategy<Vec<u8>> {
     .boxed()
 }
 
-/// One change to a file.
+/// A mutation of bytes.
 #[derive(Clone, Debug)]
 enum Damage {
     Set(Index, u8),
@@ -166,7 +166,7 @@ enum Damage {
     Repeat(Index, Index),
 }
 
-/// Bytes that mean something to a parser.
+/// Bytes with a meaning in file formats.
 const SYNTAX: &[u8] = b"0123456789-.,/e \\\n{}[]\"";
 
 fn damage() -> impl Strategy<Value = Damage> {
@@ -207,7 +207,7 @@ fn damaged(mut bytes: Vec<u8>, damage: &[Damage]) -> Vec<u8> {
     bytes
 }
 
-/// Coordinates from all over, and such as make others coincide.
+/// Coordinates of all magnitudes, and values that make vertices coincide.
 fn odd_number() -> impl Strategy<Value = f32> {
     prop_oneof![
         3 => -2.0_f32..3.0,
@@ -218,7 +218,7 @@ fn odd_number() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// One change to the lines of an OBJ.
+/// A mutation of OBJ lines.
 #[derive(Clone, Debug)]
 enum LineDamage {
     Word(Index, Index, String),
@@ -264,7 +264,7 @@ fn damaged_lines(text: &str, damage: &[LineDamage]) -> Vec<u8> {
     lines.join("\n").into_bytes()
 }
 
-/// Any faces between a few points, some of them at one place.
+/// Random faces between a few points, some of them coincident.
 fn soup() -> impl Strategy<Value = Vec<u8>> {
     let coordinate =
         prop_oneof![6 => (0..4_i32).prop_map(|x| x as f32), 3 => -2.0_f32..2.0, 1 => odd_number()];
@@ -280,7 +280,7 @@ fn soup() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// Every number and list of a document, as paths.
+/// JSON pointers to all values and lists of a document.
 fn places(value: &Value, path: &str, out: &mut Vec<String>) {
     match value {
         Value::Object(object) => {
@@ -318,7 +318,7 @@ fn odd_value() -> impl Strategy<Value = Value> {
     ]
 }
 
-/// A GLB with odd values in its JSON; as text it is a glTF that asks for its buffer by name.
+/// A GLB with mutated JSON values; with `as_text`, a glTF with an external buffer.
 fn odd_json(sample: &[u8], changes: Vec<(Index, Value)>, as_text: bool) -> Vec<u8> {
     let mut json = json_of(sample);
     if as_text {
@@ -328,23 +328,23 @@ fn odd_json(sample: &[u8], changes: Vec<(Index, Value)>, as_text: bool) -> Vec<u
         let mut paths = Vec::new();
         places(&json, "", &mut paths);
         let Some(place) = paths.get(at.index(paths.len().max(1))) else { break };
-        *json.pointer_mut(place).expect("it is there") = value;
+        *json.pointer_mut(place).expect("the pointer is valid") = value;
     }
     if as_text { json.to_string().into_bytes() } else { glb(&json, Some(bin_of(sample))) }
 }
 
-/// What a glTF made of a sample calls its buffer: its length, which no two share.
+/// Name of a sample's external buffer: its length, which is unique.
 fn sample_name(sample: &[u8]) -> String {
     format!("{}.bin", sample.len())
 }
 
-/// The binary chunk of a GLB.
+/// Binary chunk of a GLB.
 fn bin_of(glb: &[u8]) -> &[u8] {
     let json = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
     &glb[28 + json..]
 }
 
-/// The file beside a glTF.
+/// The external buffer of a glTF.
 pub(crate) fn beside(samples: &[Vec<u8>], name: &str) -> Option<Vec<u8>> {
     samples[..N_GLB].iter().find(|s| sample_name(s) == name).map(|s| bin_of(s).to_vec())
 }

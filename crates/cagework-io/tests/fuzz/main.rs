@@ -1,11 +1,12 @@
-//! Mutated files through everything that reads them: each ends in a result or an error, within seconds, and without a panic.
+//! Runs damaged files through all readers and their consumers. Each must end in a result or an error, within
+//! seconds and without a panic.
 //!
-//! `cargo xtask fuzz --minutes 60` takes a seed from the clock and says which; `--seed 1` gives the same inputs in every run.
-//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again. Files that
-//! failed once are kept in `found` and tried first.
+//! `cargo xtask fuzz --minutes 60` takes the seed from the clock and prints it; `--seed 1` makes runs
+//! repeatable. Failing inputs are written to `target/fuzz`, and `cargo xtask fuzz FILE` repeats one. Inputs
+//! that failed in the past are in `found` and run first.
 //!
-//! Inputs are tried in a process of its own, because a stack that overflows and memory that runs out end one. It says the number
-//! of each input before it tries it; when it ends, or falls silent, the number is known and so is the input.
+//! A child process runs the inputs, since stack overflow and memory exhaustion end the process. It prints the
+//! number of each input before running it, so the parent knows which input failed.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -18,16 +19,16 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Longest time on the processor for one input; the slowest takes a second.
-const LIMIT: Duration = Duration::from_secs(10);
+/// Limit on CPU time per input. The slowest takes about 1 s.
+const CPU_TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// Longest time on the clock: whoever waits that long waits for nothing, or all others have the processor.
-const PATIENCE: Duration = Duration::from_secs(600);
+/// Limit on wall-clock time per input, for a process that waits or gets no CPU time.
+const WALL_TIME_LIMIT: Duration = Duration::from_secs(600);
 
-/// Address space of the process that tries inputs, KiB: none needs more than a few MiB.
+/// Address space limit of the child process, KiB. Inputs need a few MiB.
 const MEMORY_KIB: &str = "4194304";
 
-/// Failures after which the rest of the time would be more of the same.
+/// Failures after which the run ends.
 const MAX_FAILURES: u64 = 50;
 
 const USAGE: &str = "usage: cargo xtask fuzz [--minutes N] [--seed S] | FILE ...";
@@ -64,11 +65,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// Damaged files that once failed, in `found`.
+/// Damaged files that failed in the past.
 fn found() -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/found");
-    let entries = std::fs::read_dir(folder).expect("the folder is there");
-    entries.map(|entry| entry.expect("it can be read").path().display().to_string()).collect()
+    let entries = std::fs::read_dir(folder).expect("the folder exists");
+    entries.map(|entry| entry.expect("the entry is readable").path().display().to_string()).collect()
 }
 
 fn usage() -> ExitCode {
@@ -76,38 +77,38 @@ fn usage() -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Tries inputs until somebody ends this process.
+/// Runs inputs until the process is killed.
 fn try_from(seed: u64, first: u64) {
     let mut inputs = inputs::Inputs::new(seed);
     let mut out = std::io::stdout().lock();
     for number in first.. {
-        let said = writeln!(out, "{number}").and_then(|()| out.flush());
-        if said.is_err() {
+        let written = writeln!(out, "{number}").and_then(|()| out.flush());
+        if written.is_err() {
             return;
         }
         survive::survive(&inputs.get(number));
     }
 }
 
-/// A process that tries inputs, and the numbers that it says.
+/// The child process and the input numbers it prints.
 struct Trial {
     process: Child,
     numbers: Receiver<u64>,
-    /// When the input under way was begun, and how much time the process had had on the processor.
+    /// Start of the current input: wall-clock time, and CPU time of the process.
     since: (Instant, Duration),
 }
 
 impl Trial {
     fn start(args: &[&str]) -> Self {
-        let program = std::env::current_exe().expect("this program has a file");
+        let program = std::env::current_exe().expect("the executable has a path");
         let mut process = Command::new("sh")
             .args(["-c", &format!("ulimit -v {MEMORY_KIB} && exec \"$0\" --try \"$@\"")])
             .arg(program)
             .args(args)
             .stdout(Stdio::piped())
             .spawn()
-            .expect("there is a shell");
-        let lines = BufReader::new(process.stdout.take().expect("it was asked for")).lines();
+            .expect("sh exists");
+        let lines = BufReader::new(process.stdout.take().expect("stdout is piped")).lines();
         let (send, numbers) = channel();
         std::thread::spawn(move || {
             for number in lines.map_while(Result::ok).filter_map(|line| line.parse().ok()) {
@@ -119,8 +120,7 @@ impl Trial {
         Self { process, numbers, since: (Instant::now(), Duration::ZERO) }
     }
 
-    /// The next input's number, and the processor's time for the one before. An error tells that the process has ended, or that it
-    /// takes too long.
+    /// Number of the next input, and CPU time of the previous one. An error if the process ended or exceeded a limit.
     fn next(&mut self) -> Result<(u64, Duration), RecvTimeoutError> {
         loop {
             let number = self.numbers.recv_timeout(Duration::from_secs(1));
@@ -131,13 +131,14 @@ impl Trial {
                     self.since = now;
                     return Ok((number, took));
                 }
-                Err(RecvTimeoutError::Timeout) if took < LIMIT && self.since.0.elapsed() < PATIENCE => {}
+                Err(RecvTimeoutError::Timeout)
+                    if took < CPU_TIME_LIMIT && self.since.0.elapsed() < WALL_TIME_LIMIT => {}
                 Err(e) => return Err(e),
             }
         }
     }
 
-    /// How long the process has been on the processor, as Linux counts it: in hundredths of a second.
+    /// CPU time of the process, from /proc in ticks of 10 ms.
     fn busy(&self) -> Option<Duration> {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).ok()?;
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
@@ -145,14 +146,14 @@ impl Trial {
         Some(Duration::from_millis(10 * (ticks(11)? + ticks(12)?)))
     }
 
-    /// How it ended; none if all is well.
+    /// How the process ended; `None` on success.
     fn end(mut self, timed_out: bool) -> Option<String> {
         if timed_out {
-            // It may have ended by itself meanwhile.
+            // It may have exited by itself in the meantime.
             let _ = self.process.kill();
         }
         match self.process.wait() {
-            _ if timed_out => Some(format!("not done after {} s", LIMIT.as_secs())),
+            _ if timed_out => Some(format!("not done after {} s", CPU_TIME_LIMIT.as_secs())),
             Ok(status) if status.success() => None,
             Ok(status) => Some(format!("ended with {status}")),
             Err(e) => Some(e.to_string()),
@@ -160,14 +161,14 @@ impl Trial {
     }
 }
 
-/// Tries what `target/fuzz` or anybody else has kept.
+/// Runs given files.
 fn try_files(files: &[impl AsRef<Path> + std::fmt::Display]) -> ExitCode {
     let mut outcome = ExitCode::SUCCESS;
     for file in files {
         let path = root().join(file);
         let mut trial = Trial::start(&[&path.display().to_string()]);
         let began = Instant::now();
-        // Its number, then nothing.
+        // The child prints one number, then exits.
         let ended = trial.next().and_then(|_| trial.next());
         match trial.end(matches!(ended, Err(RecvTimeoutError::Timeout))) {
             None => println!("{file}: survived in {} ms", began.elapsed().as_millis()),
@@ -180,7 +181,7 @@ fn try_files(files: &[impl AsRef<Path> + std::fmt::Display]) -> ExitCode {
     outcome
 }
 
-/// Tries inputs for some minutes. Success if all of them have ended well.
+/// Runs inputs for a number of minutes. Success if none of them fails.
 fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
     let clock = || std::time::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs());
     let seed = seed.unwrap_or_else(clock);
@@ -214,7 +215,7 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
             }
         };
         let how = trial.end(ended != Some(RecvTimeoutError::Disconnected));
-        // The input under way when the time is over is not counted.
+        // An input interrupted at the end of the time is not counted.
         next = current + u64::from(ended.is_some());
         if ended.is_some() {
             failures += 1;
@@ -224,7 +225,9 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
                     "fuzz: input {current} of seed {seed} {how}; again: cargo xtask fuzz {}",
                     path.display()
                 ),
-                Err(e) => println!("fuzz: input {current} of seed {seed} {how}; it cannot be kept: {e}"),
+                Err(e) => {
+                    println!("fuzz: input {current} of seed {seed} {how}; its file cannot be written: {e}")
+                }
             }
         }
     }
@@ -236,7 +239,7 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
     if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Writes an input down; its path from the repository's root.
+/// Writes an input to `target/fuzz`; returns its path relative to the repository.
 fn keep(seed: u64, number: u64) -> std::io::Result<PathBuf> {
     let path = Path::new("target/fuzz").join(format!("{seed}-{number}"));
     std::fs::create_dir_all(root().join("target/fuzz"))?;
@@ -244,12 +247,7 @@ fn keep(seed: u64, number: u64) -> std::io::Result<PathBuf> {
     Ok(path)
 }
 
-/// The repository's root; tests run in the folder of their crate.
+/// Root of the repository. Tests run in the directory of their crate.
 fn root() -> PathBuf {
-    // crates/cagework-io is two levels below it.
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .nth(2)
-        .expect("the crate lies in the repository")
-        .to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the crate is in crates/").to_path_buf()
 }

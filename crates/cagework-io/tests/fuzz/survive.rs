@@ -1,4 +1,4 @@
-//! What is done with each input: everything that the command and the page do with a file.
+//! Operations on each input: those of the command and the page.
 
 use std::sync::LazyLock;
 
@@ -21,33 +21,33 @@ use crate::inputs;
 
 const GRID: u32 = 8;
 
-/// What inputs meet.
+/// Fixtures.
 struct Rest {
     samples: Vec<Vec<u8>>,
-    /// A cage that poses are for.
+    /// Reference cage for poses.
     cage: Model,
     closed: Cage,
-    /// Points inside it.
+    /// Points inside the cage.
     points: Vec<Vec3>,
     binding: Binding,
 }
 
 static REST: LazyLock<Rest> = LazyLock::new(|| {
-    let cage = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
+    let cage = read("cube.obj", CUBE_OBJ.as_bytes()).expect("the OBJ is valid");
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
-    let closed = Cage::new(&cage.cage_mesh()).expect("it is closed");
+    let closed = Cage::new(&cage.cage_mesh()).expect("the cage is closed");
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
     let points = lattice(bounds);
     let binding = bind(&points, &closed, &options, &Silent).expect("points are inside");
     Rest { samples: inputs::samples(), cage, closed, points, binding }
 });
 
-/// Of memory, bytes, for each thing that is read.
-const LIMIT: u64 = 1 << 28;
+/// Memory limit of each reader, bytes.
+const MEMORY_LIMIT: u64 = 1 << 28;
 
-/// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
+/// Reads `bytes` as each kind of file and uses every result.
 pub(crate) fn survive(bytes: &[u8]) {
-    if let Ok(saved) = read_weights_npz(bytes, LIMIT) {
+    if let Ok(saved) = read_weights_npz(bytes, MEMORY_LIMIT) {
         let written = write_weights_npz(
             &saved.weights,
             &saved.frames,
@@ -55,7 +55,7 @@ pub(crate) fn survive(bytes: &[u8]) {
             &saved.extra_points,
             &saved.inner_controls,
         );
-        let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
+        let again = read_weights_npz(&written, MEMORY_LIMIT).expect("written weights are readable");
         assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
         let controls: Vec<Vec3> = cube().into_iter().map(twist).collect();
         if saved.weights.n_columns() == controls.len() + saved.frames.n_columns() {
@@ -68,15 +68,17 @@ pub(crate) fn survive(bytes: &[u8]) {
         let _ = deform_bound(&REST.binding.weights, &REST.binding.frames, &pose);
     }
     let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
-    if let Ok(inner) = read_inner_controls(bytes, DVec3::ZERO, LIMIT) {
-        let written = read_inner_controls(&write_inner_controls(&inner, DVec3::ZERO), DVec3::ZERO, LIMIT);
+    if let Ok(inner) = read_inner_controls(bytes, DVec3::ZERO, MEMORY_LIMIT) {
+        let written =
+            read_inner_controls(&write_inner_controls(&inner, DVec3::ZERO), DVec3::ZERO, MEMORY_LIMIT);
         assert!(written.is_ok(), "{written:?}");
         as_controls(inner, choice);
     }
-    if let Ok(Some(project)) = read_project("x", bytes, LIMIT) {
+    if let Ok(Some(project)) = read_project("x", bytes, MEMORY_LIMIT) {
         as_cage(&project.cage, choice);
     }
-    let read = Model::read_within("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok), LIMIT);
+    let read =
+        Model::read_within("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok), MEMORY_LIMIT);
     if let Ok(model) = read {
         as_file(&model);
         as_rig(&model, choice);
@@ -86,18 +88,18 @@ pub(crate) fn survive(bytes: &[u8]) {
     }
 }
 
-/// Points are bound to controls inside of the cube, and stay where they are at rest.
+/// Binds points to the cube with controls inside; they must stay in place at rest.
 fn as_controls(inner: InnerControls, choice: u32) {
     let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
     let options = BindOptions { grid: GRID, tau: 1e-3, ..BindOptions::default() };
     let Ok(binding) = bind(&REST.points, &set, &options, &Silent) else { return };
     let rest = deform_bound(&binding.weights, &binding.frames, Controls::from(&set).rest());
     for (p, at) in REST.points.iter().zip(rest) {
-        assert!(p.distance(at) < 1e-4, "{p} is put at {at}");
+        assert!(p.distance(at) < 1e-4, "{p} moves to {at}");
     }
 }
 
-/// A GLB that was written can be read.
+/// Exports must be readable.
 fn as_file(model: &Model) {
     assert!(model.positions.iter().all(|p| p.is_finite()));
     assert!(model.triangles.iter().flatten().all(|&v| (v as usize) < model.positions.len()));
@@ -116,7 +118,7 @@ fn as_file(model: &Model) {
     }
 }
 
-/// Reshaped with its rig it can be read, and plays.
+/// Reshaped exports must be readable and playable.
 fn as_rig(model: &Model, choice: u32) {
     if let Ok(Some(player)) = model.player() {
         for clip in 0..player.clips().len().min(2) {
@@ -148,7 +150,7 @@ fn as_pose(model: &Model) {
     }
 }
 
-/// A cage is made for it, and it is bound to that.
+/// Generates a cage and binds the model to it.
 fn as_model(model: &Model, choice: u32) {
     let flags = |bit: u32| choice >> bit & 1 == 1;
     let options = CageOptions {
@@ -159,27 +161,28 @@ fn as_model(model: &Model, choice: u32) {
         symmetry: [Symmetry::Auto, Symmetry::None, Symmetry::X, Symmetry::Z][choice as usize >> 9 & 3],
         per_component: flags(11),
         clearance: if flags(12) { 0.25 } else { 0.0 },
-        // Coarse mostly: the finer, the fewer inputs.
+        // Mostly coarse, for speed.
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
         smooth: choice >> 9 & 1,
     };
     if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
         assert_eq!(made.cage.notices(), []);
         let (smooth, options) = (options.smooth, bind_options(choice));
-        // The surface that encloses the model is the smooth one, if that was asked for.
-        let smooth = ControlSet::new(&made.cage, smooth, InnerControls::default()).expect("it was one");
+        // With `smooth`, the limit surface encloses the model.
+        let smooth =
+            ControlSet::new(&made.cage, smooth, InnerControls::default()).expect("the cage is valid");
         match bind(&model.positions, &smooth, &options, &Silent) {
             Ok(binding) => {
                 assert_eq!(binding.weights.n_rows(), model.positions.len());
                 assert!(binding.weights.data().iter().all(|w| w.is_finite()));
             }
-            // All of the model is inside, but the published cells may be too large for it.
+            // The model is inside the cage, but the classic method's cells may be too large for it.
             Err(error) => assert_eq!(options.method, Method::Classic, "{error}"),
         }
     }
 }
 
-/// It is checked, repaired and checked again, and points in its box are bound to it.
+/// Checks, repairs and rechecks a cage, and binds points in its bounding box.
 fn as_cage(mesh: &PolygonMesh, choice: u32) {
     let finite: Vec<Vec3> = mesh.positions.iter().copied().filter(|p| p.is_finite()).collect();
     let bounds = Bounds::of(&finite).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
@@ -215,7 +218,7 @@ fn bind_options(choice: u32) -> BindOptions {
     }
 }
 
-/// Points throughout a box, its corners among them.
+/// A 5 x 5 x 5 grid of points in a box, including its corners.
 fn lattice(bounds: Bounds) -> Vec<Vec3> {
     let at = |k: u32| k as f32 / 4.0;
     let points = (0..125).map(|k| Vec3::new(at(k % 5), at(k / 5 % 5), at(k / 25)));

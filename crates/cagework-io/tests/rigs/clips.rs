@@ -1,4 +1,4 @@
-//! Clips: what becomes of their tracks, and how they are baked.
+//! Animation clips: adaptation of tracks, and baking.
 
 use cagework_io::{Joints, Player, WriteError};
 use glam::Vec3;
@@ -11,14 +11,14 @@ fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_
     let model = read(&rigged().glb());
     let (bytes, report) = reshaped(&model, Joints::Follow);
     let [old, new] = [rigged().glb(), bytes].map(|bytes| player(&read(&bytes)));
-    assert_eq!(report.tracks, 2, "of the root, which moves, and of a bone, which stands still");
+    assert_eq!(report.tracks, 2, "tracks of the root, which moves, and of a bone of constant length");
     let json = json_of(&reshaped(&model, Joints::Follow).0);
     let before = json_of(&rigged().glb());
     for k in 0..4 {
         let output = |json: &serde_json::Value| json["animations"][0]["samplers"][k]["output"].clone();
         assert_eq!(output(&json), output(&before), "in place");
     }
-    // The tip turns about its joint, which has moved: the clip's end is the same turn about another place.
+    // Joints keep their orientation, so only translations of the palette change.
     for seconds in [0.0, 0.4, 1.0] {
         let [a, b] = [&old, &new].map(|player| player.at(Some(0), seconds, &[]));
         let linear = |m: &glam::Mat4| glam::Mat3::from_mat4(*m);
@@ -58,7 +58,7 @@ fn clips_do_not_change_what_becomes_of_the_shape() {
     assert_eq!(with, without);
 }
 
-/// Between keys a spline is the rule's, too: its tangents take the linear part.
+/// Between keys, cubic splines obey the same rule; tangents take the linear part.
 #[test]
 fn splines_follow_the_rule_between_their_keys() {
     let mut rig = rigged();
@@ -69,7 +69,7 @@ fn splines_follow_the_rule_between_their_keys() {
     rig.json["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE".into();
     let model = read(&rig.glb());
     let (before, after) = (player(&model), player(&read(&reshaped(&model, Joints::Follow).0)));
-    // Heights grow by 1.2 under `f`, and so does how far the root travels.
+    // `f` scales heights by 1.2, and so do the translations of the root.
     let root = |player: &Player, seconds: f32| player.at(Some(0), seconds, &[]).origins[1];
     for seconds in [0.0, 0.3, 0.7, 1.0] {
         let [old, new] = [&before, &after].map(|player| root(player, seconds));
@@ -78,7 +78,7 @@ fn splines_follow_the_rule_between_their_keys() {
     }
 }
 
-/// What bends the moving model is baked: at its frames the clip shows what was given.
+/// A baked clip reproduces the given frames.
 #[test]
 fn baked_clip_shows_its_frames() {
     let model = read(&rigged().glb());
@@ -104,9 +104,9 @@ fn baked_clip_shows_its_frames() {
     assert_eq!(model.frames(7).unwrap_err(), WriteError::NoClip(7));
 }
 
-/// A sampler that is not there was written as null for two channels that name it, and the file could not be opened again.
+/// Two channels with a missing sampler must stay unchanged. Indexing the JSON would add null members.
 #[test]
-fn channels_of_a_missing_sampler_are_left_alone() {
+fn channels_with_a_missing_sampler_stay_unchanged() {
     let mut rig = rigged();
     for channel in [0, 1] {
         rig.json["animations"][0]["channels"][channel]["sampler"] = 99.into();
@@ -119,13 +119,13 @@ fn channels_of_a_missing_sampler_are_left_alone() {
     assert_near(&read(&bytes).positions, &moved, ROUNDED, "at rest");
 }
 
-/// Samplers and accessors that channels share: each gets values of its own, and the last to go takes over what was shared.
+/// Channels that share samplers or accessors get separate values; the last one reuses the shared accessor.
 #[test]
-fn shared_samplers_and_accessors_are_parted() {
+fn shared_samplers_and_accessors_are_separated() {
     let mut rig = rigged();
     let root = rig.json["animations"][0]["samplers"][0]["output"].clone();
     rig.json["animations"][0]["samplers"][1]["output"] = root.clone();
-    // The root and the middle by one sampler; the tip, which gets none, by another that shares its values.
+    // Root and middle share one sampler. The new channel of the tip uses another one with the same output.
     rig.json["animations"][0]["channels"][1]["sampler"] = 0.into();
     let channel = serde_json::json!({ "sampler": 1, "target": { "node": 3, "path": "translation" } });
     rig.json["animations"][0]["channels"].as_array_mut().unwrap().push(channel);
@@ -136,8 +136,8 @@ fn shared_samplers_and_accessors_are_parted() {
         .map(|s| json["animations"][0]["samplers"][s as usize]["output"].as_u64().unwrap())
         .into();
     assert!(outputs[0] != outputs[1] && outputs[1] != outputs[2] && outputs[0] != outputs[2], "{outputs:?}");
-    assert!(outputs.contains(&root.as_u64().unwrap()), "{outputs:?}: the old one is not left unused");
-    // All ways grow by 1.2, as heights do under f.
+    assert!(outputs.contains(&root.as_u64().unwrap()), "{outputs:?}: the shared accessor is reused");
+    // All translations scale by 1.2, as heights do under `f`.
     let at = |bytes: &[u8], seconds| player(&read(bytes)).at(Some(0), seconds, &[]).origins;
     let [old, new] = [&before, &after].map(|bytes| [at(bytes, 0.0), at(bytes, 1.0)]);
     let way = |of: &[Vec<Vec3>; 2], node: usize| of[1][node] - of[0][node];
@@ -148,7 +148,7 @@ fn shared_samplers_and_accessors_are_parted() {
 }
 
 #[test]
-fn clips_without_a_name_are_called_by_their_number() {
+fn unnamed_clips_are_called_by_their_index() {
     let mut rig = rigged();
     rig.json["animations"][0].as_object_mut().unwrap().shift_remove("name");
     let model = read(&rig.glb());
@@ -157,9 +157,9 @@ fn clips_without_a_name_are_called_by_their_number() {
     assert_eq!(message, "there is no clip 'walk'; the model has clip 0");
 }
 
-/// All references to accessors were counted anew for every track: a person of 65 joints with 60 clips took more than five minutes.
+/// Counting references per track would take quadratic time: more than 5 min for 60 clips of 65 joints.
 #[test]
-fn many_clips_take_time_by_their_number() {
+fn many_clips_take_linear_time() {
     let mut rig = rigged();
     let animation = rig.json["animations"][0].clone();
     let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
@@ -173,15 +173,15 @@ fn many_clips_take_time_by_their_number() {
     let model = read(&rig.glb());
     let began = std::time::Instant::now();
     let (bytes, report) = reshaped(&model, Joints::Follow);
-    // 0.5 s by itself, and 60 s before.
+    // Takes 0.5 s; with quadratic time, 60 s.
     assert!(began.elapsed().as_secs() < 20, "{:?}", began.elapsed());
     assert_eq!(report.tracks, 2 * 6001);
     assert_eq!(read(&bytes).clips().len(), 6001);
 }
 
-/// A width that is taken from the number of values had room for two of a translation's three.
+/// The number of values must match the keys and the width of the property.
 #[test]
-fn channels_with_too_few_values_for_their_keys_are_left_out() {
+fn channels_with_too_few_values_are_ignored() {
     let mut rig = rigged();
     let whole = player(&read(&rig.glb())).clips()[0].channels;
     let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;

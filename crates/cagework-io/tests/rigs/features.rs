@@ -1,4 +1,4 @@
-//! What files have besides a skin and a clip: props, several sets of joints, instances, other scenes, flattened skins.
+//! Rigid props, several sets of joints, instancing, meshes outside the scene, singular skins.
 
 use cagework_io::{Joints, Model, ReshapeOptions};
 use glam::{DVec3, Mat4, Vec3, vec3};
@@ -7,7 +7,7 @@ use serde_json::json;
 use super::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
 use super::{ROUNDED, assert_near, assert_targets, by, f, player, read, reshaped, shown};
 
-/// The column with a cube on its tip, placed by a matrix.
+/// The column with a cube attached to its tip by a matrix.
 fn with_hat() -> Builder {
     let mut rig = rigged();
     let cube = rig.cube_mesh("cube");
@@ -17,13 +17,13 @@ fn with_hat() -> Builder {
     rig
 }
 
-/// The last `n` vertices: those of what was added.
+/// The last `n` vertices, which belong to the added mesh.
 fn last(model: &Model, n: usize) -> Vec<Vec3> {
     model.positions[model.positions.len() - n..].to_vec()
 }
 
 #[test]
-fn what_hangs_on_a_bone_bends_or_stays_rigid() {
+fn props_on_bones_bend_or_stay_rigid() {
     let model = read(&with_hat().glb());
     assert_eq!(model.props().unwrap(), ["hat"]);
     let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
@@ -33,7 +33,7 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     let options = ReshapeOptions { rigid: vec!["hat".into()], ..ReshapeOptions::default() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
     let rigid = last(&read(&bytes), 8);
-    // What is nearest in the least squares has the middle of what would bend (Kabsch 1976).
+    // The least-squares rigid motion maps the centroid to the centroid of the bent shape (Kabsch 1976).
     let middle = |at: &[Vec3]| at.iter().sum::<Vec3>() / at.len() as f32;
     assert!(middle(&rigid).distance(middle(&moved)) <= ROUNDED, "{rigid:?} {moved:?}");
     for (a, b) in [(0, 7), (1, 6), (2, 4)] {
@@ -42,7 +42,7 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
         assert!((before - moved[a].distance(moved[b])).abs() > 1e-3, "otherwise it is stretched");
     }
 
-    // The same on a skeleton that stays, in one of several poses, with its origin elsewhere, and mirrored.
+    // Same result with a skeleton that stays, as one of several poses, with another mesh origin, and mirrored.
     let stays = ReshapeOptions { joints: Joints::Stay, ..options.clone() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &stays).unwrap();
     assert_near(&last(&read(&bytes), 8), &rigid, ROUNDED, "the skeleton stays");
@@ -61,7 +61,7 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     baked.json["meshes"][1]["primitives"][0]["attributes"]["POSITION"] = json!(position);
     baked.json["nodes"][5] =
         json!({ "name": "hat", "mesh": 1, "translation": (vec3(0.05, 0.1, 0.0) + away).to_array() });
-    // The cube is as wide to the left as it was to the right.
+    // The mirrored cube occupies the same box.
     let mut mirrored = with_hat();
     mirrored.json["nodes"][5] =
         json!({ "name": "hat", "mesh": 1, "translation": [0.15, 0.1, 0.0], "scale": [-0.1, 0.1, 0.1] });
@@ -73,7 +73,7 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
             assert!(near <= 4.0 * ROUNDED, "{what}: {near:e}");
         }
     }
-    // A joint or a skinned mesh of the same name is something else.
+    // Joints and skinned meshes with the same name are not props.
     let mut same_name = with_hat();
     for node in [3, 4] {
         same_name.json["nodes"][node]["name"] = json!("hat");
@@ -96,9 +96,9 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     assert_eq!(last(&read(&bytes), 8), rigid);
 }
 
-/// As UniVRM exports a mesh of several materials.
+/// UniVRM exports meshes of several materials this way.
 #[test]
-fn vertices_that_primitives_share_are_written_once_or_twice() {
+fn vertices_shared_between_primitives_stay_shared() {
     let mut rig = rigged();
     let one = reshaped(&read(&rig.glb()), Joints::Follow).0.len();
     let primitive = rig.json["meshes"][0]["primitives"][0].clone();
@@ -114,15 +114,15 @@ fn vertices_that_primitives_share_are_written_once_or_twice() {
         let different: std::collections::HashSet<u64> = accessors.collect();
         assert!(different.len() <= 2, "{attribute}: {different:?}");
     }
-    // Otherwise 8 times the vertices.
+    // Separate copies would take eight times the vertices.
     assert!(bytes.len() < 3 * one, "{} and {one} bytes", bytes.len());
 }
 
 #[test]
-fn what_stays_keeps_the_bytes_of_all_its_states() {
+fn export_without_moving_parts_is_the_input() {
     let bytes = rigged().glb();
     let model = read(&bytes);
-    // Joints that stay are no reason to write anything, and no vertex moves, with any target.
+    // No joint and no vertex moves in any state, so nothing is written.
     let parts = model.parts(&[("bar".into(), 1.0)], &[]).unwrap();
     let options = ReshapeOptions { joints: Joints::Stay, parts, ..ReshapeOptions::default() };
     assert!(model.write_reshaped(&by(&model), &[], &[], &options).unwrap().0 == bytes);
@@ -145,9 +145,9 @@ fn a_rigid_piece_of_a_skin_keeps_its_lengths_with_every_target() {
     }
 }
 
-/// The second influence of each vertex in a set of its own.
+/// The second influence of each vertex in a second set.
 #[test]
-fn several_sets_of_joints_are_one() {
+fn several_sets_of_joints_add_up() {
     let mut rig = rigged();
     let n = 20;
     let mut sets = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
@@ -176,24 +176,24 @@ fn several_sets_of_joints_are_one() {
 }
 
 #[test]
-fn instances_keep_their_places_and_it_is_said() {
+fn gpu_instances_stay_unchanged_with_a_notice() {
     let mut rig = with_hat();
     let places = rig.accessor(&floats(&[0.0; 6]), F32, 2, "VEC3");
     rig.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
     let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
     rig.json["nodes"][5]["extensions"] = instancing.clone();
     let model = read(&rig.glb());
-    let told = "draws its mesh many times over: only the one at the node is bound";
-    assert!(model.notices.iter().any(|notice| notice.contains(told)), "{:?}", model.notices);
+    let expected = "draws instances of its mesh (EXT_mesh_gpu_instancing): only one of them is bound";
+    assert!(model.notices.iter().any(|notice| notice.contains(expected)), "{:?}", model.notices);
     let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
     let (bytes, _) = reshaped(&model, Joints::Follow);
     assert_near(&last(&read(&bytes), 8), &moved, ROUNDED, "the one at the node");
     assert_eq!(json_of(&bytes)["nodes"][5]["extensions"], instancing);
 }
 
-/// A level of detail that no scene shows: it must go on to match.
+/// A level of detail outside the scene must match the visible mesh.
 #[test]
-fn meshes_in_no_scene_move_along() {
+fn meshes_outside_the_scene_are_deformed() {
     let mut rig = rigged();
     let coarse = rig.cube_mesh("coarse");
     rig.push("nodes", json!({ "name": "coarse", "mesh": coarse }));
@@ -209,9 +209,9 @@ fn meshes_in_no_scene_move_along() {
     assert_near(&shown.positions, &moved, ROUNDED, "the level of detail");
 }
 
-/// A joint outside the cage that holds no vertex: the end of a chain.
+/// A joint without vertices, outside the cage: the end of a chain.
 #[test]
-fn loose_joints_go_with_their_parents() {
+fn joints_without_vertices_outside_the_cage_follow_their_parents() {
     let mut rig = rigged();
     rig.push("nodes", json!({ "name": "end", "translation": [0.0, 0.5, 0.3] }));
     rig.json["nodes"][3]["children"] = json!([5]);
@@ -228,16 +228,19 @@ fn loose_joints_go_with_their_parents() {
         let at = json_of(&bytes)["nodes"][5]["translation"].clone();
         vec3(0.0, 0.5, 0.3).distance(Vec3::from_array([0, 1, 2].map(|k| at[k].as_f64().unwrap() as f32)))
     });
-    assert!(loose <= ROUNDED && inside > 0.05, "{loose} and {inside} from where it was below its parent");
+    assert!(
+        loose <= ROUNDED && inside > 0.05,
+        "{loose} and {inside} away from the original offset to its parent"
+    );
 }
 
-/// A skin that presses the column's upper half flat cannot be undone there.
+/// The skinning matrix of the column's upper half is singular.
 #[test]
-fn flattened_vertices_go_with_their_neighbours_and_are_counted() {
+fn vertices_with_singular_skinning_follow_their_neighbours() {
     let mut rig = rigged();
     let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap();
     let mut values = super::floats(&rig, binds);
-    // Of the middle and the tip: nothing is left of x.
+    // The bind matrices of the middle and the tip project along x.
     for column in 4..12 {
         values[4 * column] = 0.0;
     }
@@ -245,15 +248,14 @@ fn flattened_vertices_go_with_their_neighbours_and_are_counted() {
     let model = read(&rig.glb());
     let (bytes, report) = reshaped(&model, Joints::Follow);
     assert_eq!(report.singular_vertices, 12, "three of five rings: {report:?}");
-    assert!(report.notices().iter().any(|n| n.contains("flattened by their skin")), "{:?}", report.notices());
+    assert!(report.notices().iter().any(|n| n.contains("collapsed by the skin")), "{:?}", report.notices());
     assert!(read(&bytes).positions.iter().all(|p| p.is_finite()));
     let still = vec![DVec3::ZERO; by(&model).len()];
     assert!(model.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0 == rig.glb());
 }
 
-/// Values of a STEP track follow the same rule as those of a linear one.
 #[test]
-fn steps_are_rescaled_as_lines_are() {
+fn step_tracks_are_rescaled_like_linear_ones() {
     let mut steps = rigged();
     steps.json["animations"][0]["samplers"][0]["interpolation"] = "STEP".into();
     let [linear, step] =
@@ -265,7 +267,7 @@ fn steps_are_rescaled_as_lines_are() {
     assert_eq!(root, key, "it holds until the next key");
 }
 
-/// The column bent by 60 degrees in its middle: what the joints hold it by is the straight one.
+/// The column is bent by 60 degrees at rest but straight in its bind pose.
 #[test]
 fn a_rest_pose_far_from_the_bind_pose_survives() {
     let mut rig = rigged();
@@ -277,7 +279,7 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
     assert!(top(&model).distance(top(&straight)) > 0.9, "it is bent at rest");
     for joints in [Joints::Follow, Joints::Stay] {
         let bytes = reshaped(&model, joints).0;
-        // The target without a default, and both at rest.
+        // The target with default weight 0, at weights 0 and 1.
         assert_targets(&model, &bytes, &[1], 2.0 * ROUNDED);
         let [before, after] = [&model, &read(&bytes)].map(|m| player(m).at(None, 0.0, &[]).palette);
         for (a, b) in before.iter().zip(&after) {
@@ -286,20 +288,20 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
     }
 }
 
-/// Found by damaged files: what a skin shrinks to nothing was written as infinite, and the file could not be opened any more.
+/// Found by fuzzing: positions beyond f32 must not be written.
 #[test]
-fn skin_that_shrinks_beyond_32_bits_is_refused() {
+fn skin_that_scales_beyond_f32_is_rejected() {
     let mut rig = rigged();
     rig.json["nodes"][0]["scale"] = json!([1e-39, 1e-39, 1e-39]);
     let model = read(&rig.glb());
     let by = vec![DVec3::ONE; model.positions.len() + model.extra_points().unwrap().len()];
     let refused = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap_err().to_string();
-    assert!(refused.contains("beyond numbers of 32 bits"), "{refused}");
+    assert!(refused.contains("exceed the range of f32"), "{refused}");
 }
 
-/// Colliders of VRM 1 that leave out their offset are at their node: their sizes and ends were left as they were.
+/// Colliders of VRM 1 without offset are at their node; radii and tails scale.
 #[test]
-fn colliders_without_an_offset_grow_as_well() {
+fn colliders_without_offset_are_scaled() {
     let mut rig = rigged();
     rig.json["extensionsUsed"] = json!(["VRMC_springBone"]);
     rig.json["extensions"] = json!({ "VRMC_springBone": { "colliders": [
@@ -309,7 +311,7 @@ fn colliders_without_an_offset_grow_as_well() {
     let json = json_of(&reshaped(&read(&rig.glb()), Joints::Follow).0);
     let shape =
         |k: usize, kind: &str| json["extensions"]["VRMC_springBone"]["colliders"][k]["shape"][kind].clone();
-    // At a height of 1 `f` grows y by 1.2 and shears, which keeps volumes; the armature doubles.
+    // At height 1, `f` scales y by 1.2 and shears, which preserves volume. The armature scales by two.
     for of in [shape(0, "sphere"), shape(1, "capsule")] {
         let radius = of["radius"].as_f64().unwrap();
         assert!((radius / 0.1 - 1.2_f64.cbrt()).abs() < 1e-3, "{radius}");
@@ -320,9 +322,9 @@ fn colliders_without_an_offset_grow_as_well() {
     assert!(found.distance(tail) <= ROUNDED, "{found} instead of {tail}");
 }
 
-/// Viewers show them at one place or another: they are kept, and it is said.
+/// Vertices without weights follow the mesh's node, with a notice.
 #[test]
-fn vertices_that_no_joint_holds_are_counted() {
+fn vertices_without_weights_follow_the_node_with_a_notice() {
     for (weight, n) in [(f32::NAN, 1), (0.0, 1), (-1.0, 1)] {
         let mut rig = rigged();
         let weights = rig.primitive(0)["attributes"]["WEIGHTS_0"].as_u64().unwrap();
@@ -331,24 +333,24 @@ fn vertices_that_no_joint_holds_are_counted() {
         let weights = rig.accessor(&floats(&values), F32, 20, "VEC4");
         rig.primitive(0)["attributes"]["WEIGHTS_0"] = weights.into();
         let model = read(&rig.glb());
-        let said = format!("skin 0 has no weight above zero for {n} vertices: they go with the mesh's node");
-        assert!(model.notices.contains(&said), "{weight}: {:?}", model.notices);
-        // The node is at 7, 7, 7: there it is bound, and from there it moves.
+        let notice = format!("skin 0 has no positive weight for {n} vertex: they follow the mesh's node");
+        assert!(model.notices.contains(&notice), "{weight}: {:?}", model.notices);
+        // The node is at (7, 7, 7), where the vertex is bound.
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
         let bytes = reshaped(&model, Joints::Follow).0;
         assert_near(&read(&bytes).positions, &moved, 16.0 * ROUNDED, "with a loose vertex");
     }
-    assert!(!read(&rigged().glb()).notices.iter().any(|notice| notice.contains("no weight")));
+    assert!(!read(&rigged().glb()).notices.iter().any(|notice| notice.contains("no positive weight")));
 }
 
-/// glTF asks for as many targets in each primitive of a mesh; where a file has fewer, poses were put at wrong numbers.
+/// All primitives of a mesh must have the same number of targets, so missing ones are added before the poses.
 #[test]
-fn primitives_with_fewer_targets_are_posed_as_the_others() {
+fn primitives_with_fewer_targets_are_padded() {
     let mut rig = rigged();
     let mut second = rig.primitive(0).clone();
     second.as_object_mut().unwrap().shift_remove("targets");
     rig.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(second);
-    // Its first target's default moves the first primitive only.
+    // The default weight of the first target applies to the first primitive only.
     let model = read(&rig.glb());
     let by = by(&model);
     let still = vec![DVec3::ZERO; by.len()];
@@ -362,7 +364,7 @@ fn primitives_with_fewer_targets_are_posed_as_the_others() {
     assert_near(&posed, &moved, 4.0 * ROUNDED, "the pose");
 }
 
-/// Poses of a clip keep its times, beside the model's own clips.
+/// Poses with times are added next to the model's clips.
 #[test]
 fn poses_are_played_at_their_times() {
     let rig = rigged();
@@ -384,26 +386,26 @@ fn poses_are_played_at_their_times() {
 }
 
 #[test]
-fn bind_matrices_that_are_no_numbers_name_their_skin() {
+fn non_finite_bind_matrices_are_errors() {
     let mut rig = rigged();
     let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap();
     let mut values = super::floats(&rig, binds);
     values[20] = f32::NAN;
     let binds = rig.accessor(&floats(&values), F32, 3, "MAT4");
     rig.json["skins"][0]["inverseBindMatrices"] = binds.into();
-    let said = Model::read("rigged.glb", &rig.glb(), &mut |_| None).unwrap_err().to_string();
-    assert!(said.contains("the inverse bind matrix of joint 1 of skin 0, which is not finite"), "{said}");
+    let message = Model::read("rigged.glb", &rig.glb(), &mut |_| None).unwrap_err().to_string();
+    assert!(message.contains("a non-finite inverse bind matrix for joint 1 of skin 0"), "{message}");
 }
 
 #[test]
-fn what_lies_on_indices_is_not_written_over() {
+fn positions_that_overlap_indices_are_not_overwritten() {
     let mut cube = plain_cube();
-    // A ninth vertex, which no triangle uses, is the first six indices.
+    // The ninth vertex, unused by triangles, overlaps the first six indices.
     cube.json["accessors"][0]["count"] = 9.into();
     cube.json["bufferViews"][0]["byteLength"] = (9 * 12).into();
     let model = read(&cube.glb());
     let again = read(&reshaped(&model, Joints::Follow).0);
     assert_eq!(again.triangles, model.triangles);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&again.positions, &moved, ROUNDED, "where the cage brings them");
+    assert_near(&again.positions, &moved, ROUNDED, "deformed positions");
 }

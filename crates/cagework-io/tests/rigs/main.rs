@@ -1,6 +1,6 @@
-//! Rigged models reshaped: the rules of `docs/rigs.md`, on a model whose bind pose is not its rest pose.
+//! Reshaping of rigged models: the rules of `docs/rigs.md`, on a model whose bind pose differs from its rest pose.
 //!
-//! What is expected is written down from the definition of skinning: `sum_j w_j G_j B_j (p + sum_k t_k d_k)`.
+//! Expected positions follow from the definition of skinning: `sum_j w_j G_j B_j (p + sum_k t_k d_k)`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -17,7 +17,7 @@ use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport};
 use common::{json_of, rigged};
 use glam::{DVec3, Vec3, vec3};
 
-/// Rounding of f32 positions of size 2, there and back.
+/// Rounding of an f32 round trip of positions up to 2.
 const ROUNDED: f32 = 2e-6;
 
 fn read(bytes: &[u8]) -> Model {
@@ -33,12 +33,12 @@ fn shown(player: &Player, clip: Option<usize>, seconds: f32, targets: &[f32]) ->
     skin_vertices(&player.skin, &posed.palette, &posed.targets)
 }
 
-/// A deformation that is no affine map.
+/// A deformation that is not affine.
 fn f(p: Vec3) -> Vec3 {
     p + vec3(0.1 + 0.1 * p.y * p.y, 0.05 + 0.2 * p.y, 0.05 * p.x * p.y)
 }
 
-/// All points of a model, and how far `f` moves them.
+/// Displacements of all points under `f`.
 fn by(model: &Model) -> Vec<DVec3> {
     let extra = model.extra_points().unwrap();
     model.positions.iter().chain(&extra).map(|&p| f(p).as_dvec3() - p.as_dvec3()).collect()
@@ -56,13 +56,13 @@ fn assert_near(found: &[Vec3], expected: &[Vec3], within: f32, what: &str) {
 }
 
 #[test]
-fn player_shows_at_rest_what_is_read() {
+fn player_at_rest_matches_the_model() {
     let model = read(&rigged().glb());
     assert_near(&shown(&player(&model), None, 0.0, &[]), &model.positions, ROUNDED, "rest");
 }
 
 #[test]
-fn unmoved_cage_gives_the_bytes_of_the_input() {
+fn unmoved_cage_returns_the_input() {
     let bytes = rigged().glb();
     let model = read(&bytes);
     let still = vec![DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()];
@@ -72,7 +72,7 @@ fn unmoved_cage_gives_the_bytes_of_the_input() {
     }
 }
 
-/// The same model at coordinates of a map is reshaped, played and baked as it is at the origin: 32-bit floats have steps of 0.5 there.
+/// Reshaping, playback and baking in map coordinates, where f32 has steps of 0.5, are as exact as near the origin.
 #[test]
 fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
     let place = vec3(500_000.25, 0.0, 4_500_000.5);
@@ -93,7 +93,7 @@ fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
     assert_near(&states(&far), &states(&near), ROUNDED, "what a cage should enclose");
     let still = vec![DVec3::ZERO; far.positions.len() + far.extra_points().unwrap().len()];
     let unmoved = far.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0;
-    assert!(unmoved == b.glb(), "what did not move keeps its bytes");
+    assert!(unmoved == b.glb(), "unmoved export is the input");
     let rigid = far.parts(&[], &["bar".to_owned()]).unwrap();
     for (joints, parts) in [Joints::Follow, Joints::Stay, Joints::Turn, Joints::Follow].into_iter().zip([
         Default::default(),
@@ -117,7 +117,7 @@ fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
 }
 
 #[test]
-fn rest_and_every_target_alone_are_where_the_cage_brings_them() {
+fn rest_and_single_targets_follow_the_cage() {
     let model = read(&rigged().glb());
     let before = player(&model);
     for joints in [Joints::Follow, Joints::Stay, Joints::Turn] {
@@ -142,11 +142,11 @@ fn rest_and_every_target_alone_are_where_the_cage_brings_them() {
 }
 
 #[test]
-fn joints_go_with_the_cage_and_hold_their_vertices_as_before() {
+fn joints_follow_the_cage_and_keep_skinning_matrices() {
     let model = read(&rigged().glb());
     let (bytes, _) = reshaped(&model, Joints::Follow);
     let (before, after) = (player(&model), player(&read(&bytes)));
-    // `G B` of every joint.
+    // Skinning matrix `G B` of each joint.
     let [old, new] = [&before, &after].map(|player| player.at(None, 0.0, &[]).palette);
     for (a, b) in old.iter().zip(&new) {
         assert!(a.abs_diff_eq(*b, ROUNDED), "{a} {b}");
@@ -156,7 +156,7 @@ fn joints_go_with_the_cage_and_hold_their_vertices_as_before() {
         let at = |n: usize| {
             Vec3::from_array([0, 1, 2].map(|k| json["nodes"][n]["translation"][k].as_f64().unwrap() as f32))
         };
-        // The armature doubles, joints do not turn.
+        // The armature scales by two; joints do not rotate.
         at(0) + 2.0 * (1..=node).map(at).sum::<Vec3>()
     };
     for (node, y) in [(1, 0.0), (2, 1.0), (3, 2.0)] {
@@ -165,7 +165,7 @@ fn joints_go_with_the_cage_and_hold_their_vertices_as_before() {
 }
 
 #[test]
-fn poses_are_targets_after_those_there_are() {
+fn poses_are_appended_to_the_targets() {
     let model = read(&rigged().glb());
     let by = by(&model);
     let still = vec![DVec3::ZERO; by.len()];
@@ -180,15 +180,15 @@ fn poses_are_targets_after_those_there_are() {
     targets[2] = 1.0;
     let bent: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
     assert_near(&shown(&after, None, 0.0, &targets), &bent, ROUNDED, "bent");
-    // Old clips have weights for all three, the new one plays the pose.
+    // Existing clips have weights for all three targets; the new clip plays the pose.
     assert_near(&shown(&after, Some(1), 1.0, &[]), &bent, ROUNDED, "played");
     let old = player(&model);
     assert_near(&shown(&after, Some(0), 0.7, &[]), &shown(&old, Some(0), 0.7, &[]), ROUNDED, "the old clip");
 }
 
-/// One mesh by two skins is two shapes: each gets its own, and its own targets.
+/// A mesh with two skins has two deformations, so it is duplicated with its targets.
 #[test]
-fn a_mesh_of_two_skins_is_reshaped_twice() {
+fn mesh_with_two_skins_is_duplicated() {
     let mut rig = rigged();
     let skin = rig.json["skins"][0].clone();
     let joints = serde_json::json!([3, 2, 1]);
@@ -213,7 +213,7 @@ fn a_mesh_of_two_skins_is_reshaped_twice() {
 }
 
 #[test]
-fn what_is_wrong_with_a_rig_is_said_or_left_alone() {
+fn rig_errors_are_reported_or_ignored() {
     let fault = |change: &dyn Fn(&mut common::Builder)| {
         let mut rig = rigged();
         change(&mut rig);
@@ -222,20 +222,20 @@ fn what_is_wrong_with_a_rig_is_said_or_left_alone() {
     let message = |change: &dyn Fn(&mut common::Builder)| fault(change).unwrap_err().to_string();
     assert_eq!(
         message(&|rig| rig.json["skins"][0]["joints"][1] = 99.into()),
-        "rigged.glb: skin 0 names joint node 99, but there are 5"
+        "rigged.glb: skin 0 refers to joint node 99, but there are 5"
     );
     assert_eq!(
         message(&|rig| {
             let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap() as usize;
             rig.json["accessors"][binds]["count"] = 2.into();
         }),
-        "rigged.glb: skin 0 names inverse bind matrix 2, but there are 2"
+        "rigged.glb: skin 0 refers to inverse bind matrix 2, but there are 2"
     );
     assert_eq!(
         message(&|rig| rig.json["nodes"][3]["children"] = serde_json::json!([1])),
         "rigged.glb: node 1 has two parents: the nodes must be a tree"
     );
-    // Viewers show these; the clip only stays as it is.
+    // Viewers accept these files; unreadable tracks stay unchanged.
     let mut rig = rigged();
     let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
     rig.json["accessors"][output]["count"] = 1.into();
@@ -258,7 +258,7 @@ fn cage_of_a_model_encloses_targets_and_a_clip() {
     assert!(positions.len() > rest && triangles == model.triangles);
     let widest = positions.iter().map(|p| p.x).fold(0.0, f32::max);
     assert!(widest > model.positions.iter().map(|p| p.x).fold(0.0, f32::max), "the target 'wide' is at 1");
-    // Its default is a quarter; the column itself is as narrow as that target leaves it.
+    // The default weight is 0.25; the column itself is as narrow as that target leaves it.
     let narrow = |p: &&Vec3| p.y > 1.9 && (p.x - 0.2).abs() < 1e-5;
     assert_eq!([&model.positions, &positions].map(|at| at.iter().filter(narrow).count()), [0, 2]);
     let (frames, of_frames) = model.states(Some("walk")).unwrap();
@@ -268,7 +268,7 @@ fn cage_of_a_model_encloses_targets_and_a_clip() {
     assert_eq!(message, "there is no clip 'run'; the model has walk");
 }
 
-/// Offsets of VRM 0, whose z is turned round, and VRM 1: they stay on the same flesh.
+/// Offsets of VRM 0 (with negated z) and VRM 1 move with the surface.
 #[test]
 fn offsets_of_a_vrm_move_with_the_shape() {
     let mut rig = rigged();
@@ -304,7 +304,7 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     let number = |v: &serde_json::Value| v.as_f64().unwrap() as f32;
     let array = |v: &serde_json::Value| vec3(number(&v[0]), number(&v[1]), number(&v[2]));
     let object = |v: &serde_json::Value| vec3(number(&v["x"]), number(&v["y"]), -number(&v["z"]));
-    // Joints are one and two up; the armature doubles and nothing turns.
+    // Joints at heights 1 and 2. The armature scales by two; joints do not rotate.
     let expected = |y: f32, offset: Vec3| {
         let joint = vec3(0.0, y, 0.0);
         (f(joint + 2.0 * offset) - f(joint)) / 2.0
@@ -312,7 +312,7 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     let offset = Vec3::from_array(offset);
     let turns = ReshapeOptions { joints: Joints::Turn, ..ReshapeOptions::default() };
     let message = model.write_reshaped(&by(&model), &[], &[], &turns).unwrap_err().to_string();
-    assert!(message.contains("the bones of a VRM 0 have no rotation"), "{message}");
+    assert!(message.contains("bones of a VRM 0 cannot have rotations"), "{message}");
     let springs = &json["VRM"]["secondaryAnimation"]["colliderGroups"][0]["colliders"][0];
     let colliders = &json["VRMC_springBone"]["colliders"];
     let capsule = &colliders[0]["shape"]["capsule"];
@@ -330,11 +330,11 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     ] {
         assert!(found.distance(expected) <= ROUNDED, "{what}: {found} instead of {expected}");
     }
-    // `f` grows y by 1.2, and nothing else at first order but shears, which keep a volume.
+    // `f` scales y by 1.2; its other first-order terms are shears, which preserve volume.
     for radius in [&springs["radius"], &capsule["radius"], &extended["sphere"]["radius"]] {
         assert!((number(radius) / 0.1 - 1.2_f32.cbrt()).abs() < 1e-3, "{radius}");
     }
-    // What is on a joint outside the cage keeps its place to the joint, wherever that goes.
+    // Offsets from a joint outside the cage stay unchanged.
     let joints = model.joints().unwrap();
     let outside = (model.positions.len() + joints[2].point) as u32;
     let (bytes, _) = model.write_reshaped(&by(&model), &[outside], &[], &ReshapeOptions::default()).unwrap();
@@ -342,7 +342,8 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     assert_eq!(person["firstPersonBoneOffset"], serde_json::json!({ "x": 0.1, "y": 0.2, "z": -0.05 }));
 }
 
-/// A sheet of 4,000 vertices with targets: what each adds to a vertex along z, and half of it along y.
+/// A sheet of 4,000 vertices with morph targets. `added`: displacement by a target of a vertex along z, half
+/// of it along y.
 fn sheet(n_targets: usize, added: impl Fn(usize, usize) -> f32) -> common::Builder {
     let n = 4_000;
     let mut rig = common::Builder::new();
@@ -372,7 +373,7 @@ fn sheet(n_targets: usize, added: impl Fn(usize, usize) -> f32) -> common::Build
     rig
 }
 
-/// Each of some targets alone, before and after a model is reshaped: how far it is from where `f` brings it.
+/// Compares single targets of a reshaped model with `f` applied to the original states.
 fn assert_targets(model: &Model, bytes: &[u8], numbers: &[usize], within: f32) {
     let (before, after) = (player(model), player(&read(bytes)));
     for (&k, share) in numbers.iter().flat_map(|k| [(k, 0.0), (k, 1.0)]) {
@@ -383,7 +384,7 @@ fn assert_targets(model: &Model, bytes: &[u8], numbers: &[usize], within: f32) {
     }
 }
 
-/// A face with as many targets as some have.
+/// As many targets as detailed face rigs have.
 #[test]
 fn ninety_three_targets_are_exported() {
     let model = read(&sheet(93, |k, v| if v % 93 == k { 0.1 } else { 0.0 }).glb());
@@ -394,9 +395,9 @@ fn ninety_three_targets_are_exported() {
     assert_targets(&model, &bytes, &[0, 46, 92], ROUNDED);
 }
 
-/// As in a baked clip: 216,000 ends.
+/// 216,000 ends, as in a baked clip.
 #[test]
-fn targets_that_all_move_every_vertex_are_read_from_a_lattice() {
+fn many_morph_ends_are_interpolated_in_a_lattice() {
     let mut rig = sheet(54, |k, v| 0.02 + 0.4 * (k as f32 + (v % 63) as f32 / 20.0).sin().abs());
     let mut weights = vec![0.0; 54];
     weights[7] = 1.0;
@@ -407,20 +408,20 @@ fn targets_that_all_move_every_vertex_are_read_from_a_lattice() {
     assert_eq!(report.morph_ends, 54 * 4_000);
     assert_eq!(report.lattice_points, model.extra_points().unwrap().len());
     assert!((1..=60_000).contains(&report.lattice_points), "{report:?}");
-    assert!(report.notices()[0].contains("read between"), "{:?}", report.notices());
+    assert!(report.notices()[0].contains("interpolated between"), "{:?}", report.notices());
 
     let [before, after] = [&bytes, &out].map(|b| shown(&player(&read(b)), None, 0.0, &[]));
     let rest: Vec<Vec3> = before.into_iter().map(f).collect();
-    assert_near(&after, &rest, 4.0 * ROUNDED, "the rest shape does not know of the lattice");
-    // Linear between nodes, `f` is off by at most an eighth of its second derivative (0.2, along y) times the cell squared, always to
-    // the same side.
+    assert_near(&after, &rest, 4.0 * ROUNDED, "the rest shape is exact");
+    // Linear interpolation of `f` errs by at most 1/8 of its second derivative (0.2, along y) times the
+    // squared cell size.
     let diagonal = {
         let all = model.extra_points().unwrap();
         let bounds = cagework_core::Bounds::of(&[&model.positions[..], &all].concat()).unwrap();
         bounds.diagonal() as f64
     };
     let cell = report.lattice_cell * diagonal;
-    // A box of 1 x 1.2 x 0.7 holds 60,000 cells of 0.0241.
+    // A box of 1 x 1.2 x 0.7 holds 60,000 cells of size 0.0241.
     assert!(cell < 0.026, "{cell}");
     assert_targets(&model, &out, &[0, 7, 30, 53], 4.0 * ROUNDED + (0.2 / 8.0 * cell * cell) as f32);
 
@@ -428,10 +429,10 @@ fn targets_that_all_move_every_vertex_are_read_from_a_lattice() {
     assert!(model.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0 == bytes);
     let all: Vec<u32> = (0..still.len() as u32).collect();
     let far = model.write_reshaped(&by(&model), &all, &[], &ReshapeOptions::default()).unwrap().1;
-    assert_eq!(far.morph_ends_outside, report.morph_ends, "ends whose whole cell is outside");
+    assert_eq!(far.morph_ends_outside, report.morph_ends, "all ends are outside");
 }
 
-/// Floats of an accessor of the builder, which lie in a view of their own.
+/// Floats of an accessor that has its own buffer view.
 fn floats(rig: &common::Builder, accessor: u64) -> Vec<f32> {
     let view = rig.json["accessors"][accessor as usize]["bufferView"].as_u64().unwrap() as usize;
     let [start, length] =
@@ -440,7 +441,7 @@ fn floats(rig: &common::Builder, accessor: u64) -> Vec<f32> {
     numbers.iter().map(|&b| f32::from_le_bytes(b)).collect()
 }
 
-/// KHR_mesh_quantization, the scale in the inverse bind matrices; one target sparse.
+/// KHR_mesh_quantization with the scale in the inverse bind matrices, and a sparse target.
 #[test]
 fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
     const UNIT: f32 = 1.0 / 1024.0;

@@ -1,4 +1,4 @@
-//! Nodes without a skin: wheels, robots of rigid parts, bones of a person that carry meshes.
+//! Unskinned nodes: wheels, robots of rigid parts, VRM bones that carry meshes.
 
 use cagework_io::{Joints, Model, ReshapeOptions};
 use glam::{DVec3, Vec3, vec3};
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::common::{self, Builder, CUBE, F32, U8, floats, json_of, rigged};
 use super::{ROUNDED, assert_near, by, f, player, read, reshaped, shown};
 
-/// A mesh of a cube of half a unit about its own origin.
+/// A mesh of a cube with edges of 0.5, centred at its origin.
 fn centred_cube(b: &mut Builder) -> usize {
     let mesh = b.cube_mesh("part");
     let position = b.vec3(&CUBE.map(|corner| corner.map(|x| 0.5 * (x - 0.5))));
@@ -15,7 +15,7 @@ fn centred_cube(b: &mut Builder) -> usize {
     mesh
 }
 
-/// A clip of channels (node, path, values of two keys, a second apart).
+/// Adds a clip. `channels`: node, path and values of two keys at 0 and 1 s.
 fn clip(b: &mut Builder, channels: &[(usize, &str, Vec<f32>)]) {
     let times = b.accessor(&floats(&[0.0, 1.0]), F32, 2, "SCALAR");
     (b.json["accessors"][times]["min"], b.json["accessors"][times]["max"]) = (json!([0.0]), json!([1.0]));
@@ -30,7 +30,7 @@ fn clip(b: &mut Builder, channels: &[(usize, &str, Vec<f32>)]) {
     b.push("animations", animation);
 }
 
-/// A model after `moved` moves all its points, as its bytes.
+/// Exports a model with all points displaced by `moved`.
 fn moved_by(model: &Model, joints: Joints, moved: impl Fn(Vec3) -> Vec3) -> Vec<u8> {
     let extra = model.extra_points().unwrap();
     let by: Vec<DVec3> =
@@ -44,7 +44,7 @@ fn translation(json: &Value, node: usize) -> Vec3 {
     Vec3::from_array([0, 1, 2].map(|k| at[k].as_f64().unwrap() as f32))
 }
 
-/// A body that stands still, and beside it a wheel that a clip turns.
+/// A body at rest, and a wheel that a clip rotates.
 fn wheel() -> Builder {
     let mut b = Builder::new();
     let mesh = centred_cube(&mut b);
@@ -56,7 +56,7 @@ fn wheel() -> Builder {
 }
 
 #[test]
-fn wheels_turn_about_where_their_axles_have_gone() {
+fn wheels_rotate_about_their_moved_axles() {
     let model = read(&wheel().glb());
     let wider = |p: Vec3| vec3(1.2 * (p.x - 1.25) + 1.25, p.y, p.z);
     let bytes = moved_by(&model, Joints::Follow, wider);
@@ -69,7 +69,7 @@ fn wheels_turn_about_where_their_axles_have_gone() {
     let rest: Vec<Vec3> = model.positions.iter().map(|&p| wider(p)).collect();
     assert_near(&read(&bytes).positions, &rest, ROUNDED, "at rest");
     let (_, report) = reshaped(&model, Joints::Follow);
-    assert_eq!(report.notices()[0], "2 of 2 joints and other nodes moved, 0 animation tracks with them");
+    assert_eq!(report.notices()[0], "moved 2 of 2 joints and other nodes and adapted 0 animation tracks");
 
     assert_eq!(model.props().unwrap(), ["wheel"]);
     let rigid = ReshapeOptions { rigid: vec!["wheel".into()], ..ReshapeOptions::default() };
@@ -78,7 +78,7 @@ fn wheels_turn_about_where_their_axles_have_gone() {
     let corners = model.positions[8..].iter().map(|&p| f(p)).sum::<Vec3>() / 8.0;
     assert!(
         translation(&json, 1).distance(corners) <= ROUNDED,
-        "the axle is where the rigid wheel has its middle"
+        "the axle is at the centre of the rigid wheel"
     );
 
     let stays = json_of(&moved_by(&model, Joints::Stay, wider));
@@ -87,7 +87,7 @@ fn wheels_turn_about_where_their_axles_have_gone() {
 }
 
 #[test]
-fn pivots_of_still_models_follow_and_those_at_the_origin_need_not() {
+fn pivots_follow_the_cage_unless_they_are_at_the_origin() {
     let mut still = wheel();
     still.json.as_object_mut().unwrap().shift_remove("animations");
     let model = read(&still.glb());
@@ -95,16 +95,16 @@ fn pivots_of_still_models_follow_and_those_at_the_origin_need_not() {
     for (node, at) in [(0, vec3(0.0, 1.0, 0.0)), (1, vec3(3.0, 0.0, 0.0))] {
         assert!(translation(&json, node).distance(f(at)) <= ROUNDED);
     }
-    assert_eq!(model.props().unwrap(), Vec::<String>::new(), "nothing hangs on a skeleton");
+    assert_eq!(model.props().unwrap(), Vec::<String>::new(), "there is no skeleton");
     let plain = read(&common::plain_cube().glb());
     assert!(!plain.is_rigged() && plain.extra_points().unwrap().is_empty());
-    // What a node flattens cannot be undone in its space.
+    // Singular transforms cannot be inverted.
     still.json["nodes"][0]["scale"] = json!([1.0, 0.0, 1.0]);
     assert!(!read(&still.glb()).is_rigged());
 }
 
 #[test]
-fn bones_of_a_person_follow_with_the_meshes_they_carry() {
+fn vrm_bones_follow_the_cage_with_their_meshes() {
     for extension in ["VRM", "VRMC_vrm"] {
         let mut rig = rigged();
         let mesh = centred_cube(&mut rig);
@@ -130,8 +130,8 @@ fn bones_of_a_person_follow_with_the_meshes_they_carry() {
     }
 }
 
-/// A robot of rigid parts whose foot hangs on the root beside its hips, with a hand on a skin. Its shin ends where the foot is, in
-/// both clips: it jumps, and stands elsewhere.
+/// A robot of rigid parts: the foot is a child of the root, next to the hips, and the shin is a child of the
+/// hips and ends at the foot. A skinned hand. Two clips: a jump, and a translation to another position.
 fn robot() -> Builder {
     let mut b = Builder::new();
     let mesh = centred_cube(&mut b);
@@ -160,9 +160,9 @@ fn robot() -> Builder {
 }
 
 #[test]
-fn feet_stay_on_legs_that_clips_move_apart_from_them() {
+fn feet_stay_attached_to_legs_in_clips() {
     let model = read(&robot().glb());
-    // Longer legs: the floor is at 0, where the foot's cube ends, and the hips at 1.
+    // Longer legs. The floor at 0 is the lower side of the foot's cube; the hips are at 1.
     let taller = |p: Vec3| vec3(p.x, if p.y < 1.0 { 1.35 * p.y } else { p.y + 0.35 }, p.z);
     let bytes = moved_by(&model, Joints::Follow, taller);
     let [before, after] = [player(&model), player(&read(&bytes))];
@@ -171,7 +171,7 @@ fn feet_stay_on_legs_that_clips_move_apart_from_them() {
         assert!(old[2].distance(old[3]) <= ROUNDED);
         let gap = new[2].distance(new[3]);
         assert!(gap <= ROUNDED, "clip {clip} at {seconds} s: {gap} between shin and foot");
-        // Jumps and steps grow as the hips' height over the floor does.
+        // Translations scale with the height of the hips.
         let way = |origins: &[Vec3], start: Vec3| origins[1] - start;
         let [old, new] = [way(&old, vec3(0.0, 1.0, 0.0)), way(&new, vec3(0.0, 1.35, 0.0))];
         assert!(new.distance(1.35 * old) <= ROUNDED, "{new} instead of 1.35 times {old}");

@@ -1,4 +1,4 @@
-//! The sample that walks, shaped by its own cage: whole ways from cage to clip.
+//! The walking sample, deformed by its own cage: from cage to exported clip.
 
 use cagework_cage::generate::{CageOptions, generate};
 use cagework_cage::samples;
@@ -14,7 +14,7 @@ use serde_json::json;
 use super::common::{Builder, json_of};
 use super::{player, read};
 
-/// The walker, and itself with its cage's vertices moved.
+/// The walking sample, and its export with displaced cage vertices.
 fn shaped(moved: impl Fn(Vec3) -> Vec3, joints: Joints) -> (Model, Model, ReshapeReport) {
     let sample = samples::build("humanoid").unwrap();
     let glb = write_mesh_glb(&sample.name, &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
@@ -23,7 +23,7 @@ fn shaped(moved: impl Fn(Vec3) -> Vec3, joints: Joints) -> (Model, Model, Reshap
     (model, shaped, report)
 }
 
-/// A model with its cage's vertices moved.
+/// A model with displaced cage vertices.
 fn by_cage(
     model: &Model,
     cage: &Cage,
@@ -41,13 +41,13 @@ fn by_cage(
     (read(&bytes), report)
 }
 
-/// Arms half as long again, from the shoulders at 0.2 on; they are above 1.1.
+/// Lengthens the arms by half, starting at the shoulders (x = 0.2). Arms are above y = 1.1.
 fn arms(p: Vec3) -> Vec3 {
     let beyond = if p.y > 1.1 { (p.x.abs() - 0.2).max(0.0) } else { 0.0 };
     p + Vec3::X * p.x.signum() * 0.5 * beyond
 }
 
-/// Where a node is, by its name; the skeleton has no turns at rest.
+/// World position of a named node; joints have no rotation at rest.
 fn origin(model: &Model, name: &str) -> Vec3 {
     let json = json_of(&model.write_reshaped(&still(model), &[], &[], &ReshapeOptions::default()).unwrap().0);
     let nodes = json["nodes"].as_array().unwrap();
@@ -71,11 +71,11 @@ fn still(model: &Model) -> Vec<glam::DVec3> {
 }
 
 #[test]
-fn elbows_of_longer_arms_are_where_the_arms_bend() {
+fn joints_of_lengthened_arms_follow_the_arms() {
     let (model, longer, _) = shaped(arms, Joints::Follow);
     for name in ["forearm.L", "hand.R"] {
         let (before, after) = (origin(&model, name), origin(&longer, name));
-        // Within 2 % of the limb, 0.8 long.
+        // 2 % of the limb's length of 0.8.
         assert!(after.distance(arms(before)) <= 0.016, "{name}: {after} instead of {}", arms(before));
     }
     let knee = origin(&model, "shin.L");
@@ -85,7 +85,7 @@ fn elbows_of_longer_arms_are_where_the_arms_bend() {
     assert_eq!((report.joints_moved, report.tracks), (0, 0));
 }
 
-/// Triangles that are turned against where their own skin turns them from rest, frame by frame.
+/// Whether each triangle is flipped relative to the rotation of its skin, in each frame.
 fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
     let at_rest = player.at(None, 0.0, &[]).palette;
     let rest = cagework_core::skin::skin_vertices(&player.skin, &at_rest, &[]);
@@ -114,20 +114,20 @@ fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
 }
 
 #[test]
-fn joints_that_follow_turn_fewer_triangles_than_joints_that_stay() {
+fn joints_that_follow_flip_fewer_triangles_than_joints_that_stay() {
     let new = |joints| {
         let (model, longer, _) = shaped(arms, joints);
         let [before, after] = [&model, &longer].map(|model| turned(&player(model), &model.triangles));
         (before.len(), before.iter().zip(&after).filter(|(before, after)| !**before && **after).count())
     };
     let ((n, follow), (_, stay)) = (new(Joints::Follow), new(Joints::Stay));
-    // Seen: 43 and 378.
+    // Measured: 43 and 378.
     assert!(follow * 5 < stay && follow * 1000 < n, "of {n}: {follow} follow, {stay} stay");
 }
 
-/// A sheet of bumps whose target leaves every cage that fits its rest: the cage is made around both.
+/// A bumpy target leaves every tight cage of the rest shape, so the cage must enclose both.
 #[test]
-fn targets_inside_the_cage_turn_no_triangles() {
+fn targets_inside_the_cage_flip_no_triangles() {
     let n = 40;
     let point = |i: u32, j: u32| vec3(i as f32 / n as f32, 0.0, j as f32 / n as f32);
     let positions: Vec<Vec3> = (0..=n).flat_map(|j| (0..=n).map(move |i| point(i, j))).collect();
@@ -169,5 +169,5 @@ fn targets_inside_the_cage_turn_no_triangles() {
             })
             .count()
     };
-    assert_eq!([up(0.0), up(0.5), up(1.0)], [0; 3], "triangles that do not look up");
+    assert_eq!([up(0.0), up(0.5), up(1.0)], [0; 3], "triangles that do not face up");
 }

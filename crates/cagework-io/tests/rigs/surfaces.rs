@@ -1,4 +1,4 @@
-//! Normals where a surface is not one sheet of one primitive: cards with a back, seams between primitives.
+//! Normals of double-sided sheets and at seams between primitives.
 
 use cagework_io::Joints;
 use glam::{Mat3, Vec3, vec3};
@@ -7,13 +7,13 @@ use serde_json::json;
 use super::common::{Builder, json_of};
 use super::{f, read, reshaped};
 
-/// Cells of the sheet along a side.
+/// Cells along a side of the sheet.
 const N: u32 = 24;
 
-/// Where it is, its normals, and triangles.
+/// Positions, normals and triangles.
 type Sheet = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>);
 
-/// A wave, and a roof with a smooth normal at its ridge: height and slope.
+/// Height and slope of two profiles: a wave, and a roof with a smooth normal at its ridge.
 fn wave(u: f32) -> [f32; 2] {
     [0.2 * (3.0 * u).sin(), 0.6 * (3.0 * u).cos()]
 }
@@ -22,7 +22,7 @@ fn roof(u: f32) -> [f32; 2] {
     [-slope.abs(), if slope == 0.0 { 0.0 } else { slope.signum() }]
 }
 
-/// A sheet of that height. Columns from `from` to `to` of `N`.
+/// A sheet with the given profile, columns `from` to `to` of `N`.
 fn sheet(height: fn(f32) -> [f32; 2], from: u32, to: u32) -> Sheet {
     let at = |i: u32, k: u32| {
         let (u, v) = (i as f32 / N as f32, k as f32 / N as f32);
@@ -36,7 +36,7 @@ fn sheet(height: fn(f32) -> [f32; 2], from: u32, to: u32) -> Sheet {
     (places, normals, triangles)
 }
 
-/// The inverse transpose of the gradient of `f` brings a normal along.
+/// Transforms a normal by the inverse transpose of the gradient of `f`.
 fn brought(p: Vec3, normal: Vec3) -> Vec3 {
     let [x, y] = [p.x, p.y];
     let gradient =
@@ -44,13 +44,13 @@ fn brought(p: Vec3, normal: Vec3) -> Vec3 {
     (gradient.inverse().transpose() * normal).normalize()
 }
 
-/// Largest angle, in degrees, of the normals of primitives after a reshape from what the gradient of `f` makes of them.
+/// Largest angle, degrees, between exported normals and normals transformed by the gradient of `f`.
 fn largest_angle(primitives: &[Sheet]) -> f32 {
     let mut rig = Builder::new();
     let list = |all: &[Vec3]| all.iter().map(Vec3::to_array).collect::<Vec<_>>();
     let of = |(at, normals, triangles): &Sheet| {
         let attributes = json!({ "POSITION": rig.vec3(&list(at)), "NORMAL": rig.vec3(&list(normals)) });
-        // A target makes it more than a statue.
+        // A morph target makes the model rigged.
         let target = json!({ "POSITION": rig.vec3(&vec![[0.0, 0.0, 0.1]; at.len()]) });
         let indices = rig.indices(triangles.as_flattened());
         json!({ "attributes": attributes, "indices": indices, "targets": [target] })
@@ -77,7 +77,7 @@ fn largest_angle(primitives: &[Sheet]) -> f32 {
 }
 
 #[test]
-fn the_gradient_above_is_that_of_the_deformation() {
+fn analytic_gradient_matches_the_deformation() {
     let (p, step) = (vec3(0.3, 0.7, 0.2), 1e-3);
     let along = |way: Vec3| (f(p + step * way) - f(p - step * way)) / (2.0 * step);
     let normal = vec3(0.2, -0.5, 0.8).normalize();
@@ -86,9 +86,9 @@ fn the_gradient_above_is_that_of_the_deformation() {
     assert!(brought(p, normal).dot(expected).abs() > 0.9999);
 }
 
-/// Hair and capes have a back: the same places, with normals against those of the front.
+/// Hair cards and capes have a back side at the same positions, with opposite normals.
 #[test]
-fn normals_of_a_card_with_a_back_turn_as_those_of_one_without() {
+fn double_sided_sheets_have_the_normals_of_single_ones() {
     let front = sheet(wave, 0, N);
     let one = largest_angle(std::slice::from_ref(&front));
     let (mut at, mut normals, mut triangles) = front;
@@ -100,7 +100,7 @@ fn normals_of_a_card_with_a_back_turn_as_those_of_one_without() {
     assert!(one < 2.0 && both < one + 0.1, "{one} and {both} degrees");
 }
 
-/// A head and a body, or two materials of one: where they meet nobody should see it.
+/// Primitives that meet at a seam must have equal normals there.
 #[test]
 fn normals_of_two_primitives_agree_at_their_seam() {
     let one = largest_angle(&[sheet(roof, 0, N)]);

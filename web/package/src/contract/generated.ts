@@ -489,12 +489,12 @@ export type Problem = { code: Code, severity: Severity,
  */
 message: string, count: number, fix: Fix | null, };
 /**
- * Format of a model's file.
+ * File format of a model.
  */
 export type ModelFormat = "obj" | "gltf" | "ply" | "stl" | "off";
 /**
- * The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
- * degrees about x when it is read, and back when it is written. Both are exact.
+ * The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
+ * read and back when written. Both rotations are exact.
  */
 export type UpAxis = "y" | "z";
 /**

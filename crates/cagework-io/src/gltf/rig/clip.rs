@@ -1,4 +1,4 @@
-//! Animation clips: values of nodes at a time.
+//! Animation clips, evaluated at a time.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -6,25 +6,25 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use serde_json::Value;
 
-use super::tracks::{Driven, driven};
+use super::tracks::{ChannelTarget, channel_target};
 use crate::gltf::{GltfDocument, GltfError};
 
-/// An animation of a document.
+/// An animation clip.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Clip {
-    /// Its name, if it has one.
+    /// Name, if any.
     pub name: Option<String>,
-    /// From 0 to its last key, seconds.
+    /// Duration from time 0 to the last key, seconds.
     pub seconds: f32,
-    /// Channels of nodes and morph weights that can be played.
+    /// Number of playable channels: transforms of nodes and morph weights.
     pub channels: usize,
-    /// Keys of all of them.
+    /// Number of keys in all channels.
     pub keys: usize,
     #[serde(skip)]
-    tracks: Vec<(Driven, Track)>,
+    tracks: Vec<(ChannelTarget, Track)>,
 }
 
-/// One channel.
+/// Keys of one channel.
 #[derive(Clone, Debug, PartialEq)]
 struct Track {
     times: Numbers,
@@ -41,14 +41,14 @@ enum Interpolation {
     Cubic,
 }
 
-/// The numbers of an accessor, shared by all tracks that use it.
+/// Numbers of an accessor, shared between tracks.
 type Numbers = Arc<[f32]>;
 
-/// Accessors that were decoded, with the width of an element: their numbers, and whether these ascend. `None` if that failed, or one
-/// is not finite. Looked at once, however many channels use them.
+/// Cache of decoded accessors by index and element width, with a flag for ascending values. `None` if
+/// decoding failed or a value is not finite.
 type Decoded = HashMap<(u32, usize), Option<(Numbers, bool)>>;
 
-/// The clips of a document; channels that cannot be read are left out.
+/// Clips of a document, without unreadable channels.
 pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
     let mut decoded = Decoded::new();
     let animations = document.json["animations"].as_array().into_iter().flatten();
@@ -56,7 +56,7 @@ pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
         .map(|animation| {
             let mut clip = Clip { name: animation["name"].as_str().map(str::to_owned), ..Clip::default() };
             for channel in animation["channels"].as_array().into_iter().flatten() {
-                let read = driven(channel).and_then(|driven| {
+                let read = channel_target(channel).and_then(|driven| {
                     let sampler = animation["samplers"].get(channel["sampler"].as_u64()? as usize)?;
                     Some((driven, Track::read(document, sampler, driven, &mut decoded)?))
                 });
@@ -72,7 +72,7 @@ pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
 }
 
 impl Clip {
-    /// When any channel has a key, seconds, ascending.
+    /// Times of all keys, seconds, ascending.
     pub(crate) fn times(&self) -> Vec<f32> {
         let mut times: Vec<f32> =
             self.tracks.iter().flat_map(|(_, track)| track.times.iter().copied()).collect();
@@ -81,14 +81,19 @@ impl Clip {
         times
     }
 
-    /// What each channel gives at a time, seconds.
-    pub(super) fn at(&self, time: f32) -> impl Iterator<Item = (Driven, Vec<f64>)> {
+    /// Value of each channel at a time, seconds.
+    pub(super) fn at(&self, time: f32) -> impl Iterator<Item = (ChannelTarget, Vec<f64>)> {
         self.tracks.iter().map(move |(driven, track)| (*driven, track.at(time, *driven)))
     }
 }
 
 impl Track {
-    fn read(document: &GltfDocument, sampler: &Value, driven: Driven, decoded: &mut Decoded) -> Option<Self> {
+    fn read(
+        document: &GltfDocument,
+        sampler: &Value,
+        driven: ChannelTarget,
+        decoded: &mut Decoded,
+    ) -> Option<Self> {
         let mut numbers = |key: &str, width: usize| {
             let accessor = sampler[key].as_u64()? as u32;
             let read = || {
@@ -100,9 +105,9 @@ impl Track {
         };
         let (times, is_sorted) = numbers("input", 1)?;
         let width = match driven {
-            Driven::Translation(_) | Driven::Scale(_) => 3,
-            Driven::Rotation(_) => 4,
-            Driven::Weights(_) | Driven::MeshWeights(_) => 1,
+            ChannelTarget::Translation(_) | ChannelTarget::Scale(_) => 3,
+            ChannelTarget::Rotation(_) => 4,
+            ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_) => 1,
         };
         let (values, _) = numbers("output", width)?;
         let interpolation = match sampler["interpolation"].as_str() {
@@ -111,22 +116,22 @@ impl Track {
             _ => Interpolation::Linear,
         };
         let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
-        // A key has one weight for each morph target.
+        // Each key has one weight per morph target.
         let width = if width == 1 { values.len() / (per_key * times.len()).max(1) } else { width };
         let is_right =
             !times.is_empty() && width > 0 && values.len() == width * per_key * times.len() && is_sorted;
         is_right.then_some(Self { times, values, width, interpolation })
     }
 
-    /// glTF 2.0, appendix C.
-    fn at(&self, time: f32, driven: Driven) -> Vec<f64> {
+    /// Interpolates as in glTF 2.0, appendix C.
+    fn at(&self, time: f32, driven: ChannelTarget) -> Vec<f64> {
         let n = self.times.len();
         let time = time.clamp(self.times[0], self.times[n - 1]);
         let next = self.times.partition_point(|&t| t <= time).clamp(1, n.max(2) - 1).min(n - 1);
         let last = next.saturating_sub(1);
         let gap = f64::from(self.times[next]) - f64::from(self.times[last]);
         let share = if gap > 0.0 { (f64::from(time) - f64::from(self.times[last])) / gap } else { 1.0 };
-        let is_rotation = matches!(driven, Driven::Rotation(_));
+        let is_rotation = matches!(driven, ChannelTarget::Rotation(_));
         let w = self.width;
         let of = |at: usize| self.values[at * w..(at + 1) * w].iter().map(|&x| f64::from(x));
         match self.interpolation {
@@ -145,7 +150,7 @@ impl Track {
             }
             Interpolation::Linear if is_rotation => {
                 let [from, to] = [last, next].map(|k| quaternion(&of(k).collect::<Vec<_>>()));
-                // Along the shorter way.
+                // Take the shorter arc.
                 let to = if from.dot(to) < 0.0 { -to } else { to };
                 from.slerp(to, share).to_array().to_vec()
             }
@@ -154,7 +159,7 @@ impl Track {
     }
 }
 
-/// All numbers of an accessor whose elements have `width` components.
+/// Numbers of an accessor with `width` components per element.
 fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbers, GltfError> {
     let source = document.source();
     Ok(match width {
@@ -164,13 +169,12 @@ fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbe
     })
 }
 
-/// The rotation of four numbers; none for zeros.
+/// Unit quaternion; identity for zeros.
 pub(super) fn quaternion(q: &[f64]) -> DQuat {
     let q = DQuat::from_xyzw(q[0], q[1], q[2], q[3]);
     if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
 }
 
-/// The vector of three numbers.
 pub(super) fn vector(v: &[f64]) -> DVec3 {
     DVec3::new(v[0], v[1], v[2])
 }

@@ -1,31 +1,31 @@
-//! A document that is changed as little as possible: what nobody writes keeps its bytes.
+//! Edits a document in place: unmodified data keeps its bytes.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher};
 
 use serde_json::{Value, json};
 
-use super::overlap::{Place, overlapping};
+use super::overlap::{ViewOffset, overlapping};
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::{self, F32, Pack, VERTICES, each_accessor, push, write_glb};
 use crate::gltf::patch::embed_images_by;
 
-/// All accessors are aligned to it.
+/// Alignment of accessors, bytes.
 const ALIGN: usize = 4;
 
 pub(super) struct Edit<'a> {
     document: &'a GltfDocument,
     pub(super) json: Value,
-    /// All buffers, one after the other.
+    /// All buffers, concatenated.
     bin: Vec<u8>,
-    /// Whether values of an accessor were written.
+    /// Whether any accessor was written.
     has_written: bool,
-    /// References to each place in the buffer.
-    uses: HashMap<Place, usize>,
-    /// Places that are never written over.
-    overlapping: HashSet<Place>,
-    /// New accessors of attributes by a hash of their bytes: primitives may share their vertices.
+    /// Number of references to each location in the buffer.
+    uses: HashMap<ViewOffset, usize>,
+    /// Locations that other accessors overlap; they are not overwritten.
+    overlapping: HashSet<ViewOffset>,
+    /// New attribute accessors by hash of their bytes, so that primitives with equal vertices share one.
     appended: HashMap<u64, usize>,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Edit<'a> {
         edit
     }
 
-    /// Counts the references anew, after some were added.
+    /// Recounts the references, after some were added.
     pub(super) fn count_uses(&mut self) {
         let mut named = Vec::new();
         each_accessor(&mut self.json, &mut |reference| named.extend(reference.as_u64()));
@@ -54,12 +54,12 @@ impl<'a> Edit<'a> {
         }
     }
 
-    /// Something that was copied names an accessor as well.
+    /// Counts one more reference to an accessor.
     pub(super) fn use_again(&mut self, accessor: usize) {
         *self.uses.entry(self.place(accessor)).or_default() += 1;
     }
 
-    fn place(&self, accessor: usize) -> Place {
+    fn place(&self, accessor: usize) -> ViewOffset {
         let accessor_json = &self.json["accessors"][accessor];
         match accessor_json["bufferView"].as_u64() {
             Some(view) => (view, accessor_json["byteOffset"].as_u64().unwrap_or(0)),
@@ -67,8 +67,8 @@ impl<'a> Edit<'a> {
         }
     }
 
-    /// Writes vectors over those of an accessor if they are plain floats that nothing else uses; otherwise, or without one,
-    /// into a new accessor, which takes the place of the other. Returns its number.
+    /// Writes vectors, in place if the accessor is unshared plain f32 data, otherwise into a new accessor.
+    /// Returns the accessor's index.
     pub(super) fn write<const N: usize>(
         &mut self,
         accessor: Option<usize>,
@@ -141,7 +141,7 @@ impl<'a> Edit<'a> {
         accessor
     }
 
-    /// Whether a new accessor has these bytes.
+    /// Whether an accessor that was added has these bytes.
     fn has_bytes(&self, accessor: usize, bytes: &[u8]) -> bool {
         let view = self.json["accessors"][accessor]["bufferView"].as_u64().unwrap_or(0) as usize;
         let start = self.json["bufferViews"][view]["byteOffset"].as_u64().unwrap_or(0) as usize;
@@ -155,7 +155,7 @@ impl<'a> Edit<'a> {
         push(json, "bufferViews", view)
     }
 
-    /// The GLB; the file as it was read if nothing has changed.
+    /// Returns the GLB; the original file if nothing changed.
     pub(super) fn finish(self) -> Result<Vec<u8>, WriteError> {
         let Self { document, mut json, mut bin, has_written, .. } = self;
         if let Some(file) = document.as_read().filter(|_| !has_written && json == joined(document)) {
@@ -163,10 +163,10 @@ impl<'a> Edit<'a> {
         }
         embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
         if document.is_decoded {
-            // Its compressed streams are no longer of use.
+            // Drops the compressed streams.
             return Pack::of_bytes(&json, &bin).finish(json);
         }
-        // What was there keeps its length: a chunk may be padded.
+        // An unchanged buffer keeps its declared length; the chunk can include padding.
         let only = if let [only] = document.buffers.as_slice() { only.len() } else { 0 };
         if bin.is_empty() {
             json.as_object_mut().map(|object| object.shift_remove("buffers"));
@@ -177,7 +177,7 @@ impl<'a> Edit<'a> {
     }
 }
 
-/// The JSON of a document with all its buffers as one, one after the other.
+/// JSON of a document with all buffers concatenated into one.
 fn joined(document: &GltfDocument) -> Value {
     let mut json = document.json.clone();
     let (mut starts, mut end) = (Vec::new(), 0);

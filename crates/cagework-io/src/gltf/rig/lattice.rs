@@ -1,46 +1,47 @@
-//! Ends of morph targets that are too many to be bound one by one.
+//! Replaces large numbers of morph target ends by a lattice of bound points.
 //!
-//! A baked clip has a target for each frame, and each moves every vertex: a million ends, whose rows of weights would take
-//! gigabytes. But a deformation is one vector field. Here it is bound at the nodes of a lattice, in the cells that vertices and
-//! ends lie in, and is linear between them. Only what a target adds is read there, `u(end) - u(rest)`: the shape at rest is as
-//! exact as ever, and what hardly moves is hardly wrong.
+//! A baked clip has one target per frame, each of which moves every vertex: weights of a million ends would
+//! take gigabytes. Instead, the displacement field u is bound at the nodes of a lattice, in the cells that
+//! contain vertices and ends, and interpolated trilinearly. Only differences `u(end) - u(rest)` are
+//! interpolated, so the rest shape stays exact and errors are small for small motions.
 
 use std::ops::Range;
 
 use glam::{DVec3, U64Vec3};
 
-use super::{Part, Rig, Target};
+use super::{Rig, RigPrimitive, Target};
 
-/// Ends above which they are read from a lattice: so many bound ones take about 0.4 GB at 100 cage vertices.
+/// Limit on directly bound ends, about 0.4 GB of weights at 100 cage vertices.
 pub(super) const MAX_ENDS: usize = 200_000;
 
-/// Nodes of the lattice, which is as fine as that allows, and cells along the longest side at the finest: finer than the grid
-/// that weights are solved on would be in vain.
+/// Limits on the lattice: nodes, and cells along the longest side. Finer cells than those of the solver's
+/// grid add no accuracy.
 const MAX_NODES: usize = 60_000;
-const CELLS: f64 = 256.0;
+const MAX_CELLS_PER_SIDE: f64 = 256.0;
 
-/// Bits of a cell's number along each axis.
-const BITS: u32 = 21;
+/// Bits of a cell coordinate.
+const CELL_INDEX_BITS: u32 = 21;
 
-/// The cells of a regular lattice that something lies in.
+/// Occupied cells of a regular lattice.
 pub(super) struct Lattice {
     origin: DVec3,
-    /// Edge of a cell, units of the file.
+    /// Edge length of a cell, file units.
     pub(super) cell: f64,
-    /// Their numbers, ascending.
+    /// Packed coordinates of the cells, ascending.
     cells: Vec<u64>,
-    /// Nodes of each, x fastest.
+    /// Node indices of each cell, x fastest.
     corners: Vec<[u32; 8]>,
     pub(super) nodes: Vec<DVec3>,
 }
 
 impl Lattice {
-    /// Around points; `size`: longest side of the box of most of them.
+    /// The lattice around `points`. `size`: longest side of the bounding box of the rest shape.
     fn new(points: &(impl Iterator<Item = DVec3> + Clone), size: f64) -> Self {
         let box_of = |[low, high]: [DVec3; 2], p| [low.min(p), high.max(p)];
         let [origin, high] = points.clone().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], box_of);
-        // However far away single ones are, their cells have numbers.
-        let finest = (size / CELLS).max((high - origin).max_element() / f64::from(1 << (BITS - 2)));
+        // Cell coordinates must fit into their bits, also for outliers.
+        let finest = (size / MAX_CELLS_PER_SIDE)
+            .max((high - origin).max_element() / f64::from(1 << (CELL_INDEX_BITS - 2)));
         let finest = finest.max(f64::MIN_POSITIVE);
         let numbers = |cell| {
             let number_of = |p: DVec3| number(place(origin, cell, p).0);
@@ -49,7 +50,7 @@ impl Lattice {
         let (mut cell, mut cells) = (finest, numbers(finest));
         loop {
             if let Some(lattice) = Self::of(origin, cell, &cells) {
-                // As much finer as nodes are left for, were the cells to fill a space.
+                // If the occupied cells fill a volume, this cell size uses up the node limit.
                 let share = (lattice.nodes.len() as f64 / MAX_NODES as f64).cbrt();
                 let finer = (cell * share).max(finest);
                 return Self::of(origin, finer, &numbers(finer)).unwrap_or(lattice);
@@ -60,7 +61,7 @@ impl Lattice {
         }
     }
 
-    /// Of these cells, if they have few enough nodes.
+    /// The lattice of the given cells; `None` if it has too many nodes.
     fn of(origin: DVec3, cell: f64, cells: &[u64]) -> Option<Self> {
         if cells.len() > MAX_NODES {
             return None;
@@ -77,14 +78,14 @@ impl Lattice {
         (nodes.len() <= MAX_NODES).then_some(lattice)
     }
 
-    /// Nodes around one of the points that it was made for.
+    /// Nodes of the cell that contains a point, and the position in the cell.
     fn around(&self, point: DVec3) -> ([u32; 8], DVec3) {
         let (cell, share) = place(self.origin, self.cell, point);
         let k = self.cells.partition_point(|&c| c < number(cell));
         (self.corners[k.min(self.corners.len() - 1)], share)
     }
 
-    /// Trilinear between the values of the nodes.
+    /// Trilinear interpolation of nodal values.
     fn at(&self, point: DVec3, values: &[DVec3]) -> DVec3 {
         let (corners, share) = self.around(point);
         let value = |k: usize| values[corners[k] as usize];
@@ -94,7 +95,7 @@ impl Lattice {
     }
 }
 
-/// The cell that a point lies in, and where in it.
+/// Cell of a point, and position in it, 0 to 1.
 fn place(origin: DVec3, cell: f64, point: DVec3) -> (U64Vec3, DVec3) {
     let at = ((point - origin) / cell).max(DVec3::ZERO);
     (at.as_u64vec3(), at.fract())
@@ -107,11 +108,12 @@ fn distinct(mut numbers: Vec<u64>) -> Vec<u64> {
 }
 
 fn number(cell: U64Vec3) -> u64 {
-    cell.x | cell.y << BITS | cell.z << (2 * BITS)
+    cell.x | cell.y << CELL_INDEX_BITS | cell.z << (2 * CELL_INDEX_BITS)
 }
 
 fn triple(number: u64) -> U64Vec3 {
-    U64Vec3::new(number, number >> BITS, number >> (2 * BITS)) & ((1 << BITS) - 1)
+    U64Vec3::new(number, number >> CELL_INDEX_BITS, number >> (2 * CELL_INDEX_BITS))
+        & ((1 << CELL_INDEX_BITS) - 1)
 }
 
 fn corners(cell: u64) -> [u64; 8] {
@@ -119,7 +121,7 @@ fn corners(cell: u64) -> [u64; 8] {
 }
 
 impl Rig<'_> {
-    /// The lattice that the ends are read from, if there are too many of them.
+    /// Builds the lattice if there are more than [`MAX_ENDS`] ends.
     pub(super) fn lattice(&self) -> Option<Lattice> {
         if self.n_ends <= MAX_ENDS {
             return None;
@@ -135,12 +137,12 @@ impl Rig<'_> {
         Some(Lattice::new(&points, (box_of[1] - box_of[0]).max_element()))
     }
 
-    /// Numbers of an end's points among the extras.
+    /// Indices of the points of an end in `extras`.
     pub(super) fn range(&self, target: &Target, first: usize) -> Range<usize> {
         first - self.n_vertices..first - self.n_vertices + target.moved.len()
     }
 
-    /// The points that are bound besides the vertices: all others, or the lattice instead of the ends.
+    /// Points to bind after the vertices: all extras or, with a lattice, its nodes instead of the ends.
     pub(crate) fn bound(&self) -> Vec<DVec3> {
         let Some(lattice) = &self.lattice else { return self.extras.clone() };
         let (mut bound, mut next) = (Vec::new(), 0);
@@ -154,12 +156,12 @@ impl Rig<'_> {
         bound
     }
 
-    /// How far all points move, from the vertices and [`Self::bound`] points.
+    /// Displacements of all points from those of the vertices and [`Self::bound`] points.
     pub(crate) fn all_moved(&self, by: Vec<DVec3>) -> Vec<DVec3> {
         self.spread(by, Lattice::at, |own, at_rest, at_end| own + (at_end - at_rest))
     }
 
-    /// Which of all points are outside the cage: those of ends where all of their cell is.
+    /// Whether each point is outside the cage. An end is outside if all nodes of its cell are.
     pub(crate) fn all_outside(&self, is_outside: Vec<bool>) -> Vec<bool> {
         let read = |lattice: &Lattice, point, nodes: &[bool]| {
             lattice.around(point).0.iter().all(|&node| nodes[node as usize])
@@ -167,8 +169,8 @@ impl Rig<'_> {
         self.spread(is_outside, read, |_, _, at_end| at_end)
     }
 
-    /// Values of all points from those that are bound. `read`: at a place, from the lattice's nodes; `of_end`: from the value of
-    /// its vertex at rest, and what is read at both places.
+    /// Values of all points from those of the bound ones. `read`: interpolates nodal values at a position.
+    /// `of_end`: combines the value of the rest vertex with the interpolated values at rest and at the end.
     fn spread<T: Copy>(
         &self,
         mut bound: Vec<T>,
@@ -195,13 +197,13 @@ impl Rig<'_> {
     }
 }
 
-/// Each end of a part's targets, with the first of its points.
-pub(super) fn ends(part: &Part) -> impl Iterator<Item = (&Target, usize)> + Clone {
+/// Each end of a primitive's morph targets, with the index of its first point.
+pub(super) fn ends(part: &RigPrimitive) -> impl Iterator<Item = (&Target, usize)> + Clone {
     part.targets.iter().flat_map(|target| target.ends.iter().flatten().map(move |&first| (target, first)))
 }
 
-/// A part's vertices at rest; what is no number lies at the origin, as among the extras.
-fn bindable_rest(part: &Part) -> Vec<DVec3> {
+/// Rest positions of a primitive, with non-finite ones replaced by the origin, as in `extras`.
+fn bindable_rest(part: &RigPrimitive) -> Vec<DVec3> {
     let finite = |p: DVec3| if p.as_vec3().is_finite() { p } else { DVec3::ZERO };
     part.rest().into_iter().map(finite).collect()
 }

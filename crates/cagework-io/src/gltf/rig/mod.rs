@@ -1,12 +1,13 @@
-//! What moves besides the vertices when a rigged or morphed document is reshaped, and the document with all of it moved.
+//! Reshapes rigged and morphed documents.
 //!
-//! The cage comes first and the skeleton on top: with `M` the skinning matrix of a vertex at rest (the node's world
-//! transform without a skin) and `f(x) = x + by(x)` the deformation, a vertex p becomes `M'^-1 f(M p)`. Joints follow the cage and
-//! their inverse bind matrices change so that `G' B' = G B`: then `M' = M`, and whatever the file's bind pose is survives.
+//! The cage deforms the rest shape, and the skeleton is fitted to it. With `M` the skinning matrix of a
+//! vertex at rest (without a skin, the node's world transform) and `f(x) = x + by(x)` the deformation, a
+//! vertex p becomes `M'^-1 f(M p)`. Joints follow the cage. Their inverse bind matrices B change so that `G'
+//! B' = G B` for the joint's world transform G, hence `M' = M` for any bind pose of the file.
 //!
-//! [`Rig`] lists the points that must be bound: vertices, ends of morph targets (or a lattice around them, if they are very
-//! many), nodes that follow, offsets of VRM.
-//! [`reshape`] writes.
+//! [`Rig`] lists the points to bind: vertices, ends of morph targets (or a lattice around them), nodes that
+//! follow the cage, and offsets stored in VRM. An end is a vertex with one morph target at weight 0 or 1.
+//! [`reshape()`] writes the document.
 
 mod clip;
 mod edit;
@@ -25,7 +26,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::gltf::json::mesh::{Primitive, Semantic};
 use cagework_core::Bounds;
-use cagework_pose::Parts as Unbent;
+use cagework_pose::Parts as HeldParts;
 use glam::{DMat4, DVec3, Vec3};
 
 use super::geometry::{Frame, attribute, vectors};
@@ -39,73 +40,74 @@ pub(crate) use clip::clips;
 use lattice::Lattice;
 pub use nodes::{JointPoint, Joints};
 pub use play::{Player, Posed};
-pub(crate) use reshape::{Named, reshape};
+pub(crate) use reshape::{PoseDisplacements, reshape};
 pub use reshape::{ReshapeOptions, ReshapeReport};
-use vrm::Spot;
+use vrm::VrmPoint;
 
-/// Half of the distance over which the gradient of the deformation at a node is measured, over the model's diagonal.
-const STEP: f64 = 0.02;
+/// Step of the central differences for the deformation gradient at a node, over the model's diagonal.
+const GRADIENT_STEP: f64 = 0.02;
 
-/// Directions of the points around an anchor.
-const AROUND: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+/// Directions of the six points around an anchor.
+const PROBE_DIRECTIONS: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
 
-/// A document's points. A point's number counts the model's vertices first, then [`Self::extras`].
+/// Points of a document. Point indices count the model's vertices, then `extras`.
 pub(crate) struct Rig<'a> {
     document: &'a GltfDocument,
     worlds: Worlds,
     /// Inverse bind matrices of the skins in use.
     binds: HashMap<u32, Vec<DMat4>>,
-    parts: Vec<Part>,
-    /// Nodes that follow the cage, each after its parent, with the first of its seven points: the origin, then those around it.
+    parts: Vec<RigPrimitive>,
+    /// Nodes that follow the cage, parents first, with the first of their seven points: origin, then the
+    /// points around it.
     follows: Vec<(u32, usize)>,
-    /// Sum of the weights that each node has as a joint, and the number of vertices that it carries without a skin. `[n_nodes]`
+    /// Sum of joint weights of each node, plus the vertices of unskinned meshes attached to it. `[n_nodes]`
     held: Vec<f64>,
-    /// Joints, nodes that clips or a person's bones move, and all nodes below them. `[n_nodes]`
+    /// Joints, nodes animated by clips, VRM bones, and their descendants. `[n_nodes]`
     on_skeleton: Vec<bool>,
-    spots: Vec<Spot>,
+    vrm_points: Vec<VrmPoint>,
     n_vertices: usize,
-    /// What the model's positions are seen from, in world space; all else here is not.
+    /// Origin of the model's positions, in world space. All other members are absolute.
     origin: DVec3,
-    /// Diagonal of the box of all states, object units.
+    /// Diagonal of the bounding box of all states, object units.
     diagonal: f64,
-    /// World space, as the file has it.
+    /// World space, as in the file.
     extras: Vec<DVec3>,
     n_ends: usize,
-    /// What is bound instead of the ends.
+    /// Replaces the ends, if there are many.
     lattice: Option<Lattice>,
 }
 
-/// A primitive of a mesh under one skin or node.
-struct Part {
+/// A primitive under one skin or node.
+struct RigPrimitive {
     instance: Instance,
     primitive: u32,
-    /// Point of its first vertex.
+    /// Point index of its first vertex.
     first: usize,
-    /// Of the document's slots, if it has triangles.
+    /// Index of the document's slot, if it has triangles and is shown.
     slot: Option<usize>,
     frame: Frame,
-    /// As the file has them, in the mesh's space.
+    /// Positions in mesh space, as in the file.
     local: Vec<DVec3>,
     targets: Vec<Target>,
 }
 
-/// A morph target of a part.
+/// A morph target of a primitive.
 struct Target {
     default: f64,
-    /// Vertices that it moves, ascending, and by how much, in the mesh's space.
+    /// Vertices that it moves, ascending, and their deltas in mesh space.
     moved: Vec<u32>,
     deltas: Vec<DVec3>,
-    /// First of the points of those vertices with the target at 0, and at 1, the others at their defaults; none where that is
-    /// the rest shape.
+    /// First point index of these vertices with the target at 0 and at 1, other targets at their defaults.
+    /// `None` if that is the rest shape.
     ends: [Option<usize>; 2],
 }
 
-impl Part {
+impl RigPrimitive {
     fn primitive<'a>(&self, document: &'a GltfDocument) -> &'a Primitive {
         &document.root.meshes[self.instance.mesh as usize].primitives[self.primitive as usize]
     }
 
-    /// Where its vertices are at rest, world space.
+    /// Rest positions, world space.
     fn rest(&self) -> Vec<DVec3> {
         let mut local = self.local.clone();
         for target in &self.targets {
@@ -119,7 +121,7 @@ impl Part {
 
 impl<'a> Rig<'a> {
     /// # Errors
-    /// A part that cannot be read; those that the model shows were read before.
+    /// If a primitive cannot be read. Those of visible meshes were validated when the file was read.
     pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3], origin: DVec3) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut rig = Self {
@@ -129,7 +131,7 @@ impl<'a> Rig<'a> {
             follows: Vec::new(),
             held: vec![0.0; document.root.nodes.len()],
             on_skeleton: vec![false; document.root.nodes.len()],
-            spots: Vec::new(),
+            vrm_points: Vec::new(),
             n_vertices: rest.len(),
             origin,
             diagonal: 0.0,
@@ -152,7 +154,7 @@ impl<'a> Rig<'a> {
             if shown.is_some() {
                 added?;
             } else if added.is_err() {
-                // Nobody sees it: it stays as it is.
+                // Unreadable meshes outside the scene stay unchanged.
                 continue;
             }
             seen.insert(key);
@@ -162,12 +164,12 @@ impl<'a> Rig<'a> {
         rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
         rig.add_nodes();
         rig.hold_without_skins();
-        rig.spots = vrm::spots(document, &rig.worlds, rig.diagonal);
-        for k in 0..rig.spots.len() {
-            rig.spots[k].point = rig.n_vertices + rig.extras.len();
-            rig.anchor(rig.spots[k].at);
+        rig.vrm_points = vrm::points(document, &rig.worlds, rig.diagonal);
+        for k in 0..rig.vrm_points.len() {
+            rig.vrm_points[k].bound_index = rig.n_vertices + rig.extras.len();
+            rig.anchor(rig.vrm_points[k].at);
         }
-        // Nothing can be bound that is no number: such a point stays where it is.
+        // Bind non-finite points at the origin.
         for point in &mut rig.extras {
             if !point.as_vec3().is_finite() {
                 *point = origin;
@@ -177,14 +179,14 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// Whether the document has more than the plain export can move: skins, morph targets, or nodes that follow the cage.
+    /// Whether an export must fit skins, morph targets or nodes that follow the cage.
     pub(crate) fn is_needed(document: &GltfDocument) -> bool {
         let instances = || document.instances.iter();
         let follow = || !nodes::holders(document).is_empty() || instances().any(|i| has_pivot(&i.world));
         Self::has_skin_or_targets(document) || !instances().any(|i| is_flat(i.world)) && follow()
     }
 
-    /// Whether the document has what the plain export leaves out.
+    /// Whether the document has skins or morph targets, which a plain export removes.
     pub(crate) fn has_skin_or_targets(document: &GltfDocument) -> bool {
         let morphs = |mesh: u32| {
             let primitives = &document.root.meshes[mesh as usize].primitives;
@@ -193,7 +195,7 @@ impl<'a> Rig<'a> {
         document.instances.iter().any(|i| i.skin.is_some() || morphs(i.mesh))
     }
 
-    /// The vertices that the shown meshes' morph targets move, with each target at 0 and at 1, as seen from the origin.
+    /// Ends of the morph targets of visible meshes, relative to the origin.
     pub(crate) fn shown_ends(&self) -> impl Iterator<Item = Vec3> {
         let shown = self.parts.iter().filter(|part| part.slot.is_some());
         let ends = shown.flat_map(lattice::ends);
@@ -201,8 +203,8 @@ impl<'a> Rig<'a> {
         ends.map(|&end| relative(end, self.origin))
     }
 
-    /// How far points move with what the cage does not bend. `by`: of all points.
-    pub(crate) fn held(&self, parts: &Unbent, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
+    /// Displacements of all points with held and rigid parts. `by`: displacements without them. `rest`: `[n_vertices]`.
+    pub(crate) fn held(&self, parts: &HeldParts, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
             return by;
         }
@@ -222,7 +224,7 @@ impl<'a> Rig<'a> {
         by
     }
 
-    /// `slot`: the number of the document's slot of a primitive, if it is shown.
+    /// `slot`: index of the document's slot of a primitive, if visible.
     fn add_instance(
         &mut self,
         slot: impl Fn(u32) -> Option<usize>,
@@ -270,7 +272,7 @@ impl<'a> Rig<'a> {
         number: u32,
         slot: Option<usize>,
         joints: &[DMat4],
-    ) -> Result<Option<Part>, GltfError> {
+    ) -> Result<Option<RigPrimitive>, GltfError> {
         let document = self.document;
         let Some(positions) = attribute(primitive, Semantic::Positions) else { return Ok(None) };
         let local = vectors(document, positions, "POSITION")?;
@@ -283,7 +285,7 @@ impl<'a> Rig<'a> {
             }
         };
         let first = slot.map(|slot| document.slots[slot].start as usize);
-        let mut part = Part {
+        let mut part = RigPrimitive {
             instance: instance.clone(),
             primitive: number,
             first: first.unwrap_or(self.n_vertices + self.extras.len()),
@@ -331,8 +333,8 @@ impl<'a> Rig<'a> {
         Ok(Some(part))
     }
 
-    /// Joints of all skins, nodes that clips or a person's bones move, nodes with meshes and a pivot, and what hangs below any of
-    /// these; but no nodes whose own transform has no effect.
+    /// Adds the nodes that follow the cage: joints, animated nodes, VRM bones, nodes with unskinned meshes and a pivot,
+    /// and the descendants of these. Excludes nodes with skinned meshes, whose transform has no effect.
     fn add_nodes(&mut self) {
         let nodes = &self.document.root.nodes;
         for node in nodes::holders(self.document) {
@@ -352,7 +354,7 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// Adds to [`Self::held`] what nodes carry without a skin: of each mesh its node, and the joint or animated node above it.
+    /// Adds the vertices of unskinned meshes to `held`, for their node and for the nearest joint or animated ancestor.
     fn hold_without_skins(&mut self) {
         let mut holders = vec![None; self.held.len()];
         for node in nodes::holders(self.document) {
@@ -375,16 +377,16 @@ impl<'a> Rig<'a> {
 
     fn anchor(&mut self, at: DVec3) {
         self.extras.push(at);
-        self.extras.extend(AROUND.map(|way| at + STEP * self.diagonal * way));
+        self.extras.extend(PROBE_DIRECTIONS.map(|way| at + GRADIENT_STEP * self.diagonal * way));
     }
 }
 
-/// Whether a node's origin says more than where the world has its own, about which no mesh turns on purpose.
+/// Whether a node's origin differs from the world origin. Otherwise it is not an intended pivot.
 fn has_pivot(world: &DMat4) -> bool {
     world.w_axis.truncate() != DVec3::ZERO
 }
 
-/// What makes two nodes that show a mesh one shape.
+/// Key of a shape: instances with equal keys deform identically.
 fn key_of(instance: &Instance) -> (u32, Option<u32>, Option<u32>) {
     (instance.mesh, instance.skin, instance.skin.is_none().then_some(instance.node).flatten())
 }

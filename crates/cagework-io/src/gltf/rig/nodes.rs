@@ -1,4 +1,4 @@
-//! Nodes that follow the cage: joints and what hangs on them.
+//! Nodes that follow the cage: joints and their descendants.
 
 use std::collections::HashMap;
 
@@ -9,87 +9,89 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::surface::rotation;
-use super::tracks::{self, Driven};
-use super::{AROUND, Rig, STEP};
+use super::tracks::{self, ChannelTarget};
+use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
 use crate::gltf::scene::{Worlds, local, name_of};
 
-/// What becomes of the skeleton.
+/// How the skeleton follows the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Joints {
-    /// Joints go where the cage takes them and keep their direction: rotation and scale tracks stay as they are.
+    /// Joints move with the cage and keep their orientation. Rotation and scale tracks stay unchanged.
     #[default]
     Follow,
-    /// Nothing of the skeleton changes: for skeletons that other files share.
+    /// The skeleton stays unchanged, for skeletons shared between files.
     Stay,
-    /// Joints turn with the shape, too.
+    /// Joints move and rotate with the shape.
     Turn,
 }
 
-/// Displacements below this, over the model's diagonal, are none.
-const SMALL: f64 = 1e-6;
-/// Bones shorter than this, over the diagonal, have no direction.
-const SHORT: f64 = 1e-4;
-/// Joints lower than this above the floor, over the height of what their skeleton holds, do not tell how long the legs are.
-const LOW: f64 = 0.1;
-/// Vertices inside the cage that tell how a rigid mesh moves, at least.
-const LEAST: usize = 3;
-/// Bounds of the ratio of heights.
-const RATIOS: (f64, f64) = (0.2, 5.0);
+/// Smaller displacements are ignored, over the model's diagonal.
+const MIN_DISPLACEMENT: f64 = 1e-6;
+/// Shorter bones have no defined direction, over the model's diagonal.
+const MIN_BONE_LENGTH: f64 = 1e-4;
+/// Lower joints are not hips: minimum height above the floor, over the height of the skeleton's vertices.
+const MIN_HIP_HEIGHT: f64 = 0.1;
+/// Minimum number of enclosed vertices for fitting a rigid motion.
+const MIN_RIGID_VERTICES: usize = 3;
+/// Range of the scale factor of clip translations.
+const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
-/// How a node has changed, for its animations.
-pub(super) struct Change {
+/// NodeChange of a node's local transform, for its animation tracks.
+pub(super) struct NodeChange {
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// What the linear part of translations becomes in a track that stands still, and in one that moves.
+    /// Linear map for deviations from `from` in tracks of constant translation, and in tracks that move.
     pub(super) still: DMat3,
     pub(super) moving: DMat3,
-    /// What rotations are turned by, from the left.
+    /// Rotation to apply to rotation keys from the left.
     pub(super) turn: Option<DQuat>,
 }
 
-/// All nodes after the cage has moved.
-pub(super) struct Moved {
-    /// By node.
-    pub(super) changes: Vec<Option<Change>>,
+/// All nodes after the deformation.
+pub(super) struct NodeUpdate {
+    /// `[n_nodes]`
+    pub(super) changes: Vec<Option<NodeChange>>,
     pub(super) nodes: Vec<Node>,
-    /// Of the numbers as they are written, in f32.
+    /// World transforms with local transforms rounded to f32, as written.
     pub(super) world: Vec<DMat4>,
     pub(super) n_moved: usize,
-    /// Joints outside the cage: those that hold vertices, and those that hold none and go with their parent.
+    /// Joints outside the cage: those with vertices, and those without, which follow their parent.
     pub(super) n_outside: usize,
     pub(super) n_loose: usize,
 }
 
-/// What nodes are moved with.
-pub(super) struct Given<'a> {
+/// Input of the node update.
+pub(super) struct Deformation<'a> {
     pub(super) by: &'a [DVec3],
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,
-    /// How nodes move whose meshes keep their shape.
+    /// Motions of nodes whose meshes stay rigid.
     pub(super) rigid: &'a HashMap<u32, Motion>,
-    /// The file's axis that points up.
+    /// Up axis of the file.
     pub(super) up: DVec3,
 }
 
-/// Gradient of the deformation at an anchor, by central differences.
+/// Deformation gradient at an anchor, by central differences.
 pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
     let column = |axis: usize| {
-        let [plus, minus] = [1 + axis, 1 + axis + AROUND.len() / 2].map(|k| by[anchor + k]);
-        DMat3::IDENTITY.col(axis) + (plus - minus) / (2.0 * STEP * diagonal)
+        let [plus, minus] = [1 + axis, 1 + axis + PROBE_DIRECTIONS.len() / 2].map(|k| by[anchor + k]);
+        DMat3::IDENTITY.col(axis) + (plus - minus) / (2.0 * GRADIENT_STEP * diagonal)
     };
     DMat3::from_cols(column(0), column(1), column(2))
 }
 
-/// What holds vertices, by a skin or by carrying them: joints, nodes that clips move, bones of a person (VRM).
+/// Nodes that carry vertices: joints, nodes animated by clips, and VRM bones.
 pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
     let json = &document.json;
     let animations = json["animations"].as_array().into_iter().flatten();
     let channels = animations.flat_map(|animation| animation["channels"].as_array().into_iter().flatten());
-    let animated = channels.filter_map(|channel| match tracks::driven(channel)? {
-        Driven::Translation(node) | Driven::Rotation(node) | Driven::Scale(node) => Some(node),
-        Driven::Weights(_) | Driven::MeshWeights(_) => None,
+    let animated = channels.filter_map(|channel| match tracks::channel_target(channel)? {
+        ChannelTarget::Translation(node) | ChannelTarget::Rotation(node) | ChannelTarget::Scale(node) => {
+            Some(node)
+        }
+        ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_) => None,
     });
     let bones = |extension: &str| &json["extensions"][extension]["humanoid"]["humanBones"];
     let of_vrm0 = bones("VRM").as_array().into_iter().flatten();
@@ -99,21 +101,21 @@ pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
     joints.chain(animated).chain(bones).filter(|&node| node < document.root.nodes.len()).collect()
 }
 
-/// A node that follows the cage: a joint, one that a clip moves or that shows a mesh, or one below these.
+/// A node that follows the cage: a joint, an animated node, a node with a mesh, or a descendant of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointPoint {
-    /// Its number in the file.
+    /// Node index in the file.
     pub node: u32,
-    /// Which of the points that are bound besides the vertices is its origin.
+    /// Index of its origin among the extra points.
     pub point: usize,
-    /// What it hangs on, by its number among the joints; none for a root. It comes before.
+    /// Index of its parent among the joints, which precedes it; `None` for roots.
     pub parent: Option<usize>,
-    /// Whether vertices hang on it: one that holds none and is outside the cage goes with its parent.
+    /// Whether it carries vertices. A joint outside the cage without vertices follows its parent.
     pub holds: bool,
 }
 
 impl Rig<'_> {
-    /// The nodes that follow, each after its parent.
+    /// Nodes that follow the cage, parents first.
     pub(crate) fn joints(&self) -> Vec<JointPoint> {
         let mut numbers = vec![None; self.held.len()];
         let parents: HashMap<u32, Option<u32>> = self.worlds.order.iter().copied().collect();
@@ -124,7 +126,7 @@ impl Rig<'_> {
             let above = parents.get(&node).copied().flatten();
             joints.push(JointPoint {
                 node,
-                // Behind all ends.
+                // Anchors are stored after all ends.
                 point: at - self.n_vertices - of_ends,
                 parent: above.and_then(|above| numbers[above as usize]),
                 holds: self.held[node as usize] > 0.0,
@@ -133,7 +135,7 @@ impl Rig<'_> {
         joints
     }
 
-    /// Names of the nodes of a skeleton that show a mesh without a skin.
+    /// Names of skeleton nodes with unskinned meshes.
     pub(crate) fn props(&self) -> Vec<String> {
         let name = |node| name_of(&self.document.json, "nodes", node, "node");
         self.follows.iter().map(|&(node, _)| node).filter(|&node| self.is_prop(node)).map(name).collect()
@@ -144,22 +146,22 @@ impl Rig<'_> {
         of_node.mesh.is_some() && of_node.skin.is_none() && self.on_skeleton[node as usize]
     }
 
-    /// The nodes of [`Self::props`] that have a name.
+    /// Nodes of [`Self::props`] with this name.
     pub(super) fn props_named(&self, name: &str) -> Vec<u32> {
         let follows = |node: &u32| self.follows.iter().any(|(follows, _)| follows == node);
         let named = named(&self.document.json, name).into_iter();
         named.filter(|&node| self.is_prop(node)).filter(follows).collect()
     }
 
-    /// How they move if their meshes keep their shape: as near as a rigid motion is to how what the cage encloses of them would
-    /// bend; as their origin does where that is too little.
+    /// Rigid motions of nodes whose meshes stay rigid: least squares over the enclosed vertices or, with too
+    /// few of them, the deformation at the node's origin.
     pub(super) fn motions(&self, props: &[u32], by: &[DVec3], is_outside: &[bool]) -> HashMap<u32, Motion> {
         let of = |&(node, at): &(u32, usize)| {
             let own = self.parts.iter().filter(|part| part.instance.node == Some(node));
             let points = own.flat_map(|part| (part.first..).zip(part.rest()));
             let inside: Vec<(DVec3, DVec3)> =
                 points.filter(|&(v, _)| !is_outside[v]).map(|(v, rest)| (rest, by[v])).collect();
-            if inside.len() >= LEAST {
+            if inside.len() >= MIN_RIGID_VERTICES {
                 return (node, Motion::of(&inside));
             }
             let turn = rotation(gradient(by, at, self.diagonal)).unwrap_or(DMat3::IDENTITY);
@@ -168,11 +170,11 @@ impl Rig<'_> {
         self.follows.iter().filter(|(node, _)| props.contains(node)).map(of).collect()
     }
 
-    /// Moves the nodes that follow, in `json` and as what they are now.
-    pub(super) fn moved(&self, given: &Given<'_>, json: &mut Value) -> Moved {
+    /// Updates the nodes that follow the cage, in `json` and in the result.
+    pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
-        let mut moved = Moved {
+        let mut moved = NodeUpdate {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
             world: self.worlds.world.clone(),
@@ -185,7 +187,7 @@ impl Rig<'_> {
             return moved;
         }
         let mut anchor = vec![None; n];
-        // Of a skeleton that stays, what hangs on it rigidly still follows the cage.
+        // Rigid meshes follow the cage even if the skeleton stays.
         let goes = |node: u32| !stays || given.rigid.contains_key(&node);
         self.follows
             .iter()
@@ -214,9 +216,10 @@ impl Rig<'_> {
             let is_loose = is_outside && self.held[i] <= 0.0;
             moved.n_outside += usize::from(is_outside && !is_loose);
             moved.n_loose += usize::from(is_loose);
-            // It holds nothing: a root on the floor, a control, the end of a chain.
+            // Nodes without vertices, such as a root on the floor, a control or the end of a chain, follow
+            // their parent.
             let by = if is_loose { parent.map_or(DVec3::ZERO, |p| delta[p as usize]) } else { given.by[at] };
-            delta[i] = if by.length() <= SMALL * self.diagonal { DVec3::ZERO } else { by };
+            delta[i] = if by.length() <= MIN_DISPLACEMENT * self.diagonal { DVec3::ZERO } else { by };
             let turn = given.joints == Joints::Turn;
             let turn = turn.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
             if delta[i] == DVec3::ZERO && turn.is_none_or(|t| t == DMat3::IDENTITY) {
@@ -254,7 +257,7 @@ impl Rig<'_> {
                 node.translation = Some(translation);
                 let turned = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
                     || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
-                // Of the change alone: its own scale may mirror it.
+                // Rotation of the change only, since the node's own scale can mirror.
                 let change = DMat3::from_mat4(to) * DMat3::from_mat4(from).inverse();
                 if let Some(m) = rotation(change).filter(|_| turned) {
                     let before = node
@@ -268,9 +271,9 @@ impl Rig<'_> {
                     turn = Some(after * before.inverse());
                 }
             }
-            // Where the parent scales, short is relative to it.
+            // Bone lengths are relative to the parent's scale.
             let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
-            let short = SHORT * self.diagonal / scale;
+            let short = MIN_BONE_LENGTH * self.diagonal / scale;
             let still = if t0.length().min(t1.length()) > short {
                 let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
                 DMat3::from_quat(turn) * (t1.length() / t0.length())
@@ -278,12 +281,12 @@ impl Rig<'_> {
                 DMat3::IDENTITY
             };
             let moving = DMat3::from_diagonal(DVec3::splat(ratios[i]));
-            moved.changes[i] = Some(Change { from: t0, to: t1, still, moving, turn });
+            moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
         }
         if moved.n_moved > 0 {
             let mut root = root.clone();
             root.nodes = std::mem::take(&mut moved.nodes);
-            // They were a tree before.
+            // The hierarchy is unchanged, so this cannot fail.
             if let Ok(worlds) = Worlds::new(&root) {
                 moved.world = worlds.world;
             }
@@ -292,11 +295,12 @@ impl Rig<'_> {
         moved
     }
 
-    /// By how much the translations of clips grow, by node; one number for a skeleton, or its feet would leave its legs.
+    /// Scale factors of clip translations, by node. All nodes of a skeleton share one factor, or feet would
+    /// detach from legs.
     ///
-    /// It is the ratio of the heights of its hips over the lowest vertex that it holds. The hips are the node that carries most
-    /// of those that are not as low as the floor.
-    fn ratios(&self, given: &Given<'_>, delta: &[DVec3]) -> Vec<f64> {
+    /// The factor is the ratio of hip heights above the skeleton's lowest vertex, after and before. The hips
+    /// are the node above the floor that carries the most vertices, including its descendants.
+    fn ratios(&self, given: &Deformation<'_>, delta: &[DVec3]) -> Vec<f64> {
         let (skeletons, n_skeletons) = self.skeletons();
         let mut carried = self.held.clone();
         for &(node, parent) in self.worlds.order.iter().rev() {
@@ -304,7 +308,7 @@ impl Rig<'_> {
                 carried[parent as usize] += carried[node as usize];
             }
         }
-        // Lowest and highest vertex at rest, and the lowest after.
+        // Lowest and highest vertex at rest, and lowest vertex after the deformation.
         let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY]; n_skeletons];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {
             let joint =
@@ -325,15 +329,16 @@ impl Rig<'_> {
             let Some(skeleton) = skeletons[i] else { continue };
             let ([low, high, after], at) = (spans[skeleton], self.worlds.world[i].w_axis.truncate());
             let (before, now) = (at.dot(given.up) - low, (at + delta[i]).dot(given.up) - after);
-            if carried[i] > hips[skeleton].0 && before > LOW * (high - low) {
-                hips[skeleton] = (carried[i], (now / before).clamp(RATIOS.0, RATIOS.1));
+            if carried[i] > hips[skeleton].0 && before > MIN_HIP_HEIGHT * (high - low) {
+                hips[skeleton] =
+                    (carried[i], (now / before).clamp(TRAVEL_SCALE_RANGE.0, TRAVEL_SCALE_RANGE.1));
             }
         }
         skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()
     }
 
-    /// The number of the skeleton of each node that follows, and how many there are: what hangs on one node that does not follow,
-    /// or has joints of the same skin, belongs together.
+    /// Skeleton index of each node that follows the cage, and the number of skeletons. Nodes belong to the
+    /// same skeleton if they share an ancestor that does not follow the cage, or a skin.
     fn skeletons(&self) -> (Vec<Option<usize>>, usize) {
         let n = self.held.len();
         let top = |above: &[usize], mut node: usize| {
@@ -342,7 +347,7 @@ impl Rig<'_> {
             }
             node
         };
-        // Number `n` is of what hangs on nothing.
+        // Index `n` stands for roots.
         let mut above: Vec<usize> = (0..=n).collect();
         let mut follows = vec![false; n];
         self.follows.iter().for_each(|(node, _)| follows[*node as usize] = true);
@@ -362,13 +367,13 @@ impl Rig<'_> {
     }
 }
 
-/// The number of a node that has a name, or of the nodes that have it; "node 7" where the file has none.
+/// Nodes with this name; unnamed nodes are called "node 7".
 fn named(json: &Value, name: &str) -> Vec<u32> {
     let n = json["nodes"].as_array().map_or(0, Vec::len) as u32;
     (0..n).filter(|&node| name_of(json, "nodes", node, "node") == name).collect()
 }
 
-/// f32 as JSON.
+/// f32 vector as JSON.
 pub(super) fn vector(v: Vec3) -> Value {
     json!(v.to_array())
 }

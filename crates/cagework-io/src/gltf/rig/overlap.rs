@@ -1,25 +1,25 @@
-//! Accessors that have bytes of others: to write over one would change the others.
+//! Finds accessors that share bytes with others and cannot be overwritten in place.
 
 use std::collections::{HashMap, HashSet};
 
 use serde_json::Value;
 
 /// Buffer view and offset in it.
-pub(super) type Place = (u64, u64);
+pub(super) type ViewOffset = (u64, u64);
 
-/// `size` bytes of every `stride` from `start` on, before `end`.
+/// Byte range `start..end` with elements of `size` bytes every `stride` bytes.
 struct Span {
-    /// Where it can be written; None for images and sparse values, which are not.
-    place: Option<Place>,
+    /// Location of the accessor; `None` for images and sparse values, which are not overwritten.
+    place: Option<ViewOffset>,
     start: u64,
     end: u64,
     stride: u64,
     size: u64,
 }
 
-/// Places of accessors that lie on others in part. Attributes that take turns in a vertex do not, nor do accessors of one
-/// and the same place, which are counted by their uses.
-pub(super) fn overlapping(json: &Value) -> HashSet<Place> {
+/// Locations of accessors that partially overlap others. Interleaved attributes do not overlap, and accessors
+/// at the same location are counted as shared.
+pub(super) fn overlapping(json: &Value) -> HashSet<ViewOffset> {
     let mut spans = spans(json);
     spans.sort_by_key(|span| span.start);
     let (mut found, mut first, mut end) = (HashSet::new(), 0, 0);
@@ -36,7 +36,7 @@ pub(super) fn overlapping(json: &Value) -> HashSet<Place> {
     found
 }
 
-/// Whether spans are attributes of the same vertices, each with its own part of the stride.
+/// Whether the spans are interleaved attributes of the same vertices.
 fn take_turns(spans: &[Span]) -> bool {
     let stride = spans[0].stride;
     let mut parts: Vec<(u64, u64)> =
@@ -57,7 +57,7 @@ fn spans(json: &Value) -> Vec<Span> {
         let (start, size) = (number(view, "byteOffset"), number(view, "byteLength"));
         (size > 0).then(|| Span { place: None, start, end: start.saturating_add(size), stride: size, size })
     };
-    let mut at_places: HashMap<Place, Span> = HashMap::new();
+    let mut at_places: HashMap<ViewOffset, Span> = HashMap::new();
     let mut spans: Vec<Span> = list("images").filter_map(whole).collect();
     for accessor in list("accessors") {
         let sparse = &accessor["sparse"];
@@ -85,7 +85,7 @@ fn spans(json: &Value) -> Vec<Span> {
         let end = start.saturating_add(stride.saturating_mul(count.saturating_sub(1))).saturating_add(size);
         let place = (number_of_view, offset);
         let span = Span { place: Some(place), start, end, stride, size };
-        // Of several the largest.
+        // Of several accessors at one location, use the largest extent.
         let at_place = at_places.entry(place).or_insert(span);
         (at_place.end, at_place.size) = (at_place.end.max(end), at_place.size.max(size));
     }
@@ -99,8 +99,9 @@ mod tests {
 
     use super::*;
 
-    /// Offset, length and stride (0 for none) of views; view, offset and type of accessors of ten floats or vectors of them.
-    fn found(views: &[[u64; 3]], accessors: &[(u64, u64, &str)]) -> Vec<Place> {
+    /// Overlapping locations. `views`: offset, length and stride (0 for none). `accessors`: view, offset and
+    /// type of ten floats or vectors.
+    fn found(views: &[[u64; 3]], accessors: &[(u64, u64, &str)]) -> Vec<ViewOffset> {
         let views: Vec<Value> = views
             .iter()
             .map(|[start, length, stride]| match stride {
@@ -114,7 +115,7 @@ mod tests {
                 json!({ "bufferView": view, "byteOffset": offset, "componentType": 5126, "count": 10, "type": kind })
             })
             .collect();
-        let mut found: Vec<Place> = overlapping(
+        let mut found: Vec<ViewOffset> = overlapping(
             &json!({ "bufferViews": views, "accessors": accessors, "images": [{ "bufferView": 0 }] }),
         )
         .into_iter()
@@ -124,20 +125,20 @@ mod tests {
     }
 
     #[test]
-    fn only_what_shares_bytes_is_found() {
-        let picture = [0, 100, 0];
-        let apart = found(&[picture, [100, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
+    fn accessors_that_share_bytes_are_found() {
+        let image = [0, 100, 0];
+        let apart = found(&[image, [100, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
         assert_eq!(apart, []);
-        let by_a_byte = found(&[picture, [101, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
+        let by_a_byte = found(&[image, [101, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
         assert_eq!(by_a_byte, [(1, 0), (2, 0)]);
-        assert_eq!(found(&[picture, [99, 120, 0]], &[(1, 0, "VEC3")]), [(1, 0)], "on a picture");
-        let within = found(&[picture, [100, 240, 0]], &[(1, 0, "VEC3"), (1, 60, "VEC3")]);
-        assert_eq!(within, [(1, 0), (1, 60)], "of one view");
-        assert_eq!(found(&[picture, [100, 120, 0]], &[(1, 0, "VEC3"), (1, 0, "SCALAR")]), [], "one place");
+        assert_eq!(found(&[image, [99, 120, 0]], &[(1, 0, "VEC3")]), [(1, 0)], "overlaps an image");
+        let within = found(&[image, [100, 240, 0]], &[(1, 0, "VEC3"), (1, 60, "VEC3")]);
+        assert_eq!(within, [(1, 0), (1, 60)], "within one view");
+        assert_eq!(found(&[image, [100, 120, 0]], &[(1, 0, "VEC3"), (1, 0, "SCALAR")]), [], "same location");
     }
 
     #[test]
-    fn attributes_may_take_turns() {
+    fn interleaved_attributes_do_not_overlap() {
         let one_view = found(&[[0, 100, 0], [100, 240, 24]], &[(1, 0, "VEC3"), (1, 12, "VEC3")]);
         assert_eq!(one_view, []);
         let two_views = [[0, 100, 0], [100, 228, 24], [112, 228, 24]];

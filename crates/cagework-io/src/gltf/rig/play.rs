@@ -1,4 +1,4 @@
-//! A document that plays its clips.
+//! Evaluation of animation clips for playback.
 
 use std::collections::HashMap;
 
@@ -7,46 +7,46 @@ use cagework_core::skin::Skin;
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::clip::{Clip, clips, quaternion, vector};
-use super::tracks::Driven;
+use super::tracks::ChannelTarget;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
 use crate::gltf::{GltfDocument, GltfError, Slot, skin};
 use crate::origin::relative;
 use ::gltf::json::mesh::Semantic;
 
-/// A model with its skeleton, morph targets and clips.
+/// Plays the clips of a model.
 #[derive(Clone, Debug)]
 pub struct Player {
-    /// The model's vertices.
+    /// Vertices with joint weights and morph deltas.
     pub skin: Skin,
     clips: Vec<Clip>,
     nodes: Vec<Node>,
-    /// Every node after its parent.
+    /// Nodes, parents first.
     order: Vec<(u32, Option<u32>)>,
-    /// What each matrix of the palette is made of: a node and a bind matrix.
+    /// Node and bind matrix of each palette entry.
     palette: Vec<(Option<u32>, DMat4)>,
-    /// Default weights of all morph targets, and where those of each node and mesh begin.
+    /// Default weights of all morph targets, and the index of the first target of each node and mesh.
     defaults: Vec<f32>,
     of_nodes: HashMap<usize, usize>,
     of_meshes: HashMap<usize, Vec<usize>>,
     names: Vec<String>,
-    /// What everything is seen from, in world space.
+    /// Origin of all positions, in world space.
     origin: DVec3,
 }
 
-/// What the vertices are posed by.
+/// Skinning input at a time of a clip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posed {
-    /// World, as seen from the model's origin, from mesh space. `[n_palette]`
+    /// World (relative to the model's origin) from mesh space. `[n_palette]`
     pub palette: Vec<Mat4>,
     /// Weights of the morph targets. `[n_targets]`
     pub targets: Vec<f32>,
-    /// Where the nodes are, as seen from the model's origin. `[n_nodes]`, world space
+    /// Positions of the nodes, world space relative to the model's origin. `[n_nodes]`
     pub origins: Vec<Vec3>,
 }
 
 impl Player {
-    /// `like`: the document in whose order the vertices are; the same, or the one that this is an export of.
+    /// `like`: document that defines the vertex order; `document` itself, or the original of which it is an export.
     pub(crate) fn new(
         document: &GltfDocument,
         like: &GltfDocument,
@@ -89,12 +89,12 @@ impl Player {
         let places: HashMap<(u32, u32), &Slot> =
             document.slots.iter().filter_map(|slot| Some((place(document, slot)?, slot))).collect();
         for (number, wanted) in like.slots.iter().enumerate() {
-            // Exports keep nodes and primitives; without nodes there is one instance of each mesh, in order.
+            // Exports keep nodes and primitives. Without nodes, meshes are in order.
             let same = place(like, wanted).and_then(|place| places.get(&place).copied());
             let Some(slot) = same.or_else(|| document.slots.get(number)) else { continue };
             let (instance, primitive) = document.primitive(slot);
             let own = player.palette.len() as u32;
-            // Of a mesh without a node the world is all there is.
+            // Meshes without nodes are in world space.
             player.palette.push((instance.node, DMat4::IDENTITY));
             let first_joint = match instance.skin {
                 None => 0,
@@ -147,20 +147,20 @@ impl Player {
         Ok(player)
     }
 
-    /// The clips.
+    /// Animation clips of the file.
     #[must_use]
     pub fn clips(&self) -> &[Clip] {
         &self.clips
     }
 
-    /// Names of the morph targets, of each shown mesh in turn, and their weights at rest.
+    /// Names and default weights of the morph targets of all visible meshes. `[n_targets]`
     #[must_use]
     pub fn targets(&self) -> (&[String], &[f32]) {
         (&self.names, &self.defaults)
     }
 
-    /// Matrices and weights at a time of a clip, seconds; at rest without one. `targets` are the weights where no clip says
-    /// otherwise. `[n_targets]`, or empty for those of the file.
+    /// Evaluates a clip at a time in seconds; `None` is the rest pose. `targets`: morph weights without a
+    /// track, `[n_targets]`, or empty for the file's defaults.
     #[must_use]
     pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
         let mut nodes = self.nodes.clone();
@@ -172,19 +172,21 @@ impl Player {
         for (driven, value) in self.clips.get(clip.unwrap_or(usize::MAX)).iter().flat_map(|c| c.at(seconds)) {
             let node = |number: usize| nodes.get(number).is_some();
             match driven {
-                Driven::Translation(n) if node(n) => {
+                ChannelTarget::Translation(n) if node(n) => {
                     nodes[n].translation = Some(vector(&value).as_vec3().to_array());
                 }
-                Driven::Rotation(n) if node(n) => {
+                ChannelTarget::Rotation(n) if node(n) => {
                     nodes[n].rotation = Some(UnitQuaternion(quaternion(&value).as_quat().to_array()));
                 }
-                Driven::Scale(n) if node(n) => nodes[n].scale = Some(vector(&value).as_vec3().to_array()),
-                Driven::Weights(n) => {
+                ChannelTarget::Scale(n) if node(n) => {
+                    nodes[n].scale = Some(vector(&value).as_vec3().to_array());
+                }
+                ChannelTarget::Weights(n) => {
                     if let Some(&first) = self.of_nodes.get(&n) {
                         put(&mut weights, first, &value);
                     }
                 }
-                Driven::MeshWeights(n) => {
+                ChannelTarget::MeshWeights(n) => {
                     for &first in self.of_meshes.get(&n).into_iter().flatten() {
                         put(&mut weights, first, &value);
                     }

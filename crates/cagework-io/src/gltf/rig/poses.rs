@@ -1,4 +1,4 @@
-//! Poses of the cage as morph targets after those that a document has.
+//! Appends cage poses as morph targets.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -6,27 +6,28 @@ use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::edit::Edit;
-use super::reshape::{Named, mesh_of};
-use super::shape::Turned;
-use super::tracks::{Driven, driven, output, own_sampler};
+use super::reshape::{PoseDisplacements, mesh_of};
+use super::shape::SurfaceGradients;
+use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
 use crate::gltf::animate::SECONDS_PER_POSE;
 use crate::gltf::pack::push;
 
-/// Appends a morph target for each pose to every mesh, and an animation that plays them. `seconds`: as in
-/// [`super::ReshapeOptions::pose_seconds`]; `rigid`: nodes whose meshes keep their shape, and which points are outside the cage.
+/// Appends one morph target per pose to every mesh, and an animation that plays them. `seconds`: as
+/// [`super::ReshapeOptions::pose_seconds`]. `rigid`: nodes whose meshes stay rigid, and whether each point is
+/// outside the cage.
 pub(super) fn append(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,
     triangles: &[[u32; 3]],
-    (poses, seconds): (&[Named<'_>], &[f32]),
+    (poses, seconds): (&[PoseDisplacements<'_>], &[f32]),
     rigid: (&[u32], &[bool]),
 ) -> Result<(), WriteError> {
     if poses.is_empty() {
         return Ok(());
     }
-    // How many targets each had before. Its primitives must have as many.
+    // Number of targets of each mesh. All primitives of a mesh must have the same number.
     let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
     for part in &rig.parts {
         let most = meshes.entry(mesh_of(edit, &part.instance)).or_insert(0);
@@ -44,10 +45,10 @@ pub(super) fn append(
             );
         }
     }
-    // One after the other: how a surface turns takes more memory than what is written of it.
+    // Process poses one at a time: gradients need more memory than the output.
     for pose in poses {
         let by = held(rig, rigid, pose.by);
-        let turned = Turned::new(triangles, &by);
+        let turned = SurfaceGradients::new(triangles, &by);
         for part in &rig.parts {
             let mesh = mesh_of(edit, &part.instance);
             let number = part.primitive as usize;
@@ -95,15 +96,15 @@ pub(super) fn append(
         if weights.is_array() {
             pad(weights, n_before, poses.len());
         } else if let Some(node) = edit.json["nodes"][node].as_object_mut() {
-            // Asking for it has made it null.
+            // Indexing created a null member.
             node.shift_remove("weights");
         }
     }
     for a in 0..edit.json["animations"].as_array().map_or(0, Vec::len) {
         for c in 0..edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len) {
-            let n_before = match driven(&edit.json["animations"][a]["channels"][c]) {
-                Some(Driven::Weights(node)) => targets_of(&edit.json, node),
-                Some(Driven::MeshWeights(mesh)) => meshes.get(&mesh).copied(),
+            let n_before = match channel_target(&edit.json["animations"][a]["channels"][c]) {
+                Some(ChannelTarget::Weights(node)) => targets_of(&edit.json, node),
+                Some(ChannelTarget::MeshWeights(mesh)) => meshes.get(&mesh).copied(),
                 _ => None,
             };
             let Some(n_before) = n_before.filter(|&n| n > 0) else { continue };
@@ -123,7 +124,7 @@ pub(super) fn append(
     Ok(())
 }
 
-/// How far points move in a pose. Only the rest shape moves: existing targets add to it as before.
+/// Displacements of all points in a pose. Ends move with the rest shape, so existing targets stay unchanged.
 fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
     let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
     for part in &rig.parts {
@@ -142,7 +143,7 @@ fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> 
     all
 }
 
-/// Extends weights to those of the poses.
+/// Extends weights to the targets of the poses.
 fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
     let mut all = weights.as_array().cloned().unwrap_or_default();
     all.resize(n_before, json!(0.0));
@@ -150,7 +151,8 @@ fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
     *weights = all.into();
 }
 
-/// An animation through all poses: at their times, or from rest and back to rest. Targets that were there keep their defaults.
+/// Adds an animation of the poses: at their times, or one per second starting and ending at rest. Existing
+/// targets stay at their defaults.
 fn play(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,

@@ -1,5 +1,6 @@
-//! Writing a reshaped document.
+//! Writes a reshaped document.
 
+use cagework_core::words::counted;
 use std::collections::HashMap;
 
 use cagework_pose::Parts;
@@ -9,9 +10,9 @@ use serde_json::Value;
 
 use super::edit::Edit;
 use super::lattice::MAX_ENDS;
-use super::nodes::{Given, Joints};
-use super::shape::{Shape, Turned};
-use super::{Part, Rig, key_of, poses, tracks, vrm};
+use super::nodes::{Deformation, Joints};
+use super::shape::{Shape, SurfaceGradients};
+use super::{Rig, RigPrimitive, key_of, poses, tracks, vrm};
 use crate::error::WriteError;
 use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
@@ -19,113 +20,132 @@ use crate::gltf::scene::Instance;
 use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
 
-/// How a rigged document is reshaped.
+/// Options for reshaping a rigged document.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReshapeOptions {
-    /// What becomes of the skeleton.
+    /// How the skeleton follows the cage.
     pub joints: Joints,
-    /// How far clips travel stays as it is; otherwise it grows as the height of the hips does.
+    /// Keeps the translations of clips; otherwise they scale with the height of the hips.
     pub keep_travel: bool,
-    /// Names of nodes below joints whose meshes keep their shape: buckles, eyes, weapons.
+    /// Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
     pub rigid: Vec<String>,
-    /// Vertices that the cage does not bend, in every state of theirs.
+    /// Vertices that stay in place or rigid.
     pub parts: Parts,
-    /// When each pose is shown, seconds; none: one after the other, a second each, from rest to rest.
+    /// Times of the poses in seconds, ascending. If empty, poses are played one per second, starting and
+    /// ending at rest.
     pub pose_seconds: Vec<f32>,
 }
 
-/// What was moved.
+/// Results of reshaping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ReshapeReport {
-    /// Joints and other nodes that follow: those that clips move or that carry meshes, and what hangs below.
+    /// Nodes that follow the cage: joints, animated nodes, nodes with meshes, and their descendants.
     pub joints: usize,
-    /// Of them, those whose transform was written anew.
+    /// Nodes among `joints` with a changed transform.
     pub joints_moved: usize,
-    /// Outside the cage, although they hold vertices: they follow it as its policy for points outside says.
+    /// Joints with vertices outside the cage. They move as points outside the cage.
     pub joints_outside: usize,
-    /// Outside the cage and without vertices: they go with their parent.
+    /// Joints without vertices outside the cage. They follow their parent.
     pub joints_loose: usize,
-    /// Vertices in states of morph targets, besides the rest shape.
+    /// Ends of morph targets: vertices with one target at weight 0 or 1.
     pub morph_ends: usize,
-    /// Of them, those outside the cage: they follow it as its policy for points outside says.
+    /// Ends outside the cage. They move as points outside the cage.
     pub morph_ends_outside: usize,
-    /// Points of the lattice that they are read from where they are too many to be bound one by one; otherwise 0.
+    /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
     pub lattice_points: usize,
-    /// Distance of two of these, over the model's diagonal.
+    /// Cell size of the lattice, over the model's diagonal.
     pub lattice_cell: f64,
-    /// Animation tracks that were written anew.
+    /// Animation tracks that changed.
     pub tracks: usize,
-    /// Animation tracks that could not be read, and stay as they are.
+    /// Unreadable animation tracks, which stay unchanged.
     pub tracks_unread: usize,
-    /// Largest condition of a skinning matrix.
+    /// Largest condition number of a skinning matrix.
     pub max_condition: f64,
-    /// Vertices whose skinning matrix cannot be undone: they go with their neighbours.
+    /// Vertices with a singular skinning matrix, which follow their neighbours.
     pub singular_vertices: usize,
 }
 
 impl ReshapeReport {
-    /// What a user should know of it, each a sentence.
+    /// Notices for the user, one sentence each.
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
         let Self { joints, joints_moved, joints_outside, morph_ends, morph_ends_outside, tracks, .. } = self;
         let mut notices = Vec::new();
-        let mut say = |n: usize, sentence: String| notices.extend((n > 0).then_some(sentence));
-        say(
+        let mut notice = |n: usize, text: String| notices.extend((n > 0).then_some(text));
+        notice(
             *joints,
             format!(
-                "{joints_moved} of {joints} joints and other nodes moved, {tracks} animation tracks with them"
+                "moved {joints_moved} of {} and adapted {}",
+                counted(*joints, "joint or other node", "joints and other nodes"),
+                counted(*tracks, "animation track", "animation tracks")
             ),
         );
-        say(
+        notice(
             *joints_outside,
             format!(
-                "{joints_outside} joints or other nodes that hold vertices are outside the cage: near it they follow, far away they \
-                 stay"
+                "{} outside the cage: near it they follow it, farther away they stay",
+                counted(
+                    *joints_outside,
+                    "joint or node with vertices is",
+                    "joints or nodes with vertices are"
+                )
             ),
         );
-        say(
+        notice(
             *morph_ends_outside,
             format!(
-                "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: near it they follow, far \
-                 away they stay; make a cage around them"
+                "{morph_ends_outside} of {} leave the cage: near it they follow it, farther away they stay; generate a cage that \
+                 encloses them",
+                counted(*morph_ends, "vertex position in morph targets", "vertex positions in morph targets")
             ),
         );
         let (n, cell) = (self.lattice_points, 100.0 * self.lattice_cell);
-        say(
+        notice(
             n,
             format!(
-                "the morph targets move {morph_ends} vertices, more than the {MAX_ENDS} that are bound one by one: what they \
-                 add is read between {n} points, {cell:.1} % of the model's size apart"
+                "the morph targets have {morph_ends} vertex positions, more than the limit of {MAX_ENDS} for individual weights: \
+                 they are interpolated between {n} points at a distance of {cell:.1} % of the model's size"
             ),
         );
         let n = self.singular_vertices;
-        say(n, format!("{n} vertices are flattened by their skin: they go with their neighbours"));
+        notice(
+            n,
+            format!(
+                "{} collapsed by the skin: they follow their neighbours",
+                counted(n, "vertex is", "vertices are")
+            ),
+        );
         let n = self.tracks_unread;
-        say(n, format!("{n} animation tracks cannot be read: they stay as they are"));
+        notice(
+            n,
+            format!(
+                "{} and stay unchanged",
+                counted(n, "animation track cannot be read", "animation tracks cannot be read")
+            ),
+        );
         notices
     }
 }
 
-/// A pose by name: how far each point moves. `[n_points]`, world space as the file has it.
-pub(crate) struct Named<'a> {
+/// PoseDisplacements displacements of all points in a pose, world space as in the file. `[n_points]`
+pub(crate) struct PoseDisplacements<'a> {
     pub(crate) name: &'a str,
     pub(crate) by: &'a [DVec3],
 }
 
-/// Writes the document with its points moved `by`, or, with poses, at rest and with a morph target more for each pose.
+/// Writes the document with points displaced by `by`; with `poses`, at rest with one more morph target per pose.
 ///
-/// `triangles` of the model; `is_outside`: of each point; counts are the caller's to check.
+/// `triangles`: of the model. `is_outside`: whether each point is outside the cage. The caller checks the counts.
 pub(crate) fn reshape(
     document: &GltfDocument,
     rig: &Rig<'_>,
     triangles: &[[u32; 3]],
     (by, is_outside): (&[DVec3], &[bool]),
-    poses: &[Named<'_>],
+    poses: &[PoseDisplacements<'_>],
     (options, up): (&ReshapeOptions, DVec3),
 ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
     if options.joints == Joints::Turn && document.json.pointer("/extensions/VRM").is_some() {
-        let message = "the bones of a VRM 0 have no rotation of their own, and must not get one: let joints follow or stay, \
-            or convert the file to VRM 1";
+        let message = "bones of a VRM 0 cannot have rotations: choose --joints follow or stay, or convert the file to VRM 1";
         return Err(WriteError::Document(message.into()));
     }
     let mut edit = Edit::new(document);
@@ -135,7 +155,7 @@ pub(crate) fn reshape(
         if found.is_empty() {
             let name = shown(name);
             return Err(WriteError::Document(format!(
-                "there is no node '{name}' below a joint to keep rigid: see the names with cagework info"
+                "there is no node '{name}' attached to a joint that could stay rigid: cagework info lists the names"
             )));
         }
         rigid.extend(found);
@@ -155,13 +175,13 @@ pub(crate) fn reshape(
     if has_moved {
         let (joints, keep_travel) = (options.joints, options.keep_travel);
         let motions = rig.motions(&rigid, by, is_outside);
-        let given = Given { by, is_outside, joints, keep_travel, rigid: &motions, up };
+        let given = Deformation { by, is_outside, joints, keep_travel, rigid: &motions, up };
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
         report.joints_loose = moved.n_loose;
         let binds = write_binds(rig, &mut edit, &moved.world);
-        let turned = Turned::new(triangles, by);
+        let turned = SurfaceGradients::new(triangles, by);
         for part in &rig.parts {
             if part.instance.node.is_some_and(|node| motions.contains_key(&node)) {
                 continue;
@@ -169,7 +189,7 @@ pub(crate) fn reshape(
             let frame = rig.frame(part, &moved.world, &binds)?;
             let Some(shape) = rig.shape(part, &turned, &frame)? else { continue };
             let states = shape.targets.iter().map(|target| &target.positions).chain([&shape.positions]);
-            // As a reader will see them, after rounding.
+            // Check the values that readers get, after rounding to f32.
             let is_seen = |(v, p): (usize, &DVec3)| {
                 frame.world(v).transform_point3(p.as_vec3().as_dvec3()).as_vec3().is_finite()
             };
@@ -177,8 +197,8 @@ pub(crate) fn reshape(
                 || !shape.positions.iter().enumerate().all(is_seen)
             {
                 return Err(WriteError::Document(format!(
-                    "mesh {}: its skin shrinks or stretches vertices so much that their new places are beyond numbers of 32 bits; \
-                     write it without its rig (--static)",
+                    "mesh {}: its skin scales vertices so strongly that their new positions exceed the range of f32; \
+                     export it without the rig (--static)",
                     part.instance.mesh
                 )));
             }
@@ -194,27 +214,27 @@ pub(crate) fn reshape(
 }
 
 impl Rig<'_> {
-    /// Ends of morph targets outside the cage.
+    /// Number of ends of morph targets outside the cage.
     fn ends_outside(&self, is_outside: &[bool]) -> usize {
         let targets = self.parts.iter().flat_map(|part| &part.targets);
         let ends = targets.flat_map(|t| t.ends.iter().flatten().map(|&first| first..first + t.moved.len()));
         ends.map(|points| is_outside[points].iter().filter(|outside| **outside).count()).sum()
     }
 
-    /// Triangles of a part's own vertices; none of points and lines.
-    pub(super) fn triangles(&self, part: &Part, all: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    /// Triangles with a primitive's own vertex indices; empty for points and lines.
+    pub(super) fn triangles(&self, part: &RigPrimitive, all: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let Some(slot) = part.slot.map(|slot| &self.document.slots[slot]) else {
-            // What no scene shows, such as a coarser level of detail; what cannot be read has none.
+            // Meshes outside the scene are not in the model's triangles. Unreadable ones have none.
             let own = triangles_of(self.document, part.primitive(self.document), part.local.len());
             return own.unwrap_or_default();
         };
         all[slot.triangles.clone()].iter().map(|t| t.map(|v| v - slot.start)).collect()
     }
 
-    /// Skinning matrices of a part where the nodes are now.
+    /// Skinning matrices of a primitive with the updated nodes.
     fn frame(
         &self,
-        part: &Part,
+        part: &RigPrimitive,
         world: &[DMat4],
         binds: &HashMap<u32, Vec<DMat4>>,
     ) -> Result<Frame, WriteError> {
@@ -230,7 +250,7 @@ impl Rig<'_> {
     }
 }
 
-/// Gives meshes that several nodes show, each in its own way, a copy for each of them but the first.
+/// Duplicates meshes that several nodes show with different deformations. The first user keeps the original.
 fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     let mut first = HashMap::new();
     let mut copies = HashMap::new();
@@ -254,7 +274,7 @@ fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     }
 }
 
-/// Inverse bind matrices with which every joint holds its vertices as before, as they are in f32.
+/// Inverse bind matrices that keep each skinning matrix, `B' = G'^-1 G B`, rounded to f32.
 fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u32, Vec<DMat4>> {
     let mut all = rig.binds.clone();
     let mut numbers: Vec<u32> = all.keys().copied().collect();
@@ -282,13 +302,13 @@ fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u
     all
 }
 
-/// The mesh that an instance has by now.
+/// The instance's mesh in the edited document.
 pub(super) fn mesh_of(edit: &Edit<'_>, instance: &Instance) -> usize {
     let of_node = |node: u32| edit.json["nodes"][node as usize]["mesh"].as_u64();
     instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
 }
 
-fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &Part, shape: &Shape) {
+fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &RigPrimitive, shape: &Shape) {
     let mesh = mesh_of(edit, &part.instance);
     let number = part.primitive as usize;
     let before = part.primitive(rig.document);

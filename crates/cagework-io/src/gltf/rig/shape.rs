@@ -1,4 +1,4 @@
-//! A part's vertices, morph targets, normals and tangents after a deformation.
+//! Vertices, morph targets, normals and tangents of a primitive after a deformation.
 
 use std::cell::OnceCell;
 
@@ -6,48 +6,49 @@ use ::gltf::json::mesh::Semantic;
 use glam::{DMat3, DMat4, DVec3};
 
 use super::surface::{Surface, cofactor};
-use super::{Part, Rig};
+use super::{Rig, RigPrimitive};
 use crate::gltf::GltfError;
 use crate::gltf::geometry::{Frame, attribute, vectors};
 
-/// Skinning matrices with a larger condition than this cannot be undone.
+/// Condition number above which a skinning matrix counts as singular.
 const MAX_CONDITION: f64 = 1e4;
 
-/// A part in the mesh's own space, as its accessors have it.
+/// Deformed primitive in mesh space, as its accessors store it.
 pub(super) struct Shape {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Option<Vec<DVec3>>,
-    /// With their handedness.
+    /// With handedness.
     pub(super) tangents: Option<Vec<(DVec3, f32)>>,
     pub(super) targets: Vec<Deltas>,
     pub(super) condition: f64,
-    /// Vertices whose skinning matrix cannot be undone.
+    /// Vertices with a singular skinning matrix.
     pub(super) n_singular: usize,
 }
 
-/// What a morph target adds; of normals and tangents if it has them.
+/// Deltas of a morph target; normals and tangents are optional.
 pub(super) struct Deltas {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Option<Vec<DVec3>>,
     pub(super) tangents: Option<Vec<DVec3>>,
 }
 
-/// How far points move, and how that turns the surface of all parts together: those that meet in a seam turn alike there.
-pub(super) struct Turned<'a> {
+/// Displacements, and deformation gradients computed over all visible primitives together, so that both sides
+/// of a seam get the same normals.
+pub(super) struct SurfaceGradients<'a> {
     triangles: &'a [[u32; 3]],
     by: &'a [DVec3],
-    /// At rest, of all vertices that are shown.
+    /// Gradients at rest of all visible vertices, computed on demand.
     gradients: OnceCell<Vec<Option<DMat3>>>,
 }
 
-impl<'a> Turned<'a> {
-    /// `triangles` of the model; `by`: of all points.
+impl<'a> SurfaceGradients<'a> {
+    /// `triangles`: of the model. `by`: displacements of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }
 
-    /// Gradients at the vertices of a part at rest; nothing for one that is not shown.
-    fn of(&self, rig: &Rig<'_>, part: &Part) -> Option<&[Option<DMat3>]> {
+    /// Gradients at the vertices of a primitive at rest; `None` if it is not visible.
+    fn of(&self, rig: &Rig<'_>, part: &RigPrimitive) -> Option<&[Option<DMat3>]> {
         part.slot?;
         let all = self.gradients.get_or_init(|| {
             let mut from = vec![DVec3::ZERO; rig.n_vertices];
@@ -64,27 +65,27 @@ impl<'a> Turned<'a> {
     }
 }
 
-/// Where the vertices of a part are in one of its states, before and after. World space.
+/// Positions of a primitive's vertices in one state, before and after the deformation. World space.
 struct State {
     from: Vec<DVec3>,
     to: Vec<DVec3>,
 }
 
-/// Normals and tangents of a part as its accessors have them.
+/// Normals and tangents of a primitive, as its accessors store them.
 struct Directions {
     normals: Option<Vec<DVec3>>,
     tangents: Option<Vec<DVec3>>,
     handedness: Vec<f32>,
-    /// What each target adds to them.
+    /// Deltas of each morph target.
     of_targets: Vec<[Option<Vec<DVec3>>; 2]>,
 }
 
 impl Rig<'_> {
-    /// A part after its points moved; none if nothing of it has changed. `frame`: its new skinning matrices.
+    /// The deformed primitive; `None` if it is unchanged. `frame`: its new skinning matrices.
     pub(super) fn shape(
         &self,
-        part: &Part,
-        turned: &Turned<'_>,
+        part: &RigPrimitive,
+        turned: &SurfaceGradients<'_>,
         frame: &Frame,
     ) -> Result<Option<Shape>, GltfError> {
         let (n, by) = (part.local.len(), turned.by);
@@ -200,14 +201,14 @@ impl Rig<'_> {
 }
 
 impl Rig<'_> {
-    /// A part's normals as its accessor has them.
-    pub(super) fn normals(&self, part: &Part) -> Result<Option<Vec<DVec3>>, GltfError> {
+    /// Normals of a primitive, as its accessor stores them.
+    pub(super) fn normals(&self, part: &RigPrimitive) -> Result<Option<Vec<DVec3>>, GltfError> {
         Ok(Directions::of(self, part)?.and_then(|directions| directions.normals))
     }
 }
 
 impl Directions {
-    fn of(rig: &Rig<'_>, part: &Part) -> Result<Option<Self>, GltfError> {
+    fn of(rig: &Rig<'_>, part: &RigPrimitive) -> Result<Option<Self>, GltfError> {
         let primitive = part.primitive(rig.document);
         let n = part.local.len();
         let normals = attribute(primitive, Semantic::Normals)
@@ -238,8 +239,8 @@ impl Directions {
         Ok(Some(Self { normals, tangents, handedness, of_targets }))
     }
 
-    /// A normal (kind 0) or tangent (1) with all targets at their defaults.
-    fn at_rest(&self, part: &Part, kind: usize, v: usize) -> DVec3 {
+    /// Normal (kind 0) or tangent (kind 1) with all targets at their defaults.
+    fn at_rest(&self, part: &RigPrimitive, kind: usize, v: usize) -> DVec3 {
         let own = [&self.normals, &self.tangents][kind].as_ref().map_or(DVec3::ZERO, |all| all[v]);
         part.targets.iter().enumerate().fold(own, |sum, (k, t)| {
             if t.default == 0.0 { sum } else { sum + t.default * self.added(k, kind, v) }
@@ -250,11 +251,11 @@ impl Directions {
         self.of_targets.get(target).and_then(|of| of[kind].as_ref()).map_or(DVec3::ZERO, |all| all[v])
     }
 
-    /// Fills in the directions of a shape. `turn`: of a state, the default one or a target (with its end and the share of the
-    /// target's deltas that it adds).
+    /// Computes normals and tangents of a shape. `turn`: directions of a state: the default one (`None`), or
+    /// (target, end, weight of the target's deltas added to the default).
     fn turned(
         &self,
-        part: &Part,
+        part: &RigPrimitive,
         shape: &mut Shape,
         turn: impl Fn(Option<(usize, usize, f64)>) -> Vec<[DVec3; 2]>,
     ) {
@@ -265,7 +266,7 @@ impl Directions {
                 continue;
             }
             let default = part.targets[k].default;
-            // A target that is at rest in one of its ends is what the base is there.
+            // An end that equals the default state needs no evaluation.
             let [off, on] = [0, 1].map(|end| {
                 let share = end as f64 - default;
                 if share == 0.0 { at_rest.clone() } else { turn(Some((k, end, share))) }

@@ -1,4 +1,4 @@
-//! How a deformation turns and stretches a surface: its gradient at every vertex.
+//! Deformation gradients at the vertices of a surface.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -6,22 +6,24 @@ use cagework_core::mesh::weld;
 
 use crate::origin::{origin_near, relative};
 
-/// Below this a gradient counts as flat, and nothing turns.
-const FLAT: f64 = 1e-9;
+/// Determinant below which a gradient counts as singular and is replaced by the identity.
+const MIN_DETERMINANT: f64 = 1e-9;
 
-/// Faces at one place whose normals have a smaller dot product are back to back: a card of hair, a cape.
-const BACK: f64 = -0.5;
+/// Coincident vertices whose normals have a smaller dot product belong to opposite sides of a thin sheet,
+/// such as hair or a cape.
+const MIN_FACING_COS: f64 = -0.5;
 
-/// Triangles of a model or a part, for gradients by least squares over the edges at a vertex.
+/// Triangles for estimating gradients by least squares over the edges at each vertex.
 pub(super) struct Surface {
     triangles: Vec<[u32; 3]>,
-    /// Vertices at one place are one, if they go to one place and are not back to back. `[n]`
+    /// Merged index of each vertex. Coincident vertices merge if they move alike and are not on opposite
+    /// sides of a sheet. `[n]`
     unique_of: Vec<u32>,
     n_unique: usize,
 }
 
 impl Surface {
-    /// Vertices go `from` a place `to` another; `triangles` of them.
+    /// `from`, `to`: positions before and after. `triangles`: of these vertices.
     pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
         let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let origin = origin_near(&world);
@@ -33,14 +35,15 @@ impl Surface {
             triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
         }
         normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
-        // At each place, the first vertex of each that it is, and which that is.
+        // For each position, its merged vertices: first vertex and merged index.
         let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_unique = 0;
         let mut unique_of = Vec::with_capacity(from.len());
         for (v, &place) in welded.unique_of.iter().enumerate() {
             let here = &mut at[place as usize];
-            let is_same =
-                |&&(first, _): &&(usize, u32)| to[first] == to[v] && normals[first].dot(normals[v]) >= BACK;
+            let is_same = |&&(first, _): &&(usize, u32)| {
+                to[first] == to[v] && normals[first].dot(normals[v]) >= MIN_FACING_COS
+            };
             let known = here.iter().find(is_same).map(|&(_, unique)| unique);
             if known.is_none() {
                 here.push((v, n_unique));
@@ -51,13 +54,14 @@ impl Surface {
         Self { triangles, unique_of, n_unique: n_unique as usize }
     }
 
-    /// Gradient at each vertex of the map from `from` to `to`: least squares over the edges, and the unit normal goes to the
-    /// unit normal. None where nothing near the vertex has moved. `[n]`
+    /// Gradient of the map from `from` to `to` at each vertex: least squares over edges, with the constraint
+    /// that the unit normal maps to the unit normal. `None` if no adjacent triangle has moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
 
-    /// The same for another state in which only the vertices `changed` are elsewhere than in the one of `others`, its gradients.
+    /// Like [`Self::gradients`], for a state that differs only at the vertices `changed` from one with
+    /// gradients `others`.
     pub(super) fn gradients_near(
         &self,
         from: &[DVec3],
@@ -116,9 +120,13 @@ impl Surface {
                 let (both, one, length) = sums[v];
                 let [n, m] = normals[v].map(DVec3::normalize_or_zero);
                 let scale = 1.0 / length.max(1e-30);
-                let one = scale * one + outer(n, n) + DMat3::from_diagonal(DVec3::splat(FLAT));
+                let one = scale * one + outer(n, n) + DMat3::from_diagonal(DVec3::splat(MIN_DETERMINANT));
                 let gradient = (scale * both + outer(m, n)) * one.inverse();
-                moved[v].then_some(if gradient.determinant() > FLAT { gradient } else { DMat3::IDENTITY })
+                moved[v].then_some(if gradient.determinant() > MIN_DETERMINANT {
+                    gradient
+                } else {
+                    DMat3::IDENTITY
+                })
             })
             .collect();
         let of = |(v, &unique): (usize, &u32)| {
@@ -128,7 +136,7 @@ impl Surface {
         self.unique_of.iter().enumerate().map(of).collect()
     }
 
-    /// Mean of a value over the neighbours of each vertex where `is_known`, for those where it is not.
+    /// Replaces values where `is_known` is false by the mean of the known neighbours.
     pub(super) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
         let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
         for triangle in &self.triangles {
@@ -151,13 +159,14 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
-/// The cofactor matrix, which normals follow; of a mirrored one its negative, so that they stay outside.
+/// Cofactor matrix, which transforms normals; negated for mirroring maps, so that normals point outside.
 pub(super) fn cofactor(m: DMat3) -> DMat3 {
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     sign * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// The rotation nearest to a matrix: Higham, Noferini 2016 by Newton's iteration, enough for what is far from flat.
+/// Nearest rotation by Newton's iteration for the polar decomposition; `None` if the matrix is singular or
+/// mirrors. See Higham and Noferini (2016).
 pub(super) fn rotation(m: DMat3) -> Option<DMat3> {
     let mut turn = m * (1.0 / m.determinant().abs().cbrt());
     for _ in 0..30 {

@@ -4,62 +4,61 @@ use glam::{DMat3, DQuat, DVec3, Vec3};
 use serde_json::Value;
 
 use super::edit::Edit;
-use super::nodes::Change;
+use super::nodes::NodeChange;
 use super::reshape::ReshapeReport;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::push;
 
-/// A translation that moves by less than this, over the node's own, stands still.
-const STILL: f64 = 1e-3;
+/// Smaller translation ranges count as constant, over the node's own translation.
+const MIN_TRANSLATION_RANGE: f64 = 1e-3;
 
-/// What a channel drives.
+/// Property animated by a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Driven {
+pub(super) enum ChannelTarget {
     Translation(usize),
     Rotation(usize),
     Scale(usize),
-    /// Morph weights of a node, or of a mesh.
+    /// Morph weights of a node.
     Weights(usize),
     MeshWeights(usize),
 }
 
-/// What a channel drives, if it is of those that a reshape knows; by `path` and node, or by a pointer
-/// (KHR_animation_pointer).
-pub(super) fn driven(channel: &Value) -> Option<Driven> {
+/// Target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
+pub(super) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
     let target = &channel["target"];
     if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str)
     {
         let mut words = pointer.strip_prefix('/')?.split('/');
         let (list, index, what) = (words.next()?, words.next()?.parse().ok()?, words.next()?);
         return match (list, what, words.next()) {
-            ("nodes", "translation", None) => Some(Driven::Translation(index)),
-            ("nodes", "rotation", None) => Some(Driven::Rotation(index)),
-            ("nodes", "scale", None) => Some(Driven::Scale(index)),
-            ("nodes", "weights", None) => Some(Driven::Weights(index)),
-            ("meshes", "weights", None) => Some(Driven::MeshWeights(index)),
+            ("nodes", "translation", None) => Some(ChannelTarget::Translation(index)),
+            ("nodes", "rotation", None) => Some(ChannelTarget::Rotation(index)),
+            ("nodes", "scale", None) => Some(ChannelTarget::Scale(index)),
+            ("nodes", "weights", None) => Some(ChannelTarget::Weights(index)),
+            ("meshes", "weights", None) => Some(ChannelTarget::MeshWeights(index)),
             _ => None,
         };
     }
     let node = target["node"].as_u64()? as usize;
     match target["path"].as_str()? {
-        "translation" => Some(Driven::Translation(node)),
-        "rotation" => Some(Driven::Rotation(node)),
-        "scale" => Some(Driven::Scale(node)),
-        "weights" => Some(Driven::Weights(node)),
+        "translation" => Some(ChannelTarget::Translation(node)),
+        "rotation" => Some(ChannelTarget::Rotation(node)),
+        "scale" => Some(ChannelTarget::Scale(node)),
+        "weights" => Some(ChannelTarget::Weights(node)),
         _ => None,
     }
 }
 
-/// Values of a sampler: its accessor, and whether only every third one is a value, between tangents.
+/// Output of a sampler. Cubic splines store in-tangent, value and out-tangent per key.
 pub(super) struct Output {
     pub(super) accessor: u32,
     pub(super) is_cubic: bool,
-    /// Keys.
+    /// Number of keys.
     pub(super) n_keys: usize,
 }
 
 impl Output {
-    /// Whether element `k` is the value of a key, and no tangent.
+    /// Whether element `k` is a value, not a tangent.
     fn is_value(&self, k: usize) -> bool {
         !self.is_cubic || k % 3 == 1
     }
@@ -74,7 +73,7 @@ pub(super) fn output(edit: &Edit<'_>, sampler: &Value) -> Option<Output> {
     Some(Output { accessor, is_cubic: sampler["interpolation"] == "CUBICSPLINE", n_keys })
 }
 
-/// Makes a sampler the channel's own if others use it; returns its number, none if there is no such sampler.
+/// Index of the channel's sampler, duplicated if shared; `None` if it does not exist.
 pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize) -> Option<usize> {
     let of = &mut edit.json["animations"][animation];
     let sampler = of["channels"][channel]["sampler"].as_u64()? as usize;
@@ -90,19 +89,19 @@ pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize)
     Some(number)
 }
 
-/// Values of a translation or rotation track; none if there are not as many as it has keys.
+/// Values of a translation or rotation track; `None` if the count does not match the keys.
 fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Vec<[f32; N]>> {
     let values = document.source().floats::<N>(output.accessor, "a track").ok()?;
     let per_key = if output.is_cubic { 3 } else { 1 };
     (values.len() == per_key * output.n_keys).then_some(values)
 }
 
-/// Whether clips move nodes that have changed, by node: otherwise their translations are the lengths of bones.
-fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<Change>]) -> Vec<bool> {
+/// Whether a clip moves each changed node. Otherwise constant translations are bone lengths.
+fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<NodeChange>]) -> Vec<bool> {
     let mut moving = vec![false; changes.len()];
     for animation in edit.json["animations"].as_array().into_iter().flatten() {
         for channel in animation["channels"].as_array().into_iter().flatten() {
-            let Some(Driven::Translation(node)) = driven(channel) else { continue };
+            let Some(ChannelTarget::Translation(node)) = channel_target(channel) else { continue };
             let Some(change) = changes.get(node).and_then(Option::as_ref) else { continue };
             let sampler = channel["sampler"].as_u64().and_then(|s| animation["samplers"].get(s as usize));
             let Some(output) = sampler.and_then(|sampler| output(edit, sampler)) else { continue };
@@ -113,17 +112,17 @@ fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<Change>]) 
             };
             let range =
                 keys().fold(DVec3::NEG_INFINITY, DVec3::max) - keys().fold(DVec3::INFINITY, DVec3::min);
-            moving[node] |= range.max_element() > STILL * change.from.length();
+            moving[node] |= range.max_element() > MIN_TRANSLATION_RANGE * change.from.length();
         }
     }
     moving
 }
 
-/// Brings translations, and rotations where bones turn, to nodes that have moved.
+/// Adapts translation and rotation tracks to nodes that have changed.
 pub(super) fn rescale(
     document: &GltfDocument,
     edit: &mut Edit<'_>,
-    changes: &[Option<Change>],
+    changes: &[Option<NodeChange>],
     report: &mut ReshapeReport,
 ) {
     let moving = moving(document, edit, changes);
@@ -132,9 +131,9 @@ pub(super) fn rescale(
         let n_channels = edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len);
         for c in 0..n_channels {
             let change = |node: usize| changes.get(node).and_then(Option::as_ref);
-            let (node, is_rotation) = match driven(&edit.json["animations"][a]["channels"][c]) {
-                Some(Driven::Translation(node)) => (node, false),
-                Some(Driven::Rotation(node)) => (node, true),
+            let (node, is_rotation) = match channel_target(&edit.json["animations"][a]["channels"][c]) {
+                Some(ChannelTarget::Translation(node)) => (node, false),
+                Some(ChannelTarget::Rotation(node)) => (node, true),
                 _ => continue,
             };
             let Some(change) = change(node).filter(|change| !is_rotation || change.turn.is_some()) else {
@@ -167,8 +166,8 @@ pub(super) fn rescale(
     }
 }
 
-/// `t' + S (t(t) - t)` with `linear` as S; tangents take the linear part only.
-fn moved(values: &[[f32; 3]], change: &Change, linear: DMat3, output: &Output) -> Vec<[f32; 3]> {
+/// Applies `t' + S (t(t) - t)` with `linear` as S to values, S alone to tangents.
+fn moved(values: &[[f32; 3]], change: &NodeChange, linear: DMat3, output: &Output) -> Vec<[f32; 3]> {
     let value = |(k, &v): (usize, &[f32; 3])| {
         let v = Vec3::from_array(v).as_dvec3();
         let v = if output.is_value(k) { change.to + linear * (v - change.from) } else { linear * v };
@@ -177,9 +176,9 @@ fn moved(values: &[[f32; 3]], change: &Change, linear: DMat3, output: &Output) -
     values.iter().enumerate().map(value).collect()
 }
 
-fn turned(values: &[[f32; 4]], change: &Change) -> Vec<[f32; 4]> {
+fn turned(values: &[[f32; 4]], change: &NodeChange) -> Vec<[f32; 4]> {
     let turn = change.turn.unwrap_or(DQuat::IDENTITY);
-    // Tangents are no unit quaternions: the product is linear in them all the same.
+    // Tangents are not unit quaternions, but the product is linear.
     let value = |q: &[f32; 4]| (turn * DQuat::from_array(q.map(f64::from))).as_quat().to_array();
     values.iter().map(value).collect()
 }
