@@ -1,6 +1,6 @@
-// Dynamic binding (Joshi et al. 2007): x += u(x), where u is how far a pose of the cage moves each place, kept at the nodes of a
-// lattice and interpolated linearly. One invocation per vertex, in place, after skin_vertices. A table instead of a texture: sixteen
-// bits are too few, and thirty-two are not filtered everywhere. Twin: cagework_core::dynamic::bend_vertices.
+// Adds the cage's displacement field to skinned positions: x += u(x). u is given at the nodes of a lattice and
+// interpolated linearly. One invocation per vertex, in place, after skin_vertices. A storage buffer, because 16-bit
+// textures are too coarse and 32-bit ones not filterable everywhere. CPU: cagework_core::dynamic::bend_vertices.
 
 struct Field {
     /// First node, object units.
@@ -31,7 +31,7 @@ fn bend_vertices(@builtin(global_invocation_id) id: vec3u) {
     if v >= work.count { return; }
     let at = (positions[v].xyz - field.origin) / field.cell;
     let first = clamp(floor(at), vec3f(0.0), vec3f(field.dims - 2u));
-    // Beyond the lattice its edge counts, where nothing moves.
+    // Outside the lattice, use its boundary values, which are zero.
     let share = clamp(at - first, vec3f(0.0), vec3f(1.0));
     let corner = vec3u(first);
     let by = mix(along_y(corner, share), along_y(corner + vec3u(0u, 0u, 1u), share), share.z);

@@ -1,38 +1,38 @@
-// What every picture is drawn with. Mirror: cagework_gpu::render::layout::Camera.
+// The camera, common to all draw shaders. Mirrored by cagework_gpu::render::layout::Camera.
 
 struct Camera {
     clip_from_world: mat4x4f,
     view_from_world: mat4x4f,
-    /// Where the eye is, world space, object units.
+    /// Eye, world space, object units.
     eye: vec3f,
-    /// 1 in perspective, 0 in an orthographic picture.
+    /// 1: perspective, 0: orthographic.
     perspective: f32,
-    /// Width and height of the picture, pixels of the target.
+    /// Width and height of the render target, pixels.
     viewport: vec2f,
-    /// The target's pixels per CSS pixel.
+    /// Pixels of the target per CSS pixel.
     scale: f32,
-    /// 1 if the target does not turn linear colours into sRGB itself.
+    /// 1 if shaders must encode sRGB, because the target's format does not.
     encode: u32,
-    /// Background above and below, linear.
+    /// Background at the top and bottom, linear.
     background_top: vec4f,
     background_bottom: vec4f,
-    /// Lines of the floor, linear, straight alpha.
+    /// Colour of the floor grid, linear, straight alpha.
     floor_color: vec4f,
-    /// Middle of the floor, world space, and where it ends, object units.
+    /// Centre of the floor, world space, and its radius, object units.
     floor_center: vec3f,
     floor_radius: f32,
-    /// Distance of its lines, object units.
+    /// Spacing of the grid lines, object units.
     floor_spacing: f32,
-    /// How much smaller clip depth is for a point that is nearer by all of its depth.
+    /// Decrease of clip depth per relative decrease of view depth, see `lifted`.
     lift: f32,
-    /// Size of a pixel of the target in clip space.
+    /// Size of a pixel of the target, clip space.
     pixel: vec2f,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 
-/// Marks what is not drawn: a place outside the clip volume.
-const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
+/// A position outside the clip volume, for hidden primitives.
+const OUTSIDE_CLIP_VOLUME = vec4f(0.0, 0.0, 2.0, 1.0);
 
 /// sRGB from linear (IEC 61966-2-1).
 fn srgb_from_linear(linear: vec3f) -> vec3f {
@@ -47,7 +47,7 @@ fn linear_from_srgb(srgb: vec3f) -> vec3f {
     return select(high, srgb / 12.92, srgb <= vec3f(0.04045));
 }
 
-/// A colour as the target takes it: premultiplied with its alpha.
+/// Colour for the target: premultiplied, sRGB if the format does not encode.
 fn to_target(linear: vec3f, alpha: f32) -> vec4f {
     var color = clamp(linear, vec3f(0.0), vec3f(1.0));
     if camera.encode == 1u { color = srgb_from_linear(color); }

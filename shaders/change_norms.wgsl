@@ -1,10 +1,10 @@
-// The inner sum of Eq. 2: by how much each cell's weights changed between two fields, over the columns of one batch.
-// One invocation per row; batches add up in `changes`. Twin: cagework_core::stencil::change_norms.
+// Inner sum of Eq. 2: change of each cell's weights between two fields, summed over the columns of a batch.
+// One invocation per row; batches add to `changes`. CPU: cagework_core::stencil::change_norms.
 
-/// `mode`, bits: absolute values instead of squares; this batch is the first, so replace what is there.
+/// Bits of `mode`: absolute values instead of squares; overwrite, for the first batch.
 const CHANGE_ABSOLUTE = 1u;
 const CHANGE_FIRST = 2u;
-/// Changes of a weight below this do not count: their squares would be denormal.
+/// Smaller changes of a weight are ignored: their squares would be denormal.
 const CHANGE_NEGLIGIBLE = 1e-18f;
 
 @group(0) @binding(0) var<uniform> work: Work;

@@ -1,4 +1,4 @@
-// Cividis (Nunez et al. 2018) at ten equal steps. Twin: cagework_gpu::render::colormap.
+// Cividis (Nuñez et al. 2018) at ten equidistant values. Same values as cagework_gpu::render::colormap.
 
 const STOPS = array<vec3f, 10>(
     vec3f(0.0, 34.0, 78.0), vec3f(18.0, 53.0, 112.0), vec3f(59.0, 73.0, 108.0), vec3f(87.0, 93.0, 109.0),
@@ -6,12 +6,12 @@ const STOPS = array<vec3f, 10>(
     vec3f(195.0, 179.0, 105.0), vec3f(225.0, 204.0, 85.0), vec3f(254.0, 232.0, 56.0),
 );
 
-/// What negative weights are drawn in: magenta, which cividis has not. Linear.
+/// Colour of negative weights: magenta, which is not in cividis. Linear.
 const NEGATIVE_COLOR = vec3f(0.68, 0.02, 0.28);
-/// Weights below it are negative: what rounding leaves is not.
+/// Weights below this value are drawn as negative; smaller deviations are rounding.
 const NEGATIVE_THRESHOLD = -1e-5f;
 
-/// Colour of a value from 0 to 1, linear.
+/// Colour of a value in [0, 1], linear.
 fn cividis(value: f32) -> vec3f {
     var stops = STOPS;
     let at = clamp(value, 0.0, 1.0) * 9.0;

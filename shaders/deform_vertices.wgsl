@@ -1,19 +1,18 @@
-// Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), straight into the vertex buffer that is drawn.
-// One invocation per bundle of 4 vertices, from `first_row` on, so that each control vertex is read once for four.
-// Bundles come in slices of 8, a slice's entries column by column, so that neighbouring invocations read neighbouring
-// entries. Twin: cagework_core::stencil::deform_vertices.
+// Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), into the vertex buffer that is drawn. One invocation
+// per bundle of 4 vertices, so that each control vertex is read once for four. Slices of 8 bundles store their entries
+// column by column, so that adjacent invocations read adjacent entries. CPU: cagework_core::stencil::deform_vertices.
 
-/// Vertices in a bundle: components of a vec4f.
+/// Vertices per bundle: the components of a vec4f.
 const BUNDLE = 4u;
-/// Bundles in a slice.
+/// Bundles per slice.
 const SLICE = 8u;
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// Where each slice starts in `columns` and `weights`, over 8.
+/// First entry of each slice in `columns` and `weights`, over 8.
 @group(0) @binding(1) var<storage, read> slices: array<u32>;
-/// Control vertices that a bundle follows; short lists end in weights of 0.
+/// Control vertices of a bundle; padding has weight 0.
 @group(0) @binding(2) var<storage, read> columns: array<u32>;
-/// Their weights for the bundle's four vertices.
+/// Weights of the bundle's four vertices.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;
 @group(0) @binding(4) var<storage, read> cage: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> positions: array<vec4f>;

@@ -1,4 +1,4 @@
-// A vertical gradient over the whole picture, with noise of half a step against bands. One triangle.
+// Vertical background gradient, dithered by half a step against banding. One triangle.
 
 struct Varying {
     @builtin(position) clip: vec4f,

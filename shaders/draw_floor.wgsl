@@ -1,5 +1,4 @@
-// A grid on the floor that fades out; every tenth line is stronger, the lines of x and z have their colours.
-// One quad as large as the floor.
+// Floor grid that fades out; every tenth line is stronger, and the x and z axes are coloured. One quad.
 
 /// Colours of the x and z axes, linear.
 const X_COLOR = vec3f(0.55, 0.07, 0.09);
@@ -20,11 +19,11 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return Varying(camera.clip_from_world * vec4f(world, 1.0), world);
 }
 
-/// How much of a pixel the lines through whole numbers cover. `width` in pixels.
+/// Coverage of a pixel by grid lines at whole numbers. `width`: pixels.
 fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
     let distance = abs(fract(at - 0.5) - 0.5) / max(slope, vec2f(1e-6));
     let cover = clamp(vec2f(0.5 * width + 0.5) - distance, vec2f(0.0), vec2f(1.0));
-    // Lines closer than a few pixels are no lines any more.
+    // Fade out lines that are only a few pixels apart.
     return cover * clamp(1.4 - 4.0 * slope, vec2f(0.0), vec2f(1.0));
 }
 
@@ -37,7 +36,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let coarse = lines(0.1 * at, 0.1 * slope, width);
     var alpha = max(0.36 * max(fine.x, fine.y), max(coarse.x, coarse.y)) * camera.floor_color.a;
     var color = camera.floor_color.rgb;
-    // Where x = 0 the line runs along z, and the other way round.
+    // The line x = 0 is the z axis, and vice versa.
     let axes = clamp(vec2f(width) - abs(at) / max(slope, vec2f(1e-6)), vec2f(0.0), vec2f(1.0));
     if axes.x > 0.0 { color = mix(color, Z_COLOR, axes.x); alpha = max(alpha, 0.75 * axes.x); }
     if axes.y > 0.0 { color = mix(color, X_COLOR, axes.y); alpha = max(alpha, 0.75 * axes.y); }

@@ -1,7 +1,7 @@
-// Arrows, rings or boxes around the selection, of constant size in the picture, in flat light.
+// Transform gizmo, with simple shading.
 
 struct GizmoView {
-    /// World from the gizmo's own space, where its axes are 1 long.
+    /// Gizmo to world space. In gizmo space the axes have length 1.
     world_from_gizmo: mat4x4f,
 }
 

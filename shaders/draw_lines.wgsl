@@ -1,8 +1,8 @@
-// Segments of constant width in the picture, anti-aliased, with round ends. One instance per segment, six vertices each.
+// Anti-aliased segments with round ends and constant width in pixels. One instance per segment, six vertices each.
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// From the segment's first point along it and across it, pixels.
+    /// Distance along and across the segment from its first point, pixels.
     @location(0) place: vec2f,
     @location(1) @interpolate(flat) length: f32,
     @location(2) @interpolate(flat) half_width: f32,
@@ -16,9 +16,9 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     var a = clip_of(item.x & INDEX_MASK);
     var b = clip_of(item.y & INDEX_MASK);
     if state == HIDDEN || (a.z < 0.0 && b.z < 0.0) {
-        return Varying(NOWHERE, vec2f(0.0), 0.0, 0.0, vec4f(0.0));
+        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), 0.0, 0.0, vec4f(0.0));
     }
-    // What lies before the near plane has no place in the picture.
+    // Clip at the near plane.
     if a.z < 0.0 { a = mix(a, b, a.z / (a.z - b.z)); }
     if b.z < 0.0 { b = mix(b, a, b.z / (b.z - a.z)); }
     let pixels = 0.5 * camera.viewport;
@@ -27,14 +27,14 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let along = select(vec2f(1.0, 0.0), from_a / max(length, 1e-6), length > 1e-6);
     let across = vec2f(-along.y, along.x);
     let half_width = 0.5 * state_width(state);
-    // Half a pixel more, where the edge fades.
+    // Half a pixel for the anti-aliased edge.
     let reach = half_width + 0.5;
     let is_b = index == 1u || index == 3u || index == 5u;
     let up = select(-reach, reach, index == 2u || index == 3u || index == 4u);
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
     let offset = (along * beyond + across * up) * camera.pixel;
-    // Divided here, so that what lies between is even in the picture, which WebGL2 cannot be asked for.
+    // Divide by w here for interpolation linear in the picture: WebGL2 lacks `linear` interpolation.
     let clip = vec4f(own.xy / own.w + offset, lifted(own).z / own.w, 1.0);
     return Varying(clip, vec2f(select(0.0, length, is_b) + beyond, up), length, half_width, state_color(state));
 }
@@ -45,6 +45,6 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let distance = length(vec2f(in.place.x - nearest, in.place.y));
     let cover = clamp(in.half_width + 0.5 - distance, 0.0, 1.0);
     if cover <= 0.0 { discard; }
-    // A line thinner than a pixel fades instead of breaking up.
+    // Fade lines thinner than a pixel, to avoid gaps.
     return to_target(in.color.rgb, in.color.a * cover * min(1.0, 2.0 * in.half_width));
 }

@@ -1,14 +1,14 @@
-// The mesh: its material, or weights or errors as colours, in studio light. Its vertices are in mesh_buffers.wgsl or
-// mesh_textures.wgsl.
+// The mesh with its material, or with weights or errors in colours, in studio light. Vertices:
+// mesh_buffers.wgsl or mesh_textures.wgsl.
 
 struct Surface {
     /// Factor of the base colour, linear RGBA.
     base_color: vec4f,
-    /// What colours it: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
+    /// Source of the colour: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
     mode: u32,
-    /// Below this alpha nothing is drawn.
+    /// Fragments with less alpha are discarded.
     alpha_cutoff: f32,
-    /// Values of the first and the last colour; of a material, `high` is how much of the value greys it.
+    /// Values of the first and last colour. With materials, `high` is the strength of greying by `value`, 0 or 1.
     low: f32,
     high: f32,
 }
@@ -19,9 +19,9 @@ const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
 
-/// Brightness that is left of what is greyed, and how much of its colour goes.
-const GREYED = 0.7;
-const FADED = 0.8;
+/// Factors of brightness and desaturation for greying.
+const GREY_BRIGHTNESS = 0.7;
+const GREY_DESATURATION = 0.8;
 
 @group(2) @binding(0) var<uniform> surface: Surface;
 @group(2) @binding(1) var base_texture: texture_2d<f32>;
@@ -29,7 +29,7 @@ const FADED = 0.8;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    // At the samples that are covered: beyond an outline, normals would turn away from the eye.
+    // Centroid: extrapolated normals at outlines would face away from the eye.
     @location(0) @interpolate(perspective, centroid) world: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) uv: vec2f,
@@ -56,7 +56,7 @@ fn value_color(value: f32) -> vec3f {
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
-    // Before any branch: derivatives need whole quads of pixels.
+    // Before branches: derivatives need complete 2x2 quads.
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let flat_normal = cross(dpdx(in.world), dpdy(in.world));
     var base = surface.base_color * in.color * texel;
@@ -67,16 +67,16 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
     if surface.mode == MATERIAL { base.a = 1.0; }
     if !is_value {
         let grey = dot(base.rgb, vec3f(0.2126, 0.7152, 0.0722));
-        base = vec4f(mix(base.rgb, vec3f(GREYED * grey), FADED * surface.high * clamp(in.value, 0.0, 1.0)), base.a);
+        let strength = GREY_DESATURATION * surface.high * clamp(in.value, 0.0, 1.0);
+        base = vec4f(mix(base.rgb, vec3f(GREY_BRIGHTNESS * grey), strength), base.a);
     }
     var normal = in.normal;
-    // A vertex whose triangles have no area has no normal; the picture's own slope then does.
-    // Either side of the surface is lit.
+    // Both sides are lit. If the vertex normal is zero (triangles without area), use the derivative's normal.
     if !is_front { normal = -normal; }
     if dot(normal, normal) < 1e-6 { normal = faceForward(flat_normal, -to_eye(in.world), flat_normal); }
     if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }
     var lit = studio_light(base.rgb, in.world, normalize(normal));
-    // Colours that mean a value keep most of their own.
+    // Shade heat maps weakly, so that colours match the legend.
     if is_value { lit = mix(lit, base.rgb, 0.35); }
     return to_target(lit, base.a);
 }

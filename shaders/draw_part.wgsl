@@ -1,11 +1,10 @@
-// A picture that was drawn before, at its place in a larger one: for canvases that nothing can be copied to.
-// One triangle; the viewport is the place.
+// Draws a texture into the viewport: composes canvases that do not support copying. One triangle.
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// Across the picture from its upper left corner, 0 to 1.
+    /// Texture coordinates from the upper left corner, 0 to 1.
     @location(0) place: vec2f,
 }
 

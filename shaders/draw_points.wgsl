@@ -1,8 +1,8 @@
-// Round points of constant size in the picture, with a rim. One instance per point, six vertices each.
+// Round points of constant size in pixels, with a rim. One instance per point, six vertices each.
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// From the middle, pixels. Even in the picture: all corners are as far away.
+    /// Offset from the centre, pixels. Interpolation is linear: all corners have the same depth.
     @location(0) place: vec2f,
     @location(1) @interpolate(flat) radius: f32,
     @location(2) @interpolate(flat) color: vec4f,
@@ -14,7 +14,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let state = item.x >> STATE_SHIFT;
     let clip = clip_of(item.x & INDEX_MASK);
     if state == HIDDEN || clip.z < 0.0 {
-        return Varying(NOWHERE, vec2f(0.0), 0.0, vec4f(0.0));
+        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), 0.0, vec4f(0.0));
     }
     let radius = 0.5 * state_width(state);
     let corner = vec2f(

@@ -1,10 +1,10 @@
-// A layer of the grid: kinds of cells, or one coordinate's value, with thin lines between cells. One quad.
-// The cells are in slice_buffers.wgsl or slice_textures.wgsl.
+// A layer of the grid, coloured by cell type or by a control's weights, with lines between cells. One quad.
+// Cells: slice_buffers.wgsl or slice_textures.wgsl.
 
 struct SliceView {
     /// Outer corner of the first cell, world space.
     corner: vec3f,
-    /// Value of the last colour; 0 if kinds of cells are shown.
+    /// Value of the last colour; 0 to colour by cell type.
     high: f32,
     /// Edge of a cell, object units.
     u: vec3f,
@@ -12,7 +12,7 @@ struct SliceView {
     n_u: u32,
     v: vec3f,
     n_v: u32,
-    /// Colour of each kind (untyped, boundary, interior, exterior), linear, straight alpha.
+    /// Colour of each cell type (untyped, boundary, interior, exterior), linear, straight alpha.
     kinds: array<vec4f, 4>,
     /// Lines between cells, linear, straight alpha.
     line_color: vec4f,
@@ -52,10 +52,10 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     }
     let distance = abs(fract(in.place - 0.5) - 0.5) / max(slope, vec2f(1e-6));
     let covers = clamp(vec2f(0.5 * camera.scale + 0.5) - distance, vec2f(0.0), vec2f(1.0));
-    // Where cells are a few pixels wide, lines would hide them.
+    // Fade out the lines if cells are only a few pixels wide.
     let visible = clamp(1.5 - 6.0 * max(slope.x, slope.y), 0.0, 1.0);
     let line = max(covers.x, covers.y) * visible * slice.line_color.a;
-    // Outside the cage there is nothing to see, and nothing that would hide what is behind.
+    // Exterior cells are not drawn and do not hide what is behind.
     if content.x == EXTERIOR { discard; }
     return to_target(mix(color.rgb, slice.line_color.rgb, line), color.a);
 }

@@ -1,5 +1,5 @@
-// The paper's smoothing (Algorithm 3): each row of u_out is the average of its neighbours in u_in and the cage.
-// One invocation per row and quad; the two fields change roles after each sweep. Twin: cagework_core::stencil::jacobi_cells.
+// The paper's smoothing (Algorithm 3): each row of u_out is the average of its neighbours in u_in and boundary values.
+// One invocation per row and quad; the fields are swapped after each sweep. CPU: cagework_core::stencil::jacobi_cells.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> neighbours: array<u32>;

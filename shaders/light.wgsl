@@ -1,4 +1,4 @@
-// Soft studio light, fixed to the camera: a key light from the upper left, a weak fill from the right, sky and ground.
+// Studio light, fixed to the camera: key light from the upper left, weak fill from the right, sky and ground.
 
 const KEY_DIRECTION = vec3f(-0.43, 0.56, 0.71);
 const FILL_DIRECTION = vec3f(0.81, 0.05, 0.58);
@@ -6,23 +6,23 @@ const KEY_COLOR = vec3f(0.90, 0.88, 0.84);
 const FILL_COLOR = vec3f(0.14, 0.16, 0.20);
 const SKY_COLOR = vec3f(0.26, 0.28, 0.32);
 const GROUND_COLOR = vec3f(0.10, 0.095, 0.09);
-/// Blinn-Phong highlight and rim.
-const GLOSS = 28.0;
-const HIGHLIGHT = 0.07;
-const RIM = 0.10;
+/// Blinn-Phong exponent, and strength of highlight and rim.
+const HIGHLIGHT_EXPONENT = 28.0;
+const HIGHLIGHT_STRENGTH = 0.07;
+const RIM_STRENGTH = 0.10;
 
-/// Light that a surface of `color` sends to the eye. `normal`: unit, world space, towards the eye's side.
+/// Light reflected to the eye by a surface of `color`. `normal`: unit, world space, facing the eye.
 fn studio_light(color: vec3f, point: vec3f, normal: vec3f) -> vec3f {
     let view = to_eye(point);
     let in_view = (camera.view_from_world * vec4f(normal, 0.0)).xyz;
     let view_in_view = (camera.view_from_world * vec4f(view, 0.0)).xyz;
-    // Half Lambert on the key light: the terminator is soft, as of a large lamp.
+    // Half Lambert for the key light: a soft terminator.
     let key = max(0.0, (dot(in_view, KEY_DIRECTION) + 0.25) / 1.25);
     let fill = max(0.0, dot(in_view, FILL_DIRECTION));
     let sky = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * normal.y);
     let half_way = normalize(KEY_DIRECTION + view_in_view);
-    let highlight = HIGHLIGHT * pow(max(0.0, dot(in_view, half_way)), GLOSS);
+    let highlight = HIGHLIGHT_STRENGTH * pow(max(0.0, dot(in_view, half_way)), HIGHLIGHT_EXPONENT);
     let edge = 1.0 - clamp(dot(normal, view), 0.0, 1.0);
-    let rim = RIM * edge * edge * edge * (0.5 + 0.5 * normal.y);
+    let rim = RIM_STRENGTH * edge * edge * edge * (0.5 + 0.5 * normal.y);
     return color * (key * key * KEY_COLOR + fill * FILL_COLOR + sky) + highlight + rim;
 }

@@ -1,8 +1,8 @@
-// The mesh's vertices where deform_vertices and vertex_normals wrote them. Twin: mesh_textures.wgsl.
+// Vertices of the mesh, as written by deform_vertices and vertex_normals. See also mesh_textures.wgsl.
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(1) var<storage, read> normals: array<vec4f>;
-/// A weight or an error of each vertex.
+/// Per vertex: weight, error or greying.
 @group(1) @binding(2) var<storage, read> values: array<f32>;
 
 fn point_at(index: u32) -> vec3f { return positions[index].xyz; }

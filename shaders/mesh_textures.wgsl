@@ -1,8 +1,8 @@
-// The mesh's vertices in textures, which the processor writes. Twin: mesh_buffers.wgsl.
+// Vertices of the mesh in textures, uploaded by the CPU. See also mesh_buffers.wgsl.
 
 @group(1) @binding(0) var positions: texture_2d<f32>;
 @group(1) @binding(1) var normals: texture_2d<f32>;
-/// A weight or an error of each vertex.
+/// Per vertex: weight, error or greying.
 @group(1) @binding(2) var values: texture_2d<f32>;
 
 fn point_at(index: u32) -> vec3f { return textureLoad(positions, place_of(index), 0).xyz; }

@@ -1,16 +1,16 @@
-// Lines, points and faces over the model share one group of bindings: a style, positions, and what is drawn of them.
-// Where the latter are: overlay_buffers.wgsl, overlay_textures.wgsl.
+// Overlays: lines, points and faces over the model share a style, positions and items. Declared in
+// overlay_buffers.wgsl or overlay_textures.wgsl.
 
 struct Style {
     /// Colour of each state, linear, straight alpha.
     colors: array<vec4f, 8>,
-    /// Width of lines or diameter of points for states 0 to 3 and 4 to 7, CSS pixels.
+    /// Line width or point diameter in states 0 to 3 and 4 to 7, CSS pixels.
     widths: array<vec4f, 2>,
     /// Rim of points, linear, straight alpha.
     rim_color: vec4f,
     /// Width of the rim, CSS pixels.
     rim: f32,
-    /// How much nearer to the eye than it is it is drawn, as a fraction of its depth.
+    /// Offset towards the eye, as a fraction of the depth: draws lines on a surface in front of it.
     lift: f32,
     /// Factor of all alphas.
     opacity: f32,
@@ -21,18 +21,18 @@ struct Style {
 /// The upper four bits of an item are its state.
 const STATE_SHIFT = 28u;
 const INDEX_MASK = 0x0fffffffu;
-/// The state of what is not drawn.
+/// State of hidden items.
 const HIDDEN = 15u;
 
 @group(1) @binding(0) var<uniform> style: Style;
 
-/// Colour of a state, with the style's opacity.
+/// Colour of a state, including the style's opacity.
 fn state_color(state: u32) -> vec4f {
     let color = style.colors[state & 7u];
     return vec4f(color.rgb, color.a * style.opacity);
 }
 
-/// Width of a state, the target's pixels.
+/// Width in a state, pixels of the target.
 fn state_width(state: u32) -> f32 {
     return style.widths[(state >> 2u) & 1u][state & 3u] * style.size * camera.scale;
 }
@@ -42,7 +42,7 @@ fn clip_of(index: u32) -> vec4f {
     return camera.clip_from_world * vec4f(point_at(index), 1.0);
 }
 
-/// Draws it a little nearer.
+/// Moves a position towards the eye by `lift`.
 fn lifted(clip: vec4f) -> vec4f {
     return vec4f(clip.xy, max(0.0, clip.z - style.lift * camera.lift), clip.w);
 }

@@ -1,4 +1,4 @@
-// What overlay.wgsl draws, in textures. Twin: overlay_buffers.wgsl.
+// Tables of overlay.wgsl in textures. See also overlay_buffers.wgsl.
 
 @group(1) @binding(1) var positions: texture_2d<f32>;
 @group(1) @binding(2) var items: texture_2d<u32>;

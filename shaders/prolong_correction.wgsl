@@ -1,10 +1,11 @@
-// Prolongation to the black rows of one kind (two or eight coarse cells around): adds the interpolated correction, zero
-// outside the cage, or, as full multigrid's first guess, replaces the value by the mean of the coarse cells there are.
-// One invocation per table entry and quad. Twin: cagework_core::stencil::prolong_correction.
+// Prolongation to black rows with two or eight coarse neighbours: adds the interpolated correction, which is
+// zero outside the cage. For the initial guess of full multigrid, overwrites by the mean of the existing
+// neighbours. One invocation per table entry and quad. CPU: cagework_core::stencil::prolong_correction.
 
 /// `mode`.
 const PROLONG_REPLACE = 1u;
-/// An entry: fine row, 1 over the number of coarse unknowns (bits of an f32), `n_sources` coarse rows.
+/// Words of an entry before the rows of its `n_sources` coarse neighbours: fine row, 1 / (number of coarse
+/// unknowns) as bits.
 const ENTRY_HEAD = 2u;
 
 @group(0) @binding(0) var<uniform> work: Work;

@@ -1,12 +1,12 @@
-// Sums in a fixed order, so that they are the same in every run: an invocation adds every 256th value of its
-// workgroup's 4096, then the workgroup adds the invocations' sums as a tree. Twin: cagework_core::stencil::reduce.
+// Sums in a fixed order, hence reproducible: an invocation adds every 256th of the workgroup's 4096 values,
+// then the workgroup adds the invocations' sums as a tree. CPU: cagework_core::stencil::reduce.
 
 const REDUCE_LANES = 256u;
 const REDUCE_VALUES = 4096u;
 
 var<workgroup> sums: array<f32, 256>;
 
-/// Sum over the workgroup, valid in every invocation.
+/// Sum over the workgroup, returned to every invocation.
 fn tree_sum(lane: u32, value: f32) -> f32 {
     sums[lane] = value;
     workgroupBarrier();

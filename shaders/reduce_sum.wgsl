@@ -1,5 +1,5 @@
-// The sum of all partial sums, written to slot `first_row` of the numbers that go back to the CPU.
-// One workgroup. Twin: cagework_core::stencil::reduce_sum.
+// Sums all partial sums into slot `first_row` of the numbers that are read back. One workgroup. CPU:
+// cagework_core::stencil::reduce_sum.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> partials: array<f32>;

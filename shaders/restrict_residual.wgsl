@@ -1,9 +1,9 @@
-// Restriction: the coarse right-hand side from the red residuals around each coarse cell, its own centre and twelve
-// edge neighbours. One invocation per coarse row and quad. Twin: cagework_core::stencil::restrict_residual.
+// Restriction: coarse right-hand side from 13 red residuals around each coarse cell, its centre and twelve
+// edge neighbours. One invocation per coarse row and quad. CPU: cagework_core::stencil::restrict_residual.
 
-/// Fine rows around a coarse one.
+/// Fine rows per coarse row.
 const N_AROUND = 13u;
-/// Weights of the cell that is the coarse cell's centre, and of the twelve others: 4/8 and 1/8.
+/// Weights of the centre, 4/8, and of the twelve edge neighbours, 1/8 each.
 const RESTRICT_CENTRE = 0.5f;
 const RESTRICT_EDGE = 0.125f;
 

@@ -1,12 +1,12 @@
-// Weights of mesh vertices for the columns of one batch, from the solved field and the cage's values.
-// One invocation per vertex and quad. Twin: cagework_core::stencil::sample_weights.
+// Weights of mesh vertices for the columns of a batch, from the solved field and boundary values. One
+// invocation per vertex and quad. CPU: cagework_core::stencil::sample_weights.
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// Where each vertex's entries start in `nodes` and in `hats`.
+/// First entry of each vertex in `nodes` and `hats`.
 @group(0) @binding(1) var<storage, read> starts: array<vec2u>;
-/// (row of the field, bits of its weight)
+/// (row of the field, weight as bits)
 @group(0) @binding(2) var<storage, read> nodes: array<vec2u>;
-/// (control vertex, bits of its weight)
+/// (control vertex, weight as bits)
 @group(0) @binding(3) var<storage, read> hats: array<vec2u>;
 @group(0) @binding(4) var<storage, read> field: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> block: array<vec4f>;

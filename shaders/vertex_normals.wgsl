@@ -1,10 +1,10 @@
-// Area-weighted vertex normals. One invocation per vertex gathers its triangles: no atomics, one order of additions.
-// A vertex without triangles gets zero. Twin: cagework_core::stencil::vertex_normals.
+// Area-weighted vertex normals. One invocation per vertex gathers its triangles: no atomics, fixed order of
+// additions. Vertices without triangles get zero. CPU: cagework_core::stencil::vertex_normals.
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// Where each vertex's triangles start in `others`.
+/// First entry of each vertex in `others`.
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
-/// A triangle's next two vertices, counter-clockwise after the one it is listed for.
+/// The next two vertices of a triangle, counter-clockwise.
 @group(0) @binding(2) var<storage, read> others: array<vec2u>;
 @group(0) @binding(3) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> normals: array<vec4f>;

@@ -1,31 +1,31 @@
-// What every kernel is told. Mirror: cagework_gpu::layout::Work.
+// Parameters common to all kernels. Mirrored by cagework_gpu::layout::Work.
 
-/// One dispatch. Items are numbered by the kernel (a row and a quad, a vertex, ...), one invocation each.
+/// Parameters of a dispatch. Each kernel defines its items (row and quad, vertex, ...); one invocation per item.
 struct Work {
     /// First item.
     first: u32,
     /// Number of items.
     count: u32,
-    /// Invocations in one row of workgroups; further ones lie along y.
+    /// Invocations per row of workgroups; further rows are along y.
     stride: u32,
-    /// Quads in a row of a field: columns of the batch over four.
+    /// Quads per row of a field: columns of the batch / 4.
     n_quads: u32,
-    /// First row of a field, or first slot of a result, that items count from.
+    /// Offset of items: first row of a field, or first slot of a result.
     first_row: u32,
-    /// First quad of the batch among all columns.
+    /// First quad of the batch.
     first_quad: u32,
-    /// A kernel's variants, its own constants.
+    /// Variant of the kernel; its constants.
     mode: u32,
-    /// Coarse rows that a fine row is interpolated from.
+    /// Number of coarse rows that a fine row is interpolated from.
     n_sources: u32,
-    /// Over-relaxation: 1 goes to the Gauss-Seidel value. Dimensionless.
+    /// Over-relaxation factor; 1 is Gauss-Seidel. Dimensionless.
     omega: f32,
 }
 
-/// Marks "no row" in tables.
+/// "No row" in tables.
 const NONE = 0xffffffffu;
 
-/// Number of an invocation in its dispatch; items end at `work.count`.
+/// Index of an invocation in its dispatch; out of range from `work.count` on.
 fn invocation(id: vec3u, stride: u32) -> u32 {
     return id.x + id.y * stride;
 }

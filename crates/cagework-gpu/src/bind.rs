@@ -1,4 +1,4 @@
-//! The bind on the GPU: geometry and assembly are the CPU's own, what lies between runs as kernels.
+//! Bind on the GPU: solving and sampling run as kernels, geometry and assembly on the CPU.
 
 use cagework_core::bind::Watch;
 use cagework_core::bind::pipeline::{FieldsOn, PreparedBind, Solution};
@@ -12,35 +12,35 @@ use crate::buffers::Allocator;
 use crate::deform::GpuWeights;
 use crate::device::GpuContext;
 use crate::error::GpuError;
-use crate::jacobi::{INTERVAL, Jacobi};
+use crate::jacobi::{Jacobi, SWEEPS_PER_CHECK};
 use crate::multigrid::Multigrid;
 use crate::plan::Plan;
 use crate::sample::Sampler;
 use crate::stream::Stream;
 
-/// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
+/// Decades from the first delta to tau, roughly. Only for the progress bar.
 const JACOBI_DECADES: f32 = 4.0;
 
-/// V-cycles that a batch usually takes: for the progress bar only.
+/// Typical number of V-cycles per batch. Only for the progress bar.
 const USUAL_CYCLES: f32 = 5.0;
 
-/// What a bind makes room for, in error messages.
-const ROOM: &str = "the fields of a bind";
+/// Name of the allocation in error messages.
+const ALLOCATION_NAME: &str = "the fields of a bind";
 
-/// What a solve leaves besides its blocks.
+/// Results of a solve, besides the sampled weights.
 struct Outcome {
     report: SolveReport,
     iterations: u32,
     delta_interval: u32,
     solve_ms: f64,
-    /// Bytes on the GPU.
+    /// Allocated GPU memory, bytes.
     allocated: u64,
 }
 
-/// [`cagework_core::bind()`] on the GPU: the same grid, stencils and assembly, the same weights to 1e-4. The weights are
-/// on the GPU afterwards as well.
+/// [`cagework_core::bind()`] on the GPU: same grid, stencils and assembly; weights agree to 1e-4. The weights
+/// are also left on the GPU.
 ///
-/// `options.memory_limit` holds for the GPU's buffers and for the CPU's arrays, each.
+/// `options.memory_limit` applies to the GPU's buffers and to the CPU's arrays separately.
 ///
 /// # Errors
 /// As [`bind_on`].
@@ -56,10 +56,11 @@ pub async fn bind_gpu<'a>(
     Ok((binding, weights))
 }
 
-/// [`bind_gpu`] for whoever wants the weights here only.
+/// Like [`bind_gpu`], without leaving the weights on the GPU.
 ///
 /// # Errors
-/// Those of a bind, [`crate::PlanError`] if it does not fit, [`GpuError::Solver`] for conjugate gradients, or the GPU failed.
+/// Those of a bind; [`crate::PlanError`] if it does not fit into memory; [`GpuError::Solver`] for conjugate
+/// gradients; errors of the GPU.
 pub async fn bind_on<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,
@@ -77,13 +78,13 @@ pub async fn bind_on<'a>(
     let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit)?;
     let mut solved = solve_and_sample(&prepared, options, &plan, &watch, context).await?;
     if solved.report.stalled {
-        // Conjugate gradients run on the processor only.
+        // Fall back to conjugate gradients, which only the CPU implements.
         solved = prepared.solve_on_host(&watch)?;
     }
     Ok(prepared.finish(solved, &watch)?)
 }
 
-/// Solves all columns. Returns what [`PreparedBind::finish`] needs.
+/// Solves all columns. Returns the input of [`PreparedBind::finish`].
 async fn solve_and_sample(
     prepared: &PreparedBind<'_>,
     options: &BindOptions,
@@ -123,7 +124,7 @@ async fn multigrid(
     let hierarchy = prepared.hierarchy();
     let began = stream.now_ms();
     let rule = options.stop_rule().of_batch(plan.n_batches as usize);
-    let mut allocator = Allocator::new(stream.context(), ROOM);
+    let mut allocator = Allocator::new(stream.context(), ALLOCATION_NAME);
     let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
     let mut multigrid = Multigrid::new(stream, &mut allocator, hierarchy, plan)?;
     let allocated = allocator.settle().await?;
@@ -160,7 +161,7 @@ async fn jacobi(
 ) -> Result<Outcome, GpuError> {
     let began = stream.now_ms();
     let rule = options.stop_rule();
-    let mut allocator = Allocator::new(stream.context(), ROOM);
+    let mut allocator = Allocator::new(stream.context(), ALLOCATION_NAME);
     let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
     let jacobi = Jacobi::new(stream, &mut allocator, prepared.hierarchy(), plan)?;
     let allocated = allocator.settle().await?;
@@ -176,5 +177,5 @@ async fn jacobi(
         let field = jacobi.field(batch as usize, sweeps);
         sampler.sample(stream, field, batch * plan.n_lanes, blocks).await?;
     }
-    Ok(Outcome { report, iterations: sweeps, delta_interval: INTERVAL, solve_ms, allocated })
+    Ok(Outcome { report, iterations: sweeps, delta_interval: SWEEPS_PER_CHECK, solve_ms, allocated })
 }

@@ -1,4 +1,4 @@
-//! Buffers: made, filled, read back; out of memory is an error, not a crash.
+//! Buffer allocation and readback, with out-of-memory as an error.
 
 use bytemuck::Pod;
 use futures_channel::oneshot;
@@ -7,43 +7,43 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::plan::PlanError;
 
-/// Smallest buffer: bindings must not be empty, and no kernel reads more of an empty one.
+/// Minimum buffer size: bindings must not be empty.
 const MIN_BYTES: u64 = 16;
 
-/// Makes the buffers and textures of one thing and notices when there is no memory left.
+/// Allocates the buffers and textures of one object and detects failures.
 ///
-/// A GPU answers late: behind all frames under way. So everything is made, filled and bound first, which never waits,
-/// and asked about once, by [`Self::settle`]; whatever went wrong until then went wrong here. (Opening a page on a
-/// software GPU, an answer for each buffer took 2 s.)
+/// Errors of the GPU arrive late, after all submitted frames. So everything is created and filled without
+/// waiting, and [`Self::settle`] checks once for all errors since [`Self::new`]. Waiting for each buffer
+/// delayed opening a page on a software GPU by 2 s.
 #[derive(Debug)]
-#[must_use = "nothing is known to be there before it has settled"]
+#[must_use = "allocation errors are reported by settle"]
 pub struct Allocator<'a> {
     context: &'a GpuContext,
     what: &'static str,
     allocated: u64,
-    // In the order in which they have to be popped.
+    // In reverse order of creation, as required for popping.
     memory: wgpu::ErrorScopeGuard,
     refused: wgpu::ErrorScopeGuard,
 }
 
 impl<'a> Allocator<'a> {
-    /// An allocator for `what`, as error messages call it, that has made nothing yet. Until it settles, nothing may be
-    /// awaited: the device's errors are its own.
+    /// `what`: name in error messages. Until [`Self::settle`], nothing may be awaited, because the error
+    /// scopes belong to the device.
     pub fn new(context: &'a GpuContext, what: &'static str) -> Self {
         let refused = context.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = context.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         Self { context, what, allocated: 0, memory, refused }
     }
 
-    /// Waits for the GPU's answer; bytes of everything made.
+    /// Waits for the GPU. Returns the total allocated bytes.
     ///
     /// # Errors
     /// [`GpuError::OutOfMemory`], [`GpuError::Refused`], [`GpuError::DeviceLost`].
     pub async fn settle(self) -> Result<u64, GpuError> {
-        // Popped before anything is awaited: other work may push scopes of its own meanwhile.
+        // Pop before awaiting: other tasks may push scopes of their own.
         let (memory, refused) = (self.memory.pop(), self.refused.pop());
         let (no_memory, refusal) = (memory.await, refused.await);
-        // A lost device refuses everything, and that it is lost is the better message.
+        // A lost device rejects everything; report the loss instead.
         self.context.check()?;
         if no_memory.is_some() {
             return Err(GpuError::OutOfMemory { what: self.what.to_owned(), bytes: self.allocated });
@@ -54,15 +54,15 @@ impl<'a> Allocator<'a> {
         Ok(self.allocated)
     }
 
-    /// What is made elsewhere, but belongs to it.
+    /// Counts memory allocated elsewhere.
     pub(crate) fn count(&mut self, bytes: u64) {
         self.allocated += bytes;
     }
 
-    /// A buffer of zeros.
+    /// Creates a buffer of zeros.
     ///
     /// # Errors
-    /// [`PlanError::Binding`] for a storage buffer that is larger than a binding may be.
+    /// [`PlanError::Binding`] if a storage buffer exceeds the binding limit.
     pub fn zeros(
         &mut self,
         what: &'static str,
@@ -83,7 +83,7 @@ impl<'a> Allocator<'a> {
         }))
     }
 
-    /// A storage buffer of zeros that can be copied from and to.
+    /// Creates a storage buffer of zeros that can be copied from and to.
     ///
     /// # Errors
     /// As [`Self::zeros`].
@@ -92,7 +92,7 @@ impl<'a> Allocator<'a> {
         self.zeros(what, bytes, usage)
     }
 
-    /// A storage buffer that holds `data`.
+    /// Creates a storage buffer with contents `data`.
     ///
     /// # Errors
     /// As [`Self::zeros`].
@@ -105,7 +105,7 @@ impl<'a> Allocator<'a> {
         Ok(buffer)
     }
 
-    /// A buffer to read results back through.
+    /// Creates a buffer for reading results back.
     ///
     /// # Errors
     /// As [`Self::zeros`].
@@ -115,14 +115,14 @@ impl<'a> Allocator<'a> {
     }
 }
 
-/// A buffer that results are copied to and then read from.
+/// A mappable buffer that results are copied to.
 #[derive(Debug)]
 pub struct Readback {
     pub(crate) buffer: wgpu::Buffer,
 }
 
 impl Readback {
-    /// Hands the first `bytes`, which `submission` copied here, to `take`.
+    /// Maps the first `bytes`, copied here by `submission`, and passes them to `take`.
     pub(crate) async fn read<T>(
         &self,
         context: &GpuContext,
@@ -132,7 +132,7 @@ impl Readback {
     ) -> Result<T, GpuError> {
         let (sender, receiver) = oneshot::channel();
         self.buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
-            // Nobody listens any more when the wait was given up.
+            // The receiver is gone if the wait timed out.
             let _ = sender.send(result);
         });
         let lost = |reason: String| GpuError::DeviceLost { reason };

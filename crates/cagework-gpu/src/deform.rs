@@ -1,5 +1,5 @@
-//! Moving the mesh: weights stay on the GPU, a moved cage is all that is uploaded, positions and normals land in the
-//! vertex buffers that are drawn.
+//! Deforms the mesh: weights stay on the GPU, only the cage's pose is uploaded, and positions and normals are
+//! written to the vertex buffers for drawing.
 
 use bytemuck::Pod;
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, SLICE, SlicedWeights};
@@ -16,17 +16,17 @@ use crate::layout::Work;
 use crate::pipelines::Launch;
 use crate::skin::Skinner;
 
-/// Distance of two dispatches' parameters, the baseline's alignment of dynamic offsets, bytes.
+/// Stride of dispatch parameters, bytes: the baseline's alignment of dynamic offsets.
 const WORK_STRIDE: u64 = 256;
 
-/// Weights that are uploaded at once, but for what fills the last slice: about 10 ms of a page's main thread.
-const PART: u32 = 1 << 19;
+/// Weights per upload, before rounding up to a slice: blocks a page's main thread for about 10 ms.
+const WEIGHTS_PER_UPLOAD: u32 = 1 << 19;
 
-/// A bind's weights on the GPU.
+/// Weights of a bind on the GPU.
 #[derive(Debug)]
 pub struct GpuWeights {
-    /// Each of a whole number of slices.
-    parts: Vec<Part>,
+    /// Chunks of whole slices.
+    chunks: Vec<WeightChunk>,
     frames: Frames,
     n_vertices: u32,
     n_columns: u32,
@@ -34,7 +34,7 @@ pub struct GpuWeights {
 }
 
 #[derive(Debug)]
-struct Part {
+struct WeightChunk {
     first_vertex: u32,
     n_vertices: u32,
     slices: wgpu::Buffer,
@@ -43,22 +43,23 @@ struct Part {
 }
 
 impl GpuWeights {
-    /// Uploads weights, whose columns are the controls and then `frames`.
+    /// Uploads weights. Columns: the controls, then `frames`.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub async fn new(context: &GpuContext, weights: &Weights, frames: &Frames) -> Result<Self, GpuError> {
         let n_vertices = weights.n_rows();
         let mut allocator = Allocator::new(context, "the weights");
-        // Where lists differ most, a weight takes a place in each bundle of its slice.
-        let most = PART.min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
-        let (mut parts, mut bytes, mut begin) = (Vec::new(), 0, 0);
+        // In the worst case each weight takes a place in every bundle of its slice.
+        let most = WEIGHTS_PER_UPLOAD
+            .min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
+        let (mut chunks, mut bytes, mut begin) = (Vec::new(), 0, 0);
         while begin < n_vertices {
             let start = weights.indptr()[begin];
             let more = weights.indptr()[begin..].partition_point(|&end| end - start <= most);
             let end = (begin + more.next_multiple_of(SLICE * BUNDLE)).min(n_vertices);
             let sliced = SlicedWeights::of_rows(weights, begin..end);
-            parts.push(Part {
+            chunks.push(WeightChunk {
                 first_vertex: begin as u32,
                 n_vertices: (end - begin) as u32,
                 slices: allocator.table("slices of weights", &sliced.slices)?,
@@ -67,13 +68,13 @@ impl GpuWeights {
             });
             begin = end;
             if begin < n_vertices {
-                // Whatever else waits for this thread has its turn: a browser's events and frames.
+                // Yields to other tasks, such as events and frames of a browser.
                 bytes += allocator.settle().await?;
                 allocator = Allocator::new(context, "the weights");
             }
         }
         Ok(Self {
-            parts,
+            chunks,
             frames: frames.clone(),
             n_vertices: n_vertices as u32,
             n_columns: weights.n_columns() as u32,
@@ -81,25 +82,25 @@ impl GpuWeights {
         })
     }
 
-    /// Bytes held on the GPU.
+    /// Allocated GPU memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 }
 
-/// A kernel with the offset of its parameters and its workgroups.
+/// Kernel, offset of its parameters, workgroups.
 type Step = (Launch, u32, [u32; 2]);
 
-/// Deforms one mesh, frame after frame.
+/// Deforms one mesh repeatedly.
 #[derive(Debug)]
 pub struct Deformer {
     cage: wgpu::Buffer,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
-    /// Kernels in order; normals are the last.
+    /// In order of execution; normals are last.
     steps: Vec<Step>,
-    /// What comes before the normals.
+    /// Runs before the normals.
     holder: Option<Holder>,
     frames: Frames,
     n_vertices: u32,
@@ -107,7 +108,7 @@ pub struct Deformer {
 }
 
 impl Deformer {
-    /// Makes vertex buffers for `weights` and the normals of `triangles`.
+    /// Creates vertex buffers for `weights` and tables for the normals of `triangles`.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
@@ -129,7 +130,7 @@ impl Deformer {
         let table = NormalTable::new(n_vertices as usize, triangles);
         let starts = allocator.table("starts of triangle lists", &table.starts)?;
         let others = allocator.table("triangle lists", &table.others)?;
-        let n_steps = weights.parts.len() as u64 + 1;
+        let n_steps = weights.chunks.len() as u64 + 1;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let works = allocator.zeros("work parameters", n_steps * WORK_STRIDE, usage)?;
 
@@ -147,11 +148,11 @@ impl Deformer {
             n_columns,
         };
         let (cage, positions) = (deformer.cage.clone(), deformer.positions.clone());
-        for part in &weights.parts {
-            let buffers = [&part.slices, &part.columns, &part.weights, &cage, &positions];
+        for chunk in &weights.chunks {
+            let buffers = [&chunk.slices, &chunk.columns, &chunk.weights, &cage, &positions];
             let launch = launch(&kernels::DEFORM_VERTICES, &buffers);
-            let n_bundles = part.n_vertices.div_ceil(BUNDLE as u32);
-            deformer.add(context, &works, launch, part.first_vertex, n_bundles);
+            let n_bundles = chunk.n_vertices.div_ceil(BUNDLE as u32);
+            deformer.add(context, &works, launch, chunk.first_vertex, n_bundles);
         }
         let launch = launch(&kernels::VERTEX_NORMALS, &[&starts, &others, &positions, &deformer.normals]);
         deformer.add(context, &works, launch, 0, n_vertices);
@@ -174,10 +175,10 @@ impl Deformer {
         self.steps.push((launch, offset as u32, groups));
     }
 
-    /// Uploads the cage's pose, `[n_cage]`, object units; what `encode` records next follows it.
+    /// Uploads the cage's pose, `[n_cage]`, object units, for subsequent calls of [`Self::encode`].
     ///
     /// # Panics
-    /// If there is not one position per cage vertex.
+    /// If the number of positions differs from the number of cage vertices.
     pub fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
         let columns = self.frames.columns(cage_positions);
         assert_eq!(columns.len(), self.n_columns as usize, "one position per cage vertex");
@@ -188,12 +189,12 @@ impl Deformer {
         }
     }
 
-    /// Holds parts that the cage does not bend from the next pose on, or none.
+    /// Sets the parts that are held or rigid, from the next pose on.
     pub(crate) fn hold(&mut self, holder: Option<Holder>) {
         self.holder = holder;
     }
 
-    /// Records the deformation: positions and normals are up to date for what comes after it.
+    /// Records the computation of positions and normals.
     pub fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
         let (_, moving) = self.steps.split_last().expect("normals are the last step");
         self.encode_steps(encoder, moving, |pass| {
@@ -203,12 +204,12 @@ impl Deformer {
         });
     }
 
-    /// The same for a clip: positions by a skin, then normals.
+    /// Like [`Self::encode`], with positions from skinning.
     pub(crate) fn encode_skinned(&self, encoder: &mut wgpu::CommandEncoder, skinner: &Skinner) {
         self.encode_steps(encoder, &[], |pass| skinner.encode(pass));
     }
 
-    /// Records `moving`, then what puts vertices right, then normals.
+    /// Records `moving`, then `then`, then normals.
     fn encode_steps(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -257,13 +258,13 @@ impl Deformer {
         let submission = context.queue.submit([encoder.finish()]);
         let (sender, done) = oneshot::channel();
         context.queue.on_submitted_work_done(move || {
-            // The receiver lives until the wait below ends.
+            // The receiver exists until the wait below returns.
             let _ = sender.send(());
         });
         context.wait(&submission, done).await
     }
 
-    /// Reads positions back, for export. `[n_vertices]`, object units.
+    /// Reads the positions back. `[n_vertices]`, object units.
     ///
     /// # Errors
     /// As [`Self::run`], and [`GpuError::OutOfMemory`].
@@ -272,7 +273,7 @@ impl Deformer {
         Ok(rows.into_iter().map(Vec4::truncate).collect())
     }
 
-    /// Reads normals back. `[n_vertices]`
+    /// Reads the normals back. `[n_vertices]`
     ///
     /// # Errors
     /// As [`Self::read_positions`].
@@ -282,7 +283,7 @@ impl Deformer {
     }
 }
 
-/// Reads the first `count` elements of a buffer.
+/// Reads back the first `count` elements of a buffer.
 pub(crate) async fn read_all<T: Pod>(
     context: &GpuContext,
     buffer: &wgpu::Buffer,

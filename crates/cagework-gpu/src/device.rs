@@ -1,4 +1,4 @@
-//! The GPU: which one, its limits, and what became of it.
+//! GPU selection, limits and faults.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -7,60 +7,60 @@ use futures_channel::oneshot;
 use crate::error::GpuError;
 use crate::pipelines::Pipelines;
 
-/// Names part of the adapter to use, for machines that have several.
+/// Environment variable that selects an adapter by part of its name.
 pub const ADAPTER_VARIABLE: &str = "CAGEWORK_ADAPTER";
 
-/// Longest wait for one slice of work, which should take 50 ms: slow software adapters under load included.
-const PATIENCE_S: u64 = 120;
+/// Timeout for one slice of work, s. Slices are sized for 50 ms; slow software adapters under load take longer.
+const WAIT_LIMIT_S: u64 = 120;
 
-/// How a context is made.
+/// Options for opening a GPU.
 #[derive(Clone, Debug, Default)]
 pub struct ContextOptions {
-    /// Part of the adapter's name; the environment's `CAGEWORK_ADAPTER` if none, the fastest adapter without either.
+    /// Part of the adapter's name. By default the environment's `CAGEWORK_ADAPTER`, or the fastest adapter.
     pub adapter: Option<String>,
-    /// Plan with storage bindings of at most this many bytes instead of the device's limit. For tests.
+    /// Upper limit on storage bindings in plans, bytes. For tests.
     pub max_binding_bytes: Option<u64>,
-    /// Draw only, as in a browser without WebGPU, whatever the GPU could do. For tests; needs the feature `webgl`.
+    /// Only draw, as in a browser without WebGPU. For tests; needs the feature `webgl`.
     pub draws_only: bool,
-    /// Make pipelines when they are first needed, for who draws and deforms: by default all are there before anything
-    /// is measured.
+    /// Create pipelines on first use, to start faster. By default all are created immediately, so that
+    /// timings exclude it.
     pub pipelines_later: bool,
 }
 
-/// A device, its queue, and the pipelines of all kernels. A clone is another handle to the same device.
+/// Device, queue and kernel pipelines. Clones share the device.
 #[derive(Clone, Debug)]
 pub struct GpuContext {
-    /// For what is not done here: surfaces.
+    /// For creating surfaces.
     pub instance: wgpu::Instance,
     /// The GPU.
     pub adapter: wgpu::Adapter,
-    /// The connection to it.
+    /// Logical device.
     pub device: wgpu::Device,
-    /// Where work is submitted.
+    /// Queue for submitting work.
     pub queue: wgpu::Queue,
-    /// Largest storage binding, bytes.
+    /// Maximum size of a storage binding, bytes.
     pub max_binding_bytes: u64,
     draws_only: bool,
     pub(crate) pipelines: Pipelines,
     fault: Arc<Fault>,
 }
 
-/// The first thing that went wrong behind our back.
+/// First device loss and first uncaptured error, set by callbacks.
 #[derive(Debug, Default)]
 struct Fault {
     lost: OnceLock<String>,
     refused: OnceLock<String>,
-    /// Who wants to hear of a loss when it happens.
+    /// Senders that are notified of a device loss.
     waiting: Mutex<Vec<oneshot::Sender<String>>>,
 }
 
 impl Fault {
-    /// Only the first report is kept: later ones follow from it.
+    /// Stores the first report only; later ones are consequences.
     fn lose(&self, message: &str) {
         let _ = self.lost.set(message.to_owned());
         if let Ok(mut waiting) = self.waiting.lock() {
             for waiting in waiting.drain(..) {
-                // Whoever no longer waits needs no answer.
+                // The receiver may be gone.
                 let _ = waiting.send(message.to_owned());
             }
         }
@@ -91,7 +91,7 @@ impl GpuContext {
         Self::with_adapter(instance, adapter, options).await
     }
 
-    /// Opens `adapter`, which a surface may have chosen.
+    /// Opens `adapter`, for example one that a surface requires.
     ///
     /// # Errors
     /// [`GpuError::NoDevice`].
@@ -141,27 +141,27 @@ impl GpuContext {
         })
     }
 
-    /// Whether this device draws and no more: what moves then moves on the processor, and shaders find their tables in
-    /// textures. Decided once, when it is opened; false wherever kernels run.
+    /// Whether the device only draws. Then deformation runs on the CPU, and shaders read tables from
+    /// textures. Fixed when the device is opened.
     #[must_use]
     pub fn draws_only(&self) -> bool {
-        // The page's two artifacts each need half of what asks here: said so that a compiler leaves out the other.
+        // Constant in each of the page's two builds, so the compiler drops the other one's code.
         cfg!(feature = "webgl") && (cfg!(target_family = "wasm") || self.draws_only)
     }
 
-    /// Whether processor cores play the GPU.
+    /// Whether the adapter is a software rasteriser.
     #[must_use]
     pub fn is_software(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Name of the GPU as people know it.
+    /// Marketing name of the GPU.
     #[must_use]
     pub fn adapter_name(&self) -> String {
         self.adapter.get_info().name
     }
 
-    /// Resolves with the platform's reason when the device is lost, and never if it is not.
+    /// Resolves with the platform's reason when the device is lost.
     pub fn lost(&self) -> oneshot::Receiver<String> {
         let (sender, receiver) = oneshot::channel();
         if let Ok(mut waiting) = self.fault.waiting.lock() {
@@ -173,21 +173,21 @@ impl GpuContext {
         receiver
     }
 
-    /// Gives the device up: as a reset of the driver would, or because whoever watches knows of one.
+    /// Destroys the device, as a driver reset would.
     pub fn lose(&self, reason: &str) {
         self.device.destroy();
-        // WebGPU tells by itself, and better.
+        // WebGPU reports the loss itself, with a better reason.
         if self.draws_only() {
             self.fault.lose(reason);
         }
     }
 
-    /// Whether all is well so far.
+    /// Checks for a lost device and uncaptured errors.
     ///
     /// # Errors
     /// [`GpuError::DeviceLost`], [`GpuError::Refused`].
     pub fn check(&self) -> Result<(), GpuError> {
-        // Lets the platform say what it knows; what it says lands in the fault.
+        // Runs pending callbacks, which set the fault.
         let _ = self.device.poll(wgpu::PollType::Poll);
         if let Some(reason) = self.fault.lost.get() {
             return Err(GpuError::DeviceLost { reason: reason.clone() });
@@ -198,7 +198,7 @@ impl GpuContext {
         Ok(())
     }
 
-    /// Waits for what a callback of `submission` sends: on the web by returning to the event loop, elsewhere by polling.
+    /// Waits for the value sent by a callback of `submission`. Polls natively; on the web it returns to the event loop.
     pub(crate) async fn wait<T>(
         &self,
         submission: &wgpu::SubmissionIndex,
@@ -206,35 +206,35 @@ impl GpuContext {
     ) -> Result<T, GpuError> {
         let poll = self.device.poll(wgpu::PollType::Wait {
             submission_index: Some(submission.clone()),
-            timeout: Some(std::time::Duration::from_secs(PATIENCE_S)),
+            timeout: Some(std::time::Duration::from_secs(WAIT_LIMIT_S)),
         });
         self.check()?;
         if let Err(wgpu::PollError::Timeout) = poll {
-            return Err(GpuError::Timeout { seconds: PATIENCE_S });
+            return Err(GpuError::Timeout { seconds: WAIT_LIMIT_S });
         }
         let answer = answer.await;
         self.check()?;
-        answer.map_err(|_| GpuError::DeviceLost { reason: "it dropped its work".to_owned() })
+        answer.map_err(|_| GpuError::DeviceLost { reason: "a callback was dropped".to_owned() })
     }
 }
 
-/// What adapters and surfaces come from.
+/// Creates the entry point of wgpu, for adapters and surfaces.
 #[must_use]
 pub fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     if cfg!(all(feature = "webgl", target_family = "wasm")) {
         descriptor.backends = wgpu::Backends::GL;
-        // Browsers signal fences between two tasks only, so that waiting for one within a task would never end. What is
-        // read back is waited for by the reading itself.
+        // Browsers signal fences only between tasks, so waiting within a task would never end. Readbacks
+        // synchronise by themselves.
         descriptor.backend_options.gl.fence_behavior = wgpu::GlFenceBehavior::AutoFinish;
     } else {
-        // GLES cannot do what the kernels need, and where it is it offers the same GPU once more.
+        // GLES lacks features that kernels need, and would list the same GPUs again.
         descriptor.backends = wgpu::Backends::PRIMARY;
     }
     wgpu::Instance::new(descriptor)
 }
 
-/// The baseline in all but sizes: those are taken as offered, and plans go by what the device then has.
+/// Baseline limits, except buffer sizes, which are those of the adapter. Plans adapt to them.
 fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
     if draws_only {
         let baseline = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(offered.clone());
@@ -247,7 +247,7 @@ fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
     }
 }
 
-/// The first adapter whose name contains `name`, whatever the case.
+/// First adapter whose name contains `name`, ignoring case.
 async fn adapter_named(instance: &wgpu::Instance, name: String) -> Result<wgpu::Adapter, GpuError> {
     let adapters = instance.enumerate_adapters(wgpu::Backends::PRIMARY).await;
     let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();

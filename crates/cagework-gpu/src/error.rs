@@ -1,4 +1,4 @@
-//! What can go wrong on a GPU. Every one of these leaves the CPU as the way out.
+//! Errors of the GPU. The CPU can be used instead in all cases.
 
 use cagework_core::options::Solver;
 use cagework_core::{BindError, Cancelled};
@@ -6,92 +6,94 @@ use thiserror::Error;
 
 use crate::plan::PlanError;
 
-/// Why work on the GPU did not come about.
+/// Error of an operation on the GPU.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GpuError {
-    /// There is no GPU that can be used.
+    /// There is no usable GPU.
     #[error(
         "no usable GPU was found ({reason}): install a Vulkan driver (mesa-vulkan-drivers has a software one) or use the CPU"
     )]
     NoAdapter {
-        /// What the platform said.
+        /// Reason given by the platform.
         reason: String,
     },
-    /// The GPU that was asked for is not there.
-    #[error("no GPU is called like {wanted:?}; there are: {found}")]
+    /// No GPU has the requested name.
+    #[error("no GPU name contains {wanted:?}; available: {found}")]
     UnknownAdapter {
-        /// Part of the name that was asked for.
+        /// Requested part of a name.
         wanted: String,
-        /// Names found, comma-separated.
+        /// Names of all GPUs, comma-separated.
         found: String,
     },
-    /// The GPU offers less than WebGPU's baseline.
-    #[error("the GPU {adapter:?} gave no device: {reason}")]
+    /// The GPU does not meet WebGPU's baseline.
+    #[error("the GPU {adapter:?} cannot be opened: {reason}. Update its driver, or use the CPU")]
     NoDevice {
-        /// Its name.
+        /// Name of the GPU.
         adapter: String,
-        /// What the platform said.
+        /// Reason given by the platform.
         reason: String,
     },
-    /// The device is gone: unplugged, reset by the driver, or taken away by the browser.
+    /// The device was removed, reset by the driver, or revoked by the browser.
     #[error("the GPU was lost ({reason}): start again, or use the CPU")]
     DeviceLost {
-        /// What the platform said.
+        /// Reason given by the platform.
         reason: String,
     },
-    /// An allocation failed although it was planned for.
-    #[error("the GPU has no memory for {what} ({bytes} bytes): use a smaller grid, or the CPU")]
+    /// An allocation failed although it was within the plan.
+    #[error("the GPU is out of memory for {what} ({bytes} bytes): use a smaller grid, or the CPU")]
     OutOfMemory {
-        /// What was to be allocated.
+        /// Name of the allocation.
         what: String,
-        /// How much.
+        /// Size of the allocation.
         bytes: u64,
     },
-    /// The GPU refused work: a fault of this program.
-    #[error("the GPU refused work: {reason}")]
+    /// Validation error: a bug in this crate.
+    #[error(
+        "the GPU rejected a command, which is a bug in Cagework: {reason}. Please report it, and use the CPU"
+    )]
     Refused {
-        /// What the platform said.
+        /// Reason given by the platform.
         reason: String,
     },
-    /// The GPU did not answer.
+    /// A submission did not finish in time.
     #[error(
-        "the GPU did not answer within {seconds} s: its driver hangs, or it is far too slow for this grid"
+        "the GPU did not answer within {seconds} s: its driver hangs, or it is too slow for this grid; use a smaller grid, or the CPU"
     )]
     Timeout {
-        /// How long was waited.
+        /// Time limit.
         seconds: u64,
     },
-    /// What was handed over does not belong together.
+    /// Inconsistent input.
     #[error("cannot be drawn: {reason}")]
     Model {
-        /// What does not.
+        /// What is inconsistent.
         reason: String,
     },
-    /// A GPU made of processor cores would draw for minutes.
+    /// A software rasteriser would take minutes for this picture.
     #[error(
-        "the model's {triangles} triangles cover {pixels:.1e} pixels, each counted for each triangle; without a graphics card the limit is {limit:e}: use one, or a smaller picture"
+        "the model's {triangles} triangles cover {pixels:.1e} pixels in total, counting overlaps; without a graphics card the limit is {limit:e}: use a smaller picture or a machine with a GPU"
     )]
     Layers {
-        /// How many there are.
+        /// Number of triangles.
         triangles: usize,
-        /// Pixels, counted for each triangle that covers them.
+        /// Sum of the pixels covered by each triangle.
         pixels: f64,
-        /// Most that are drawn.
+        /// Maximum of `pixels`.
         limit: f64,
     },
-    /// Something has to come first.
-    #[error("there is no {missing} yet: load one first")]
+    /// A required object has not been set.
+    #[error("no {missing} has been set: load one first")]
     NotReady {
-        /// What.
+        /// The missing object.
         missing: &'static str,
     },
-    /// A solver that runs on the CPU only.
-    #[error("the solver {0} runs on the CPU only: bind there, or choose multigrid or jacobi")]
+    /// The solver is not implemented on the GPU.
+    #[error("the solver {0} runs on the CPU only: bind on the CPU, or choose multigrid or jacobi")]
     Solver(Solver),
-    /// The bind does not fit.
+    /// The bind does not fit into the GPU's memory.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// An error that has nothing to do with the GPU, cancelling included.
+    /// An error unrelated to the GPU, including cancellation.
     #[error(transparent)]
     Bind(#[from] BindError),
 }

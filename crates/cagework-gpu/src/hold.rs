@@ -1,4 +1,4 @@
-//! Parts of the mesh that the cage does not bend: put right on the GPU after each deformation, before normals.
+//! Applies held and rigid parts on the GPU, after the deformation and before the normals.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// Holds parts of one mesh.
+/// Held and rigid parts of one mesh.
 #[derive(Debug)]
 pub(crate) struct Holder {
     parts: Arc<BoundParts>,
@@ -22,7 +22,8 @@ pub(crate) struct Holder {
 }
 
 impl Holder {
-    /// `copies`: the vertices that copies after the mesh's own belong to; `positions`: the vertex buffer that it changes.
+    /// `copies`: source vertices of the duplicates that follow the mesh's vertices. `positions`: vertex
+    /// buffer to modify.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
@@ -51,7 +52,7 @@ impl Holder {
         Ok(Self { parts, motions, launch, groups })
     }
 
-    /// Takes where the controls are. `[n_columns]`
+    /// Uploads the motions of the pieces for a pose. `controls`: `[n_columns]`, object units.
     pub(crate) fn pose(&self, context: &GpuContext, controls: &[Vec3]) {
         let motions = self.parts.motions(controls);
         if !motions.is_empty() {
@@ -59,7 +60,7 @@ impl Holder {
         }
     }
 
-    /// Records that parts are put right.
+    /// Records the kernel.
     pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
         pass.set_pipeline(&self.launch.pipeline);
         pass.set_bind_group(0, &self.launch.bind_group, &[0]);

@@ -1,8 +1,8 @@
-//! The paper's smoothing on the GPU: Algorithm 3 with Eq. 2 as the stop rule.
+//! Jacobi smoothing on the GPU: the paper's Algorithm 3 with Eq. 2 as stop rule.
 //!
-//! Changes versus the paper: two fields change roles instead of being copied, and every [`INTERVAL`] sweeps the one
-//! number delta comes back instead of the whole field. Eq. 2 couples all columns of a cell, so the fields of all batches
-//! are alive together, and batches add up in one buffer of changes, a number per cell.
+//! Changes versus the paper: two fields are swapped, not copied, and every [`SWEEPS_PER_CHECK`] sweeps only
+//! the number delta is read back, not the field. Eq. 2 couples all columns of a cell, so the fields of all
+//! batches are kept, and each batch adds to one buffer of changes per cell.
 
 use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;
@@ -19,10 +19,10 @@ use crate::pipelines::Launch;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Sweeps between two looks at delta. Fixed, not adapted to the clock: the result must not depend on it.
-pub const INTERVAL: u32 = 10;
+/// Sweeps between checks of delta. Independent of the clock, so that results are reproducible.
+pub const SWEEPS_PER_CHECK: u32 = 10;
 
-/// Fields of all batches, with all kernels bound to them.
+/// Fields of all batches, and the kernels bound to them.
 #[derive(Debug)]
 pub struct Jacobi {
     level: GpuLevel,
@@ -34,7 +34,7 @@ pub struct Jacobi {
     readback: Readback,
 }
 
-/// One batch. Sweeps go from `fields[0]` to `fields[1]` and back.
+/// One batch. Sweep k reads `fields[k % 2]` and writes the other field.
 #[derive(Debug)]
 struct BatchFields {
     fields: [wgpu::Buffer; 2],
@@ -43,7 +43,7 @@ struct BatchFields {
 }
 
 impl Jacobi {
-    /// Uploads the finest level and all columns' values on the cage.
+    /// Uploads the finest level and the boundary values of all columns.
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
@@ -86,10 +86,10 @@ impl Jacobi {
         })
     }
 
-    /// Sweeps until delta falls below tau. `checked(stream, sweeps, delta)` is told each time delta is known.
+    /// Sweeps until delta falls below tau. Calls `checked(stream, sweeps, delta)` after each check.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn solve(
         &self,
         stream: &mut Stream<'_>,
@@ -102,7 +102,7 @@ impl Jacobi {
         let work = Work { n_quads: self.n_quads, ..Work::default() };
         let (mut done, mut is_last) = (0, false);
         while !is_last {
-            let round = INTERVAL.min(rule.max_iterations - done);
+            let round = SWEEPS_PER_CHECK.min(rule.max_iterations - done);
             for (number, batch) in self.batches.iter().enumerate() {
                 for sweep in done..done + round {
                     let launch = &batch.sweeps[sweep as usize % 2];
@@ -119,13 +119,13 @@ impl Jacobi {
             let delta = f64::from(sum) / f64::from(self.level.n_unknowns.max(1));
             is_last = report.iteration_done(&rule, delta, None)
                 || done >= rule.max_iterations
-                || report.ends_at_round_off(STALLED_SWEEPS / INTERVAL as usize);
+                || report.ends_at_round_off(STALLED_SWEEPS / SWEEPS_PER_CHECK as usize);
             checked(stream, done, delta);
         }
         Ok((done, report))
     }
 
-    /// A batch's field after `sweeps` sweeps.
+    /// Field of a batch after `sweeps` sweeps.
     #[must_use]
     pub fn field(&self, batch: usize, sweeps: u32) -> &wgpu::Buffer {
         &self.batches[batch].fields[sweeps as usize % 2]

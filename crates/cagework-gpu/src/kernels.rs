@@ -1,11 +1,12 @@
-//! The kernel table: every compute shader with what its pipeline needs. `tests/shaders.rs` compares it with the WGSL.
+//! Kernel table: each compute shader with its bindings and workgroup size. `tests/shaders.rs` compares it
+//! with the WGSL.
 
 use Binding::{Read, ReadWrite, Uniform};
 
-/// What a binding is. All are in group 0, numbered in the table's order.
+/// Type of a binding. Bindings are in group 0, numbered in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binding {
-    /// `var<uniform>`: the dispatch's [`crate::layout::Work`], at a dynamic offset.
+    /// `var<uniform>`: the dispatch's [`crate::layout::Work`] at a dynamic offset.
     Uniform,
     /// `var<storage, read>`.
     Read,
@@ -13,22 +14,23 @@ pub enum Binding {
     ReadWrite,
 }
 
-/// One compute shader.
+/// A compute shader.
 #[derive(Debug)]
 pub struct Kernel {
-    /// Name of the file, the entry point, and the CPU twin in `cagework_core::stencil`, `parts`, `skin` or `dynamic`.
+    /// Name of the file, the entry point, and the CPU implementation in `cagework_core::stencil`, `parts`,
+    /// `skin` or `dynamic`.
     pub name: &'static str,
-    /// The whole source.
+    /// Complete source.
     pub wgsl: &'static str,
-    /// Invocations of a workgroup; all are one-dimensional.
+    /// Invocations per workgroup. All kernels are one-dimensional.
     pub workgroup: u32,
-    /// Bindings in order.
+    /// Bindings, in order.
     pub bindings: &'static [Binding],
-    /// Rough number of memory accesses of an invocation: what slices of work are measured in.
+    /// Approximate memory accesses per invocation, for sizing slices of work.
     pub cost: u32,
 }
 
-/// Declares kernels and the list of them all.
+/// Declares kernels and the list `ALL`.
 macro_rules! kernels {
     ($($(#[$doc:meta])* $id:ident = $name:literal + [$($shared:literal),+], $workgroup:literal, $cost:literal, $bindings:expr;)+) => {
         $(
@@ -52,31 +54,31 @@ macro_rules! kernels {
 kernels! {
     /// Gauss-Seidel on one colour, in place.
     RELAX_CELLS = "relax_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// The paper's smoothing.
+    /// The paper's smoothing step.
     JACOBI_CELLS = "jacobi_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
-    /// Eq. 2, inner sum.
+    /// Inner sum of Eq. 2.
     CHANGE_NORMS = "change_norms" + ["work"], 64, 64, &[Uniform, Read, Read, ReadWrite];
     /// Residual of the red rows.
     RESIDUAL = "residual" + ["work"], 64, 44, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
-    /// Residual to the coarse right-hand side.
+    /// Restricts the residual to the coarse right-hand side.
     RESTRICT_RESIDUAL = "restrict_residual" + ["work"], 64, 69, &[Uniform, Read, Read, ReadWrite];
-    /// Coarse correction to the fine level.
+    /// Prolongs the coarse correction.
     PROLONG_CORRECTION = "prolong_correction" + ["work"], 64, 24, &[Uniform, Read, Read, ReadWrite];
-    /// Partial sums of squares of a field.
+    /// Partial sums of squares.
     SUM_SQUARES = "sum_squares" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Partial sums of roots: Eq. 2, outer sum.
+    /// Partial sums of roots: outer sum of Eq. 2.
     SUM_ROOTS = "sum_roots" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Sum of partial sums.
+    /// Sums partial sums.
     REDUCE_SUM = "reduce_sum" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Weights at the mesh's vertices.
+    /// Weights at mesh vertices.
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Deformed positions.
     DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Parts that the cage does not bend.
+    /// Held and rigid parts.
     HOLD_PARTS = "hold_parts" + ["work"], 64, 16, &[Uniform, Read, Read, Read, ReadWrite];
-    /// Positions of a clip.
+    /// Skinned positions.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
-    /// Positions of a clip, bent by the cage.
+    /// Adds the cage's displacement field to skinned positions.
     BEND_VERTICES = "bend_vertices" + ["work"], 64, 12, &[Uniform, Read, ReadWrite];
     /// Normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];

@@ -1,8 +1,8 @@
-//! Mirrors of the shaders' structs. `tests/shaders.rs` compares names, offsets and sizes.
+//! Rust mirrors of shader structs. `tests/shaders.rs` compares names, offsets and sizes.
 
 use bytemuck::{Pod, Zeroable};
 
-/// One dispatch; see `shaders/work.wgsl`, whose `Work` it mirrors.
+/// Parameters of a dispatch. Mirrors `Work` in `shaders/work.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Work {
@@ -10,28 +10,28 @@ pub struct Work {
     pub first: u32,
     /// Number of items.
     pub count: u32,
-    /// Invocations in one row of workgroups; further ones lie along y.
+    /// Invocations per row of workgroups; further rows are along y.
     pub stride: u32,
-    /// Quads in a row of a field: columns of the batch over four.
+    /// Quads per row of a field: columns of the batch / 4.
     pub n_quads: u32,
-    /// First row of a field, or first slot of a result, that items count from.
+    /// Offset of items: first row of a field, or first slot of a result.
     pub first_row: u32,
-    /// First quad of the batch among all columns.
+    /// First quad of the batch.
     pub first_quad: u32,
-    /// A kernel's variants, see [`mode`].
+    /// Variant of a kernel, see [`mode`].
     pub mode: u32,
-    /// Coarse rows that a fine row is interpolated from.
+    /// Number of coarse rows that a fine row is interpolated from.
     pub n_sources: u32,
-    /// Over-relaxation; 1 goes to the Gauss-Seidel value. Dimensionless.
+    /// Over-relaxation factor; 1 is Gauss-Seidel. Dimensionless.
     pub omega: f32,
 }
 
-/// Values of [`Work::mode`], the shaders' constants of the same names.
+/// Values of [`Work::mode`]. The shaders define constants with the same names.
 pub mod mode {
     /// `change_norms`: absolute values instead of squares.
     pub const CHANGE_ABSOLUTE: u32 = 1;
-    /// `change_norms`: replace what is there.
+    /// `change_norms`: overwrite instead of add.
     pub const CHANGE_FIRST: u32 = 2;
-    /// `prolong_correction`: replace by the mean.
+    /// `prolong_correction`: overwrite by the mean.
     pub const PROLONG_REPLACE: u32 = 1;
 }

@@ -1,4 +1,4 @@
-//! A hierarchy's stencils and transfers on the GPU, and right-hand sides on their way there.
+//! Uploads a hierarchy's stencils, transfers and right-hand sides.
 
 use cagework_core::levels::Level;
 use cagework_core::solve::hierarchy::Hierarchy;
@@ -8,24 +8,24 @@ use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Bytes of four columns of a row.
+/// Bytes of a quad: four columns of a row.
 pub(crate) const QUAD_BYTES: u64 = 16;
 
-/// One level's stencils.
+/// Stencils of a level.
 #[derive(Debug)]
 pub struct GpuLevel {
     pub(crate) neighbours: wgpu::Buffer,
     pub(crate) diagonal: wgpu::Buffer,
     pub(crate) rhs_of_row: wgpu::Buffer,
     pub(crate) n_rows: u32,
-    /// First row and number of rows of each colour, without the zero rows.
+    /// First row and number of rows of each colour, excluding zero rows.
     pub(crate) colours: [(u32, u32); 2],
     pub(crate) n_unknowns: u32,
-    /// Rows of its right-hand side.
+    /// Rows of the right-hand side.
     pub(crate) n_rhs: u32,
 }
 
-/// How a level and the next coarser one exchange fields.
+/// Transfer tables between a level and the next coarser one.
 #[derive(Debug)]
 pub struct GpuTransfer {
     pub(crate) around: wgpu::Buffer,
@@ -36,7 +36,7 @@ pub struct GpuTransfer {
 }
 
 impl GpuLevel {
-    /// Uploads a level; `finest`: its right-hand side has one row per cut cell.
+    /// Uploads a level. With `finest`, the right-hand side has one row per cut cell.
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
@@ -54,7 +54,7 @@ impl GpuLevel {
         })
     }
 
-    /// A field of zeros on this level.
+    /// Allocates a field of zeros.
     pub(crate) fn field(
         &self,
         allocator: &mut Allocator<'_>,
@@ -63,14 +63,14 @@ impl GpuLevel {
         allocator.storage("field", u64::from(self.n_rows) * u64::from(n_quads) * QUAD_BYTES)
     }
 
-    /// Room for a right-hand side on this level.
+    /// Allocates a right-hand side.
     pub(crate) fn rhs(&self, allocator: &mut Allocator<'_>, n_quads: u32) -> Result<wgpu::Buffer, GpuError> {
         allocator.storage("right-hand side", u64::from(self.n_rhs) * u64::from(n_quads) * QUAD_BYTES)
     }
 }
 
 impl GpuTransfer {
-    /// Uploads the tables between level k and level k + 1.
+    /// Uploads the tables between levels k and k + 1.
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
@@ -88,8 +88,8 @@ impl GpuTransfer {
     }
 }
 
-/// Uploads the cage's values of columns `first_column..first_column + n_lanes` on level k: to the rows of cut cells on
-/// the finest level, to the cells' own rows on coarser ones. `values` is scratch space.
+/// Uploads the boundary values of columns `first_column..first_column + n_lanes` on level k: one row per cut
+/// cell on the finest level, the cells' rows on coarser ones. `values` is scratch space.
 pub(crate) fn upload_rhs(
     context: &GpuContext,
     hierarchy: &Hierarchy,

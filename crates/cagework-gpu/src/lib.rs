@@ -1,9 +1,10 @@
-//! Cagework on the GPU: core WebGPU compute, the same kernels on lavapipe, a desktop GPU and in the browser.
+//! Cagework on the GPU, using baseline WebGPU compute. The same kernels run natively, on lavapipe and in browsers.
 //!
-//! [`GpuContext`] holds the device and one pipeline per [`kernels`] row; [`bind_gpu`] solves batch after batch on it and
-//! reads back only the weights sampled at the mesh's vertices; [`Deformer`] keeps them on the GPU and moves the mesh.
-//! [`Session`] is all of it for one model, with pictures by the [`render`]er.
-//! Everything is async and nothing blocks the web's event loop: work goes out in short slices ([`stream`]), awaited.
+//! [`GpuContext`] holds the device and one pipeline per kernel of [`kernels`]. [`bind_gpu`] solves batch by
+//! batch and reads back only the weights at mesh vertices. [`Deformer`] keeps the weights on the GPU and
+//! deforms the mesh. [`Session`] combines them for one model and [`render`]s it.
+//!
+//! All calls are async and do not block the event loop of a browser: work is submitted in short slices ([`stream`]).
 
 pub mod bind;
 pub mod buffers;

@@ -1,6 +1,7 @@
-//! Full multigrid and V(2,1) cycles, batch after batch: the algorithm of `cagework_core::solve::multigrid`, step by step.
+//! Full multigrid with V(2,1) cycles, batch by batch: the algorithm of `cagework_core::solve::multigrid`.
 //!
-//! Per cycle two numbers come back, the squares of the coarse correction (the stop rule's delta) and of the residual.
+//! Each cycle reads back two numbers: squared norms of the coarse correction (delta of the stop rule) and of
+//! the residual.
 
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, Convergence, OMEGA};
@@ -16,11 +17,11 @@ use crate::pipelines::Launch;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Slots of the numbers that are read back.
+/// Indices of the numbers that are read back.
 const RESIDUAL: u32 = 0;
 const DELTA: u32 = 1;
 
-/// Fields of one batch on every level, with all kernels bound to them.
+/// Fields of one batch on all levels, and the kernels bound to them.
 #[derive(Debug)]
 pub struct Multigrid {
     n_quads: u32,
@@ -31,20 +32,20 @@ pub struct Multigrid {
     scratch: Vec<f32>,
 }
 
-/// One level's fields and kernels.
+/// Fields and kernels of a level.
 #[derive(Debug)]
 struct LevelWork {
     level: GpuLevel,
     field: wgpu::Buffer,
     rhs: wgpu::Buffer,
     relax: Launch,
-    /// None on the coarsest level.
-    coarser: Option<Coarser>,
+    /// `None` on the coarsest level.
+    coarser: Option<CoarseTransfer>,
 }
 
-/// The way to the next coarser level and back.
+/// Transfers to and from the next coarser level.
 #[derive(Debug)]
-struct Coarser {
+struct CoarseTransfer {
     residual: Launch,
     restrict: Launch,
     faces: Launch,
@@ -53,17 +54,17 @@ struct Coarser {
     n_corners: u32,
 }
 
-/// Sums of squares on the finest level.
+/// Kernels for sums of squares on the finest level.
 #[derive(Debug)]
 enum Squares {
-    /// Of the red residuals and of the coarse correction, and the sum of either's partial sums.
+    /// Sums the red residuals and the coarse correction.
     Levels { residual: Launch, correction: Launch, sum: Launch },
-    /// Of the change from the values kept in `before`: there is no coarser level.
+    /// Sums the change from the values saved in `before`, if there is only one level.
     Single { before: wgpu::Buffer, changes: Launch, sum: Launch },
 }
 
 impl Multigrid {
-    /// Uploads the hierarchy and makes room for one batch.
+    /// Uploads the hierarchy and allocates one batch.
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
@@ -85,7 +86,7 @@ impl Multigrid {
             );
             levels.push(LevelWork { level, field, rhs, relax, coarser: None });
         }
-        // One buffer for all levels: the kernel writes each level's own zero row.
+        // Shared by all levels: the kernel writes each level's zero row.
         let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
         let numbers = allocator.storage("numbers", 8)?;
         let squares = if levels.len() == 1 {
@@ -101,7 +102,8 @@ impl Multigrid {
             let red_residual = allocator.storage("residual", red_bytes)?;
             for k in 0..hierarchy.transfers.len() {
                 let transfer = GpuTransfer::new(allocator, hierarchy, k)?;
-                let coarser = Coarser::new(stream, &levels[k], &levels[k + 1], &transfer, &red_residual);
+                let coarser =
+                    CoarseTransfer::new(stream, &levels[k], &levels[k + 1], &transfer, &red_residual);
                 levels[k].coarser = Some(coarser);
             }
             let most = n_groups(levels[0].level.n_rows * n_quads);
@@ -116,17 +118,17 @@ impl Multigrid {
         Ok(Self { n_quads, levels, squares, numbers, readback, scratch: Vec::new() })
     }
 
-    /// The finest level's field.
+    /// Field of the finest level.
     #[must_use]
     pub fn field(&self) -> &wgpu::Buffer {
         &self.levels[0].field
     }
 
-    /// Solves the batch that starts at `first_column`, or returns a report of cycles that stalled. Calls
-    /// `cycle_done(stream, cycle, delta)` after each cycle.
+    /// Solves the batch that starts at `first_column`. The report can be `stalled`. Calls `cycle_done(stream,
+    /// cycle, delta)` after each cycle.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn solve(
         &mut self,
         stream: &mut Stream<'_>,
@@ -170,7 +172,7 @@ impl Multigrid {
         }
     }
 
-    /// One V(2,1) cycle from level k down.
+    /// One V(2,1) cycle, starting at level k.
     async fn cycle(&self, stream: &mut Stream<'_>, k: usize) -> Result<(), GpuError> {
         let coarsest = self.levels.len() - 1;
         let n_quads = self.n_quads;
@@ -206,7 +208,7 @@ impl Multigrid {
         Ok(())
     }
 
-    /// Sweeps on the coarsest level; measures the change if it is the only one.
+    /// Sweeps on the coarsest level. Computes delta if it is the only level.
     async fn relax_coarsest(&self, stream: &mut Stream<'_>, only: bool) -> Result<(), GpuError> {
         let coarsest = self.levels.len() - 1;
         let LevelWork { level, field, .. } = &self.levels[coarsest];
@@ -254,7 +256,7 @@ impl Multigrid {
     }
 }
 
-impl Coarser {
+impl CoarseTransfer {
     fn new(
         stream: &Stream<'_>,
         fine: &LevelWork,
@@ -279,12 +281,12 @@ impl Coarser {
     }
 }
 
-/// Workgroups that reduce `count` values.
+/// Workgroups for reducing `count` values.
 pub(crate) fn n_groups(count: u32) -> u32 {
     count.div_ceil(REDUCE_VALUES as u32)
 }
 
-/// The sum of `count` values' squares or roots, into `slot`.
+/// Sums `count` values with the kernel `partial` (squares or roots), into `slot`.
 pub(crate) async fn sum_into(
     stream: &mut Stream<'_>,
     partial: &Launch,

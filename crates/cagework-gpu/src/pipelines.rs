@@ -1,4 +1,4 @@
-//! One compute pipeline per row of the kernel table.
+//! One compute pipeline per kernel.
 
 use std::num::NonZeroU64;
 use std::sync::{Arc, OnceLock};
@@ -6,8 +6,7 @@ use std::sync::{Arc, OnceLock};
 use crate::kernels::{ALL, Binding, Kernel};
 use crate::layout::Work;
 
-/// Pipelines of all kernels, in the table's order, each made when it is first needed: who deforms only need not wait
-/// for the solvers'. A clone is another handle.
+/// Pipelines of all kernels, in the table's order, created on first use. Clones share them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipelines(Arc<[OnceLock<Pipeline>; ALL.len()]>);
 
@@ -17,7 +16,7 @@ struct Pipeline {
     layout: wgpu::BindGroupLayout,
 }
 
-/// A kernel with its buffers: what is dispatched.
+/// A kernel with bound buffers, ready to dispatch.
 #[derive(Clone, Debug)]
 pub struct Launch {
     pub(crate) pipeline: wgpu::ComputePipeline,
@@ -27,9 +26,9 @@ pub struct Launch {
 }
 
 impl Launch {
-    /// Workgroups for so many invocations, and the invocations of a row of them: an axis has a limit.
+    /// Workgroups for `count` invocations, and invocations per row of workgroups, as the number per axis is limited.
     pub(crate) fn groups(&self, count: u32) -> ([u32; 2], u32) {
-        /// The baseline's limit.
+        /// Baseline limit.
         const MAX_GROUPS: u32 = 65_535;
         let groups = count.div_ceil(self.workgroup);
         let rows = groups.div_ceil(MAX_GROUPS).max(1);
@@ -39,14 +38,14 @@ impl Launch {
 }
 
 impl Pipelines {
-    /// Makes all of them.
+    /// Creates all pipelines.
     pub(crate) fn make_all(&self, device: &wgpu::Device) {
         for (slot, kernel) in self.0.iter().zip(ALL) {
             slot.get_or_init(|| Pipeline::new(device, kernel));
         }
     }
 
-    /// A kernel bound to `buffers`, in the table's order after the uniform, which is `works`.
+    /// Binds a kernel to `works` (the uniform) and `buffers`, in the table's order.
     pub(crate) fn launch(
         &self,
         device: &wgpu::Device,
@@ -55,7 +54,7 @@ impl Pipelines {
         buffers: &[&wgpu::Buffer],
     ) -> Launch {
         debug_assert_eq!(buffers.len() + 1, kernel.bindings.len(), "{}: one buffer per binding", kernel.name);
-        let number = ALL.iter().position(|k| k.name == kernel.name).expect("every kernel is in the table");
+        let number = ALL.iter().position(|k| k.name == kernel.name).expect("kernels are in the table");
         let pipeline = self.0[number].get_or_init(|| Pipeline::new(device, kernel));
         let work = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: works,
@@ -119,7 +118,7 @@ impl Pipeline {
             module: &module,
             entry_point: Some(kernel.name),
             compilation_options: wgpu::PipelineCompilationOptions {
-                // Every kernel writes all it reads from workgroup memory.
+                // All kernels write workgroup memory before reading it.
                 zero_initialize_workgroup_memory: false,
                 ..wgpu::PipelineCompilationOptions::default()
             },

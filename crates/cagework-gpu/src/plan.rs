@@ -1,4 +1,4 @@
-//! Memory is planned before any of it is allocated: how many columns go in a batch, and what that takes.
+//! Memory plan of a bind on the GPU, made before allocating: batch size and total memory.
 
 use cagework_core::options::Solver;
 use cagework_core::sample::Stencils;
@@ -9,71 +9,70 @@ use thiserror::Error;
 /// Bytes of four columns of a row.
 const QUAD_BYTES: u64 = 16;
 
-/// Most columns of a batch: more would gain nothing, and the sampled block is read back at once.
+/// Maximum columns of a batch. Larger batches are not faster, and the sampled block is read back at once.
 pub const MAX_LANES: u64 = 128;
 
 /// Sizes of a bind on the GPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Columns of a batch, a multiple of 4.
+    /// Columns per batch, a multiple of 4.
     pub n_lanes: u32,
-    /// Batches.
+    /// Number of batches.
     pub n_batches: u32,
-    /// Vertices that are sampled and read back at a time.
+    /// Vertices sampled and read back at a time.
     pub vertices_per_block: u32,
-    /// Bytes of stencils, transfers and sampling tables.
+    /// Memory of stencils, transfers and sampling tables, bytes.
     pub table_bytes: u64,
-    /// Bytes of fields, right-hand sides, and blocks.
+    /// Memory of fields, right-hand sides and blocks, bytes.
     pub field_bytes: u64,
 }
 
-/// Why a bind does not fit on the GPU.
+/// Error of planning a bind.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
-    /// One array alone is larger than the GPU can bind.
+    /// An array exceeds the binding limit.
     #[error(
-        "{what} needs {needed} bytes in one piece, the GPU binds at most {limit}: use a smaller grid, or the CPU"
+        "{what} needs {needed} bytes in one buffer, more than the GPU's limit of {limit}: use a smaller grid, or the CPU"
     )]
     Binding {
-        /// Which one.
+        /// Name of the array.
         what: &'static str,
-        /// Bytes.
+        /// Size in bytes.
         needed: u64,
-        /// Bytes.
+        /// Limit in bytes.
         limit: u64,
     },
-    /// All together is larger than allowed.
+    /// The total exceeds the memory limit.
     #[error(
         "the GPU would need {} MiB for this bind, more than the limit of {} MiB: use a smaller grid or raise the limit",
         needed >> 20, limit >> 20
     )]
     Memory {
-        /// Bytes for the smallest batches.
+        /// Memory with the smallest batches, bytes.
         needed: u64,
-        /// Bytes.
+        /// Limit in bytes.
         limit: u64,
     },
 }
 
-/// What the sizes depend on.
+/// Quantities that determine the plan.
 struct Sizes {
-    /// Largest tables, each with its name and bytes.
+    /// Names and bytes of the largest tables.
     tables: Vec<(&'static str, u64)>,
-    /// Rows of all arrays of a batch; Jacobi keeps all batches, multigrid one.
+    /// Total rows of all arrays of a batch. Jacobi keeps all batches, multigrid one.
     rows: u64,
-    /// Rows of the largest one.
+    /// Rows of the largest array.
     largest_rows: u64,
-    /// Bytes that do not depend on the number of columns.
+    /// Memory independent of the number of columns, bytes.
     other_bytes: u64,
     all_batches: bool,
 }
 
 impl Plan {
-    /// The plan of a bind: the largest batches for which no array exceeds `max_binding_bytes` and all together stay
-    /// below `memory_limit`.
+    /// Chooses the largest batches for which every array fits `max_binding_bytes` and the total fits `memory_limit`.
     ///
     /// # Errors
-    /// [`PlanError`] when not even batches of four columns do.
+    /// [`PlanError`] if batches of four columns do not fit.
     pub fn new(
         hierarchy: &Hierarchy,
         stencils: &Stencils,
@@ -97,7 +96,7 @@ impl Plan {
             (max_binding_bytes / (sizes.largest_rows * QUAD_BYTES)).min(MAX_LANES / 4).min(all_quads);
         let plan = |n_quads: u64| {
             let n_batches = all_quads.div_ceil(n_quads);
-            // Evened out: 7 quads in batches of at most 6 are 4 and 3.
+            // Balance the batches: 7 quads with a limit of 6 become 4 and 3.
             let n_quads = all_quads.div_ceil(n_batches);
             let vertices_per_block =
                 (stencils.len() as u64).min(max_binding_bytes / (n_quads * QUAD_BYTES)).max(1);
@@ -118,13 +117,13 @@ impl Plan {
             .ok_or_else(|| PlanError::Memory { needed: plan(1).bytes(), limit: memory_limit })
     }
 
-    /// Bytes of all buffers.
+    /// Total memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.table_bytes + self.field_bytes
     }
 
-    /// Quads of four columns in a batch.
+    /// Quads (of four columns) per batch.
     #[must_use]
     pub fn n_quads(&self) -> u32 {
         self.n_lanes / 4
@@ -146,8 +145,8 @@ impl Sizes {
             .sum();
         let rows = match solver {
             Solver::Jacobi => 2 * n_rows + n_cut,
-            // The field, red residuals, right-hand side; two fields on each coarse level. A single level keeps its old
-            // values as well.
+            // Field, red residuals and right-hand side; two fields per coarse level. A single level also
+            // keeps the previous field.
             _ if coarse_rows == 0 => 2 * n_rows + n_cut,
             _ => n_rows + red_rows + n_cut + 2 * coarse_rows,
         };

@@ -1,4 +1,4 @@
-//! Weights at the mesh's vertices, from the field of a batch: all that ever comes back of a field.
+//! Samples weights at mesh vertices from the field of a batch. Only these are read back, not fields.
 
 use cagework_core::sample::Stencils;
 use cagework_core::solve::rows::{LANES, Row};
@@ -12,7 +12,7 @@ use crate::levels::QUAD_BYTES;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Sampling stencils on the GPU and room for one block of weights.
+/// Sampling stencils on the GPU, with buffers for one block of weights.
 #[derive(Debug)]
 pub struct Sampler {
     starts: wgpu::Buffer,
@@ -46,10 +46,11 @@ impl Sampler {
         })
     }
 
-    /// Samples `field`, the batch that starts at `first_column`, into `blocks`, the CPU's batches of [`LANES`] columns.
+    /// Samples `field` of the batch that starts at `first_column` into `blocks`, the CPU's batches of
+    /// [`LANES`] columns.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn sample(
         &self,
         stream: &mut Stream<'_>,
@@ -78,12 +79,12 @@ impl Sampler {
         Ok(())
     }
 
-    /// Puts a block, `[vertex][lane]`, where the CPU would have put its own samples.
+    /// Copies a block, `[vertex][lane]`, into the CPU's batches.
     fn scatter(&self, bytes: &[u8], first_column: usize, first_vertex: usize, blocks: &mut [Vec<Row>]) {
         for (k, row) in bytes.chunks_exact(self.n_quads as usize * QUAD_BYTES as usize).enumerate() {
             for (quad, values) in row.chunks_exact(QUAD_BYTES as usize).enumerate() {
                 let column = first_column + 4 * quad;
-                // The last batch's padding may reach beyond the CPU's.
+                // Padding of the last batch can exceed the CPU's columns.
                 if let Some(block) = blocks.get_mut(column / LANES) {
                     let values: [f32; 4] = bytemuck::pod_read_unaligned(values);
                     block[first_vertex + k][column % LANES..column % LANES + 4].copy_from_slice(&values);

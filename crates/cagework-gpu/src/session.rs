@@ -1,7 +1,7 @@
-//! One model, one cage, one GPU: load, cage, bind, pose, frame, read back.
+//! A model, a cage and their weights on one GPU: loading, binding, posing, drawing, reading back.
 //!
-//! The same type serves tests, the command and the page. A page has two: one draws and deforms on its main thread, one
-//! binds in a worker and hands over weights ([`Session::bind`] there, [`Session::adopt`] here).
+//! Used by tests, the command and the page. A page has two: one on its main thread draws and deforms, one in
+//! a worker binds and passes weights ([`Session::bind`] there, [`Session::adopt`] here).
 
 mod again;
 mod green;
@@ -30,7 +30,7 @@ pub use picture::MAX_PICTURE;
 use green::check_size;
 use mover::Mover;
 
-/// Everything about one model on one GPU.
+/// A model, its cage and weights on one GPU.
 #[derive(Debug)]
 pub struct Session {
     context: GpuContext,
@@ -40,25 +40,25 @@ pub struct Session {
     model: Option<Arc<DrawModel>>,
     controls: Option<ControlSet>,
     pose: Vec<Vec3>,
-    bound: Option<Bound>,
-    /// What of the model the cage does not bend.
+    bound: Option<SessionBind>,
+    /// Held and rigid parts.
     parts: Parts,
-    /// What the mesh follows while a clip plays.
+    /// Skinning, while a clip plays.
     playing: Option<Skinner>,
-    /// Whether the cage moved since the mesh was deformed last.
+    /// Whether the cage moved since the last deformation.
     moved: bool,
 }
 
-/// A bind, here and on the GPU.
+/// Weights on the CPU and GPU.
 #[derive(Debug)]
-struct Bound {
-    /// Shared, because a session that is made again on another device takes them without a copy.
+struct SessionBind {
+    /// Shared, so that [`Session::recover`] needs no copy.
     weights: Arc<Weights>,
     frames: Arc<Frames>,
-    /// Columns are the cage's triangles, too.
+    /// Green coordinates: further columns for the cage's triangles.
     is_green: bool,
     mover: Mover,
-    /// What of it the cage does not bend, if there is anything.
+    /// Held and rigid parts, if any.
     parts: Option<Arc<BoundParts>>,
 }
 
@@ -87,16 +87,15 @@ impl Session {
         &self.context
     }
 
-    /// Another model; weights of the one before are dropped. The camera stays where it is: see
-    /// [`Self::frame_all`].
+    /// Replaces the model and drops the weights. The camera does not move; see [`Self::frame_all`].
     ///
     /// # Errors
-    /// [`GpuError::Model`] if its lists do not belong together; otherwise as [`crate::buffers::Allocator::zeros`].
+    /// [`GpuError::Model`] if its lists are inconsistent; otherwise as [`crate::buffers::Allocator::zeros`].
     pub async fn set_model(&mut self, model: DrawModel) -> Result<(), GpuError> {
         self.set_shared_model(Arc::new(model)).await
     }
 
-    /// As [`Self::set_model`], of a model that others hold, too.
+    /// Like [`Self::set_model`], without a copy.
     ///
     /// # Errors
     /// As [`Self::set_model`].
@@ -110,12 +109,12 @@ impl Session {
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
         self.update_bounds();
-        // A wireframe may have been asked for before there was a model.
+        // The scene's wireframe option may be older than the model.
         self.write_scene();
         Ok(())
     }
 
-    /// Another cage, or other controls, at rest; weights for those before are dropped.
+    /// Replaces the controls, at rest, and drops the weights.
     ///
     /// # Errors
     /// As [`crate::buffers::Allocator::zeros`].
@@ -129,13 +128,13 @@ impl Session {
         Ok(())
     }
 
-    /// The cage at rest.
+    /// The cage in its rest pose.
     #[must_use]
     pub fn cage(&self) -> Option<&Cage> {
         self.controls.as_ref().map(ControlSet::cage)
     }
 
-    /// Binds the model to the cage: on this GPU, or on the processor where it only draws.
+    /// Binds the model to the cage: on this GPU, or on the CPU if the device only draws.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage; otherwise as [`bind_gpu`].
@@ -156,11 +155,11 @@ impl Session {
         Ok(binding.report)
     }
 
-    /// Takes weights that were bound elsewhere.
+    /// Uses weights that were computed elsewhere.
     ///
     /// # Errors
-    /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if the weights belong to others; otherwise as
-    /// [`crate::buffers::Allocator::zeros`].
+    /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if sizes do not match them;
+    /// otherwise as [`crate::buffers::Allocator::zeros`].
     pub async fn adopt(&mut self, weights: Weights, frames: Frames) -> Result<(), GpuError> {
         let (model, controls) = self.parts()?;
         let (rows, columns) = (model.positions.len(), controls.n_controls());
@@ -192,7 +191,7 @@ impl Session {
         mover.pose(&self.context, &self.columns(is_green, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
-        self.bound = Some(Bound { weights, frames, is_green, mover, parts: None });
+        self.bound = Some(SessionBind { weights, frames, is_green, mover, parts: None });
         self.hold().await?;
         self.write_values();
         Ok(())
@@ -204,22 +203,22 @@ impl Session {
         self.renderer.set_vertices(&self.context, None);
     }
 
-    /// The weights, once there are some.
+    /// The weights, if bound.
     #[must_use]
     pub fn weights(&self) -> Option<&Weights> {
         self.bound.as_ref().map(|b| b.weights.as_ref())
     }
 
-    /// The columns of the weights after those of the controls, once there are weights.
+    /// Meaning of the columns after those of the controls, if bound.
     #[must_use]
     pub fn frames(&self) -> Option<&Frames> {
         self.bound.as_ref().map(|b| b.frames.as_ref())
     }
 
-    /// Moves the cage; the next frame shows it and the mesh that follows. Uploads the cage and nothing else.
+    /// Sets the pose of the controls, for the next frame. Uploads only these.
     ///
     /// # Panics
-    /// If there is not one position per control.
+    /// If the number of positions differs from the number of controls.
     pub fn pose(&mut self, cage_positions: &[Vec3]) {
         assert_eq!(cage_positions.len(), self.pose.len(), "one position per control");
         self.pose.copy_from_slice(cage_positions);
@@ -230,22 +229,22 @@ impl Session {
         }
     }
 
-    /// Draws the cage somewhere else; the mesh stays where it is. For editing the cage itself.
+    /// Draws the cage at other positions without deforming the mesh, for editing the rest cage.
     ///
     /// # Panics
-    /// If there is not one position per control.
+    /// If the number of positions differs from the number of controls.
     pub fn show_cage(&mut self, cage_positions: &[Vec3]) {
         assert_eq!(cage_positions.len(), self.pose.len(), "one position per control");
         self.renderer.pose(&self.context, cage_positions);
     }
 
-    /// Where the controls are. `[n_controls]`, object units.
+    /// Current pose of the controls. `[n_controls]`, object units.
     #[must_use]
     pub fn cage_positions(&self) -> &[Vec3] {
         &self.pose
     }
 
-    /// What is drawn from now on.
+    /// Sets the scene to draw.
     pub fn set_scene(&mut self, scene: SceneOptions) {
         let is_other = |a: &SceneOptions, b: &SceneOptions| {
             (a.mesh, a.weights_to_one) != (b.mesh, b.weights_to_one)
@@ -259,7 +258,7 @@ impl Session {
         }
     }
 
-    /// What is drawn.
+    /// The current scene.
     #[must_use]
     pub fn scene(&self) -> &SceneOptions {
         &self.scene
@@ -269,7 +268,7 @@ impl Session {
         self.renderer.set_scene(&self.context, self.scene.clone(), self.model.as_deref());
     }
 
-    /// Uploads what the scene's heat map shows; nothing without weights.
+    /// Uploads the values of the scene's heat map or greying. Heat maps need weights.
     fn write_values(&mut self) {
         let is_plain = matches!(self.scene.mesh, MeshStyle::Solid | MeshStyle::Clay);
         if let (true, Some(greyed), Some(model)) = (is_plain, &self.scene.greyed, &self.model) {
@@ -295,8 +294,8 @@ impl Session {
         self.renderer.set_values(&self.context, &model.with_copies(&values), range);
     }
 
-    /// Values of the first and the last colour of the scene's heat map, for a legend: weights, or logarithms to base 10
-    /// of errors over the cage's diagonal. Nothing without a heat map or weights.
+    /// Values of the first and last colour of the heat map, for a legend: weights, or log10(error / cage
+    /// diagonal). `None` without a heat map or weights.
     #[must_use]
     pub fn value_range(&self) -> Option<[f32; 2]> {
         let weights = self.weights()?;
@@ -316,12 +315,12 @@ impl Session {
         &self.camera
     }
 
-    /// The camera, to be moved.
+    /// The camera, mutable.
     pub fn camera_mut(&mut self) -> &mut Camera {
         &mut self.camera
     }
 
-    /// Bounds of model and cage at rest; nothing before there is either.
+    /// Bounds of model and cage at rest, if any.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
@@ -332,7 +331,7 @@ impl Session {
         }
     }
 
-    /// Turns the camera's attention to model and cage, as large as fits.
+    /// Fits model and cage into the picture.
     pub fn frame_all(&mut self) {
         if let Some(bounds) = self.bounds() {
             self.camera.frame(bounds);
@@ -342,17 +341,17 @@ impl Session {
     fn update_bounds(&mut self) {
         if let Some(bounds) = self.bounds() {
             self.camera.set_scene(bounds);
-            // The model stands on the floor, not its cage.
+            // The floor is below the model, not the cage.
             let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
             self.renderer.set_bounds(model.unwrap_or(bounds));
         }
     }
 
-    /// Draws a frame into `target`, a view of `format` and `size` (pixels), with `scale` of its pixels per CSS pixel:
-    /// deforms the mesh if the cage moved, draws, submits, and does not wait. About formats see [`crate::render`].
+    /// Draws a frame into `target`, a view of `format` and `size` (pixels), with `scale` pixels per CSS
+    /// pixel. Deforms the mesh if the cage moved. Submits without waiting. Formats: see [`crate::render`].
     ///
     /// # Errors
-    /// [`GpuError::DeviceLost`], [`GpuError::Refused`]: what went wrong since the last look.
+    /// [`GpuError::DeviceLost`], [`GpuError::Refused`]: errors since the last call.
     pub fn frame(
         &mut self,
         target: &wgpu::TextureView,
@@ -361,7 +360,7 @@ impl Session {
         scale: f32,
     ) -> Result<(), GpuError> {
         self.context.check()?;
-        // A canvas that is folded away has no area, and nothing to show.
+        // A collapsed canvas has no area.
         if size.contains(&0) {
             return Ok(());
         }
@@ -395,7 +394,7 @@ impl Session {
         }
     }
 
-    /// Where the mesh is, `[n_vertices]`, object units: deformed once there are weights, else at rest.
+    /// Current positions of the mesh, `[n_vertices]`, object units: deformed if bound, else at rest.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without a model; [`GpuError::OutOfMemory`], [`GpuError::DeviceLost`],
@@ -406,7 +405,7 @@ impl Session {
             Some(bound) => {
                 let by_processor = || self.deformed(&self.pose).unwrap_or_default();
                 let mut positions = bound.mover.read_positions(&self.context, by_processor).await?;
-                // Copies of vertices come last.
+                // Copies come last.
                 positions.truncate(model.positions.len());
                 Ok(positions)
             }

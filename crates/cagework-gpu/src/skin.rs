@@ -1,4 +1,4 @@
-//! Playing a clip: skinning on the GPU, into the vertex buffer that [`crate::Deformer`] fills while nothing plays.
+//! Skinning on the GPU while a clip plays, into the vertex buffer of [`crate::Deformer`].
 
 use cagework_core::dynamic::{DisplacementField, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
@@ -11,41 +11,41 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// A model that plays. Where the device only draws, the processor skins.
+/// Skins one model repeatedly; on the CPU if the device only draws.
 #[derive(Debug)]
 pub struct Skinner {
     skin: Skin,
     palette: Vec<Mat4>,
     targets: Vec<f32>,
-    /// What bends the model after its skin.
+    /// Added after skinning.
     field: Option<DisplacementField>,
-    kernel: Option<OnGpu>,
+    kernel: Option<SkinKernels>,
 }
 
 #[derive(Debug)]
-struct OnGpu {
+struct SkinKernels {
     palette: wgpu::Buffer,
     targets: wgpu::Buffer,
-    /// Skinning, then bending.
+    /// Skinning, then the displacement field.
     launches: Vec<Launch>,
     groups: [u32; 2],
 }
 
-/// A skin as the kernel reads it; floats beside integers as their bits.
+/// A skin in the layout of the kernel. Floats are stored as bits.
 #[derive(Debug)]
 pub struct SkinTables {
     /// `[n_vertices]`
     pub rest: Vec<[f32; 4]>,
-    /// Where influences and deltas begin. `[n_vertices + 1]`
+    /// First influence and first delta of each vertex. `[n_vertices + 1]`
     pub starts: Vec<[u32; 2]>,
-    /// Matrix and weight.
+    /// Joint and weight.
     pub influences: Vec<[u32; 2]>,
-    /// Target and what it adds.
+    /// Morph target and displacement.
     pub deltas: Vec<[u32; 4]>,
 }
 
 impl SkinTables {
-    /// The tables of a skin.
+    /// Converts a skin.
     #[must_use]
     pub fn new(skin: &Skin) -> Self {
         let starts = skin.joint_starts.iter().zip(&skin.delta_starts);
@@ -59,7 +59,8 @@ impl SkinTables {
     }
 }
 
-/// A field as the kernel reads it, with its lattice before its values; floats as their bits. `[2 + n_nodes]`
+/// A displacement field in the layout of the kernel: the lattice, then values. Floats are stored as bits. `[2
+/// + n_nodes]`
 #[must_use]
 pub fn field_table(field: &DisplacementField) -> Vec<[u32; 4]> {
     let lattice = &field.lattice;
@@ -69,7 +70,7 @@ pub fn field_table(field: &DisplacementField) -> Vec<[u32; 4]> {
 }
 
 impl Skinner {
-    /// `positions`: the vertex buffer that it fills, where kernels can.
+    /// `positions`: output vertex buffer of the kernels.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
@@ -109,11 +110,11 @@ impl Skinner {
         let of_work = Work { count, stride, ..Work::default() };
         context.queue.write_buffer(&work, 0, bytemuck::bytes_of(&of_work));
         allocator.settle().await?;
-        skinner.kernel = Some(OnGpu { palette, targets, launches, groups });
+        skinner.kernel = Some(SkinKernels { palette, targets, launches, groups });
         Ok(skinner)
     }
 
-    /// Takes matrices and weights of targets; what is missing stays as it was.
+    /// Sets joint matrices and morph weights. Missing ones keep their values.
     pub(crate) fn pose(&mut self, context: &GpuContext, palette: &[Mat4], targets: &[f32]) {
         self.palette.iter_mut().zip(palette).for_each(|(to, from)| *to = *from);
         self.targets.iter_mut().zip(targets).for_each(|(to, from)| *to = *from);
@@ -124,9 +125,9 @@ impl Skinner {
         }
     }
 
-    /// Records where the vertices go, without normals.
+    /// Records the computation of positions, without normals.
     pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
-        let Some(OnGpu { launches, groups, .. }) = &self.kernel else { return };
+        let Some(SkinKernels { launches, groups, .. }) = &self.kernel else { return };
         for launch in launches {
             pass.set_pipeline(&launch.pipeline);
             pass.set_bind_group(0, &launch.bind_group, &[0]);
@@ -134,7 +135,7 @@ impl Skinner {
         }
     }
 
-    /// Where the vertices are, by the processor.
+    /// Positions, computed on the CPU.
     pub(crate) fn positions(&self) -> Vec<Vec3> {
         let mut positions = skin_vertices(&self.skin, &self.palette, &self.targets);
         if let Some(field) = &self.field {

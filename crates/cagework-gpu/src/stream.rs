@@ -1,9 +1,9 @@
-//! Work goes to the GPU in short slices, so that a page stays smooth, no driver's watchdog wakes up, and progress and
-//! cancel come through.
+//! Submits work in short slices: the page stays responsive, drivers' watchdogs do not fire, and progress and
+//! cancellation work.
 //!
-//! Dispatches are recorded until their estimated cost reaches a slice's budget, then submitted; one that is larger is
-//! split by items. The budget follows the measured time. At most two slices are in flight. Splitting changes no result:
-//! kernels treat items independently, and reductions are never split.
+//! Dispatches are recorded until their estimated cost reaches the budget, then submitted. A larger dispatch
+//! is split by items. The budget is adapted to measured times. At most two slices are pending. Splitting does
+//! not change results: items are independent, and reductions are not split.
 
 use std::collections::VecDeque;
 
@@ -18,28 +18,28 @@ use crate::kernels::Kernel;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// Time a slice should take, milliseconds: three frames at 60 Hz, far below the 2 s of a driver's watchdog.
+/// Target time of a slice, ms: three frames at 60 Hz; watchdogs of drivers allow 2 s.
 const SLICE_MS: f64 = 50.0;
 
-/// Slices in flight: one that runs and one behind it. More only adds latency to cancelling, and crashed iOS 26.
-const MAX_IN_FLIGHT: usize = 2;
+/// Maximum number of pending slices: one running, one queued. More delay cancellation, and crashed iOS 26.
+const MAX_PENDING_SLICES: usize = 2;
 
-/// First budget, memory accesses: 10 to 100 ms on a software adapter with two threads, well below 1 ms on a GPU.
-const FIRST_BUDGET: u64 = 1 << 25;
+/// Initial budget, memory accesses: 10 to 100 ms on a software adapter with two threads, below 1 ms on a GPU.
+const INITIAL_BUDGET: u64 = 1 << 25;
 
-/// Budgets stay in here: below, overhead would dominate; above, one number would not be worth waiting for.
-const BUDGETS: [u64; 2] = [1 << 20, 1 << 36];
+/// Range of the budget, memory accesses: limits the overhead per slice, and the wait for a readback.
+const BUDGET_RANGE: [u64; 2] = [1 << 20, 1 << 36];
 
-/// Distance of two dispatches' parameters, the baseline's alignment of dynamic offsets, bytes.
+/// Stride of dispatch parameters, bytes: the baseline's alignment of dynamic offsets.
 const WORK_STRIDE: u64 = 256;
 
-/// Dispatches in a slice.
+/// Maximum dispatches per slice.
 const MAX_WORKS: u64 = 1024;
 
-/// Workgroups along an axis, the baseline's limit.
+/// Maximum workgroups per axis, the baseline's limit.
 const MAX_GROUPS: u32 = 65_535;
 
-/// What is recorded for the next slice.
+/// A recorded command.
 #[derive(Debug)]
 enum Command {
     Dispatch { launch: Launch, offset: u32, groups: [u32; 2] },
@@ -47,16 +47,16 @@ enum Command {
     Copy { from: wgpu::Buffer, to: wgpu::Buffer, bytes: u64 },
 }
 
-/// A slice that was submitted.
+/// A submitted slice.
 #[derive(Debug)]
-struct Flight {
+struct PendingSlice {
     submission: wgpu::SubmissionIndex,
     done: oneshot::Receiver<()>,
     cost: u64,
     submitted_ms: f64,
 }
 
-/// Where the solve is, for whoever watches.
+/// Progress of the solve.
 #[derive(Clone, Copy, Debug, Default)]
 struct Status {
     fraction: f32,
@@ -64,7 +64,7 @@ struct Status {
     delta: Option<f32>,
 }
 
-/// Records and submits one solve's work.
+/// Records and submits the work of one solve.
 pub struct Stream<'a> {
     context: &'a GpuContext,
     watch: &'a Watch<'a>,
@@ -73,7 +73,7 @@ pub struct Stream<'a> {
     commands: Vec<Command>,
     cost: u64,
     budget: u64,
-    in_flight: VecDeque<Flight>,
+    pending: VecDeque<PendingSlice>,
     last_done_ms: f64,
     status: Status,
 }
@@ -95,40 +95,40 @@ impl<'a> Stream<'a> {
             parameters: Vec::new(),
             commands: Vec::new(),
             cost: 0,
-            budget: FIRST_BUDGET,
-            in_flight: VecDeque::new(),
+            budget: INITIAL_BUDGET,
+            pending: VecDeque::new(),
             last_done_ms: 0.0,
             status: Status::default(),
         })
     }
 
-    /// The context that work goes to.
+    /// The GPU.
     #[must_use]
     pub fn context(&self) -> &'a GpuContext {
         self.context
     }
 
-    /// The watcher's clock, milliseconds.
+    /// The watcher's clock, ms.
     #[must_use]
     pub fn now_ms(&self) -> f64 {
         self.watch.now_ms()
     }
 
-    /// A kernel with its buffers, in the table's order after the uniform.
+    /// Binds a kernel to buffers, in the table's order after the uniform.
     #[must_use]
     pub fn launch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Launch {
         self.context.pipelines.launch(&self.context.device, kernel, &self.works, buffers)
     }
 
-    /// What the watcher is told with the next slices: the solve's fraction, iterations and delta so far.
+    /// Sets the progress to report with the next slices: fraction, iterations, delta.
     pub fn set_status(&mut self, fraction: f32, iteration: u32, delta: Option<f32>) {
         self.status = Status { fraction, iteration, delta };
     }
 
-    /// Runs a kernel on `count` items; `work`'s own first, count and stride do not matter.
+    /// Records a kernel for `count` items. Overwrites `first`, `count` and `stride` of `work`.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn run(&mut self, launch: &Launch, work: Work, count: u32) -> Result<(), GpuError> {
         let cost = u64::from(launch.cost.max(1));
         let mut first = 0;
@@ -155,10 +155,10 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    /// Runs a reducing kernel, `groups` workgroups over `count` values.
+    /// Records a reducing kernel: `groups` workgroups over `count` values.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn reduce(
         &mut self,
         launch: &Launch,
@@ -170,20 +170,20 @@ impl<'a> Stream<'a> {
         self.submit_if_full().await
     }
 
-    /// Sets a buffer to zero.
+    /// Records clearing a buffer.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.commands.push(Command::Clear(buffer.clone()));
     }
 
-    /// Copies the start of a buffer to another's.
+    /// Records copying the first `bytes` of a buffer.
     pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64) {
         self.commands.push(Command::Copy { from: from.clone(), to: to.clone(), bytes });
     }
 
-    /// Finishes what was recorded and hands the first `bytes` of `from` to `take`.
+    /// Submits all commands and passes the first `bytes` of `from` to `take`.
     ///
     /// # Errors
-    /// Cancelled, or the GPU failed.
+    /// If cancelled, or on errors of the GPU.
     pub async fn read<T>(
         &mut self,
         from: &wgpu::Buffer,
@@ -194,8 +194,8 @@ impl<'a> Stream<'a> {
         self.copy(from, &through.buffer, bytes);
         let submission = self.submit().await?;
         let taken = through.read(self.context, &submission, bytes, take).await?;
-        while let Some(flight) = self.in_flight.pop_front() {
-            self.land(flight).await?;
+        while let Some(slice) = self.pending.pop_front() {
+            self.land(slice).await?;
         }
         Ok(taken)
     }
@@ -215,14 +215,14 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    /// Sends what was recorded on its way; waits until few enough slices are.
+    /// Submits the recorded commands. Waits if too many slices are pending.
     async fn submit(&mut self) -> Result<wgpu::SubmissionIndex, GpuError> {
         let Status { fraction, iteration, delta } = self.status;
         self.watch.report(Stage::Solve, fraction, iteration, delta)?;
-        if self.in_flight.len() >= MAX_IN_FLIGHT
-            && let Some(flight) = self.in_flight.pop_front()
+        if self.pending.len() >= MAX_PENDING_SLICES
+            && let Some(slice) = self.pending.pop_front()
         {
-            self.land(flight).await?;
+            self.land(slice).await?;
         }
         let queue = &self.context.queue;
         if !self.parameters.is_empty() {
@@ -232,10 +232,10 @@ impl<'a> Stream<'a> {
         let submission = queue.submit([encode(self.context, &self.commands)]);
         let (sender, done) = oneshot::channel();
         queue.on_submitted_work_done(move || {
-            // Nobody listens any more after a cancel.
+            // The receiver is gone after cancelling.
             let _ = sender.send(());
         });
-        self.in_flight.push_back(Flight {
+        self.pending.push_back(PendingSlice {
             submission: submission.clone(),
             done,
             cost: self.cost,
@@ -247,16 +247,16 @@ impl<'a> Stream<'a> {
         Ok(submission)
     }
 
-    /// Waits for a slice and learns from the time it took.
-    async fn land(&mut self, flight: Flight) -> Result<(), GpuError> {
-        self.context.wait(&flight.submission, flight.done).await?;
+    /// Waits for a slice and adapts the budget to its time.
+    async fn land(&mut self, slice: PendingSlice) -> Result<(), GpuError> {
+        self.context.wait(&slice.submission, slice.done).await?;
         let now = self.now_ms();
-        let elapsed = now - self.last_done_ms.max(flight.submitted_ms);
+        let elapsed = now - self.last_done_ms.max(slice.submitted_ms);
         self.last_done_ms = now;
-        // A slice that something else cut short says little about the cost of memory accesses.
-        if elapsed > 0.0 && 2 * flight.cost >= self.budget {
-            let wanted = (flight.cost as f64 * SLICE_MS / elapsed) as u64;
-            let [least, most] = BUDGETS;
+        // Only full slices are representative.
+        if elapsed > 0.0 && 2 * slice.cost >= self.budget {
+            let wanted = (slice.cost as f64 * SLICE_MS / elapsed) as u64;
+            let [least, most] = BUDGET_RANGE;
             self.budget = wanted.clamp(self.budget / 4, 2 * self.budget).clamp(least, most);
         }
         Ok(())

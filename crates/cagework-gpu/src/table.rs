@@ -1,14 +1,14 @@
-//! Tables: what shaders read by number. A buffer where they can, rows of a texture where they cannot.
+//! Arrays for shaders: buffers, or texture rows on devices without storage buffers.
 
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::plan::PlanError;
 
-/// Entries in a row of a texture: the least width that every WebGL2 has. Mirror: `ROW_SHIFT` in `shaders/rows.wgsl`.
-pub const ROW: u32 = 1 << 11;
+/// Entries per texture row: WebGL2's minimum texture width. `ROW_SHIFT` in `shaders/rows.wgsl`.
+pub const ENTRIES_PER_ROW: u32 = 1 << 11;
 
-/// What the entries of a table are.
+/// Type of a table's entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// `vec4f`.
@@ -20,7 +20,7 @@ pub enum Entry {
 }
 
 impl Entry {
-    /// Bytes of an entry.
+    /// Size of an entry, bytes.
     #[must_use]
     pub fn bytes(self) -> u32 {
         match self {
@@ -38,7 +38,7 @@ impl Entry {
         }
     }
 
-    /// How shaders see a table of these.
+    /// Binding type of a table.
     pub(crate) fn binding(self, context: &GpuContext) -> wgpu::BindingType {
         if !context.draws_only() {
             return wgpu::BindingType::Buffer {
@@ -58,20 +58,20 @@ impl Entry {
     }
 }
 
-/// Entries on the GPU. A clone is another handle to the same ones.
+/// An array on the GPU. Clones share the data.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Table {
     /// For kernels and draw shaders.
     Buffer(wgpu::Buffer),
-    /// For draw shaders that have no buffers.
+    /// For draw shaders on devices without storage buffers.
     Texture { texture: wgpu::Texture, view: wgpu::TextureView, entry_bytes: u32 },
 }
 
 impl Table {
-    /// A table of `count` zeros; whether there was memory for it is known when the allocator has settled.
+    /// A table of `count` zeros. Lack of memory is reported when the allocator is settled.
     ///
     /// # Errors
-    /// [`PlanError::Binding`] if it is larger than shaders may read.
+    /// [`PlanError::Binding`] if it exceeds the binding limit.
     pub(crate) fn new(
         context: &GpuContext,
         allocator: &mut Allocator<'_>,
@@ -83,7 +83,7 @@ impl Table {
         if !context.draws_only() {
             return Ok(Self::Buffer(allocator.storage(what, bytes)?));
         }
-        let most = u64::from(ROW) * u64::from(context.device.limits().max_texture_dimension_2d);
+        let most = u64::from(ENTRIES_PER_ROW) * u64::from(context.device.limits().max_texture_dimension_2d);
         if count as u64 > most {
             let limit = u64::from(entry.bytes()) * most;
             return Err(PlanError::Binding { what, needed: bytes, limit }.into());
@@ -92,8 +92,7 @@ impl Table {
         Ok(Self::unchecked(context, what, entry, count))
     }
 
-    /// A table of `count` zeros, small enough for every device; should there be no memory left, the device says so
-    /// with the next frame.
+    /// A table of `count` zeros that is smaller than every limit. Lack of memory is reported by the next frame.
     pub(crate) fn unchecked(context: &GpuContext, what: &'static str, entry: Entry, count: usize) -> Self {
         if !context.draws_only() {
             return Self::Buffer(context.device.create_buffer(&wgpu::BufferDescriptor {
@@ -107,8 +106,8 @@ impl Table {
         let texture = context.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(what),
             size: wgpu::Extent3d {
-                width: count.min(ROW),
-                height: count.div_ceil(ROW),
+                width: count.min(ENTRIES_PER_ROW),
+                height: count.div_ceil(ENTRIES_PER_ROW),
                 depth_or_array_layers: 1,
             },
             mip_level_count: 1,
@@ -122,21 +121,22 @@ impl Table {
         Self::Texture { texture, view, entry_bytes: entry.bytes() }
     }
 
-    /// Overwrites the first entries with `bytes`, whole entries of them.
+    /// Overwrites the first entries. `bytes`: of whole entries.
     pub(crate) fn write(&self, context: &GpuContext, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
         match self {
             Self::Buffer(buffer) => context.queue.write_buffer(buffer, 0, bytes),
-            // There is none elsewhere; the condition leaves this out of the page's main artifact.
+            // Always true; the condition removes this code from the page's WebGPU build.
             Self::Texture { texture, entry_bytes, .. } if context.draws_only() => {
-                let row_bytes = (ROW * entry_bytes) as usize;
+                let row_bytes = (ENTRIES_PER_ROW * entry_bytes) as usize;
                 let (rows, rest) = bytes.split_at(bytes.len() / row_bytes * row_bytes);
                 let n_rows = (rows.len() / row_bytes) as u32;
-                for (bytes, y, size) in
-                    [(rows, 0, [ROW, n_rows]), (rest, n_rows, [rest.len() as u32 / entry_bytes, 1])]
-                {
+                for (bytes, y, size) in [
+                    (rows, 0, [ENTRIES_PER_ROW, n_rows]),
+                    (rest, n_rows, [rest.len() as u32 / entry_bytes, 1]),
+                ] {
                     if !bytes.is_empty() {
                         write_rows(context, texture, bytes, y, size);
                     }
@@ -146,7 +146,7 @@ impl Table {
         }
     }
 
-    /// What a bind group holds of it.
+    /// Resource for bind groups.
     pub(crate) fn resource(&self) -> wgpu::BindingResource<'_> {
         match self {
             Self::Buffer(buffer) => buffer.as_entire_binding(),
@@ -154,7 +154,7 @@ impl Table {
         }
     }
 
-    /// Bytes of all entries that there is room for.
+    /// Allocated bytes.
     pub(crate) fn bytes(&self) -> u64 {
         match self {
             Self::Buffer(buffer) => buffer.size(),
@@ -165,7 +165,7 @@ impl Table {
     }
 }
 
-/// Writes `size` entries from row `y` on.
+/// Writes `size` entries, starting at row `y`.
 fn write_rows(
     context: &GpuContext,
     texture: &wgpu::Texture,

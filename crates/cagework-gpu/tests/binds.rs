@@ -1,4 +1,4 @@
-//! Whole binds on the GPU against the CPU's.
+//! Complete binds: GPU versus CPU.
 
 mod support;
 
@@ -14,28 +14,28 @@ use glam::Vec3;
 use pollster::block_on;
 use support::{assert_close, cage, egg, flat, gpu, gpu_with, with_prepared};
 
-/// The bar for weights, GPU against CPU: both stop at tau, a tenth of it.
+/// Tolerance for weights: both solvers stop at tau, a tenth of this.
 const WEIGHT_TOLERANCE: f32 = 1e-4;
 
-/// The bar for positions, over the cage's diagonal.
+/// Tolerance for positions, over the cage diagonal.
 const POSITION_TOLERANCE: f32 = 1e-4;
 
-/// f32 sums of dozens of products near 1, with the same weights on both sides.
+/// Rounding of f32 sums of dozens of products near 1; the weights are identical.
 const SAME_WEIGHTS_TOLERANCE: f32 = 2e-6;
 
-/// Normals of triangles a few hundredths across: positions' rounding over that.
+/// Rounding of positions, over edges of a few hundredths.
 const NORMAL_TOLERANCE: f32 = 2e-4;
 
 fn options(method: Method, solver: Solver) -> BindOptions {
     BindOptions { grid: 21, method, solver, tau: 1e-6, ..BindOptions::default() }
 }
 
-/// Vertices of which some lie outside the cage.
+/// Vertices, some of them outside the cage.
 fn points() -> Vec<Vec3> {
     egg(15, 17).positions.iter().map(|p| 1.25 * p).collect()
 }
 
-/// All weights, zeros included. `[row][column]`
+/// All weights, including zeros. `[row][column]`
 fn dense(weights: &Weights) -> Vec<f32> {
     let n = weights.n_columns();
     let mut values = vec![0.0; weights.n_rows() * n];
@@ -48,7 +48,7 @@ fn dense(weights: &Weights) -> Vec<f32> {
 }
 
 fn on_gpu(context: &GpuContext, positions: &[Vec3], cage: &Cage, options: &BindOptions) -> Binding {
-    block_on(bind_gpu(positions, cage, options, &Silent, context)).expect("the bind is possible").0
+    block_on(bind_gpu(positions, cage, options, &Silent, context)).expect("the bind succeeds").0
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn weights_equal_the_cpus() {
 #[test]
 fn delta_and_residual_equal_the_cpus() {
     let (context, cage, positions) = (gpu(), cage([3, 2, 2]), points());
-    // Numbers of the first cycle are far above rounding, so they agree to a few digits.
+    // Values of the first cycle are far above rounding errors.
     let options = options(Method::Embedded, Solver::Multigrid);
     let cpu = bind(&positions, &cage, &options, &Silent).unwrap().report;
     let gpu = on_gpu(&context, &positions, &cage, &options).report;
@@ -84,7 +84,7 @@ fn delta_and_residual_equal_the_cpus() {
     {
         assert!((gpu / cpu - 1.0).abs() < 1e-3, "{gpu} {cpu}");
     }
-    // Jacobi's deltas after the same number of sweeps, by both readings of Eq. 2.
+    // Jacobi's deltas after the same number of sweeps, for both variants of Eq. 2.
     for delta_norm in [DeltaNorm::Euclidean, DeltaNorm::Literal] {
         let options =
             BindOptions { delta_norm, max_iterations: 40, ..self::options(Method::Classic, Solver::Jacobi) };
@@ -105,7 +105,7 @@ fn several_batches_give_the_same_weights() {
     for solver in [Solver::Multigrid, Solver::Jacobi] {
         let options = options(Method::Embedded, solver);
         let one = on_gpu(&whole, &positions, &cage, &options);
-        // A field of 21^3 cells at most and 8 columns: 300 kB.
+        // At most 21^3 cells and 8 columns: 300 kB.
         let rows = one.report.levels[0] + 2;
         let limit = rows * 4 * 8 + 100;
         let split = gpu_with(&ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() });
@@ -115,7 +115,7 @@ fn several_batches_give_the_same_weights() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_with_numbers() {
+fn plan_errors_state_size_and_limit() {
     let (cage, positions) = (cage([3, 2, 2]), points());
     let options = options(Method::Embedded, Solver::Multigrid);
     let tiny = gpu_with(&ContextOptions { max_binding_bytes: Some(4096), ..ContextOptions::default() });
@@ -135,7 +135,7 @@ fn what_does_not_fit_is_refused_with_numbers() {
 }
 
 #[test]
-fn a_solver_of_the_cpu_is_refused_by_name() {
+fn unsupported_solver_is_an_error() {
     let (context, cage, positions) = (gpu(), cage([1, 1, 1]), egg(3, 4).positions);
     let options = options(Method::Embedded, Solver::ConjugateGradient);
     let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap_err();
@@ -179,14 +179,14 @@ fn cancel_stops_the_solve() {
         };
         let error = block_on(bind_gpu(&positions, &cage, &options, &cancel, &context)).unwrap_err();
         assert!(matches!(error, GpuError::Bind(BindError::Cancelled(_))), "{error}");
-        assert_eq!(reports.load(Ordering::Relaxed), 1, "nothing is reported after a cancel");
+        assert_eq!(reports.load(Ordering::Relaxed), 1, "no reports after cancelling");
     }
-    // The context is good for the next bind.
+    // The context can be used again.
     on_gpu(&context, &positions, &cage, &options(Method::Embedded, Solver::Multigrid));
 }
 
 #[test]
-fn bad_input_is_refused_as_on_the_cpu() {
+fn invalid_input_gives_the_cpus_errors() {
     let (context, cage) = (gpu(), cage([1, 1, 1]));
     let options = BindOptions { grid: 8, cell_shape: CellShape::Cubic, ..BindOptions::default() };
     let error = block_on(bind_gpu(&[], &cage, &options, &Silent, &context)).unwrap_err();
@@ -206,7 +206,7 @@ fn a_lost_device_is_an_error() {
 }
 
 #[test]
-fn an_unknown_adapter_is_named() {
+fn error_names_the_unknown_adapter() {
     let options = ContextOptions { adapter: Some("no such card".to_owned()), ..ContextOptions::default() };
     let error = block_on(GpuContext::new(&options)).unwrap_err();
     assert!(error.to_string().contains("no such card"), "{error}");
@@ -226,7 +226,7 @@ fn deformed_mesh_equals_the_cpus() {
         .collect();
     let expected = deform_bound(&binding.weights, &binding.frames, &posed);
     let normals = vertex_normals(&expected, &mesh.triangles);
-    // Whole, and in parts of a few slices each.
+    // In one buffer, and in chunks of a few slices.
     for max_binding_bytes in [None, Some(64 << 10)] {
         let context = gpu_with(&ContextOptions { max_binding_bytes, ..ContextOptions::default() });
         block_on(async {

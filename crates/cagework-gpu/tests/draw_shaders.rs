@@ -1,4 +1,4 @@
-//! The draw shaders against the draw table and the layouts, without a GPU: naga reads them as wgpu will.
+//! Compares draw shaders with the draw table and Rust's layouts. Needs no GPU: naga parses them, as in wgpu.
 
 use std::mem::{offset_of, size_of};
 
@@ -37,7 +37,7 @@ fn draw_shaders_are_baseline_webgpu() {
     }
 }
 
-/// What a table's entries are, in a buffer.
+/// Type of a buffer's entries.
 fn entry(inner: &TypeInner) -> Entry {
     use naga::VectorSize::{Bi, Quad};
     match inner {
@@ -62,7 +62,12 @@ fn bindings_equal_the_draw_table() {
                 let kind = match (variable.space, &module.types[variable.ty].inner) {
                     (AddressSpace::Uniform, _) => DrawBinding::Uniform,
                     (AddressSpace::Storage { access }, TypeInner::Array { base, .. }) => {
-                        assert_eq!(access, naga::StorageAccess::LOAD, "{} only reads", shader.name);
+                        assert_eq!(
+                            access,
+                            naga::StorageAccess::LOAD,
+                            "{}: storage buffers are read-only",
+                            shader.name
+                        );
                         DrawBinding::Table(entry(&module.types[*base].inner))
                     }
                     (_, TypeInner::Image { class: ImageClass::Sampled { .. }, .. }) => DrawBinding::Texture,
@@ -84,7 +89,7 @@ fn bindings_equal_the_draw_table() {
     }
 }
 
-/// Names and offsets of a WGSL struct's members, and its span.
+/// Names and offsets of the members of a WGSL struct, and its size.
 fn members(shader: &DrawShader, name: &str) -> (Vec<(String, usize)>, usize) {
     let module = parse(shader);
     module
@@ -158,7 +163,7 @@ fn constant(shader: &DrawShader, name: &str) -> f64 {
 }
 
 #[test]
-fn constants_equal_rusts() {
+fn constants_equal_those_of_rust() {
     let same = |shader: &DrawShader, name: &str, value: f64| {
         assert_eq!(constant(shader, name), value, "{name} in {}", shader.name);
     };
@@ -169,11 +174,11 @@ fn constants_equal_rusts() {
     same(&shaders::MESH, "BLENDED", f64::from(surface_mode::BLENDED));
     same(&shaders::LINES, "STATE_SHIFT", f64::from(STATE_SHIFT));
     same(&shaders::LINES, "HIDDEN", f64::from(HIDDEN));
-    // An f32 on one side, the number as written on the other.
+    // Compared as f32: the shader's constant is parsed as f64.
     assert_eq!(constant(&shaders::MESH, "NEGATIVE_THRESHOLD") as f32, colormap::NEGATIVE_THRESHOLD);
 }
 
-/// The stops of the colour map stand in the shader as in Rust.
+/// The shader contains the stops of the colour map.
 #[test]
 fn colour_map_is_the_same_in_wgsl() {
     let text: String = shaders::MESH.wgsl.split_whitespace().collect();
@@ -183,7 +188,7 @@ fn colour_map_is_the_same_in_wgsl() {
     }
 }
 
-/// Without WebGPU the same shaders run on WebGL2: nothing in buffers but uniforms, and GLSL ES 3.00 that naga can write.
+/// Shaders for WebGL2 have no buffers except uniforms, and naga translates them to GLSL ES 3.00.
 #[cfg(feature = "webgl")]
 #[test]
 fn draw_shaders_are_webgl2() {
@@ -226,10 +231,10 @@ fn draw_shaders_are_webgl2() {
     }
 }
 
-/// Rows of tables in textures are as wide in the shader as in Rust.
+/// The width of texture rows is the same in shaders and in Rust.
 #[cfg(feature = "webgl")]
 #[test]
-fn rows_of_textures_are_as_wide_in_wgsl() {
-    let shift = cagework_gpu::table::ROW.trailing_zeros();
+fn texture_row_width_is_the_same_in_wgsl() {
+    let shift = cagework_gpu::table::ENTRIES_PER_ROW.trailing_zeros();
     assert!(shaders::MESH.wgsl_textures.contains(&format!("const ROW_SHIFT = {shift}u;")));
 }

@@ -1,4 +1,4 @@
-//! The shaders against the kernel table and the layouts, without a GPU: naga reads them as wgpu will.
+//! Compares kernels with the kernel table and Rust's layouts. Needs no GPU: naga parses them, as in wgpu.
 
 use std::mem::{offset_of, size_of};
 
@@ -13,7 +13,7 @@ use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
 const MAX_STORAGE_BUFFERS: usize = 8;
 const MAX_INVOCATIONS: u32 = 256;
 
-/// Longest shader file, lines.
+/// Maximum lines of a shader file.
 const MAX_LINES: usize = 120;
 
 fn parse(kernel: &Kernel) -> naga::Module {
@@ -40,7 +40,7 @@ fn bindings_and_workgroups_equal_the_table() {
         let module = parse(kernel);
         assert_eq!(module.entry_points.len(), 1, "{}", kernel.name);
         let entry = &module.entry_points[0];
-        assert_eq!(entry.name, kernel.name, "the entry point is named as its file");
+        assert_eq!(entry.name, kernel.name, "the entry point has the file's name");
         assert_eq!(entry.workgroup_size, [kernel.workgroup, 1, 1], "{}", kernel.name);
         let mut found: Vec<_> = module
             .global_variables
@@ -89,7 +89,7 @@ fn work_mirrors_its_wgsl_struct() {
     }
 }
 
-/// Value of a shader's constant.
+/// Value of a constant in the shader.
 fn constant(kernel: &Kernel, name: &str) -> f64 {
     let module = parse(kernel);
     let (_, constant) = module
@@ -107,7 +107,7 @@ fn constant(kernel: &Kernel, name: &str) -> f64 {
 }
 
 #[test]
-fn constants_equal_rusts() {
+fn constants_equal_those_of_rust() {
     let same = |kernel: &Kernel, name: &str, value: f64| {
         assert_eq!(constant(kernel, name), value, "{name} in {}", kernel.name);
     };
@@ -125,19 +125,19 @@ fn constants_equal_rusts() {
 }
 
 #[test]
-fn every_shader_file_is_in_the_table_and_short() {
+fn every_shader_file_is_used_and_short() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders");
     for file in std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()) {
         let text = std::fs::read_to_string(&file).unwrap();
         let name = file.file_stem().unwrap().to_str().unwrap();
         assert!(text.lines().count() <= MAX_LINES, "{name} has more than {MAX_LINES} lines");
-        assert!(text.starts_with("// "), "{name} does not say what it computes");
+        assert!(text.starts_with("// "), "{name} has no description in its first line");
         let used = ALL.iter().any(|k| k.wgsl.contains(&text)) || DRAWN.iter().any(|d| d.wgsl.contains(&text));
-        // Tables in textures are WebGL2's only; the workspace's tests have the feature.
+        // The textures of WebGL2 are only used with the feature, which tests of the workspace enable.
         #[cfg(feature = "webgl")]
         let used = used || DRAWN.iter().any(|d| d.wgsl_textures.contains(&text));
         #[cfg(not(feature = "webgl"))]
         let used = used || name == "rows" || name.ends_with("_textures");
-        assert!(used, "{name} belongs to no kernel and no draw shader");
+        assert!(used, "{name} is used by no kernel or draw shader");
     }
 }

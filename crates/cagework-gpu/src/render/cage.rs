@@ -1,4 +1,4 @@
-//! The cage in the picture: lines, handles, chosen faces.
+//! Draws the cage: edges, handles and selected faces.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::controls::{SurfaceView, bones, lines};
 use super::layout::STATE_SHIFT;
-use super::overlay::{Item, NOTHING, Overlay, item, unique_edges};
+use super::overlay::{HIDDEN_ITEM, Item, Overlay, item, unique_edges};
 use super::pipelines::Layouts;
 use super::scene::{Selection, Theme};
 use super::theme::state;
@@ -16,11 +16,11 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// The cage as it is drawn, and controls inside.
+/// GPU data of the cage and of controls inside it.
 #[derive(Debug)]
 pub(super) struct CageView {
     pub(super) positions: Table,
-    /// Of the cage; positions of controls inside come after them.
+    /// Number of cage vertices; controls inside follow in `positions`.
     n_vertices: usize,
     n_controls: usize,
     edges: Vec<[u32; 2]>,
@@ -30,7 +30,7 @@ pub(super) struct CageView {
     pub(super) lines: Overlay,
     pub(super) handles: Overlay,
     pub(super) faces: Overlay,
-    /// Lines and handles of controls inside.
+    /// Lines and handles of the controls inside.
     pub(super) bones: Overlay,
     pub(super) inner: Overlay,
     pub(super) surface: Option<SurfaceView>,
@@ -51,11 +51,11 @@ impl CageView {
         let overlay = |items: &[Item]| Overlay::new(context, layouts, &positions, items);
         let view = Self {
             lines: overlay(&lines(&edges)),
-            handles: overlay(&vec![NOTHING; n_vertices]),
+            handles: overlay(&vec![HIDDEN_ITEM; n_vertices]),
             bones: overlay(&lines(&bones(controls))),
-            inner: overlay(&vec![NOTHING; n_controls - n_vertices]),
+            inner: overlay(&vec![HIDDEN_ITEM; n_controls - n_vertices]),
             surface: SurfaceView::new(context, layouts, &mut allocator, controls)?,
-            faces: overlay(&vec![NOTHING; 2 * cage.triangles().len()]),
+            faces: overlay(&vec![HIDDEN_ITEM; 2 * cage.triangles().len()]),
             positions,
             n_vertices,
             n_controls,
@@ -69,7 +69,7 @@ impl CageView {
         Ok(view)
     }
 
-    /// Uploads where the controls are.
+    /// Uploads the positions of the controls.
     pub(super) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
         if let Some(surface) = &self.surface {
             surface.pose(context, positions);
@@ -78,13 +78,13 @@ impl CageView {
         self.positions.write(context, bytemuck::cast_slice(&padded));
     }
 
-    /// All lines, those on top last.
+    /// All line overlays, topmost last.
     pub(super) fn all_lines(&self) -> impl Iterator<Item = &Overlay> {
         let surface = self.surface.iter().flat_map(|surface| [&surface.shells, &surface.curves]);
         surface.chain([&self.bones, &self.lines])
     }
 
-    /// Writes what is chosen and pointed at.
+    /// Updates overlays from the selection.
     pub(super) fn select(
         &mut self,
         context: &GpuContext,
@@ -143,7 +143,7 @@ impl CageView {
             .iter()
             .zip(&self.face_of_triangle)
             .flat_map(|(&[a, b, c], &face)| match states[face as usize] {
-                state::NORMAL => [NOTHING, NOTHING],
+                state::NORMAL => [HIDDEN_ITEM, HIDDEN_ITEM],
                 state => [item(state, a, b), [c, 0]],
             })
             .collect()

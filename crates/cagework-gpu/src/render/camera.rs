@@ -1,42 +1,42 @@
-//! The camera: an orbit around a target, in perspective or orthographic. Plain mathematics, no GPU.
+//! Orbit camera, perspective or orthographic. Does not use the GPU.
 //!
-//! y is up. Pixels are whatever unit [`Camera::set_viewport`] was told, from the top left corner, x right and y down:
-//! CSS pixels on a page, so that pointer events can be passed on as they come.
+//! y is up. Pixels are in units of [`Camera::set_viewport`], from the top left corner, x right, y down. A
+//! page uses CSS pixels, so pointer events need no conversion.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use cagework_core::Bounds;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-/// Vertical field of view, radians: 35 degrees, a short telephoto, which distorts characters little.
+/// Vertical field of view, radians: 35 degrees, a short telephoto lens with little distortion.
 const FOV_Y: f32 = 35.0 * PI / 180.0;
 
-/// Room left around what is framed, as a factor.
+/// Distance factor of [`Camera::frame`], for a margin around the scene.
 const FRAME_MARGIN: f32 = 1.12;
 
-/// The same around points that a picture is fitted to.
+/// Distance factor of [`Camera::fit`].
 const FIT_MARGIN: f32 = 1.06;
 
-/// Nearest and farthest the target may be, over the scene's radius.
-const DISTANCES: [f32; 2] = [1e-3, 1e3];
+/// Range of the distance to the target, over the scene's radius.
+const DISTANCE_RANGE: [f32; 2] = [1e-3, 1e3];
 
-/// How far behind the scene the floor is still drawn, over the scene's radius.
+/// Distance of the far plane behind the scene, over the scene's radius, so that the floor is visible.
 const FAR_REACH: f32 = 24.0;
 
-/// The near plane is at this fraction of the distance to the target: depth is an f32, which has digits enough.
+/// Distance of the near plane, over the distance to the target. A 32-bit float depth buffer is precise enough.
 const NEAR_FRACTION: f32 = 0.02;
 
-/// How depth becomes size.
+/// Projection of depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
-    /// Far things are smaller.
+    /// Size decreases with depth.
     #[default]
     Perspective,
-    /// They are not.
+    /// Size is independent of depth.
     Orthographic,
 }
 
-/// Views along an axis.
+/// Axis-aligned views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisView {
     /// From +z, x to the right.
@@ -56,15 +56,15 @@ pub enum AxisView {
 /// A half line in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts: on the near plane.
+    /// Start, on the near plane.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
 }
 
-/// A point of the picture.
+/// Projection of a point into the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Projected {
+pub struct ImagePoint {
     /// Pixels from the top left corner.
     pub position: Vec2,
     /// Distance from the eye along the view direction, object units.
@@ -74,17 +74,17 @@ pub struct Projected {
 /// An orbit camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it turns around, world space.
+    /// Centre of the orbit, world space.
     pub target: Vec3,
-    /// Turn around y, radians; 0 looks along -z.
+    /// Angle about y, radians; 0 looks along -z.
     pub yaw: f32,
-    /// Height above the horizon, radians, at most a right angle; positive looks down.
+    /// Elevation, radians, -π/2 to π/2; positive looks down.
     pub pitch: f32,
-    /// From the eye to the target, object units.
+    /// Distance from eye to target, object units.
     pub distance: f32,
-    /// Vertical field of view, radians. The orthographic picture is as large as this one at the target.
+    /// Vertical field of view, radians. An orthographic picture has the same size at the target.
     pub fov_y: f32,
-    /// How depth becomes size.
+    /// Projection.
     pub projection: Projection,
     viewport: Vec2,
     scene_center: Vec3,
@@ -92,7 +92,7 @@ pub struct Camera {
 }
 
 impl Default for Camera {
-    /// Looks at a scene of radius 1 around the origin from the front right, slightly above.
+    /// A view from the front right, slightly above, for a scene of radius 1 around the origin.
     fn default() -> Self {
         Self {
             target: Vec3::ZERO,
@@ -109,22 +109,22 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// Width and height of the picture in pixels; at least one each.
+    /// Width and height of the picture in pixels, at least 1.
     #[must_use]
     pub fn viewport(&self) -> Vec2 {
         self.viewport
     }
 
-    /// Tells the size of the picture in pixels.
+    /// Sets the size of the picture in pixels.
     pub fn set_viewport(&mut self, size: Vec2) {
         self.viewport = size.max(Vec2::ONE);
     }
 
-    /// Tells where everything is: near and far planes enclose it, and zooming stays within reason.
+    /// Sets the bounds of the scene, which determine the near and far planes and limit zooming.
     pub fn set_scene(&mut self, bounds: Bounds) {
         self.scene_center = bounds.center();
         let radius = 0.5 * bounds.diagonal();
-        // A scene of one point has no size of its own: take the unit of length.
+        // A single point has no size; use 1.
         self.scene_radius = if radius > 0.0 { radius } else { 1.0 };
     }
 
@@ -147,7 +147,7 @@ impl Camera {
         self.backward().cross(self.right())
     }
 
-    /// Where the eye is, world space.
+    /// Position of the eye, world space.
     #[must_use]
     pub fn eye(&self) -> Vec3 {
         self.target + self.distance * self.backward()
@@ -194,7 +194,7 @@ impl Camera {
         self.clip_from_view() * self.view_from_world()
     }
 
-    /// Near and far plane, distances from the eye along the view.
+    /// Distances of near and far plane from the eye along the view direction.
     fn depths(&self) -> [f32; 2] {
         let depth = (self.eye() - self.scene_center).dot(self.backward());
         let far = (depth + FAR_REACH * self.scene_radius).max(2.0 * self.distance);
@@ -207,8 +207,7 @@ impl Camera {
         }
     }
 
-    /// How much smaller clip depth (not divided by w) is for a point that is nearer to the eye by all of its depth, or
-    /// of the target's in an orthographic picture: what overlays are lifted by, in proportion.
+    /// Scale of overlay offsets: decrease of clip depth (before division by w) per relative decrease of view depth.
     #[must_use]
     pub(crate) fn lift(&self) -> f32 {
         let [near, far] = self.depths();
@@ -218,7 +217,7 @@ impl Camera {
         }
     }
 
-    /// Half the height of the picture at the target, object units.
+    /// Half the picture's height at the target, object units.
     fn half_height(&self) -> f32 {
         self.distance * (0.5 * self.fov_y).tan()
     }
@@ -233,29 +232,29 @@ impl Camera {
         2.0 * depth * (0.5 * self.fov_y).tan() / self.viewport.y
     }
 
-    /// Turns around the target; `delta` in radians, x to the right, y down, as the hand moves.
+    /// Rotates about the target. `delta`: pointer movement in radians, x right, y down.
     pub fn orbit(&mut self, delta: Vec2) {
         self.yaw = (self.yaw - delta.x).rem_euclid(TAU);
         self.pitch = (self.pitch + delta.y).clamp(-FRAC_PI_2, FRAC_PI_2);
     }
 
-    /// Moves the target so that what is at its depth follows the pointer; `delta` in pixels.
+    /// Moves the target so that points at its depth follow the pointer. `delta`: pixels.
     pub fn pan(&mut self, delta: Vec2) {
         let size = self.units_per_pixel(self.target);
         self.target += size * (delta.y * self.up() - delta.x * self.right());
     }
 
-    /// Scales the distance by `factor` (below 1: nearer); the point at the target's depth under `cursor` stays there.
+    /// Multiplies the distance by `factor`. The point at the target's depth under `cursor` stays in place.
     pub fn zoom_at(&mut self, factor: f32, cursor: Vec2) {
         let fixed = self.on_target_plane(cursor);
-        let limits = DISTANCES.map(|d| d * self.scene_radius);
+        let limits = DISTANCE_RANGE.map(|d| d * self.scene_radius);
         let distance = (self.distance * factor).clamp(limits[0], limits[1]);
         let factor = distance / self.distance;
         self.target = fixed + factor * (self.target - fixed);
         self.distance = distance;
     }
 
-    /// Where the ray through a pixel meets the plane through the target that faces the eye.
+    /// Intersection of the ray through a pixel with the plane through the target that faces the eye.
     #[must_use]
     pub fn on_target_plane(&self, cursor: Vec2) -> Vec3 {
         let from_center = cursor - 0.5 * self.viewport;
@@ -263,7 +262,7 @@ impl Camera {
         self.target + size * (from_center.x * self.right() - from_center.y * self.up())
     }
 
-    /// Looks at a box so that it just fills the picture, from where it looks now.
+    /// Fits a box into the picture, keeping the view direction.
     pub fn frame(&mut self, bounds: Bounds) {
         self.target = bounds.center();
         let half = 0.5 * bounds.extent();
@@ -285,12 +284,12 @@ impl Camera {
                 }
             })
             .fold(0.0, f32::max);
-        // A single vertex has no size: come as near as a twentieth of the scene.
+        // A single vertex has no size: limit the distance to a twentieth of the scene's radius.
         self.distance = (FRAME_MARGIN * needed).max(0.05 * self.scene_radius);
     }
 
-    /// Looks at points so that they just fill the picture, from where it looks now. Nearer than [`Self::frame`], and the
-    /// target is wherever that needs it: for pictures, not for hands that turn the view.
+    /// Fits points into the picture as tightly as possible, keeping the view direction. The target can be
+    /// anywhere, so use [`Self::frame`] for interactive views.
     pub fn fit(&mut self, points: &[Vec3]) {
         let tan_y = (0.5 * self.fov_y).tan();
         let tans = [tan_y * self.viewport.x / self.viewport.y, tan_y];
@@ -301,7 +300,7 @@ impl Camera {
         };
         let mut needed = 0.0_f32;
         for (tan, across) in tans.into_iter().zip(across) {
-            // The distance from which each side sees the outermost point; moved across, both see it from the same one.
+            // Distance from which each side touches the outermost point. Shifting the target sideways equalises both.
             let from_side = |sign: f32| {
                 let from =
                     |p: &Vec3| sign * (*p - self.target).dot(across) / tan + (*p - self.target).dot(depth);
@@ -316,7 +315,7 @@ impl Camera {
         self.distance = (FIT_MARGIN * needed).max(0.05 * self.scene_radius);
     }
 
-    /// Looks along an axis at the same target.
+    /// Looks along an axis, keeping the target.
     pub fn look_along(&mut self, view: AxisView) {
         (self.yaw, self.pitch) = match view {
             AxisView::Front => (0.0, 0.0),
@@ -328,19 +327,19 @@ impl Camera {
         };
     }
 
-    /// Where a point of the world is in the picture; nothing if it lies before the near plane.
+    /// Projects a point into the picture. `None` if it is in front of the near plane.
     #[must_use]
-    pub fn project(&self, point: Vec3) -> Option<Projected> {
+    pub fn project(&self, point: Vec3) -> Option<ImagePoint> {
         let clip = self.clip_from_world() * point.extend(1.0);
         if clip.z < 0.0 || clip.w <= 0.0 {
             return None;
         }
         let ndc = clip.truncate() / clip.w;
         let position = 0.5 * self.viewport * Vec2::new(1.0 + ndc.x, 1.0 - ndc.y);
-        Some(Projected { position, depth: (self.eye() - point).dot(self.backward()) })
+        Some(ImagePoint { position, depth: (self.eye() - point).dot(self.backward()) })
     }
 
-    /// The half line behind a pixel.
+    /// Ray through a pixel.
     #[must_use]
     pub fn ray(&self, cursor: Vec2) -> Ray {
         let at_target = self.on_target_plane(cursor);

@@ -1,18 +1,18 @@
-//! Cividis: equal steps of the value look equally far apart, also to the colour-blind and in grey.
+//! Cividis colour map: perceptually uniform, also for colour-blind viewers and in grey.
 //!
 //! Source: Nuñez, Anderton, Renslow: Optimizing colormaps with consideration for color vision deficiency to enable
-//! accurate interpretation of scientific data. PLoS ONE 13(7), 2018. Twin: `shaders/colormap.wgsl`.
+//! accurate interpretation of scientific data. PLoS ONE 13(7), 2018. Same values as `shaders/colormap.wgsl`.
 
-/// Logarithms to base 10 of the errors, over the cage's diagonal, that the first and the last colour stand for.
+/// Range of log10(error / cage diagonal) of the colour map.
 pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
 
-/// Weights below this are drawn as negative: what rounding leaves is not.
+/// Weights below this value are drawn as negative; smaller deviations are rounding.
 pub const NEGATIVE_THRESHOLD: f32 = -1e-5;
 
-/// Weights are drawn from 0 to their largest one, but to this at least.
+/// Minimum upper end of the colour range for weights.
 pub const MIN_WEIGHT_RANGE: f32 = 1e-3;
 
-/// Cividis at ten equal steps, sRGB.
+/// Ten equidistant samples, sRGB.
 pub const STOPS: [[u8; 3]; 10] = [
     [0x00, 0x22, 0x4e],
     [0x12, 0x35, 0x70],
@@ -26,7 +26,7 @@ pub const STOPS: [[u8; 3]; 10] = [
     [0xfe, 0xe8, 0x38],
 ];
 
-/// Colour of a value from 0 to 1, sRGB; for a legend.
+/// Colour of a value in [0, 1], sRGB, for legends.
 #[must_use]
 pub fn cividis(value: f32) -> [u8; 3] {
     let at = value.clamp(0.0, 1.0) * (STOPS.len() - 1) as f32;

@@ -1,4 +1,4 @@
-//! What stands beside a cage: its smooth surface, and controls inside with their radius.
+//! Draws a cage's smooth surface, and controls inside with their radius.
 
 use cagework_core::{ControlSet, Controls, InnerElement};
 use glam::Vec3;
@@ -12,19 +12,19 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// Lines on the smooth surface, and around balls and tubes: they follow the controls.
+/// Lines on the smooth surface and around balls and tubes, which follow the controls.
 #[derive(Debug)]
 pub(super) struct SurfaceView {
     set: ControlSet,
     positions: Table,
-    /// Where faces of the cage meet on its smooth surface.
+    /// Curves on the smooth surface between faces of the cage.
     pub(super) curves: Overlay,
     /// Edges of balls, tubes and sheets.
     pub(super) shells: Overlay,
 }
 
 impl SurfaceView {
-    /// None for a plain cage, which is its own surface.
+    /// `None` for a plain cage, which is its own surface.
     pub(super) fn new(
         context: &GpuContext,
         layouts: &Layouts,
@@ -44,7 +44,7 @@ impl SurfaceView {
         Ok(Some(Self { set: controls.to_set(), positions, curves, shells }))
     }
 
-    /// Uploads where the controls have it.
+    /// Uploads the surface for a pose of the controls.
     pub(super) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
         let surface: Vec<[f32; 4]> =
             self.set.surface_at(positions).iter().map(|p| p.extend(1.0).to_array()).collect();
@@ -57,7 +57,7 @@ impl SurfaceView {
     }
 }
 
-/// Edges of the surface between parts of two faces of the cage.
+/// Edges of the surface between regions of different cage faces.
 fn curves(controls: Controls<'_>) -> Vec<[u32; 2]> {
     let mut edges: Vec<([u32; 2], Option<u32>)> = Vec::new();
     for (face, corners) in (0u32..).zip(controls.surface().faces()) {
@@ -72,7 +72,7 @@ fn curves(controls: Controls<'_>) -> Vec<[u32; 2]> {
     pairs.map(|pair| pair[0].0).collect()
 }
 
-/// Polylines and outlines of sheets: pairs of controls.
+/// Edges of polylines and outlines of sheets, as pairs of controls.
 pub(super) fn bones(controls: Controls<'_>) -> Vec<[u32; 2]> {
     let Some(inner) = controls.inner() else { return Vec::new() };
     let first = controls.cage().n_vertices() as u32;
@@ -97,8 +97,8 @@ mod tests {
 
     use super::*;
 
-    /// Each of the twelve edges of a box becomes four edges in two steps; a ball has 120 of its own, a bone of three corners
-    /// two lines, a sheet of four four.
+    /// Two subdivision steps split each of the 12 edges of a box into four. A polyline of three points has
+    /// two edges, a sheet of four points four.
     #[test]
     fn curves_are_the_edges_of_the_cage_and_bones_those_of_elements() {
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };

@@ -1,4 +1,4 @@
-//! The camera as editing sees it.
+//! [`Camera`] as the editing code's [`View`].
 
 use cagework_core::edit::View;
 use glam::{Vec2, Vec3};

@@ -1,4 +1,4 @@
-//! One frame: what is drawn, in which order.
+//! Draws a frame.
 
 use std::sync::Arc;
 
@@ -20,26 +20,26 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::Table;
 
-/// How far the floor reaches, over the scene's radius.
+/// Radius of the floor, over the scene's radius.
 const FLOOR_REACH: f32 = 5.0;
 
-/// Depths of the gizmo: before everything else, yet its own parts hide each other.
+/// Depth range of the gizmo: in front of everything, with depth tests within the gizmo.
 const GIZMO_DEPTHS: [f32; 2] = [0.0, 1e-3];
 
-/// What a frame is drawn into in the end.
+/// Render target of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
-    /// The view.
+    /// View to draw into.
     pub view: &'a wgpu::TextureView,
-    /// The view's format.
+    /// Format of the view.
     pub format: wgpu::TextureFormat,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Its pixels per CSS pixel.
+    /// Pixels per CSS pixel.
     pub scale: f32,
 }
 
-/// Textures that a frame is drawn into before its samples are averaged.
+/// Multisampled colour and depth attachments.
 #[derive(Debug)]
 struct Targets {
     format: wgpu::TextureFormat,
@@ -49,7 +49,7 @@ struct Targets {
 }
 
 impl Drop for Targets {
-    /// Now, not when a browser collects garbage: a slow GPU changes sizes with every pause.
+    /// Frees memory immediately, not at garbage collection: adaptive resolution changes the size often.
     fn drop(&mut self) {
         self.color.destroy();
         self.depth.destroy();
@@ -68,12 +68,12 @@ pub struct Renderer {
     wires: Option<Wires>,
     cage: Option<CageView>,
     slice: Option<SlicePlane>,
-    /// Of problems, of what is held, of joints.
+    /// Problems, grabbed points, joints.
     marks: Vec<MarksView>,
     gizmo: GizmoShape,
     scene: SceneOptions,
     floor: Bounds,
-    /// Values of the first and the last colour of a heat map.
+    /// Values of the first and last colour of the heat map.
     range: [f32; 2],
 }
 
@@ -109,7 +109,7 @@ impl Renderer {
         }
     }
 
-    /// Another model, at rest; `normals` for its vertices.
+    /// Sets the model at rest. `normals`: of its vertices.
     pub(crate) async fn set_model(
         &mut self,
         context: &GpuContext,
@@ -123,7 +123,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Another cage, at rest.
+    /// Sets the cage at rest.
     pub(crate) async fn set_cage(
         &mut self,
         context: &GpuContext,
@@ -134,7 +134,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws vertices where these tables have them; at rest without.
+    /// Sets the tables of positions and normals; `None` for the rest pose.
     pub(crate) fn set_vertices(&mut self, context: &GpuContext, tables: Option<[&Table; 2]>) {
         let Some(mesh) = &mut self.mesh else { return };
         match tables {
@@ -147,14 +147,14 @@ impl Renderer {
         self.make_marks(context);
     }
 
-    /// Where the controls are. Nothing happens without a cage.
+    /// Uploads the positions of the controls, if there is a cage.
     pub(crate) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
         if let Some(cage) = &self.cage {
             cage.pose(context, positions);
         }
     }
 
-    /// Weights or errors of all vertices, and the values of the first and the last colour.
+    /// Uploads a value per vertex for the heat map. `range`: values of the first and last colour.
     pub(crate) fn set_values(&mut self, context: &GpuContext, values: &[f32], range: [f32; 2]) {
         let Some(mesh) = self.mesh.as_ref().filter(|_| !values.is_empty()) else { return };
         debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
@@ -163,18 +163,18 @@ impl Renderer {
         mesh.set_style(context, self.scene.mesh, range, self.scene.greyed.is_some());
     }
 
-    /// Where model and cage are at rest: the floor lies below.
+    /// Sets the rest bounds, which place the floor.
     pub(crate) fn set_bounds(&mut self, bounds: Bounds) {
         self.floor = bounds;
     }
 
-    /// Another scene.
+    /// Sets the scene.
     pub(crate) fn set_scene(&mut self, context: &GpuContext, scene: SceneOptions, model: Option<&DrawModel>) {
         let before = std::mem::replace(&mut self.scene, scene);
         self.apply(context, model, Some(&before));
     }
 
-    /// Writes what differs from `before`, or all of it.
+    /// Applies the differences from `before`, or everything.
     fn apply(&mut self, context: &GpuContext, model: Option<&DrawModel>, before: Option<&SceneOptions>) {
         let scene = &self.scene;
         let theme_changed = before.is_none_or(|b| b.theme != scene.theme);
@@ -223,7 +223,7 @@ impl Renderer {
         self.marks = MarksView::all(context, &self.layouts, &self.scene, mesh, cage);
     }
 
-    /// Records a picture.
+    /// Records a frame.
     pub(crate) fn draw(
         &mut self,
         context: &GpuContext,
@@ -258,7 +258,7 @@ impl Renderer {
                 resolve_target: Some(view),
                 ops: wgpu::Operations {
                     load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    // Only the average of the samples is wanted.
+                    // Only the resolved picture is needed.
                     store: wgpu::StoreOp::Discard,
                 },
             })],

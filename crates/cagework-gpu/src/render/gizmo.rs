@@ -1,4 +1,4 @@
-//! The gizmo: its shape, where it is on the GPU, and which part is under the pointer.
+//! Transform gizmo: geometry, drawing and picking.
 
 mod solids;
 
@@ -17,37 +17,37 @@ use crate::device::GpuContext;
 /// Length of an axis in the picture, CSS pixels.
 pub const GIZMO_PX: f32 = 84.0;
 
-/// How near the pointer must be, CSS pixels.
-const REACH_PX: f32 = 8.0;
+/// Pick radius of axes and rings, CSS pixels.
+const PICK_RADIUS_PX: f32 = 8.0;
 
-/// Where an axis begins, over its length: inside it the whole is grabbed.
+/// Start of an axis, over its length. The space inside is the centre handle.
 const AXIS_START: f32 = 0.16;
 
-/// The square of a plane, from and to, along both of its axes.
-const PLANE: [f32; 2] = [0.30, 0.50];
+/// Extent of a plane handle along both of its axes, over the axis length.
+const PLANE_RANGE: [f32; 2] = [0.30, 0.50];
 
-/// Radius of the ring that faces the eye: outside those around the axes.
-const VIEW_RING: f32 = 1.16;
+/// Radius of the ring that faces the eye, over the axis length: outside the axis rings.
+const VIEW_RING_RADIUS: f32 = 1.16;
 
-/// Radius of a ring's tube.
-const TUBE: f32 = 0.014;
+/// Tube radius of a ring, over the axis length.
+const TUBE_RADIUS: f32 = 0.014;
 
 /// Segments of a ring.
 const RING_SEGMENTS: u32 = 64;
 
-/// Most vertices of a gizmo: four rings of 64 x 8 quads are the largest.
+/// Vertices of the largest gizmo: four rings of 64 x 8 quads.
 const MAX_VERTICES: u64 = 4 * 64 * 8 * 6;
 
 type Vertex = [f32; 10];
 
-/// The part of a gizmo under the pointer; where there is none, the nearest one within `radius`, as a finger needs it.
-/// `cursor` and `radius`: pixels of the camera's viewport.
+/// Handle of the gizmo under the pointer, or the nearest one within `radius`, for touch input. `cursor` and
+/// `radius` are in pixels of the camera's viewport.
 #[must_use]
 pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2, radius: f32) -> Option<GizmoPart> {
     let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
     let at = |p: Vec3| camera.project(gizmo.center + size * (gizmo.rotation * p)).map(|p| p.position);
     let center = at(Vec3::ZERO)?.distance(cursor);
-    if gizmo.mode != GizmoMode::Rotate && center <= 1.2 * REACH_PX {
+    if gizmo.mode != GizmoMode::Rotate && center <= 1.2 * PICK_RADIUS_PX {
         return Some(GizmoPart::View);
     }
     let to_line = |a: Vec3, b: Vec3| Some(to_segment(cursor, at(a)?, at(b)?));
@@ -59,13 +59,14 @@ pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2, radius: f32) -> 
     };
     let facing_ring = || {
         let facing = gizmo.rotation.inverse() * facing(camera);
-        nearest(ring_points(2).map(|p| VIEW_RING * (facing * p)), to_line)
+        nearest(ring_points(2).map(|p| VIEW_RING_RADIUS * (facing * p)), to_line)
     };
     let around = (gizmo.mode == GizmoMode::Rotate).then(|| (facing_ring(), GizmoPart::View));
     let thin = around.into_iter().chain((0..3).map(|axis| (along(axis), GizmoPart::Axis(axis))));
-    let thin =
-        thin.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(distance, _)| *distance <= REACH_PX.max(radius));
-    if let Some((_, part)) = thin.filter(|(distance, _)| *distance <= REACH_PX) {
+    let thin = thin
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(distance, _)| *distance <= PICK_RADIUS_PX.max(radius));
+    if let Some((_, part)) = thin.filter(|(distance, _)| *distance <= PICK_RADIUS_PX) {
         return Some(part);
     }
     let square = |axis: u8| {
@@ -81,7 +82,7 @@ pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2, radius: f32) -> 
     all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
 }
 
-/// Least distance to the sides of a closed line; `to_line` answers that of one side, nothing for one behind the eye.
+/// Smallest distance to the segments of a closed line. `to_line`: distance to a segment, `None` behind the eye.
 fn nearest(points: impl Iterator<Item = Vec3> + Clone, to_line: impl Fn(Vec3, Vec3) -> Option<f32>) -> f32 {
     let sides = points.clone().zip(points.cycle().skip(1));
     sides.filter_map(|(a, b)| to_line(a, b)).fold(f32::INFINITY, f32::min)
@@ -91,7 +92,7 @@ fn unit(axis: u8) -> Vec3 {
     [Vec3::X, Vec3::Y, Vec3::Z][usize::from(axis % 3)]
 }
 
-/// Turns z towards the eye: the axis that a free rotation turns around.
+/// Rotates z towards the eye.
 fn facing(camera: &Camera) -> Quat {
     Quat::from_mat3(&Mat3::from_cols(camera.right(), camera.up(), camera.backward()))
 }
@@ -106,7 +107,7 @@ fn ring_points(axis: u8) -> impl Iterator<Item = Vec3> + Clone {
 
 fn plane_corners(axis: u8) -> [Vec3; 4] {
     let (u, v) = (unit(axis + 1), unit(axis + 2));
-    let [a, b] = PLANE;
+    let [a, b] = PLANE_RANGE;
     [a * u + a * v, b * u + a * v, b * u + b * v, a * u + b * v]
 }
 
@@ -122,28 +123,28 @@ fn is_in_quad(p: Vec2, corners: [Vec2; 4]) -> bool {
     sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
 }
 
-/// A gizmo as it is drawn.
+/// GPU data of the gizmo.
 #[derive(Debug)]
 pub(super) struct GizmoShape {
     vertices: wgpu::Buffer,
-    /// Vertices along the gizmo's own axes, and of those that face the eye, which come after them.
+    /// Number of vertices in the gizmo's frame, and in the frame that faces the eye, which follow.
     counts: [u32; 2],
-    /// Where either are.
-    places: [Place; 2],
+    /// Transforms of both frames.
+    transforms: [FrameTransform; 2],
     shape: Option<(GizmoMode, Option<GizmoPart>)>,
 }
 
-/// Where a part of a gizmo is, on the GPU.
+/// Transform of a frame of the gizmo.
 #[derive(Debug)]
-struct Place {
+struct FrameTransform {
     uniform: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
 }
 
-impl Place {
+impl FrameTransform {
     fn write(&self, context: &GpuContext, size: f32, rotation: Quat, center: Vec3) {
-        let place = Mat4::from_scale_rotation_translation(Vec3::splat(size), rotation, center);
-        let view = GizmoView { world_from_gizmo: place.to_cols_array_2d() };
+        let transform = Mat4::from_scale_rotation_translation(Vec3::splat(size), rotation, center);
+        let view = GizmoView { world_from_gizmo: transform.to_cols_array_2d() };
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&view));
     }
 }
@@ -158,21 +159,21 @@ impl GizmoShape {
                 mapped_at_creation: false,
             })
         };
-        let place = |label| {
+        let transform = |label| {
             let uniform = buffer(label, size_of::<GizmoView>() as u64, wgpu::BufferUsages::UNIFORM);
             let bind_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some(label),
                 layout: &layouts.gizmo,
                 entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
             });
-            Place { uniform, bind_group }
+            FrameTransform { uniform, bind_group }
         };
-        let places = [place("gizmo"), place("gizmo's part that faces the eye")];
+        let transforms = [transform("gizmo"), transform("gizmo's part that faces the eye")];
         let vertices = buffer("gizmo's shape", MAX_VERTICES * GIZMO_STRIDE, wgpu::BufferUsages::VERTEX);
-        Self { vertices, counts: [0; 2], places, shape: None }
+        Self { vertices, counts: [0; 2], transforms, shape: None }
     }
 
-    /// Writes the shape, if it changed, and where it is in this camera.
+    /// Updates the geometry, if it changed, and the transforms.
     pub(super) fn update(&mut self, context: &GpuContext, gizmo: &Gizmo, camera: &Camera) {
         if self.shape != Some((gizmo.mode, gizmo.active)) {
             let mut vertices = shape(gizmo.mode, gizmo.active);
@@ -183,7 +184,7 @@ impl GizmoShape {
             self.shape = Some((gizmo.mode, gizmo.active));
         }
         let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
-        let [own, towards_eye] = &self.places;
+        let [own, towards_eye] = &self.transforms;
         own.write(context, size, gizmo.rotation, gizmo.center);
         towards_eye.write(context, size, facing(camera), gizmo.center);
     }
@@ -191,31 +192,33 @@ impl GizmoShape {
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_vertex_buffer(0, self.vertices.slice(..));
         let mut first = 0;
-        // Browsers warn of draws without vertices.
-        for (count, place) in self.counts.into_iter().zip(&self.places).filter(|(count, _)| *count > 0) {
-            pass.set_bind_group(1, &place.bind_group, &[]);
+        // Browsers warn about empty draw calls.
+        for (count, transform) in
+            self.counts.into_iter().zip(&self.transforms).filter(|(count, _)| *count > 0)
+        {
+            pass.set_bind_group(1, &transform.bind_group, &[]);
             pass.draw(first..first + count, 0..1);
             first += count;
         }
     }
 }
 
-/// Colour of a part: its own, or that of the part under the pointer.
+/// Colour of a handle: highlighted if it is active.
 fn color(active: Option<GizmoPart>, part: GizmoPart, own: usize, alpha: f32) -> [f32; 4] {
     let [r, g, b, _] = linear(if active == Some(part) { ACTIVE } else { AXES[own] });
     [r, g, b, alpha]
 }
 
-/// Triangles of a gizmo that face the eye, towards z: the ring to turn around the view direction.
+/// Triangles in the frame that faces the eye: the view ring.
 fn facing_shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     let mut out = Vec::new();
     if mode == GizmoMode::Rotate {
-        ring(&mut out, 2, [VIEW_RING, TUBE], color(active, GizmoPart::View, 4, 1.0));
+        ring(&mut out, 2, [VIEW_RING_RADIUS, TUBE_RADIUS], color(active, GizmoPart::View, 4, 1.0));
     }
     out
 }
 
-/// Triangles of a gizmo along its own axes.
+/// Triangles in the gizmo's frame.
 fn shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     let mut out = Vec::new();
     let color = |part, own, alpha| color(active, part, own, alpha);
@@ -223,7 +226,7 @@ fn shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
         let own = color(GizmoPart::Axis(axis), usize::from(axis), 1.0);
         let turn = Quat::from_rotation_arc(Vec3::Z, unit(axis));
         match mode {
-            GizmoMode::Rotate => ring(&mut out, axis, [1.0, TUBE], own),
+            GizmoMode::Rotate => ring(&mut out, axis, [1.0, TUBE_RADIUS], own),
             GizmoMode::Move => {
                 cone(&mut out, turn, [AXIS_START, 0.80], [0.013, 0.013], own);
                 cone(&mut out, turn, [0.78, 1.0], [0.058, 0.0], own);
@@ -262,14 +265,14 @@ mod tests {
         (camera, gizmo)
     }
 
-    /// Where a point of the gizmo's own space is in the picture.
+    /// Position in the picture of a point in the gizmo's frame.
     fn at(camera: &Camera, gizmo: &Gizmo, p: Vec3) -> Vec2 {
         let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
-        camera.project(gizmo.center + size * (gizmo.rotation * p)).expect("it is in front").position
+        camera.project(gizmo.center + size * (gizmo.rotation * p)).expect("the point is visible").position
     }
 
     #[test]
-    fn every_part_is_found_where_it_is_drawn() {
+    fn every_handle_is_picked_where_it_is_drawn() {
         let (camera, mut gizmo) = scene();
         for mode in [GizmoMode::Move, GizmoMode::Scale] {
             gizmo.mode = mode;
@@ -297,32 +300,32 @@ mod tests {
     }
 
     #[test]
-    fn view_ring_is_a_circle_around_the_middle_and_lies_outside_the_others() {
+    fn view_ring_is_a_circle_outside_the_axis_rings() {
         let (mut camera, mut gizmo) = scene();
         gizmo.mode = GizmoMode::Rotate;
-        // In the middle of the picture, where perspective makes no ellipse of a circle that faces the eye.
+        // At the picture's centre, where perspective does not distort circles that face the eye.
         camera.target = gizmo.center;
         let center = at(&camera, &gizmo, Vec3::ZERO);
         for k in 0..12 {
             let away = Vec2::from_angle(TAU * k as f32 / 12.0);
             for (radius, part) in [(1.0, Some(GizmoPart::View)), (1.0 + 12.0 / GIZMO_PX, None)] {
-                let cursor = center + radius * VIEW_RING * GIZMO_PX * away;
+                let cursor = center + radius * VIEW_RING_RADIUS * GIZMO_PX * away;
                 assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), part, "{k}, {radius}");
             }
         }
         gizmo.mode = GizmoMode::Move;
-        let cursor = center + VIEW_RING * GIZMO_PX * Vec2::NEG_Y;
+        let cursor = center + VIEW_RING_RADIUS * GIZMO_PX * Vec2::NEG_Y;
         assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), None, "arrows have no ring");
     }
 
-    /// Fingers missed all parts by more than 8 pixels, because the radius they are given was ignored.
+    /// Touch input passes a larger pick radius.
     #[test]
-    fn finger_finds_what_a_mouse_misses_and_a_part_below_it_comes_first() {
+    fn larger_radius_picks_near_handles_and_covered_ones_come_first() {
         let (camera, mut gizmo) = scene();
         for mode in [GizmoMode::Move, GizmoMode::Scale, GizmoMode::Rotate] {
             gizmo.mode = mode;
             let (tip, part) = match mode {
-                GizmoMode::Rotate => (facing(&camera) * Vec3::X * VIEW_RING, GizmoPart::View),
+                GizmoMode::Rotate => (facing(&camera) * Vec3::X * VIEW_RING_RADIUS, GizmoPart::View),
                 _ => (Vec3::Y, GizmoPart::Axis(1)),
             };
             let [center, end] = [Vec3::ZERO, gizmo.rotation.inverse() * tip].map(|p| at(&camera, &gizmo, p));
@@ -339,7 +342,7 @@ mod tests {
         assert_eq!(
             pick_gizmo(&camera, &gizmo, square, 24.0),
             Some(GizmoPart::Plane(2)),
-            "axes lie beside it"
+            "axes are farther away"
         );
     }
 
@@ -351,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn size_in_the_picture_does_not_depend_on_the_distance() {
+    fn gizmo_size_is_independent_of_the_distance() {
         let (mut camera, gizmo) = scene();
         camera.target = gizmo.center;
         for distance in [2.0, 20.0] {

@@ -1,4 +1,4 @@
-//! Triangles over each other, by the thousand: what a GPU made of processor cores would draw for minutes.
+//! Overdraw limit for software rasterisers.
 
 use glam::Vec3;
 
@@ -6,18 +6,18 @@ use super::camera::Camera;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Most pixels, counted for each triangle that covers them, that an adapter made of processor cores draws: 10 s of one core for a
-/// picture in llvmpipe; in a browser some 3 s for a rough one, of which opening a model waits for several.
-const SOFTWARE_PIXELS: f64 = 1e8;
+/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. Takes 10 s
+/// of one core in llvmpipe; in browsers about 3 s at reduced resolution, several times while a model opens.
+const MAX_SOFTWARE_PIXELS: f64 = 1e8;
 
-/// What each pixel of a triangle's longest side counts for beside the triangle's area: slivers have hardly any. Measured
-/// on a fan of 100,000 of them, in SwiftShader (which browsers have) and in llvmpipe.
-const SIDE: f64 = if cfg!(target_family = "wasm") { 10.0 } else { 0.5 };
+/// Cost of a triangle per pixel of its longest side, in addition to its area, because slivers have almost no
+/// area. Measured with a fan of 100,000 slivers in SwiftShader (browsers) and llvmpipe.
+const SIDE_COST: f64 = if cfg!(target_family = "wasm") { 10.0 } else { 0.5 };
 
-/// Refuses a model whose picture of `size` pixels an adapter made of processor cores would draw for minutes.
+/// Rejects a picture of `size` pixels that a software rasteriser would draw for minutes.
 ///
 /// # Errors
-/// [`GpuError::Layers`] when its triangles cover too many pixels.
+/// [`GpuError::Layers`] if the overdraw exceeds the limit.
 pub fn check_layers(
     context: &GpuContext,
     camera: &Camera,
@@ -26,14 +26,14 @@ pub fn check_layers(
     size: [u32; 2],
 ) -> Result<(), GpuError> {
     let pixels = if context.is_software() { covered(camera, positions, triangles, size) } else { 0.0 };
-    if pixels <= SOFTWARE_PIXELS {
+    if pixels <= MAX_SOFTWARE_PIXELS {
         return Ok(());
     }
-    Err(GpuError::Layers { triangles: triangles.len(), pixels, limit: SOFTWARE_PIXELS })
+    Err(GpuError::Layers { triangles: triangles.len(), pixels, limit: MAX_SOFTWARE_PIXELS })
 }
 
-/// Pixels that triangles cover, each triangle's counted for itself, and their sides; one that reaches behind the camera
-/// covers all.
+/// Pixels covered by triangles, counting overlaps, plus the cost of their sides. A triangle that extends
+/// behind the camera counts as the whole picture.
 fn covered(camera: &Camera, positions: &[Vec3], triangles: &[[u32; 3]], size: [u32; 2]) -> f64 {
     let picture = f64::from(size[0]) * f64::from(size[1]);
     let places: Vec<_> = positions.iter().map(|&p| camera.project(p).map(|at| at.position)).collect();
@@ -41,7 +41,7 @@ fn covered(camera: &Camera, positions: &[Vec3], triangles: &[[u32; 3]], size: [u
         let [a, b, c] = t.map(|i| places[i as usize]);
         let (Some(a), Some(b), Some(c)) = (a, b, c) else { return picture };
         let side = (b - a).length().max((c - b).length()).max((a - c).length());
-        (f64::from(0.5 * (b - a).perp_dot(c - a).abs()) + SIDE * f64::from(side)).min(picture)
+        (f64::from(0.5 * (b - a).perp_dot(c - a).abs()) + SIDE_COST * f64::from(side)).min(picture)
     };
     triangles.iter().map(area).sum()
 }
@@ -55,7 +55,7 @@ mod tests {
     use crate::render::Projection;
 
     #[test]
-    fn each_triangle_is_counted_for_itself() {
+    fn overlapping_triangles_are_all_counted() {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::ONE.with_z(0.0), Vec3::Y];
         let mut camera = Camera::default();
         (camera.yaw, camera.pitch, camera.projection) = (0.0, 0.0, Projection::Orthographic);
@@ -65,7 +65,7 @@ mod tests {
         camera.frame(bounds);
         let at = |p| camera.project(p).unwrap().position;
         let side = f64::from(at(Vec3::X).distance(at(Vec3::ZERO)));
-        let square = side * side + 2.0 * SIDE * side * 2.0_f64.sqrt();
+        let square = side * side + 2.0 * SIDE_COST * side * 2.0_f64.sqrt();
         let triangles = [[0, 1, 2], [0, 2, 3]].repeat(50);
         let counted = covered(&camera, &corners, &triangles, [100, 100]);
         assert!((counted / (50.0 * square) - 1.0).abs() < 1e-4, "{counted} of {}", 50.0 * square);

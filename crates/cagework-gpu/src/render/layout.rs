@@ -1,74 +1,74 @@
-//! Mirrors of the draw shaders' structs. `tests/shaders.rs` compares names, offsets and sizes.
+//! Rust mirrors of the draw shaders' structs. `tests/draw_shaders.rs` compares names, offsets and sizes.
 
 use bytemuck::{Pod, Zeroable};
 
-/// See `shaders/camera.wgsl`.
+/// Mirrors `Camera` in `shaders/camera.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Camera {
-    /// Clip from world, columns.
+    /// World to clip space, column-major.
     pub clip_from_world: [[f32; 4]; 4],
-    /// View from world, columns.
+    /// World to view space, column-major.
     pub view_from_world: [[f32; 4]; 4],
-    /// Where the eye is, world space, object units.
+    /// Eye, world space, object units.
     pub eye: [f32; 3],
-    /// 1 in perspective, 0 in an orthographic picture.
+    /// 1: perspective, 0: orthographic.
     pub perspective: f32,
-    /// Width and height of the picture, pixels of the target.
+    /// Width and height of the render target, pixels.
     pub viewport: [f32; 2],
-    /// The target's pixels per CSS pixel.
+    /// Pixels of the target per CSS pixel.
     pub scale: f32,
-    /// 1 if the target does not turn linear colours into sRGB itself.
+    /// 1 if shaders must encode sRGB, because the target's format does not.
     pub encode: u32,
-    /// Background above, linear.
+    /// Background colour at the top, linear.
     pub background_top: [f32; 4],
-    /// Background below, linear.
+    /// Background colour at the bottom, linear.
     pub background_bottom: [f32; 4],
-    /// Lines of the floor, linear, straight alpha.
+    /// Colour of the floor grid, linear, straight alpha.
     pub floor_color: [f32; 4],
-    /// Middle of the floor, world space.
+    /// Centre of the floor, world space.
     pub floor_center: [f32; 3],
-    /// Where it ends, object units.
+    /// Radius of the floor, object units.
     pub floor_radius: f32,
-    /// Distance of its lines, object units.
+    /// Spacing of the grid lines, object units.
     pub floor_spacing: f32,
-    /// How much smaller clip depth is for a point that is nearer by all of its depth.
+    /// Decrease of clip depth per relative decrease of view depth, see [`Style::lift`].
     pub lift: f32,
-    /// Size of a pixel of the target in clip space.
+    /// Size of a pixel of the target, clip space.
     pub pixel: [f32; 2],
 }
 
-/// See `shaders/draw_mesh.wgsl`.
+/// Mirrors `Surface` in `shaders/draw_mesh.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Surface {
     /// Factor of the base colour, linear RGBA.
     pub base_color: [f32; 4],
-    /// What colours it, see [`surface_mode`].
+    /// Source of the colour, see [`surface_mode`].
     pub mode: u32,
-    /// Below this alpha nothing is drawn.
+    /// Fragments with less alpha are discarded.
     pub alpha_cutoff: f32,
-    /// Value of the first colour.
+    /// Value of the first colour of the colour map.
     pub low: f32,
-    /// Value of the last colour; of a material, how much of the vertices' values greys it.
+    /// Value of the last colour. With materials: strength of greying by the vertices' values, 0 or 1.
     pub high: f32,
 }
 
-/// Values of [`Surface::mode`], the shader's constants of the same names.
+/// Values of [`Surface::mode`]. The shader defines constants with the same names.
 pub mod surface_mode {
-    /// The material, which covers everything behind it.
+    /// Material, opaque.
     pub const MATERIAL: u32 = 0;
-    /// Weights of one cage vertex.
+    /// Weights of a control.
     pub const WEIGHTS: u32 = 1;
-    /// Logarithms of errors.
+    /// Errors, as base 10 logarithms.
     pub const ERRORS: u32 = 2;
-    /// One colour, without texture and vertex colours.
+    /// A single colour, without texture and vertex colours.
     pub const CLAY: u32 = 3;
-    /// The material, with its alpha.
+    /// Material, blended by its alpha.
     pub const BLENDED: u32 = 4;
 }
 
-/// See `shaders/overlay.wgsl`.
+/// Mirrors `Style` in `shaders/overlay.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Style {
@@ -80,7 +80,7 @@ pub struct Style {
     pub rim_color: [f32; 4],
     /// Width of the rim, CSS pixels.
     pub rim: f32,
-    /// How much nearer to the eye than it is it is drawn, as a fraction of its depth.
+    /// Offset towards the eye, as a fraction of the depth: draws lines on a surface in front of it.
     pub lift: f32,
     /// Factor of all alphas.
     pub opacity: f32,
@@ -88,19 +88,19 @@ pub struct Style {
     pub size: f32,
 }
 
-/// Upper bits of an item that hold its state; the constant of `shaders/overlay.wgsl`.
+/// Position of the state bits in an item. Same as in `shaders/overlay.wgsl`.
 pub const STATE_SHIFT: u32 = 28;
 
-/// The state of what is not drawn; the constant of `shaders/overlay.wgsl`.
+/// State of hidden items. Same as in `shaders/overlay.wgsl`.
 pub const HIDDEN: u32 = 15;
 
-/// See `shaders/draw_slice.wgsl`.
+/// Mirrors `SliceView` in `shaders/draw_slice.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SliceView {
     /// Outer corner of the first cell, world space.
     pub corner: [f32; 3],
-    /// Value of the last colour; 0 if kinds of cells are shown.
+    /// Value of the last colour; 0 to colour by cell type.
     pub high: f32,
     /// Edge of a cell along u, object units.
     pub u: [f32; 3],
@@ -110,16 +110,16 @@ pub struct SliceView {
     pub v: [f32; 3],
     /// Cells along v.
     pub n_v: u32,
-    /// Colour of each kind (untyped, boundary, interior, exterior), linear, straight alpha.
+    /// Colour of each cell type (untyped, boundary, interior, exterior), linear, straight alpha.
     pub kinds: [[f32; 4]; 4],
     /// Lines between cells, linear, straight alpha.
     pub line_color: [f32; 4],
 }
 
-/// See `shaders/draw_gizmo.wgsl`.
+/// Mirrors `GizmoView` in `shaders/draw_gizmo.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GizmoView {
-    /// World from the gizmo's own space, where its axes are 1 long.
+    /// Gizmo to world space. In gizmo space the axes have length 1.
     pub world_from_gizmo: [[f32; 4]; 4],
 }

@@ -1,4 +1,4 @@
-//! Places with a problem, what is held, and wireframes: overlays that come and go.
+//! Overlays of problems, grabbed points, joints, and wireframes.
 
 use std::ops::Range;
 
@@ -13,13 +13,13 @@ use super::scene::{Marks, SceneOptions, Theme};
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
-/// The state whose width is that of a line rather than a point.
-const SEGMENT: u32 = 4;
+/// State of segments; [`Style::widths`] has their line width there.
+const SEGMENT_STATE: u32 = 4;
 
-/// The state of a point without a filling.
-pub(super) const RING: u32 = 1;
+/// State of rings: points without a fill.
+pub(super) const RING_STATE: u32 = 1;
 
-/// Marks as they are drawn.
+/// GPU data of [`Marks`].
 #[derive(Debug)]
 pub(super) struct MarksView {
     pub(super) segments: Option<Overlay>,
@@ -27,7 +27,7 @@ pub(super) struct MarksView {
 }
 
 impl MarksView {
-    /// Problems, what is held, joints: as they are drawn, the last on top.
+    /// Problems, grabbed points and joints, topmost last.
     pub(super) fn all(
         context: &GpuContext,
         layouts: &Layouts,
@@ -42,7 +42,7 @@ impl MarksView {
             view
         };
         let SceneOptions { marks, held, joints, .. } = scene;
-        // Joints are inside the model, and seen through it.
+        // Joints are inside the model and visible through it.
         let joints = (joints, [palette.joints(); 2]);
         [(marks, with_behind(palette.marks())), (held, with_behind(palette.held())), joints].map(view).into()
     }
@@ -63,13 +63,13 @@ impl MarksView {
         if !marks.segments.is_empty() {
             let ends: Vec<Vec3> = marks.segments.iter().flatten().copied().collect();
             let items: Vec<Item> =
-                (0..marks.segments.len() as u32).map(|k| item(SEGMENT, 2 * k, 2 * k + 1)).collect();
+                (0..marks.segments.len() as u32).map(|k| item(SEGMENT_STATE, 2 * k, 2 * k + 1)).collect();
             let positions = upload(context, &ends);
             view.segments = Some(Overlay::new(context, layouts, &positions, &items));
         }
         if !marks.points.is_empty() || !marks.rings.is_empty() {
             let all = [&marks.points[..], &marks.rings].concat();
-            let state = |k: u32| if (k as usize) < marks.points.len() { 0 } else { RING };
+            let state = |k: u32| if (k as usize) < marks.points.len() { 0 } else { RING_STATE };
             let items: Vec<Item> = (0..all.len() as u32).map(|k| item(state(k), k, 0)).collect();
             view.points.push(Overlay::new(context, layouts, &upload(context, &all), &items));
         }
@@ -89,7 +89,7 @@ fn upload(context: &GpuContext, points: &[Vec3]) -> Table {
     table
 }
 
-/// The mesh's edges, at rest and where it is; made when first asked for.
+/// Wireframes of the mesh, at rest and deformed; created on first use.
 #[derive(Debug)]
 pub(super) struct Wires {
     pub(super) base: Overlay,
@@ -97,7 +97,7 @@ pub(super) struct Wires {
 }
 
 impl Wires {
-    /// Without edges of `hidden` triangles alone.
+    /// Omits edges that only belong to `hidden` triangles.
     pub(super) fn new(
         context: &GpuContext,
         layouts: &Layouts,

@@ -1,4 +1,4 @@
-//! The model on the GPU: corners, indices, materials, textures.
+//! GPU data of the model: corners, indices, materials, textures.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// The model as it is drawn.
+/// GPU data of a model.
 #[derive(Debug)]
 pub(super) struct Mesh {
     corners: wgpu::Buffer,
@@ -22,11 +22,11 @@ pub(super) struct Mesh {
     pub(super) rest: Table,
     /// Normals at rest.
     pub(super) rest_normals: Table,
-    /// A weight or an error of each vertex.
+    /// Per vertex: weight, error or greying.
     pub(super) values: Table,
-    /// Where the vertices are now; the bind group that the mesh is drawn with.
+    /// Positions, normals and values of the vertices.
     vertices: wgpu::BindGroup,
-    /// Positions that are drawn: at rest, or deformed.
+    /// Positions in use: rest or deformed.
     pub(super) positions: Table,
     pub(super) n_vertices: u32,
 }
@@ -91,7 +91,7 @@ impl Mesh {
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }
 
-    /// Draws vertices from other tables from now on: where they are deformed to.
+    /// Draws with these tables of vertices from now on.
     pub(super) fn set_vertices(
         &mut self,
         context: &GpuContext,
@@ -103,14 +103,14 @@ impl Mesh {
         self.positions = positions.clone();
     }
 
-    /// Draws vertices where they are at rest from now on.
+    /// Draws the rest pose from now on.
     pub(super) fn set_rest(&mut self, context: &GpuContext, layouts: &Layouts) {
         let (rest, normals) = (self.rest.clone(), self.rest_normals.clone());
         self.set_vertices(context, layouts, &rest, &normals);
     }
 
-    /// Writes what colours the surface, and the values of the first and the last colour.
-    /// Materials are greyed as the vertices' values say, if `is_greyed`.
+    /// Sets the source of colours, and the values of the first and last colour. With `is_greyed`, materials
+    /// are greyed by the vertices' values.
     pub(super) fn set_style(
         &self,
         context: &GpuContext,
@@ -138,7 +138,8 @@ impl Mesh {
         }
     }
 
-    /// Draws the groups that are `blended` or not, but for those of `hidden` triangles. Colours that mean a value cover everything.
+    /// Draws the groups that are blended or those that are not, except groups of `hidden` triangles. Colour
+    /// maps are opaque, so all groups then count as not blended.
     pub(super) fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,

@@ -1,16 +1,17 @@
-//! The renderer: a picture of the scene, into a page's canvas or a texture of its own.
+//! Renders the scene into a canvas or a texture.
 //!
-//! It reads the vertex buffers that `deform_vertices` and `vertex_normals` wrote; nothing is copied, and a frame
-//! uploads a few hundred bytes. Where the device only draws, the same tables are textures ([`crate::table`]). Colours are computed in linear light and blended premultiplied, with four samples per
-//! pixel and a depth buffer. What changes rarely (chosen vertices, styles, a heat map) is written when it changes.
+//! Reads the vertex buffers written by `deform_vertices` and `vertex_normals` without copies; a frame uploads
+//! a few hundred bytes. On devices that only draw, the same tables are textures ([`crate::table`]). Colours
+//! are linear, blended premultiplied, with 4x multisampling. Data that rarely changes (selection, styles,
+//! heat map) is uploaded on change.
 //!
-//! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first what is behind the mesh, fainter),
-//! controls inside, handles, marks, gizmo.
+//! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
+//! mesh, fainter), controls inside, handles, marks, gizmo.
 //!
-//! **Format of the target.** sRGB formats (`rgba8unorm-srgb`) are written in linear light and encoded by the GPU. A
-//! canvas has none: configure it with its preferred format and the sRGB one among `view_formats`, and draw into a view
-//! of the latter. Where that is not possible, any 8-bit format does: shaders then encode, and only blending differs a
-//! little.
+//! **Target format.** To sRGB formats (`rgba8unorm-srgb`), shaders write linear colours and the GPU encodes.
+//! Canvases have no sRGB format: configure the preferred format, list its sRGB variant in `view_formats`, and
+//! draw into a view of the latter. If that is not possible, use any 8-bit format: shaders then encode, and
+//! blending differs slightly.
 
 mod cage;
 pub mod camera;
@@ -33,7 +34,7 @@ mod slice;
 mod texture;
 mod theme;
 
-pub use camera::{AxisView, Camera, Projected, Projection, Ray};
+pub use camera::{AxisView, Camera, ImagePoint, Projection, Ray};
 pub use frame::{Renderer, Target};
 pub use gizmo::{GIZMO_PX, pick_gizmo};
 pub use layers::check_layers;

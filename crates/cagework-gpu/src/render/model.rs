@@ -1,4 +1,4 @@
-//! What is drawn of a model: corners with texture coordinates and colours, material groups, decoded textures.
+//! A drawable model: corners with texture coordinates and colours, material groups, decoded textures.
 
 use std::sync::Arc;
 
@@ -6,43 +6,43 @@ use bytemuck::{Pod, Zeroable};
 use cagework_core::Weights;
 use glam::Vec3;
 
-/// Base colour without a material, linear: a light, slightly warm grey, as of unfired clay.
+/// Default base colour, linear: light, slightly warm grey.
 pub const CLAY: [f32; 4] = [0.52, 0.505, 0.485, 1.0];
 
-/// A model as it is drawn.
+/// A drawable model.
 ///
-/// Vertices that are bound and deformed (`positions`) and corners that are drawn (`vertices`) are two lists: an OBJ's
-/// vertex may have several texture coordinates, and a glTF's seams must not show in the shading.
+/// Vertices (`positions`) are bound and deformed, corners (`vertices`) are drawn. They differ because an OBJ
+/// vertex can have several texture coordinates, and seams of a glTF must not show in the shading.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DrawModel {
-    /// Rest positions, what is bound. `[n_vertices]`, object units.
+    /// Rest positions of the vertices. `[n_vertices]`, object units.
     pub positions: Vec<Vec3>,
-    /// Vertices once more, for surfaces that share them but not their normals: an OBJ's hard edges. The vertex that each
-    /// moves with; they are counted on from `positions`. `[n_copies]`
+    /// Duplicated vertices with normals of their own, for hard edges of an OBJ: the vertex that each one
+    /// moves with. Numbered after `positions`. `[n_copies]`
     pub copies: Vec<u32>,
     /// Corners of triangles. `[n_corners]`
     pub vertices: Vec<DrawVertex>,
     /// Indices into `vertices`, counter-clockwise seen from outside. `[n_triangles]`
     pub triangles: Vec<[u32; 3]>,
-    /// Material of each range of triangles; triangles of no group are drawn as clay.
+    /// Materials of ranges of triangles. The other triangles have the base colour [`CLAY`].
     pub groups: Vec<DrawGroup>,
-    /// Textures that groups name.
+    /// Textures of the groups.
     pub textures: Vec<Arc<DrawTexture>>,
 }
 
-/// A corner of triangles.
+/// A corner of a triangle.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DrawVertex {
-    /// The vertex of `positions`, or the one of `copies`, that it moves with and that it shares its normal with.
+    /// Index into `positions` followed by `copies`: determines position and normal.
     pub source: u32,
     /// Texture coordinates, v downwards as in glTF.
     pub uv: [f32; 2],
-    /// Factor of the base colour, linear RGBA, 65,535 for one.
+    /// Factor of the base colour, linear RGBA; 65,535 is 1.
     pub color: [u16; 4],
 }
 
-/// Triangles of one material.
+/// A range of triangles with one material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawGroup {
     /// Range of [`DrawModel::triangles`].
@@ -51,34 +51,34 @@ pub struct DrawGroup {
     pub base_color: [f32; 4],
     /// Base colour texture, an index into [`DrawModel::textures`].
     pub texture: Option<u32>,
-    /// What alpha means.
+    /// Use of alpha.
     pub alpha: Alpha,
 }
 
-/// What a material's alpha means.
+/// Use of a material's alpha.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Alpha {
-    /// Nothing.
+    /// Ignored.
     #[default]
     Opaque,
-    /// Below the cutoff nothing is drawn.
+    /// Fragments with less alpha than the cutoff are discarded.
     Mask {
         /// The cutoff.
         cutoff: f32,
     },
-    /// How much covers what is behind.
+    /// Blended with what is behind.
     Blend,
 }
 
-/// What a texture is outside its image.
+/// Texture sampling outside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image again.
+    /// Repeated.
     #[default]
     Repeat,
-    /// The image mirrored.
+    /// Repeated, mirrored every other time.
     Mirror,
-    /// Its edge.
+    /// Clamped to the edge.
     Clamp,
 }
 
@@ -91,12 +91,12 @@ pub struct DrawTexture {
     pub height: u32,
     /// sRGB with straight alpha, rows from the top. `[height, width, 4]`
     pub rgba: Vec<u8>,
-    /// Along u and v.
+    /// Wrapping along u and v.
     pub wrap: [Wrap; 2],
 }
 
 impl DrawVertex {
-    /// A corner without texture and colour.
+    /// A corner without texture coordinates and colour.
     #[must_use]
     pub fn plain(source: u32) -> Self {
         Self { source, uv: [0.0; 2], color: [u16::MAX; 4] }
@@ -110,14 +110,14 @@ impl Default for DrawGroup {
 }
 
 impl DrawModel {
-    /// A model of clay.
+    /// A model without materials.
     #[must_use]
     pub fn plain(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
         let vertices = (0..positions.len() as u32).map(DrawVertex::plain).collect();
         Self { positions, vertices, triangles, ..Self::default() }
     }
 
-    /// Several models as one: vertices, copies, corners and triangles of the first, then those of the next; textures are shared.
+    /// Concatenates models: vertices, copies, corners and triangles in order. Textures are not duplicated.
     #[must_use]
     pub fn joined(models: &[&Self]) -> Self {
         let n_vertices: usize = models.iter().map(|m| m.positions.len()).sum();
@@ -125,7 +125,7 @@ impl DrawModel {
         for model in models {
             let first = all.positions.len() as u32;
             let own = model.positions.len() as u32;
-            // Copies come after the vertices of all.
+            // Copies are numbered after the vertices of all models.
             let first_copy = (n_vertices + all.copies.len()) as u32;
             let source = |s: u32| if s < own { first + s } else { first_copy + s - own };
             let (corner, triangle) = (all.vertices.len() as u32, all.triangles.len() as u32);
@@ -135,7 +135,7 @@ impl DrawModel {
             all.vertices.extend(model.vertices.iter().map(|v| DrawVertex { source: source(v.source), ..*v }));
             all.triangles.extend(model.triangles.iter().map(|t| t.map(|c| corner + c)));
             all.textures.extend(model.textures.iter().cloned());
-            // Triangles of no group get one of their own, so that no group is of two models.
+            // Triangles without a group get one, so that no group spans two models.
             all.groups.extend(model.whole_groups().into_iter().map(|group| DrawGroup {
                 triangles: triangle + group.triangles.start..triangle + group.triangles.end,
                 texture: group.texture.map(|t| texture + t),
@@ -145,9 +145,9 @@ impl DrawModel {
         all
     }
 
-    /// The groups, and clay for the triangles of none.
+    /// The groups, and groups of default material for the other triangles.
     pub(super) fn whole_groups(&self) -> Vec<DrawGroup> {
-        // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
+        // Sorts number pairs, as other code does: another instance of sort would enlarge the page's module.
         let mut order: Vec<[u32; 2]> =
             (0u32..).zip(&self.groups).map(|(k, g)| [g.triangles.start, k]).collect();
         order.sort_unstable();
@@ -169,45 +169,54 @@ impl DrawModel {
         groups
     }
 
-    /// Values of vertices, and those of the copies after them. `[n_vertices]` -> `[n_vertices + n_copies]`
+    /// Appends the values of the copies. `[n_vertices]` -> `[n_vertices + n_copies]`
     #[must_use]
     pub(crate) fn with_copies<T: Copy>(&self, values: &[T]) -> Vec<T> {
         values.iter().copied().chain(self.copies.iter().map(|&v| values[v as usize])).collect()
     }
 
-    /// Weights with those of the copies; nothing if there are none.
+    /// Weights with rows for the copies. `None` without copies.
     pub(crate) fn rows_with_copies(&self, weights: &Weights) -> Option<Weights> {
         let rows = || (0..self.positions.len() as u32).chain(self.copies.iter().copied()).collect::<Vec<_>>();
         (!self.copies.is_empty()).then(|| weights.with_rows(&rows()))
     }
 
-    /// Triangles as indices into `positions` and `copies`: what normals are made of. `[n_triangles]`
+    /// Triangles as indices into `positions` followed by `copies`, for computing normals. `[n_triangles]`
     #[must_use]
     pub fn shading_triangles(&self) -> Vec<[u32; 3]> {
         let source = |corner: u32| self.vertices[corner as usize].source;
         self.triangles.iter().map(|t| t.map(source)).collect()
     }
 
-    /// Why the lists do not belong together, if they do not.
+    /// Describes the first inconsistency of the lists.
     pub(crate) fn fault(&self) -> Option<String> {
         let (n_vertices, n_corners) = (self.positions.len(), self.vertices.len());
         if let Some(v) = self.copies.iter().find(|&&v| v as usize >= n_vertices) {
-            return Some(format!("a copy names vertex {v}, but there are {n_vertices}"));
+            return Some(format!("a copy refers to vertex {v}; number of vertices: {n_vertices}"));
         }
         let n_sources = n_vertices + self.copies.len();
         if let Some(v) = self.vertices.iter().find(|v| v.source as usize >= n_sources) {
-            return Some(format!("a corner names vertex {}, but there are {n_sources}", v.source));
+            return Some(format!(
+                "a corner refers to vertex {}; number of vertices and copies: {n_sources}",
+                v.source
+            ));
         }
         if let Some(i) = self.triangles.iter().flatten().find(|&&i| i as usize >= n_corners) {
-            return Some(format!("a triangle names corner {i}, but there are {n_corners}"));
+            return Some(format!("a triangle refers to corner {i}; number of corners: {n_corners}"));
         }
         for group in &self.groups {
             let range = &group.triangles;
             if range.start > range.end || range.end as usize > self.triangles.len() {
-                return Some(format!("a material covers triangles {range:?} of {}", self.triangles.len()));
+                return Some(format!(
+                    "a material covers triangles {range:?}; number of triangles: {}",
+                    self.triangles.len()
+                ));
             }
             if let Some(t) = group.texture.filter(|&t| t as usize >= self.textures.len()) {
-                return Some(format!("a material names texture {t}, but there are {}", self.textures.len()));
+                return Some(format!(
+                    "a material refers to texture {t}; number of textures: {}",
+                    self.textures.len()
+                ));
             }
         }
         for (number, t) in self.textures.iter().enumerate() {
@@ -241,13 +250,13 @@ mod tests {
     }
 
     #[test]
-    fn copies_move_as_their_vertices_do() {
+    fn copies_have_the_weights_of_their_vertices() {
         let mut model = triangle();
         model.copies = vec![2, 0];
         assert_eq!(model.fault(), None);
         assert_eq!(model.with_copies(&[10, 11, 12]), [10, 11, 12, 12, 10]);
         let weights = Weights::new(2, vec![0, 1, 2, 4], vec![0, 1, 0, 1], vec![1.0, 1.0, 0.25, 0.75]);
-        let weights = weights.expect("they are weights");
+        let weights = weights.expect("the weights are valid");
         let all = model.rows_with_copies(&weights).expect("there are copies");
         for (row, source) in [0, 1, 2, 2, 0].into_iter().enumerate() {
             assert_eq!(all.row(row), weights.row(source));
@@ -256,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_of_no_group_are_clay() {
+    fn triangles_without_group_get_the_default_material() {
         let mut model = DrawModel::plain(vec![Vec3::ZERO; 3], vec![[0, 1, 2]; 10]);
         let group = |range| DrawGroup { triangles: range, base_color: [1.0; 4], ..DrawGroup::default() };
         model.groups = vec![group(6..8), group(1..4)];
@@ -282,7 +291,7 @@ mod tests {
         assert_eq!(all.fault(), None);
         assert_eq!(all.copies, [0, 2, 4, 7]);
         let sources: Vec<u32> = all.vertices.iter().map(|v| v.source).collect();
-        // Nine vertices, then the copies: two of the first model, one of each other.
+        // Nine vertices, then copies: two of the first model, one of each of the others.
         assert_eq!(sources, [0, 1, 2, 9, 10, 3, 4, 5, 11, 6, 7, 8, 12]);
         assert_eq!(all.triangles[2..], [[5, 6, 7], [9, 10, 11]]);
         let groups: Vec<_> = all.groups.iter().map(|g| (g.triangles.clone(), g.texture)).collect();
@@ -290,11 +299,11 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_is_named() {
+    fn faults_name_the_invalid_index() {
         let faulty = |edit: fn(&mut DrawModel)| {
             let mut model = triangle();
             edit(&mut model);
-            model.fault().expect("it is faulty")
+            model.fault().expect("the model has a fault")
         };
         assert!(faulty(|m| m.vertices[1].source = 3).contains("vertex 3"));
         assert!(faulty(|m| m.copies = vec![5]).contains("vertex 5"));

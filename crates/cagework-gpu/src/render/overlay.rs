@@ -1,4 +1,4 @@
-//! Lines, points and faces over the model: items that index positions, each with a state.
+//! Lines, points and faces over the model. Items index positions and have a state.
 
 use super::layout::{HIDDEN, STATE_SHIFT, Style};
 use super::pipelines::Layouts;
@@ -6,27 +6,27 @@ use super::theme::state;
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
-/// How much of the opacity is left where something nearer is.
+/// Opacity factor of overlays behind a surface.
 pub(super) const BEHIND_OPACITY: f32 = 0.22;
 
-/// An item: state and first index, second index.
+/// Two words: state and first index; second index.
 pub(super) type Item = [u32; 2];
 
-/// An item with a state.
+/// Packs an item.
 pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
     [state << STATE_SHIFT | a, b]
 }
 
-/// An item that is not drawn.
-pub(super) const NOTHING: Item = [HIDDEN << STATE_SHIFT, 0];
+/// A hidden item.
+pub(super) const HIDDEN_ITEM: Item = [HIDDEN << STATE_SHIFT, 0];
 
-/// Items of one kind over one table of positions.
+/// Items of one kind with a table of positions.
 #[derive(Debug)]
 pub(super) struct Overlay {
     positions: Table,
     items: Table,
     count: u32,
-    /// In front, and behind something.
+    /// Styles in front of and behind surfaces.
     styles: [wgpu::Buffer; 2],
     bind_groups: [wgpu::BindGroup; 2],
 }
@@ -60,7 +60,7 @@ impl Overlay {
         self.items.write(context, bytemuck::cast_slice(items));
     }
 
-    /// Other items; only a longer list takes a new table.
+    /// Replaces the items. Allocates only if there are more than before.
     pub(super) fn set_items(&mut self, context: &GpuContext, layouts: &Layouts, items: &[Item]) {
         if size_of_val(items) as u64 > self.items.bytes() {
             self.items = Table::unchecked(context, "items", Entry::Pair, items.len());
@@ -70,7 +70,7 @@ impl Overlay {
         self.write(context, items);
     }
 
-    /// Other positions; nothing happens when they are the same.
+    /// Replaces the table of positions.
     pub(super) fn set_positions(&mut self, context: &GpuContext, layouts: &Layouts, positions: &Table) {
         if self.positions != *positions {
             self.positions = positions.clone();
@@ -78,31 +78,31 @@ impl Overlay {
         }
     }
 
-    /// What it looks like.
+    /// Sets the style in front; behind surfaces it is fainter.
     pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
         self.set_styles(context, with_behind(style));
     }
 
-    /// What it looks like in front of and behind something.
+    /// Sets the styles in front of and behind surfaces.
     pub(super) fn set_styles(&self, context: &GpuContext, styles: [Style; 2]) {
         for (buffer, style) in self.styles.iter().zip(styles) {
             context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
         }
     }
 
-    /// The same in front and behind something: of what is always inside the model.
+    /// Sets the same style in front of and behind surfaces, for overlays inside the model.
     pub(super) fn set_style_of_both(&self, context: &GpuContext, style: Style) {
         for buffer in &self.styles {
             context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
         }
     }
 
-    /// Draws all items with the pipeline that is set: lines and points.
+    /// Draws all items as lines or points, with the current pipeline.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, behind: bool) {
         self.draw_instances(pass, behind, 6, self.count);
     }
 
-    /// Draws all items with the pipeline that is set: faces, two items each.
+    /// Draws all items as faces, two items each, with the current pipeline.
     pub(super) fn draw_faces(&self, pass: &mut wgpu::RenderPass<'_>) {
         self.draw_instances(pass, false, 3, self.count / 2);
     }
@@ -115,10 +115,10 @@ impl Overlay {
     }
 }
 
-/// A style, and it behind something.
+/// A style and its fainter version behind surfaces.
 pub(super) fn with_behind(style: Style) -> [Style; 2] {
     let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
-    // What is chosen is seen through everything.
+    // Selected items stay fully visible.
     for state in [state::SELECTED, state::BOTH] {
         behind.colors[state as usize][3] /= BEHIND_OPACITY;
     }
@@ -145,7 +145,7 @@ fn bind(
     })
 }
 
-/// Every edge of polygons once, smaller vertex first, in order of first occurrence.
+/// Unique edges of polygons, smaller vertex first, in order of first occurrence.
 pub(super) fn unique_edges<'a>(polygons: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; 2]> {
     let mut edges: Vec<[u32; 3]> = Vec::new();
     for polygon in polygons {
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edges_of_a_box_are_twelve() {
+    fn box_has_twelve_edges() {
         let faces: [&[u32]; 6] =
             [&[0, 2, 3, 1], &[4, 5, 7, 6], &[0, 1, 5, 4], &[2, 6, 7, 3], &[0, 4, 6, 2], &[1, 3, 7, 5]];
         let edges = unique_edges(faces.into_iter());
@@ -175,8 +175,8 @@ mod tests {
     }
 
     #[test]
-    fn items_keep_state_and_indices_apart() {
+    fn item_packs_state_and_indices() {
         assert_eq!(item(4, 0x0fff_ffff, 7), [0x4fff_ffff, 7]);
-        assert_eq!(NOTHING[0] >> STATE_SHIFT, HIDDEN);
+        assert_eq!(HIDDEN_ITEM[0] >> STATE_SHIFT, HIDDEN);
     }
 }

@@ -1,10 +1,10 @@
-//! Pictures put together on a canvas that nothing can be copied to: WebGL2's. Nobody else needs it.
+//! Composes pictures on a WebGL2 canvas, which does not support copying.
 
 use super::pipelines::layout_of;
 use super::shaders::PART;
 use crate::device::GpuContext;
 
-/// Draws pictures to their places.
+/// Draws textures side by side.
 #[derive(Debug)]
 pub struct PartPainter {
     layout: wgpu::BindGroupLayout,
@@ -12,7 +12,7 @@ pub struct PartPainter {
 }
 
 impl PartPainter {
-    /// For targets of a format.
+    /// `format`: of the targets.
     #[must_use]
     pub fn new(context: &GpuContext, format: wgpu::TextureFormat) -> Self {
         let device = &context.device;
@@ -23,7 +23,7 @@ impl PartPainter {
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(PART.name),
-            // Group 0 is the camera's, which this shader has no use for.
+            // Group 0 is the camera, which this shader does not use.
             bind_group_layouts: &[None, Some(&layout)],
             immediate_size: 0,
         });
@@ -51,7 +51,8 @@ impl PartPainter {
         Self { layout, pipeline }
     }
 
-    /// Records the drawing of pictures into `target`, each with its left edge at some pixel; what none covers is black.
+    /// Records the drawing of textures into `target`, each at a horizontal offset in pixels. The rest is
+    /// cleared to black.
     pub fn paint(
         &self,
         context: &GpuContext,

@@ -1,4 +1,4 @@
-//! Render pipelines, for each format of a target.
+//! Render pipelines, per target format.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,13 +8,13 @@ use super::model::DrawVertex;
 use super::shaders::{self, DrawBinding, DrawShader};
 use crate::device::GpuContext;
 
-/// Samples per pixel.
+/// Multisampling samples per pixel.
 pub(super) const SAMPLES: u32 = 4;
 
-/// Depth of 32 bits: handles far away stay before the cage they belong to.
+/// 32-bit float, so that distant handles are still separated from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Bind group layouts, which do not depend on the target.
+/// Bind group layouts; independent of the target.
 #[derive(Debug)]
 pub(super) struct Layouts {
     pub(super) camera: wgpu::BindGroupLayout,
@@ -25,7 +25,7 @@ pub(super) struct Layouts {
     pub(super) gizmo: wgpu::BindGroupLayout,
 }
 
-/// What is drawn with a pipeline of its own.
+/// Kinds of primitives, each with its pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Background,
@@ -42,7 +42,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Shader, depth, and whether it is blended.
+    /// Shader, depth test, blending.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
             Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
@@ -60,7 +60,7 @@ impl Kind {
     }
 }
 
-/// Pipelines for one format, each made when it is first drawn with: the first frame need not wait for all.
+/// Pipelines for one format, created on first use, so that the first frame is not delayed.
 #[derive(Debug)]
 pub(super) struct Pipelines {
     context: GpuContext,
@@ -69,7 +69,7 @@ pub(super) struct Pipelines {
     made: [OnceLock<wgpu::RenderPipeline>; 11],
 }
 
-/// A vertex of the gizmo: position, normal, colour.
+/// Bytes of a gizmo vertex: position, normal, colour.
 pub(super) const GIZMO_STRIDE: u64 = 40;
 
 const GIZMO_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
@@ -78,20 +78,20 @@ const GIZMO_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
 const MESH_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
     wgpu::vertex_attr_array![0 => Uint32, 1 => Float32x2, 2 => Unorm16x4];
 
-/// How depth is treated.
+/// Depth test and write.
 #[derive(Clone, Copy)]
 struct Depth {
     compare: CompareFunction,
     write: bool,
 }
 
-/// What is nearer covers what is behind.
+/// Opaque surfaces.
 const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true };
-/// Shows where nothing nearer is, and covers nothing.
+/// Overlays in front of surfaces.
 const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
-/// Shows where something nearer is.
+/// Overlays behind surfaces.
 const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
-/// Knows no depth.
+/// Without depth test.
 const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
@@ -133,7 +133,7 @@ impl Layouts {
         }
     }
 
-    /// Groups of a shader after the camera's.
+    /// Bind groups of a shader, without the camera's.
     fn of(&self, shader: &DrawShader) -> Vec<&wgpu::BindGroupLayout> {
         match shader.name {
             "draw_mesh" => vec![&self.vertices, &self.material],

@@ -1,4 +1,4 @@
-//! What of it all is drawn, and how: plain values that a page or a command sets.
+//! What is drawn and how: plain values, set by the page or a command.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -6,76 +6,76 @@ use std::sync::Arc;
 use cagework_core::slice::Slice;
 use glam::{Quat, Vec3};
 
-/// Colours of the surroundings.
+/// Colours of background and overlays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
     /// For dark pages.
     #[default]
     Dark,
-    /// For light pages and for print.
+    /// For light pages and print.
     Light,
 }
 
-/// How the mesh is drawn.
+/// Display of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeshStyle {
-    /// Not at all.
+    /// Not drawn.
     Hidden,
     /// With its materials.
     #[default]
     Solid,
-    /// One plain colour, whatever its materials.
+    /// One colour, without materials.
     Clay,
-    /// Weights of one cage vertex, from 0 to the largest of the mesh (or to 1), in the colours of [`super::colormap`]; negative
-    /// ones in a warning colour. See [`crate::Session::value_range`] for a legend.
+    /// Weights of a control in the colours of [`super::colormap`], from 0 to the mesh's maximum or to 1;
+    /// negative weights in a warning colour. Legend: [`crate::Session::value_range`].
     Weights {
-        /// The cage vertex.
+        /// Index of the control.
         column: u32,
     },
-    /// How far the weights miss the rest pose, over the cage's diagonal, logarithmic from
+    /// Reproduction error of the weights at rest, over the cage diagonal, on a logarithmic scale:
     /// [`super::colormap::ERROR_RANGE`].
     Errors,
 }
 
-/// What is drawn.
+/// Contents and display options of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneOptions {
-    /// Colours of the surroundings.
+    /// Colours of background and overlays.
     pub theme: Theme,
-    /// Whether the gradient behind everything is drawn; without it the picture is transparent there.
+    /// Whether the background is drawn. Otherwise it is transparent.
     pub backdrop: bool,
-    /// How the mesh is drawn.
+    /// Display of the mesh.
     pub mesh: MeshStyle,
-    /// Whether colours of weights span 0 to 1, not 0 to the largest.
+    /// Whether colours of weights span 0 to 1 instead of 0 to the maximum.
     pub weights_to_one: bool,
-    /// How much each vertex of the mesh is greyed where it shows its materials, 0 to 1: what stays where it is.
+    /// Greying of each vertex in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], 0 to 1, for held vertices.
     /// `[n_vertices]`
     pub greyed: Option<Arc<Vec<f32>>>,
-    /// Whether the mesh's edges are drawn on it.
+    /// Whether the mesh's edges are drawn.
     pub mesh_edges: bool,
-    /// Whether the mesh in its rest pose is drawn as a wireframe over everything, as in the paper's figures 2 to 5.
+    /// Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of the paper.
     pub base_wireframe: bool,
     /// Whether the cage's edges are drawn.
     pub cage_lines: bool,
-    /// Whether the cage's vertices are drawn as round handles.
+    /// Whether handles are drawn at the cage's vertices.
     pub handles: bool,
-    /// Whether the cage steps back: fainter lines, and only handles that are chosen or pointed at.
+    /// Whether the cage is drawn fainter, with only selected and hovered handles.
     pub cage_faint: bool,
-    /// Ranges of [`super::DrawModel::triangles`] that are not drawn, each of whole groups.
+    /// Hidden ranges of [`super::DrawModel::triangles`], each of whole groups.
     pub hidden: Vec<Range<u32>>,
-    /// Whether a floor grid is drawn below the model.
+    /// Whether the floor grid is drawn.
     pub floor: bool,
-    /// What of the cage is chosen or pointed at.
+    /// Selected and hovered elements of the cage.
     pub selection: Selection,
-    /// Handles of the tool in use.
+    /// Transform gizmo.
     pub gizmo: Option<Gizmo>,
-    /// A slice of the grid.
+    /// Slice of the grid.
     pub slice: Option<SliceView>,
     /// Places with a problem.
     pub marks: Marks,
-    /// What a hand holds of the model: points, and a line to where it cannot follow.
+    /// Grabbed points, with lines to targets that they cannot reach.
     pub held: Marks,
-    /// Joints of a skeleton, seen through everything.
+    /// Joints of a skeleton, visible through surfaces.
     pub joints: Marks,
 }
 
@@ -104,67 +104,67 @@ impl Default for SceneOptions {
     }
 }
 
-/// What of the cage is chosen or pointed at. Numbers that the cage does not have are ignored.
+/// Selected and hovered elements of the cage. Invalid indices are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// Chosen vertices.
+    /// Selected vertices.
     pub vertices: Vec<u32>,
-    /// Chosen edges, by their vertices in any order.
+    /// Selected edges, as vertices in any order.
     pub edges: Vec<[u32; 2]>,
-    /// Chosen faces.
+    /// Selected faces.
     pub faces: Vec<u32>,
-    /// The vertex under the pointer.
+    /// Hovered vertex.
     pub hovered_vertex: Option<u32>,
-    /// The edge under the pointer.
+    /// Hovered edge.
     pub hovered_edge: Option<[u32; 2]>,
-    /// The face under the pointer.
+    /// Hovered face.
     pub hovered_face: Option<u32>,
-    /// Vertices without a partner, where symmetry is asked for.
+    /// Vertices without a mirror image, in symmetric editing.
     pub unmatched: Vec<u32>,
 }
 
-/// What a gizmo does.
+/// Operation of a gizmo, with the shape of its handles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GizmoMode {
-    /// Arrows.
+    /// Move: arrows.
     #[default]
     Move,
-    /// Rings.
+    /// Rotate: rings.
     Rotate,
-    /// Boxes.
+    /// Scale: boxes.
     Scale,
 }
 
-/// A part of a gizmo.
+/// A handle of a gizmo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GizmoPart {
-    /// Along or around one of its axes: 0, 1, 2.
+    /// Along or about an axis: 0, 1, 2.
     Axis(u8),
-    /// In the plane across one of its axes, when moving.
+    /// Moving in the plane normal to an axis.
     Plane(u8),
-    /// In the view plane (moving), around the view direction (rotating), or all axes alike (scaling).
+    /// Moving in the view plane, rotating about the view direction, or uniform scaling.
     View,
 }
 
-/// Handles around the selection, of constant size in the picture.
+/// A transform gizmo. Its size in the picture is constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gizmo {
-    /// What it does.
+    /// Operation.
     pub mode: GizmoMode,
-    /// Where it is, world space.
+    /// Origin, world space.
     pub center: Vec3,
-    /// Its axes.
+    /// Orientation of the axes.
     pub rotation: Quat,
-    /// The part under the pointer or in use.
+    /// Hovered or dragged handle.
     pub active: Option<GizmoPart>,
 }
 
-/// How a slice is drawn.
+/// Display of a slice.
 #[derive(Clone, Debug)]
 pub struct SliceView {
-    /// The slice. Made anew for another place; sharing it makes setting a scene cheap.
+    /// The slice. Shared, so that setting a scene is cheap; compared by identity.
     pub slice: Arc<Slice>,
-    /// One coordinate's value, from 0 to its largest, instead of the kinds of cells: a cage vertex. Needs [`Slice::weights`].
+    /// Control whose weights are shown, from 0 to the maximum, instead of cell types. Requires [`Slice::weights`].
     pub column: Option<u32>,
 }
 
@@ -174,7 +174,7 @@ impl PartialEq for SliceView {
     }
 }
 
-/// Places on or beside the model: of a problem, or what is held.
+/// Marked places on or near the model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
     /// Points, world space.
@@ -183,8 +183,8 @@ pub struct Marks {
     pub rings: Vec<Vec3>,
     /// Segments, world space.
     pub segments: Vec<[Vec3; 2]>,
-    /// Vertices of the mesh, where they are now.
+    /// Vertices of the mesh, which follow the deformation.
     pub mesh_vertices: Vec<u32>,
-    /// Vertices of the cage, where they are now.
+    /// Vertices of the cage, which follow its pose.
     pub cage_vertices: Vec<u32>,
 }

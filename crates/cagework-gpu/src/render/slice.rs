@@ -1,4 +1,4 @@
-//! The slice of the grid on the GPU: a table of its cells, made by the CPU.
+//! A slice of the grid: a table of cells, filled by the CPU.
 
 use super::colormap::MIN_WEIGHT_RANGE;
 use super::layout::SliceView as Uniform;
@@ -8,7 +8,7 @@ use super::theme::linear;
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
-/// A slice as it is drawn.
+/// GPU data of a slice.
 #[derive(Debug)]
 pub(super) struct SlicePlane {
     bind_group: wgpu::BindGroup,

@@ -1,13 +1,13 @@
-//! Textures: uploaded with smaller versions of themselves, averaged in linear light.
+//! Texture upload, with mipmaps averaged in linear light.
 
 use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 
-/// Steps of the table that leads from linear light back to bytes: finer than sRGB's steepest place needs.
+/// Size of the table for encoding sRGB. Its step is smaller than one byte at sRGB's steepest slope.
 const ENCODE_STEPS: usize = 8192;
 
-/// sRGB bytes to linear light and back.
+/// Lookup tables for decoding and encoding sRGB bytes.
 struct Tables {
     linear: Vec<f32>,
     encoded: Vec<u8>,
@@ -31,7 +31,7 @@ impl Tables {
         Self { linear, encoded }
     }
 
-    /// The image at half its size, rounded down, each pixel the mean of four.
+    /// Image at half size, rounded down; each pixel is the mean of four.
     fn halved(&self, image: &DrawTexture) -> DrawTexture {
         let (width, height) = ((image.width / 2).max(1), (image.height / 2).max(1));
         let mut rgba = Vec::with_capacity(4 * (width * height) as usize);
@@ -55,7 +55,7 @@ impl Tables {
     }
 }
 
-/// The image and all its halves, largest first; no side larger than `most`.
+/// Mip levels, largest first, omitting those with a side above `most`.
 fn levels(image: &DrawTexture, most: u32) -> Vec<DrawTexture> {
     let tables = Tables::new();
     let mut levels = vec![image.clone()];
@@ -67,7 +67,7 @@ fn levels(image: &DrawTexture, most: u32) -> Vec<DrawTexture> {
     levels
 }
 
-/// Uploads an image, sRGB with straight alpha.
+/// Uploads an image: sRGB, straight alpha.
 pub(super) fn upload(
     context: &GpuContext,
     allocator: &mut Allocator<'_>,
@@ -114,7 +114,7 @@ mod tests {
         DrawTexture { width, height, rgba: rgba.collect(), ..DrawTexture::default() }
     }
 
-    /// Half black, half white is linear 0.5, and that is sRGB 188 (IEC 61966-2-1).
+    /// Half black, half white is 0.5 in linear light: sRGB 188 (IEC 61966-2-1).
     #[test]
     fn halves_are_averaged_in_linear_light() {
         let checkers = image(4, 4, |x, y| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn one_colour_stays_what_it_is() {
+    fn mip_levels_keep_a_constant_colour() {
         let plain = image(7, 3, |_, _| [10, 100, 200, 128]);
         for level in levels(&plain, 8192) {
             assert!(level.rgba.chunks(4).all(|p| p == [10, 100, 200, 128]), "{} wide", level.width);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn larger_images_than_the_device_allows_are_halved() {
+    fn images_above_the_size_limit_are_halved() {
         let wide = image(16_384, 1, |_, _| [1; 4]);
         assert_eq!(levels(&wide, 8192)[0].width, 8192);
         assert_eq!(levels(&wide, 2048)[0].width, 2048);

@@ -1,24 +1,24 @@
-//! Colours: one table per theme, in sRGB as designers write them.
+//! Colours of themes, in sRGB.
 
 use super::layout::Style;
-use super::marks::RING;
+use super::marks::RING_STATE;
 use super::scene::Theme;
 
-/// States of handles, edges and faces; numbers of [`Style::colors`].
+/// States of handles, edges and faces: indices into [`Style::colors`].
 pub(super) mod state {
-    /// Neither chosen nor pointed at.
+    /// Neither selected nor hovered.
     pub(in crate::render) const NORMAL: u32 = 0;
-    /// Under the pointer.
+    /// Hovered.
     pub(in crate::render) const HOVERED: u32 = 1;
-    /// Chosen.
+    /// Selected.
     pub(in crate::render) const SELECTED: u32 = 2;
-    /// Chosen and under the pointer.
+    /// Selected and hovered.
     pub(in crate::render) const BOTH: u32 = 3;
-    /// Without a partner, where symmetry is asked for.
+    /// Without a mirror image, in symmetric editing.
     pub(in crate::render) const UNMATCHED: u32 = 4;
 }
 
-/// Colours of a theme: sRGB bytes and alpha.
+/// Colours of a theme.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Palette {
     pub(super) background_top: Color,
@@ -31,7 +31,7 @@ pub(super) struct Palette {
     pub(super) selected: Color,
     pub(super) both: Color,
     pub(super) unmatched: Color,
-    /// Its smooth surface.
+    /// Lines on the cage's smooth surface.
     pub(super) curves: Color,
     /// Controls inside.
     pub(super) inner: Color,
@@ -44,15 +44,14 @@ pub(super) struct Palette {
     pub(super) cell_lines: Color,
 }
 
-/// `0xRRGGBB` and alpha.
+/// sRGB as `0xRRGGBB`, and alpha.
 pub(super) type Color = (u32, f32);
 
-/// Colours of the axes x, y, z, of what belongs to none, and of the ring around the view: thin, so that it must differ
-/// from dark and light.
+/// Colours of handles: axes x, y, z, view handle, view ring. The ring is thin and must contrast with dark and light.
 pub(super) const AXES: [Color; 5] =
     [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0), (0x8a94a6, 1.0)];
 
-/// The active part of a gizmo.
+/// Colour of the active handle.
 pub(super) const ACTIVE: Color = (0xffc53d, 1.0);
 
 const DARK: Palette = Palette {
@@ -108,25 +107,25 @@ impl Theme {
     }
 }
 
-/// Linear from sRGB (IEC 61966-2-1), with alpha.
+/// Linear colour from sRGB (IEC 61966-2-1); alpha is unchanged.
 pub(super) fn linear((rgb, alpha): Color) -> [f32; 4] {
     let channel = |shift: u32| linear_from_srgb((rgb >> shift & 0xff) as u8);
     [channel(16), channel(8), channel(0), alpha]
 }
 
-/// Linear, 0 to 1, from a byte of sRGB (IEC 61966-2-1).
+/// Linear value in [0, 1] from an sRGB byte (IEC 61966-2-1).
 fn linear_from_srgb(byte: u8) -> f32 {
     let c = f32::from(byte) / 255.0;
     if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A byte of sRGB from linear, 0 to 1.
+/// sRGB byte from a linear value in [0, 1].
 fn srgb_from_linear(c: f32) -> u8 {
     let srgb = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
     (255.0 * srgb).round() as u8
 }
 
-/// Takes back that colours are blended multiplied by their alpha: files of pictures have them without. sRGB
+/// Converts premultiplied to straight alpha, which image files use. sRGB bytes.
 pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
     if (1..=254).contains(alpha) {
         for value in rgb {
@@ -136,7 +135,7 @@ pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
 }
 
 impl Palette {
-    /// Colours of all states, `normal` given.
+    /// Colours of all states, with `normal` for the first.
     fn states(&self, normal: Color) -> [[f32; 4]; 8] {
         let mut colors = [linear(normal); 8];
         colors[state::HOVERED as usize] = linear(self.hovered);
@@ -158,30 +157,30 @@ impl Palette {
         }
     }
 
-    /// The same where the cage steps back.
+    /// Edges of a faint cage.
     pub(super) fn faint_lines(&self) -> Style {
         Style { opacity: 0.35, ..self.cage_lines() }
     }
 
-    /// Where faces of the cage meet on its smooth surface.
+    /// Edges between cage faces on the smooth surface.
     pub(super) fn curves(&self, is_faint: bool) -> Style {
         let opacity = if is_faint { 0.75 } else { 1.0 };
         Style { colors: [linear(self.curves); 8], widths: [[1.25; 4]; 2], opacity, ..self.cage_lines() }
     }
 
-    /// Balls and tubes around controls inside.
+    /// Outlines of balls and tubes around controls inside.
     pub(super) fn shells(&self) -> Style {
         Style { colors: self.states(self.inner), widths: [[0.9; 4]; 2], opacity: 0.6, ..self.cage_lines() }
     }
 
-    /// Lines between controls inside.
+    /// Edges between controls inside.
     pub(super) fn bones(&self) -> Style {
         Style { colors: self.states(self.inner), widths: [[2.0; 4]; 2], ..self.cage_lines() }
     }
 
     /// Controls inside.
     pub(super) fn inner(&self) -> Style {
-        // It lies on the model, whatever its colour, and not on the background.
+        // White rim: they are in front of the model, not the background.
         Style { colors: self.states(self.inner), rim_color: [1.0, 1.0, 1.0, 0.9], ..self.handles() }
     }
 
@@ -207,7 +206,7 @@ impl Palette {
         Style { colors, opacity: 1.0, size: 1.0, ..Style::default() }
     }
 
-    /// The mesh at rest, or its edges where it is.
+    /// Wireframe of the rest pose, or edges of the mesh.
     pub(super) fn wire(&self, base: bool) -> Style {
         let color = if base { self.wire } else { self.mesh_edges };
         Style {
@@ -233,16 +232,16 @@ impl Palette {
         }
     }
 
-    /// What a hand holds of the model.
+    /// Grabbed points.
     pub(super) fn held(&self) -> Style {
         Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
 
-    /// Joints: dots, and rings of the same colour.
+    /// Joints: dots and rings.
     pub(super) fn joints(&self) -> Style {
         let color = linear((self.wire.0, 1.0));
         let mut colors = [color; 8];
-        colors[RING as usize][3] = 0.0;
+        colors[RING_STATE as usize][3] = 0.0;
         Style { colors, widths: [[8.0, 9.0, 8.0, 8.0], [2.0; 4]], rim_color: color, rim: 2.0, ..self.marks() }
     }
 }
@@ -257,15 +256,14 @@ mod tests {
         0.2126 * r + 0.7152 * g + 0.0722 * b
     }
 
-    /// Contrast as WCAG 2 defines it.
+    /// Contrast ratio of WCAG 2.
     fn contrast(a: Color, b: Color) -> f32 {
         let (a, b) = (luminance(a), luminance(b));
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
     }
 
-    /// WCAG 2.2, 1.4.11: graphics need 3 : 1 against what is next to them.
     #[test]
-    fn a_colour_comes_back_from_its_product_with_alpha() {
+    fn division_by_alpha_inverts_premultiplication() {
         for alpha in [40_u8, 128, 254, 255] {
             let shown = 200_u8;
             let product = srgb_from_linear(linear_from_srgb(shown) * f32::from(alpha) / 255.0);
@@ -277,8 +275,9 @@ mod tests {
         }
     }
 
+    /// WCAG 2.2, 1.4.11: graphics need a contrast of 3 : 1 to adjacent colours.
     #[test]
-    fn cage_and_marks_stand_out_from_the_background() {
+    fn cage_and_marks_contrast_with_the_background() {
         for palette in [&DARK, &LIGHT] {
             for color in [
                 palette.cage,

@@ -1,4 +1,4 @@
-//! A session made again: beside the first, or on another device.
+//! Copies of a session: on the same GPU, or on another one.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 impl Session {
-    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with: those of closed
-    /// forms, which know the plain cage alone.
+    /// A session on the same GPU with the same model, cage and pose, for comparing other weights. Contains
+    /// only the cage, without controls inside, as closed forms require.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
@@ -26,8 +26,8 @@ impl Session {
         Ok(twin)
     }
 
-    /// The same on another device, after this one was lost: model, cage, weights, pose, scene, camera. This session stays as it is,
-    /// so that a device without enough memory leaves it for the next attempt.
+    /// The same session on another device, after a loss of this one. Keeps `self`, so that it can be repeated
+    /// if the device is out of memory.
     ///
     /// # Errors
     /// As the calls that set them.

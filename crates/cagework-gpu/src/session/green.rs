@@ -1,4 +1,4 @@
-//! Weights whose columns are not the cage's vertices alone.
+//! Weights with columns for the cage's triangles.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -11,7 +11,8 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Takes Green coordinates: [`cagework_core::green::green_weights`], which have a column for each triangle of the cage as well.
+    /// Uses Green coordinates: [`cagework_core::green::green_weights`], with additional columns for the
+    /// cage's triangles.
     ///
     /// # Errors
     /// As [`Self::adopt`].
@@ -22,8 +23,8 @@ impl Session {
         self.bound(weights.into(), Arc::default(), true, None).await
     }
 
-    /// What the columns of weights stand for where the controls are at `positions`: them, and for Green coordinates, of plain
-    /// cages, the triangles.
+    /// Vectors that the columns of the weights multiply, for controls at `positions`: these and, with Green
+    /// coordinates, those of the triangles.
     pub(super) fn columns<'a>(&self, is_green: bool, positions: &'a [Vec3]) -> Cow<'a, [Vec3]> {
         match self.cage() {
             Some(cage) if is_green => green_controls(cage, positions).into(),
@@ -32,13 +33,14 @@ impl Session {
     }
 }
 
-/// Whether weights are of so many vertices and controls.
+/// Checks the size of weights.
 pub(super) fn check_size(weights: &Weights, rows: usize, columns: usize) -> Result<(), GpuError> {
     if (weights.n_rows(), weights.n_columns()) == (rows, columns) {
         return Ok(());
     }
     let (of, by) = (weights.n_rows(), weights.n_columns());
-    let reason =
-        format!("weights are of {of} vertices and {by} controls, but there are {rows} and {columns}");
+    let reason = format!(
+        "the weights are for {of} vertices and {by} controls, the model and cage have {rows} and {columns}"
+    );
     Err(GpuError::Model { reason })
 }

@@ -1,6 +1,6 @@
-//! What moves the mesh when the cage moves: kernels, or the processor where the device only draws.
+//! Deforms the mesh, by kernels, or on the CPU if the device only draws.
 //!
-//! Which one is decided when the device is opened ([`GpuContext::draws_only`]); to the session both are the same.
+//! Chosen when the device is opened ([`GpuContext::draws_only`]); both have the same interface.
 
 use std::sync::Arc;
 
@@ -20,17 +20,17 @@ use crate::render::DrawModel;
 use crate::skin::Skinner;
 use crate::table::{Entry, Table};
 
-/// Deforms one mesh, frame after frame; `[positions, normals]` are what is drawn.
+/// Deforms one mesh repeatedly. `[positions, normals]` are drawn.
 #[derive(Debug)]
 pub(super) enum Mover {
-    /// By kernels: a moved cage is all that is uploaded.
+    /// On the GPU: only the cage is uploaded.
     Kernels { deformer: Box<Deformer>, tables: [Table; 2] },
-    /// By the processor: every vertex is uploaded.
+    /// On the CPU: all vertices are uploaded.
     Processor { model: Arc<DrawModel>, triangles: Vec<[u32; 3]>, tables: [Table; 2] },
 }
 
 impl Mover {
-    /// `on_gpu`: the same weights, if they are there already.
+    /// `on_gpu`: `weights` on the GPU, if available.
     pub(super) async fn new(
         context: &GpuContext,
         model: &Arc<DrawModel>,
@@ -57,8 +57,8 @@ impl Mover {
         Ok(Self::Kernels { deformer: Box::new(deformer), tables })
     }
 
-    /// Holds parts that the cage does not bend from the next pose on; none: everything follows. The processor is told with each
-    /// frame.
+    /// Sets held and rigid parts from the next pose on, or none. On the CPU they are passed to each
+    /// deformation instead.
     pub(super) async fn hold(
         &mut self,
         context: &GpuContext,
@@ -79,16 +79,16 @@ impl Mover {
         tables.each_ref()
     }
 
-    /// Takes where the cage is.
+    /// Sets the cage's pose.
     pub(super) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
         match self {
             Self::Kernels { deformer, .. } => deformer.pose(context, cage_positions),
-            // It looks when it deforms: a pose that no frame shows costs nothing.
+            // The CPU deforms in `encode`, only for poses that are drawn.
             Self::Processor { .. } => {}
         }
     }
 
-    /// Sees to it that what is recorded next finds the mesh where the cage has it: `positions`, by the processor.
+    /// Deforms the mesh for the commands recorded next. `positions`: computes them on the CPU.
     pub(super) fn encode(
         &self,
         context: &GpuContext,
@@ -97,7 +97,7 @@ impl Mover {
     ) {
         match self {
             Self::Kernels { deformer, .. } => deformer.encode(encoder),
-            // There is none elsewhere; the condition leaves this out of the page's main artifact.
+            // Always true; the condition removes this code from the page's WebGPU build.
             Self::Processor { model, .. } if context.draws_only() => {
                 self.show(context, model.with_copies(&positions()));
             }
@@ -105,7 +105,7 @@ impl Mover {
         }
     }
 
-    /// The same where a clip has it.
+    /// Like [`Self::encode`], with positions from `skinner`.
     pub(super) fn encode_skinned(
         &self,
         context: &GpuContext,
@@ -119,7 +119,7 @@ impl Mover {
         }
     }
 
-    /// What skins in its place while a clip plays. `skin` of the model's vertices.
+    /// Prepares playing a clip. `skin`: of the model's vertices.
     pub(super) async fn skinner(
         &self,
         context: &GpuContext,
@@ -133,7 +133,7 @@ impl Mover {
         Skinner::new(context, skin, field, positions).await
     }
 
-    /// Uploads vertices and their normals.
+    /// Uploads positions and computes and uploads normals.
     fn show(&self, context: &GpuContext, at: Vec<Vec3>) {
         let Self::Processor { triangles, tables: [positions, normals], .. } = self else { return };
         let shading = vertex_normals(&at, triangles);
@@ -143,7 +143,7 @@ impl Mover {
         }
     }
 
-    /// Where the mesh is, object units: `[n_vertices]`, and copies after them or not.
+    /// Current positions, object units: `[n_vertices]`, on the GPU followed by copies.
     pub(super) async fn read_positions(
         &self,
         context: &GpuContext,
@@ -151,7 +151,7 @@ impl Mover {
     ) -> Result<Vec<Vec3>, GpuError> {
         match self {
             Self::Kernels { deformer, .. } => {
-                // Again even if nothing moved: it costs a millisecond, and a frame may not have been drawn yet.
+                // Always runs, for 1 ms: the pose may not have been drawn yet.
                 deformer.run(context).await?;
                 deformer.read_positions(context).await
             }

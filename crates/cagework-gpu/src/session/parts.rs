@@ -1,4 +1,4 @@
-//! What of the model the cage does not bend.
+//! Held and rigid parts of the model.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Lets parts of the model stay as they are or keep their shape, whatever the cage does; weights come and go meanwhile.
+    /// Sets held and rigid parts of the model. They are kept when weights change.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without a model, [`GpuError::Model`] if a vertex does not exist; otherwise as
@@ -22,14 +22,14 @@ impl Session {
         let is_there = |v: &u32| (*v as usize) < n;
         let is_whole = parts.stays.is_empty() || parts.stays.len() == n;
         if !is_whole || !parts.rigid.iter().flatten().all(is_there) {
-            let reason = "a part names a vertex that does not exist".to_owned();
+            let reason = "a held or rigid part refers to a vertex that does not exist".to_owned();
             return Err(GpuError::Model { reason });
         }
         self.parts = parts;
         self.hold().await
     }
 
-    /// Gets the parts ready for the weights of the moment.
+    /// Prepares the parts for the current weights.
     pub(super) async fn hold(&mut self) -> Result<(), GpuError> {
         let (Some(bound), Some(model), Some(set)) = (&self.bound, &self.model, &self.controls) else {
             return Ok(());
@@ -49,10 +49,10 @@ impl Session {
         Ok(())
     }
 
-    /// Where vertices are with the controls at `pose`, by the processor, `[n_vertices]`, object units; none before there are weights.
+    /// Vertices deformed on the CPU, `[n_vertices]`, object units. `None` without weights.
     ///
     /// # Panics
-    /// If there is not one position per control.
+    /// If the number of positions differs from the number of controls.
     #[must_use]
     pub fn deformed(&self, pose: &[Vec3]) -> Option<Vec<Vec3>> {
         let bound = self.bound.as_ref()?;

@@ -1,4 +1,4 @@
-//! Pictures that are read back.
+//! Pictures that are read back to the CPU.
 
 use glam::Vec2;
 
@@ -7,24 +7,25 @@ use crate::buffers::Allocator;
 use crate::error::GpuError;
 use crate::render::{Target, divide_by_alpha};
 
-/// Format of pictures that are read back.
+/// Format of pictures.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
-/// Largest side of a picture, the baseline's limit, pixels; less where the GPU has less.
+/// Maximum side of a picture, pixels: the baseline's texture size. Less if the GPU supports less.
 pub const MAX_PICTURE: u32 = 8192;
 
 impl Session {
-    /// A picture of `size` pixels, `scale` of them per CSS pixel, from where the camera is. RGBA, sRGB, rows from
-    /// the top; opaque with a backdrop, else colours are not multiplied by alpha: `[height, width, 4]`.
+    /// Renders a picture of `size` pixels, with `scale` pixels per CSS pixel, and reads it back. RGBA, sRGB,
+    /// straight alpha, rows from the top; opaque if the scene has a background. `[height, width, 4]`
     ///
     /// # Errors
-    /// [`GpuError::Model`] for a size of 0 or above [`MAX_PICTURE`] or what the GPU can draw; [`GpuError::OutOfMemory`],
-    /// [`GpuError::DeviceLost`], [`GpuError::Refused`].
+    /// [`GpuError::Model`] if a side is not in 1 to [`MAX_PICTURE`], or above the GPU's limit;
+    /// [`GpuError::OutOfMemory`], [`GpuError::DeviceLost`], [`GpuError::Refused`].
     pub async fn picture(&mut self, size: [u32; 2], scale: f32) -> Result<Vec<u8>, GpuError> {
         let [width, height] = size;
         let most = MAX_PICTURE.min(self.context.device.limits().max_texture_dimension_2d);
         if size.iter().any(|s| !(1..=most).contains(s)) {
-            let reason = format!("a picture of {width} x {height} pixels: sides are 1 to {most}");
+            let reason =
+                format!("a picture cannot have {width} x {height} pixels: sides must be 1 to {most}");
             return Err(GpuError::Model { reason });
         }
         self.context.check()?;

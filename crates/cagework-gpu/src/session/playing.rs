@@ -1,4 +1,4 @@
-//! Clips: the mesh follows a skin.
+//! Clips: the mesh follows its skin.
 
 use cagework_core::dynamic::DisplacementField;
 use cagework_core::skin::Skin;
@@ -8,12 +8,12 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Lets the mesh follow a skin instead of the cage, until [`Self::stop_playing`]; [`Self::play`] says where it is. `skin` of
-    /// the model's vertices; `field` bends what it has moved.
+    /// Makes the mesh follow a skin instead of the cage until [`Self::stop_playing`]. [`Self::play`] sets its
+    /// pose. `skin`: of the model's vertices. `field`: displacements added after skinning.
     ///
     /// # Errors
-    /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] for another model's skin; otherwise as
-    /// [`crate::buffers::Allocator::zeros`].
+    /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] if the skin's size does not match; otherwise
+    /// as [`crate::buffers::Allocator::zeros`].
     pub async fn start_playing(
         &mut self,
         skin: &Skin,
@@ -30,7 +30,7 @@ impl Session {
         Ok(())
     }
 
-    /// Matrices of the joints and weights of the morph targets; the next frame shows them.
+    /// Sets joint matrices and morph weights for the next frame.
     pub fn play(&mut self, palette: &[Mat4], targets: &[f32]) {
         if let Some(skinner) = &mut self.playing {
             skinner.pose(&self.context, palette, targets);
@@ -38,7 +38,7 @@ impl Session {
         }
     }
 
-    /// The mesh follows the cage again.
+    /// Makes the mesh follow the cage again.
     pub fn stop_playing(&mut self) {
         self.moved |= self.playing.take().is_some();
     }

@@ -1,4 +1,4 @@
-//! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
+//! Kernels of each frame: deformation, including vertices outside the cage, skinning, and normals.
 
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
@@ -9,23 +9,23 @@ use cagework_gpu::skin::{SkinTables, field_table};
 use cagework_pose::parts::{PieceMotion, hold_parts};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
-use super::support::{Seeded, assert_close, egg, flat};
+use super::support::{Rng, assert_close, egg, flat};
 use super::{ROWS, bytes, run};
 
-/// Sums of dozens of products of weights and coordinates near 1.
+/// Rounding of sums of dozens of products near 1.
 const POINT_TOLERANCE: f32 = 2e-6;
 
-/// Unit vectors: `inverseSqrt` is good to 2 ulp.
+/// Rounding of unit vectors: `inverseSqrt` has an error of 2 ulp.
 const NORMAL_TOLERANCE: f32 = 2e-6;
 
-/// A matrix of weights with rows of different lengths, some empty.
-fn random_weights(seeded: &mut Seeded, n_rows: usize, n_columns: u32) -> Weights {
+/// Random weights; rows have different lengths, some are empty.
+fn random_weights(rng: &mut Rng, n_rows: usize, n_columns: u32) -> Weights {
     let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
     for _ in 0..n_rows {
-        let stride = 1 + (seeded.bits() % 40) as u32;
+        let stride = 1 + (rng.bits() % 40) as u32;
         let first = indices.len();
         indices.extend((0..n_columns).step_by(stride as usize).skip(1));
-        let row = seeded.values(indices.len() - first);
+        let row = rng.values(indices.len() - first);
         let total: f32 = row.iter().sum();
         data.extend(row.iter().map(|w| w / total));
         indptr.push(indices.len() as u32);
@@ -43,10 +43,10 @@ fn unpadded(values: &[f32]) -> Vec<f32> {
 
 #[test]
 fn deform_vertices_matches_cpu() {
-    let mut seeded = Seeded(12);
-    let weights = random_weights(&mut seeded, 203, 31);
+    let mut rng = Rng(12);
+    let weights = random_weights(&mut rng, 203, 31);
     let sliced = SlicedWeights::new(&weights);
-    let posed: Vec<Vec3> = (0..31).map(|_| seeded.point()).collect();
+    let posed: Vec<Vec3> = (0..31).map(|_| rng.point()).collect();
     let mut expected = vec![Vec3::ZERO; 203];
     let inputs = [
         bytes(&sliced.slices).to_vec(),
@@ -65,28 +65,28 @@ fn deform_vertices_matches_cpu() {
 
 #[test]
 fn skin_vertices_matches_cpu() {
-    let mut seeded = Seeded(15);
+    let mut rng = Rng(15);
     let (n, n_joints, n_targets) = (131, 9, 4);
     let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
     for v in 0..n {
-        skin.positions.push(seeded.point());
-        // One to five joints; every third vertex has targets.
-        let weights: Vec<f32> = seeded.values(1 + v % 5).iter().map(|w| w.abs() + 0.1).collect();
+        skin.positions.push(rng.point());
+        // One to five joints; every third vertex has morph targets.
+        let weights: Vec<f32> = rng.values(1 + v % 5).iter().map(|w| w.abs() + 0.1).collect();
         let total: f32 = weights.iter().sum();
         skin.joints.extend((0..).zip(weights).map(|(k, w)| ((v as u32 + 3 * k) % n_joints, w / total)));
         skin.joint_starts.push(skin.joints.len() as u32);
         if v % 3 == 0 {
-            skin.deltas.extend((0..n_targets).map(|target| (target, seeded.point())));
+            skin.deltas.extend((0..n_targets).map(|target| (target, rng.point())));
         }
         skin.delta_starts.push(skin.deltas.len() as u32);
     }
     let palette: Vec<Mat4> = (0..n_joints)
         .map(|_| {
-            let turn = Quat::from_axis_angle(seeded.point().normalize_or(Vec3::Y), 2.0);
-            Mat4::from_scale_rotation_translation(Vec3::ONE + 0.2 * seeded.point(), turn, seeded.point())
+            let turn = Quat::from_axis_angle(rng.point().normalize_or(Vec3::Y), 2.0);
+            Mat4::from_scale_rotation_translation(Vec3::ONE + 0.2 * rng.point(), turn, rng.point())
         })
         .collect();
-    let targets = seeded.values(n_targets as usize);
+    let targets = rng.values(n_targets as usize);
     let tables = SkinTables::new(&skin);
     let matrices: Vec<[f32; 16]> = palette.iter().map(Mat4::to_cols_array).collect();
     let inputs = [
@@ -106,37 +106,36 @@ fn skin_vertices_matches_cpu() {
 
 #[test]
 fn bend_vertices_matches_cpu() {
-    let mut seeded = Seeded(16);
+    let mut rng = Rng(16);
     let TriMesh { positions, triangles } = egg(5, 6);
     let faces = triangles.iter().map(|t| t.to_vec()).collect();
     let lattice = Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap());
     let n = lattice.dims.element_product() as usize;
-    let values = (0..n).map(|_| seeded.point().extend(0.0)).collect();
+    let values = (0..n).map(|_| rng.point().extend(0.0)).collect();
     let size = lattice.cell * lattice.dims.as_vec3();
-    // In the lattice, on its edge and beyond it.
+    // Inside the lattice, on its boundary and outside.
     let mut points: Vec<Vec3> = (0..131)
-        .map(|_| lattice.origin + 0.5 * size + 0.7 * size * seeded.point())
+        .map(|_| lattice.origin + 0.5 * size + 0.7 * size * rng.point())
         .chain([lattice.origin, lattice.origin + size])
         .collect();
     let field = DisplacementField { lattice, values };
     let (table, moved) = (field_table(&field), padded(&points, 1.0));
     let result = run(&kernels::BEND_VERTICES, ROWS, points.len() as u32, &[bytes(&table), bytes(&moved)]);
     bend_vertices(&field, &mut points);
-    // Values jump from node to node, so that rounding of where a vertex is counts a hundredfold.
+    // Values differ strongly between nodes, which amplifies rounding of positions a hundredfold.
     assert_close(&unpadded(&result), &flat(&points), 100.0 * POINT_TOLERANCE);
 }
 
 #[test]
 fn hold_parts_matches_cpu() {
-    let mut seeded = Seeded(17);
+    let mut rng = Rng(17);
     let n = 131;
-    // Some stay in part, every third belongs to one of four pieces, some do both, some neither.
-    let rest: Vec<Vec4> =
-        (0..n).map(|v| seeded.point().extend([0.0, 0.0, 0.4, 1.0][v as usize % 4])).collect();
+    // Some vertices are partly held, every third is in one of four pieces; some are both, some neither.
+    let rest: Vec<Vec4> = (0..n).map(|v| rng.point().extend([0.0, 0.0, 0.4, 1.0][v as usize % 4])).collect();
     let piece_of: Vec<u32> = (0..n).map(|v| if v % 3 == 0 { 1 + v / 3 % 4 } else { 0 }).collect();
     let motions: Vec<PieceMotion> =
-        (0..4).map(|_| [0, 1, 2].map(|_| seeded.point().extend(seeded.point().x))).collect();
-    let mut moved: Vec<Vec3> = (0..n).map(|_| seeded.point()).collect();
+        (0..4).map(|_| [0, 1, 2].map(|_| rng.point().extend(rng.point().x))).collect();
+    let mut moved: Vec<Vec3> = (0..n).map(|_| rng.point()).collect();
     let inputs = [bytes(&rest), bytes(&piece_of), bytes(&motions)].map(<[u8]>::to_vec);
     let at = padded(&moved, 1.0);
     let inputs = [&inputs[0], &inputs[1], &inputs[2], bytes(&at)];
@@ -148,7 +147,7 @@ fn hold_parts_matches_cpu() {
 #[test]
 fn vertex_normals_matches_cpu() {
     let mut mesh = egg(11, 13);
-    // A vertex of no triangle.
+    // A vertex without triangles.
     mesh.positions.push(Vec3::ONE);
     let n = mesh.positions.len();
     let table = NormalTable::new(n, &mesh.triangles);

@@ -1,4 +1,5 @@
-//! Each kernel does one step as its twin in `cagework_core::stencil` does, on odd sizes.
+//! Each kernel versus its CPU implementation in `cagework_core::stencil`, for sizes that are not multiples of
+//! workgroups.
 
 mod deforming;
 #[path = "../support/mod.rs"]
@@ -19,36 +20,36 @@ use cagework_gpu::layout::{Work, mode};
 use cagework_gpu::stream::Stream;
 use cagework_gpu::{GpuContext, GpuError};
 use glam::Vec3;
-use support::{Seeded, assert_close, cage, egg, gpu, with_prepared};
+use support::{Rng, assert_close, cage, egg, gpu, with_prepared};
 
-/// Sums of up to 14 numbers in [0, 1), times at most 6: fused multiply-adds and divisions of 2.5 ulp (WGSL's bound)
-/// leave a few ulp of 8.
+/// Sums of up to 14 numbers in [0, 1), times at most 6: fused multiply-adds and WGSL's division error of 2.5
+/// ulp give a few ulp of 8.
 const ROW_TOLERANCE: f32 = 8e-6;
 
-/// Sums of thousands of positive numbers, relative: the order is the same, products may be fused.
+/// Relative, for sums of thousands of positive numbers: the order is the same, products may be fused.
 const SUM_TOLERANCE: f32 = 2e-6;
 
-/// Columns: odd in quads, so that rows do not align with workgroups.
+/// Columns. An odd number of quads, so that rows do not align with workgroups.
 const N_LANES: usize = 12;
 const N_QUADS: u32 = 3;
 
-/// Cells along the longest side: rows of odd and even length.
+/// Cells along the longest side. Rows have odd and even lengths.
 const GRID: u32 = 13;
 
 fn hierarchy_of<T>(use_it: impl FnOnce(&Hierarchy, &Stencils) -> T) -> T {
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    // So large that it touches the cage and leaves it.
+    // Large enough to cross the cage.
     let positions: Vec<Vec3> = egg(7, 9).positions.iter().map(|p| 1.3 * p).collect();
     with_prepared(&positions, &cage([2, 2, 3]), &options, |prepared| {
         let hierarchy = prepared.hierarchy();
-        assert!(hierarchy.levels.len() >= 2, "a transfer is to be tested");
+        assert!(hierarchy.levels.len() >= 2, "the test needs a transfer");
         use_it(hierarchy, prepared.stencils())
     })
 }
 
-/// Uploads `inputs`, runs the kernel once, and returns the last of them, as it is afterwards.
+/// Uploads `inputs`, runs the kernel once, and reads back the last one.
 fn run(kernel: &Kernel, work: Work, count: u32, inputs: &[&[u8]]) -> Vec<f32> {
-    pollster::block_on(step(&gpu(), kernel, work, count, inputs)).expect("one step runs")
+    pollster::block_on(step(&gpu(), kernel, work, count, inputs)).expect("the kernel runs")
 }
 
 async fn step(
@@ -83,16 +84,16 @@ fn bytes<T: bytemuck::Pod>(data: &[T]) -> &[u8] {
     bytemuck::cast_slice(data)
 }
 
-/// A field with zero rows where the level has them.
-fn field(seeded: &mut Seeded, level: &Level) -> Vec<f32> {
-    let mut values = seeded.values(level.n_rows() * N_LANES);
+/// A random field; zero rows of the level are zero.
+fn field(rng: &mut Rng, level: &Level) -> Vec<f32> {
+    let mut values = rng.values(level.n_rows() * N_LANES);
     for row in [level.zero_row() as usize, level.n_rows() - 1] {
         values[row * N_LANES..(row + 1) * N_LANES].fill(0.0);
     }
     values
 }
 
-/// Work of rows and quads.
+/// Parameters for kernels over rows and quads.
 const ROWS: Work = Work {
     first: 0,
     count: 0,
@@ -111,10 +112,10 @@ fn relax_cells_matches_cpu() {
         for (k, omega, colour) in [(0, 1.0, 0), (0, 1.2, 1), (1, 1.0, 1), (1, 1.2, 0)] {
             let level = &hierarchy.levels[k];
             let table = LevelTable::new(level, k == 0);
-            let mut seeded = Seeded(1 + k as u64);
+            let mut rng = Rng(1 + k as u64);
             let n_rhs = if k == 0 { level.n_cut() } else { level.n_rows() };
-            let rhs = seeded.values(n_rhs * N_LANES);
-            let mut expected = field(&mut seeded, level);
+            let rhs = rng.values(n_rhs * N_LANES);
+            let mut expected = field(&mut rng, level);
             let first = level.first_row(colour);
             let n = level.colours[colour].n_cells;
             let inputs = [
@@ -137,9 +138,9 @@ fn jacobi_cells_matches_cpu() {
     hierarchy_of(|hierarchy, _| {
         let level = &hierarchy.levels[0];
         let table = LevelTable::new(level, true);
-        let mut seeded = Seeded(2);
-        let rhs = seeded.values(level.n_cut() * N_LANES);
-        let u_in = field(&mut seeded, level);
+        let mut rng = Rng(2);
+        let rhs = rng.values(level.n_cut() * N_LANES);
+        let u_in = field(&mut rng, level);
         let mut expected = vec![0.5; u_in.len()];
         let inputs = [
             bytes(&table.neighbours),
@@ -161,9 +162,9 @@ fn change_norms_matches_cpu() {
     for (norm, first) in
         [(DeltaNorm::Euclidean, true), (DeltaNorm::Euclidean, false), (DeltaNorm::Literal, false)]
     {
-        let mut seeded = Seeded(3);
-        let (old, new) = (seeded.values(N_ROWS * N_LANES), seeded.values(N_ROWS * N_LANES));
-        let mut expected = seeded.values(N_ROWS);
+        let mut rng = Rng(3);
+        let (old, new) = (rng.values(N_ROWS * N_LANES), rng.values(N_ROWS * N_LANES));
+        let mut expected = rng.values(N_ROWS);
         let absolute = if norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
         let work = Work { mode: absolute | if first { mode::CHANGE_FIRST } else { 0 }, ..ROWS };
         let inputs = [bytes(&old), bytes(&new), bytes(&expected)];
@@ -179,15 +180,15 @@ fn residual_matches_cpu() {
         for k in [0, 1] {
             let level = &hierarchy.levels[k];
             let table = LevelTable::new(level, k == 0);
-            let mut seeded = Seeded(4);
+            let mut rng = Rng(4);
             let n_rhs = if k == 0 { level.n_cut() } else { level.n_rows() };
-            let mut rhs = seeded.values(n_rhs * N_LANES);
+            let mut rhs = rng.values(n_rhs * N_LANES);
             if k > 0 {
-                // Coarse right-hand sides are zero where fields are.
+                // The zero row of coarse right-hand sides is zero.
                 let zero = level.zero_row() as usize;
                 rhs[zero * N_LANES..(zero + 1) * N_LANES].fill(0.0);
             }
-            let u = field(&mut seeded, level);
+            let u = field(&mut rng, level);
             let n_rows = level.first_row(1);
             let mut expected = vec![0.5; n_rows * N_LANES];
             let inputs = [
@@ -201,7 +202,7 @@ fn residual_matches_cpu() {
             let result = run(&kernels::RESIDUAL, ROWS, n_rows as u32 * N_QUADS, &inputs);
             stencil::residual(n_rows, N_LANES, &table, &rhs, &u, &mut expected);
             assert_close(&result, &expected, ROW_TOLERANCE);
-            assert!(result[(n_rows - 1) * N_LANES..].iter().all(|&r| r == 0.0), "the zero row stays zero");
+            assert!(result[(n_rows - 1) * N_LANES..].iter().all(|&r| r == 0.0), "the zero row is still zero");
         }
     });
 }
@@ -211,7 +212,7 @@ fn restrict_residual_matches_cpu() {
     hierarchy_of(|hierarchy, _| {
         let (fine, coarse) = (&hierarchy.levels[0], &hierarchy.levels[1]);
         let table = TransferTable::new(fine, coarse, &hierarchy.transfers[0]);
-        let red = &field(&mut Seeded(5), fine)[..fine.first_row(1) * N_LANES];
+        let red = &field(&mut Rng(5), fine)[..fine.first_row(1) * N_LANES];
         let mut expected = vec![0.5; coarse.n_rows() * N_LANES];
         let inputs = [bytes(&table.around), bytes(red), bytes(&expected)];
         let result = run(&kernels::RESTRICT_RESIDUAL, ROWS, coarse.n_rows() as u32 * N_QUADS, &inputs);
@@ -230,9 +231,9 @@ fn prolong_correction_matches_cpu() {
             for (n_sources, entries, count) in
                 [(2, &table.faces, transfer.faces.len()), (8, &table.corners, transfer.corners.len())]
             {
-                let mut seeded = Seeded(6);
-                let from = field(&mut seeded, coarse);
-                let mut expected = field(&mut seeded, fine);
+                let mut rng = Rng(6);
+                let from = field(&mut rng, coarse);
+                let mut expected = field(&mut rng, fine);
                 let inputs = [bytes(entries), bytes(&from), bytes(&expected)];
                 let work = Work { mode: bits, n_sources, ..ROWS };
                 let result = run(&kernels::PROLONG_CORRECTION, work, count as u32 * N_QUADS, &inputs);
@@ -250,7 +251,7 @@ fn prolong_correction_matches_cpu() {
     });
 }
 
-/// Compares relative to the largest number.
+/// Compares relative to the largest value.
 #[track_caller]
 fn assert_sums_close(gpu: &[f32], cpu: &[f32]) {
     let largest = cpu.iter().fold(0.0f32, |m, x| m.max(x.abs()));
@@ -260,7 +261,7 @@ fn assert_sums_close(gpu: &[f32], cpu: &[f32]) {
 #[test]
 fn sum_squares_matches_cpu() {
     for n_quads in [1, 255, 4096, 9001] {
-        let values = Seeded(7).values(4 * n_quads);
+        let values = Rng(7).values(4 * n_quads);
         let expected = stencil::sum_squares(&values);
         let room = vec![0.0f32; expected.len()];
         let result = run(&kernels::SUM_SQUARES, ROWS, n_quads as u32, &[bytes(&values), bytes(&room)]);
@@ -271,7 +272,7 @@ fn sum_squares_matches_cpu() {
 #[test]
 fn sum_roots_matches_cpu() {
     for n in [1, 257, 4097, 12_289] {
-        let values = Seeded(8).values(n);
+        let values = Rng(8).values(n);
         let expected = stencil::sum_roots(&values);
         let room = vec![0.0f32; expected.len()];
         let result = run(&kernels::SUM_ROOTS, ROWS, n as u32, &[bytes(&values), bytes(&room)]);
@@ -282,7 +283,7 @@ fn sum_roots_matches_cpu() {
 #[test]
 fn reduce_sum_matches_cpu() {
     for n in [1, 255, 256, 10_007] {
-        let values = Seeded(9).values(n);
+        let values = Rng(9).values(n);
         let work = Work { first_row: 2, ..ROWS };
         let result = run(&kernels::REDUCE_SUM, work, n as u32, &[bytes(&values), bytes(&[0.0f32; 3])]);
         assert_sums_close(&result, &[0.0, 0.0, stencil::reduce_sum(&values)]);
@@ -294,8 +295,8 @@ fn sample_weights_matches_cpu() {
     hierarchy_of(|hierarchy, stencils| {
         let table = SamplingTable::new(stencils);
         assert!(!table.hats.is_empty(), "some vertices are near the cage");
-        let u = field(&mut Seeded(10), &hierarchy.levels[0]);
-        // The second batch, and not from the first vertex.
+        let u = field(&mut Rng(10), &hierarchy.levels[0]);
+        // The second batch, starting at a later vertex.
         let (first_vertex, first_column) = (5, N_LANES);
         let n = stencils.len() - first_vertex;
         let mut expected = vec![0.5; n * N_LANES];

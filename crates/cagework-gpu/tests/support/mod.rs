@@ -1,5 +1,5 @@
-//! What the GPU's tests share: one device, meshes, seeded numbers, comparing.
-#![allow(dead_code, reason = "every test binary uses its part")]
+//! Shared by GPU tests: a device, meshes, random numbers, comparisons.
+#![allow(dead_code, reason = "each test binary uses a subset")]
 
 use cagework_core::bind::Watch;
 use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};
@@ -9,7 +9,7 @@ use cagework_core::{Bounds, Cage, TriMesh, subdivided_box};
 use cagework_gpu::{ContextOptions, GpuContext};
 use glam::Vec3;
 
-/// A context of its own. No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
+/// Opens a GPU or fails the test. The software adapter of mesa-vulkan-drivers suffices.
 pub(crate) fn gpu() -> GpuContext {
     gpu_with(&ContextOptions::default())
 }
@@ -22,10 +22,10 @@ pub(crate) fn gpu_with(options: &ContextOptions) -> GpuContext {
     }
 }
 
-/// Numbers that look random, the same in every run (splitmix64).
-pub(crate) struct Seeded(pub(crate) u64);
+/// Reproducible random numbers (splitmix64).
+pub(crate) struct Rng(pub(crate) u64);
 
-impl Seeded {
+impl Rng {
     pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -34,7 +34,7 @@ impl Seeded {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// Uniform in [0, 1).
     pub(crate) fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
     }
@@ -48,12 +48,12 @@ impl Seeded {
     }
 }
 
-/// Fails at the worst value that differs by more than `tolerance`.
+/// Fails if a value differs by more than `tolerance`; reports the largest difference.
 #[track_caller]
 pub(crate) fn assert_close(gpu: &[f32], cpu: &[f32], tolerance: f32) {
     assert_eq!(gpu.len(), cpu.len(), "lengths");
     let worst = (0..gpu.len()).max_by(|&a, &b| {
-        // NaN counts as the worst of all: total order puts it last.
+        // The total order puts NaN last, so it is reported.
         (gpu[a] - cpu[a]).abs().total_cmp(&(gpu[b] - cpu[b]).abs())
     });
     if let Some(i) = worst {
@@ -72,13 +72,13 @@ pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(Vec3::to_array).collect()
 }
 
-/// A cage that is no box: the vertices of a subdivided one, moved about.
+/// A subdivided box with moved vertices.
 pub(crate) fn cage(divisions: [u32; 3]) -> Cage {
     let bounds = Bounds { min: Vec3::new(-1.0, -0.6, -0.8), max: Vec3::new(1.1, 0.7, 0.5) };
     let mut mesh = subdivided_box(bounds, 0.0, divisions);
-    let mut seeded = Seeded(11);
+    let mut rng = Rng(11);
     for p in &mut mesh.positions {
-        *p += 0.12 * (seeded.point() - 0.5);
+        *p += 0.12 * (rng.point() - 0.5);
     }
     Cage::new(&mesh).expect("a box stays closed when its vertices move a little")
 }
@@ -110,7 +110,7 @@ pub(crate) fn egg(n_rings: u32, n_segments: u32) -> TriMesh {
     TriMesh { positions, triangles }
 }
 
-/// Hands a prepared bind to `use_it`.
+/// Prepares a bind for `use_it`.
 pub(crate) fn with_prepared<T>(
     positions: &[Vec3],
     cage: &Cage,
@@ -119,6 +119,6 @@ pub(crate) fn with_prepared<T>(
 ) -> T {
     let watch = Watch::new(&Silent);
     let prepared = PreparedBind::new(positions, cage.into(), options, FieldsOn::Device, &watch)
-        .expect("the tests' input is good");
+        .expect("the input is valid");
     use_it(&prepared)
 }

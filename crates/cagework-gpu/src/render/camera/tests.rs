@@ -1,9 +1,9 @@
 use super::*;
 
-/// Rounding of f32 products of numbers of size 10, in pixels of a picture 800 wide.
+/// Rounding of f32 products of numbers up to 10, in pixels of a picture 800 wide.
 const PIXELS: f32 = 0.02;
 
-/// The same in object units.
+/// The same, in object units.
 const UNITS: f32 = 2e-5;
 
 fn camera(projection: Projection) -> Camera {
@@ -35,9 +35,9 @@ fn axes_are_orthonormal_and_right_handed() {
 }
 
 #[test]
-fn target_is_in_the_middle() {
+fn target_is_in_the_centre() {
     for camera in both() {
-        let projected = camera.project(camera.target).expect("it is in front");
+        let projected = camera.project(camera.target).expect("the point is visible");
         assert!(projected.position.abs_diff_eq(Vec2::new(400.0, 300.0), PIXELS));
         assert!((projected.depth - camera.distance).abs() < UNITS);
     }
@@ -47,7 +47,7 @@ fn target_is_in_the_middle() {
 fn front_view_has_x_to_the_right_and_y_up() {
     for mut camera in both() {
         camera.look_along(AxisView::Front);
-        let at = |p: Vec3| camera.project(camera.target + p).expect("it is in front").position;
+        let at = |p: Vec3| camera.project(camera.target + p).expect("the point is visible").position;
         let middle = at(Vec3::ZERO);
         assert!(at(Vec3::X).x > middle.x + 10.0 && (at(Vec3::X).y - middle.y).abs() < PIXELS);
         assert!(at(Vec3::Y).y < middle.y - 10.0 && (at(Vec3::Y).x - middle.x).abs() < PIXELS);
@@ -70,27 +70,27 @@ fn every_axis_view_looks_along_its_axis() {
     }
 }
 
-/// Field of view 2 atan(1/2): at distance d, half the height is d/2.
+/// With a field of view of 2 atan(1/2), half the height at distance d is d/2.
 #[test]
 fn perspective_divides_by_depth() {
     let mut camera =
         Camera { fov_y: 2.0 * 0.5f32.atan(), yaw: 0.0, pitch: 0.0, distance: 4.0, ..Camera::default() };
     camera.set_viewport(Vec2::new(200.0, 100.0));
-    // Depth 4: half the height, 50 pixels, is 2 units. Depth 2: 1 unit.
-    let at = |p: Vec3| camera.project(p).expect("it is in front").position;
+    // At depth 4, half the height (50 pixels) is 2 units; at depth 2, 1 unit.
+    let at = |p: Vec3| camera.project(p).expect("the point is visible").position;
     assert!(at(Vec3::new(1.0, 1.0, 0.0)).abs_diff_eq(Vec2::new(125.0, 25.0), PIXELS));
     assert!(at(Vec3::new(1.0, 0.5, 2.0)).abs_diff_eq(Vec2::new(150.0, 25.0), PIXELS));
     assert!((camera.units_per_pixel(Vec3::ZERO) - 2.0 / 50.0).abs() < 1e-6);
 }
 
 #[test]
-fn ray_goes_through_what_is_drawn_there() {
+fn ray_passes_through_the_projected_point() {
     for camera in both() {
         for point in [Vec3::ZERO, Vec3::new(1.0, 0.5, -0.7), Vec3::new(-0.3, 1.2, 1.4)] {
-            let projected = camera.project(point).expect("it is in front");
+            let projected = camera.project(point).expect("the point is visible");
             let ray = camera.ray(projected.position);
             let along = (point - ray.origin).dot(ray.direction);
-            assert!(along > 0.0, "the point lies ahead");
+            assert!(along > 0.0, "the point is ahead");
             assert!((ray.origin + along * ray.direction).abs_diff_eq(point, UNITS), "{camera:?}");
         }
     }
@@ -112,7 +112,7 @@ fn zoom_keeps_the_point_under_the_cursor() {
             let before = camera.distance;
             camera.zoom_at(factor, cursor);
             assert!((camera.distance / before - factor).abs() < 1e-5);
-            let now = camera.project(fixed).expect("it is in front").position;
+            let now = camera.project(fixed).expect("the point is visible").position;
             assert!(now.abs_diff_eq(cursor, PIXELS), "{now} instead of {cursor}");
             assert_eq!(camera.backward(), direction);
         }
@@ -120,7 +120,7 @@ fn zoom_keeps_the_point_under_the_cursor() {
 }
 
 #[test]
-fn zoom_stays_within_reason() {
+fn zoom_is_limited() {
     let mut camera = camera(Projection::Perspective);
     for _ in 0..100 {
         camera.zoom_at(0.5, Vec2::ZERO);
@@ -133,11 +133,11 @@ fn zoom_stays_within_reason() {
 }
 
 #[test]
-fn pan_moves_what_is_at_the_target_with_the_pointer() {
+fn pan_moves_points_at_the_target_with_the_pointer() {
     for mut camera in both() {
         let grabbed = camera.on_target_plane(Vec2::new(300.0, 200.0));
         camera.pan(Vec2::new(55.0, -20.0));
-        let now = camera.project(grabbed).expect("it is in front").position;
+        let now = camera.project(grabbed).expect("the point is visible").position;
         assert!(now.abs_diff_eq(Vec2::new(355.0, 180.0), PIXELS));
     }
 }
@@ -148,15 +148,15 @@ fn orbit_stops_at_the_poles_and_keeps_the_distance() {
     camera.orbit(Vec2::new(1.0, 10.0));
     assert_eq!(camera.pitch, FRAC_PI_2);
     assert!((camera.eye().distance(camera.target) - 5.0).abs() < UNITS);
-    // The hand moves right: what is in front moves right, the eye goes left around it.
+    // Dragging right moves the front of the scene right, hence the eye left.
     let mut camera = Camera { yaw: 0.0, pitch: 0.0, ..camera };
     camera.orbit(Vec2::new(0.2, 0.0));
     let front = camera.target + 0.5 * Vec3::Z;
-    assert!(camera.project(front).expect("it is in front").position.x > 400.0);
+    assert!(camera.project(front).expect("the point is visible").position.x > 400.0);
 }
 
 #[test]
-fn framed_box_fills_the_picture_and_no_more() {
+fn framed_box_fills_the_picture() {
     let bounds = Bounds { min: Vec3::new(-3.0, 0.0, 1.0), max: Vec3::new(1.0, 1.0, 2.0) };
     for mut camera in both() {
         for size in [Vec2::new(800.0, 600.0), Vec2::new(300.0, 900.0)] {
@@ -170,7 +170,8 @@ fn framed_box_fills_the_picture_and_no_more() {
                         if k & 2 == 0 { bounds.min.y } else { bounds.max.y },
                         if k & 4 == 0 { bounds.min.z } else { bounds.max.z },
                     );
-                    let ndc = camera.project(corner).expect("it is in front").position / size * 2.0 - 1.0;
+                    let ndc =
+                        camera.project(corner).expect("the point is visible").position / size * 2.0 - 1.0;
                     ndc.abs().max_element()
                 })
                 .fold(0.0, f32::max);
@@ -183,7 +184,8 @@ fn framed_box_fills_the_picture_and_no_more() {
 fn switching_the_projection_keeps_the_size_at_the_target() {
     let [perspective, orthographic] = both();
     let point = perspective.target + 0.7 * perspective.right() + 0.2 * perspective.up();
-    let [a, b] = [perspective, orthographic].map(|c| c.project(point).expect("it is in front").position);
+    let [a, b] =
+        [perspective, orthographic].map(|c| c.project(point).expect("the point is visible").position);
     assert!(a.abs_diff_eq(b, PIXELS), "{a} {b}");
 }
 
@@ -196,30 +198,29 @@ fn depth_is_ordered_and_within_the_clip_volume() {
         };
         let (near, far) = (camera.target + camera.backward(), camera.target - camera.backward());
         assert!(0.0 < z(near) && z(near) < z(far) && z(far) < 1.0);
-        // Lifted by a hundredth of the distance, a point is as deep as one that lies there.
+        // A point offset by a hundredth of the distance has the depth of a point at that place.
         let clip = camera.clip_from_world() * camera.target.extend(1.0);
         let nearer = camera.target + 0.01 * camera.distance * camera.backward();
         assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);
     }
 }
 
-/// A box seen from its corner left two thirds of a picture empty.
 #[test]
-fn fitted_points_fill_the_picture_and_no_more() {
+fn fitted_points_fill_the_picture() {
     let corners = [[0.0, 0.0, 0.0], [3.0, 0.2, 0.0], [0.5, 1.0, 0.4], [-0.3, 0.1, -2.0]].map(Vec3::from);
     for mut camera in both() {
         for size in [Vec2::new(800.0, 600.0), Vec2::new(300.0, 900.0)] {
             camera.set_viewport(size);
-            camera.set_scene(Bounds::of(&corners).expect("there are some"));
+            camera.set_scene(Bounds::of(&corners).expect("the list is not empty"));
             camera.fit(&corners);
             let places =
-                corners.map(|c| camera.project(c).expect("it is in front").position / size * 2.0 - 1.0);
+                corners.map(|c| camera.project(c).expect("the point is visible").position / size * 2.0 - 1.0);
             let high = places.into_iter().fold(Vec2::MIN, Vec2::max);
             let low = places.into_iter().fold(Vec2::MAX, Vec2::min);
             let fill = high.max(-low);
             assert!((0.9..0.99).contains(&fill.max_element()), "{size}: {low} to {high}");
             let tight = if fill.x > fill.y { 0 } else { 1 };
-            assert!((high[tight] + low[tight]).abs() < 0.05, "in the middle: {low} to {high}");
+            assert!((high[tight] + low[tight]).abs() < 0.05, "centred: {low} to {high}");
         }
     }
 }

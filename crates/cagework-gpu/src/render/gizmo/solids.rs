@@ -1,4 +1,4 @@
-//! Solids that a gizmo is made of, as triangles.
+//! Triangles of the gizmo's solids.
 
 use std::f32::consts::TAU;
 
@@ -6,15 +6,15 @@ use glam::{Quat, Vec3};
 
 use super::{RING_SEGMENTS, Vertex, ring_points, unit};
 
-/// Segments around cones and rods.
-const AROUND: u32 = 16;
+/// Segments of cones and rods.
+const CONE_SEGMENTS: u32 = 16;
 
-/// A corner with its normal; none is lit from everywhere.
+/// A vertex. A zero normal disables shading.
 pub(super) fn vertex(p: Vec3, n: Vec3, [r, g, b, a]: [f32; 4]) -> Vertex {
     [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, a]
 }
 
-/// A cube with sides along the axes.
+/// An axis-aligned cube.
 pub(super) fn cube(out: &mut Vec<Vertex>, center: Vec3, half: f32, color: [f32; 4]) {
     for axis in 0..3u8 {
         for sign in [-1.0, 1.0] {
@@ -28,13 +28,13 @@ pub(super) fn cube(out: &mut Vec<Vertex>, center: Vec3, half: f32, color: [f32; 
     }
 }
 
-/// A cone, rod or stump along z from `z[0]` to `z[1]`, turned; its lower end is closed.
+/// A rotated cone or frustum along z from `z[0]` to `z[1]`, closed at its lower end.
 pub(super) fn cone(out: &mut Vec<Vertex>, turn: Quat, z: [f32; 2], radius: [f32; 2], color: [f32; 4]) {
     let around = |k: u32| {
-        let (sin, cos) = (TAU * k as f32 / AROUND as f32).sin_cos();
+        let (sin, cos) = (TAU * k as f32 / CONE_SEGMENTS as f32).sin_cos();
         Vec3::new(cos, sin, 0.0)
     };
-    for k in 0..AROUND {
+    for k in 0..CONE_SEGMENTS {
         let (d, e) = (around(k), around(k + 1));
         let at = |d: Vec3, end: usize| turn * (radius[end] * d + z[end] * Vec3::Z);
         for (p, n) in
@@ -48,7 +48,7 @@ pub(super) fn cone(out: &mut Vec<Vertex>, turn: Quat, z: [f32; 2], radius: [f32;
     }
 }
 
-/// A ring around an axis; `[radius, tube]`.
+/// A torus about an axis; `[radius, tube radius]`.
 pub(super) fn ring(out: &mut Vec<Vertex>, axis: u8, [radius, tube]: [f32; 2], color: [f32; 4]) {
     const SIDES: u32 = 8;
     let points: Vec<Vec3> = ring_points(axis).collect();
