@@ -1,11 +1,10 @@
-//! Running other programs from the repository's root, loudly.
+//! Runs other programs in the root of the repository.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The repository's root.
 pub(crate) fn root() -> PathBuf {
-    // crates/xtask is two levels below it.
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/xtask has a root").to_path_buf()
 }
 
@@ -39,7 +38,7 @@ pub(crate) fn output(program: &str, args: &[&str]) -> Result<String, String> {
     if !output.status.success() {
         return Err(format!("`{}` failed ({})", show(program, args), output.status));
     }
-    String::from_utf8(output.stdout).map_err(|e| format!("{program} printed something that is not text: {e}"))
+    String::from_utf8(output.stdout).map_err(|e| format!("{program} printed text that is not UTF-8: {e}"))
 }
 
 fn show(program: &str, args: &[&str]) -> String {

@@ -24,6 +24,8 @@ const USAGE: &str = "usage: cargo xtask TASK
   check          format, lints, documentation, dependency arrows, import circles, phrases in prose, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
+  check-scripts  the part of `check` that is about TypeScript
+  test-beside    the part of `test` that runs beside the Rust tests: the Python package, TypeScript, the page's build
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
   wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
@@ -48,6 +50,8 @@ fn main() -> ExitCode {
         ["test"] => tasks::test(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
+        ["test-beside"] => tasks::test_beside(),
+        ["check-scripts"] => tasks::check_scripts(),
         ["python"] => python::test(),
         ["wheel", rest @ ..] => python::wheel(rest),
         ["npm"] => package::test(),

@@ -45,7 +45,7 @@ pub(crate) fn start(args: &[&str]) -> Result<(), String> {
     exec(&[&["vite", "preview", "web", "--config", "web/vite.config.ts"], args].concat())
 }
 
-/// Tests of the TypeScript's own logic, without a browser.
+/// Tests TypeScript modules without a browser.
 ///
 /// # Errors
 /// When one fails.
@@ -60,13 +60,21 @@ pub(crate) fn test_scripts() -> Result<(), String> {
 /// When one fails.
 pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
     build()?;
+    test_built_page(args)
+}
+
+/// Tests the page in `dist/`; `args` go to Playwright.
+///
+/// # Errors
+/// When a test fails.
+pub(crate) fn test_built_page(args: &[&str]) -> Result<(), String> {
     exec(&[&["playwright", "test", "--config", "web/playwright.config.ts"], args].concat())
 }
 
-/// Tests the page as it was built last in a second browser, Firefox.
+/// Tests the page in `dist/` in Firefox.
 ///
 /// # Errors
-/// When something does not work there.
+/// When a test fails.
 pub(crate) fn test_firefox() -> Result<(), String> {
     run("node", &["web/e2e/firefox.mjs"], &[])
 }
@@ -81,7 +89,7 @@ pub(crate) fn pictures() -> Result<(), String> {
     run("npx", &playwright, &[("PICTURES", "1")])
 }
 
-/// Types of the TypeScript, which the build does not look at.
+/// Checks the types of the TypeScript, which the build ignores.
 ///
 /// # Errors
 /// When one is wrong.
@@ -90,7 +98,7 @@ pub(crate) fn check_types() -> Result<(), String> {
     exec(&["tsc", "--project", "web"])
 }
 
-/// What a visitor waits for must stay small, and compute with vectors.
+/// Checks the sizes of the files that a visitor waits for, and that the wasm uses vector instructions.
 fn check_sizes() -> Result<(), String> {
     let folder = root().join(FOLDER).join("assets");
     let entries = std::fs::read_dir(&folder).map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
@@ -118,7 +126,7 @@ fn check_sizes() -> Result<(), String> {
     Ok(())
 }
 
-/// Bytes after gzip, as servers send them.
+/// Size after gzip, bytes.
 fn compressed(bytes: &[u8]) -> Result<usize, String> {
     use std::io::Write as _;
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());

@@ -1,4 +1,6 @@
-//! The tasks themselves: each does its own set-up.
+//! The tasks. Each installs what it needs.
+
+use std::process::Command;
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
@@ -17,28 +19,38 @@ pub(crate) fn build() -> Result<(), String> {
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
-/// What is tested, and built with the same features each time. Benches have no tests, and criterion takes half a minute; what
-/// this crate needs has been built with its own features.
+/// Packages of all test builds, which then share features and artifacts. Benches have no tests but need criterion, which takes
+/// half a minute; xtask has other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
-/// Everything that can fail because the program is wrong.
+/// Runs all tests.
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
-    run("cargo", &[&["test", "--locked"], &TESTED[..]].concat(), &[])?;
-    // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
-    fuzz(&["--minutes", "0.1", "--seed", "1"])?;
-    validate_exports()?;
-    python::test()?;
-    site::test_scripts()?;
-    site::test_page(&[])?;
+    let rust = [&["test", "--locked"], &TESTED[..]].concat();
+    run("cargo", &[&rust[..], &["--no-run"]].concat(), &[])?;
+    // Most Rust tests leave one of two cores idle.
+    beside("test-beside", || {
+        run("cargo", &rust, &[])?;
+        // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
+        fuzz(&["--minutes", "0.1", "--seed", "1"])?;
+        validate_exports()
+    })?;
+    site::test_built_page(&[])?;
     site::test_firefox()?;
     package::test()
 }
 
-/// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
+/// The part of [`test`] that runs beside the Rust tests, once those have been built.
+pub(crate) fn test_beside() -> Result<(), String> {
+    python::test()?;
+    site::test_scripts()?;
+    site::build()
+}
+
+/// Reads damaged files with all readers. Built as tests, with overflow checks and debug assertions.
 pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
-    // The workspace's features, as `cargo test` has built them.
+    // With the features of `cargo test`.
     run(
         "cargo",
         &[&["test", "--quiet", "--locked"], &TESTED[..], &["--test", "fuzz", "--"], args].concat(),
@@ -46,12 +58,22 @@ pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
     )
 }
 
-/// Everything that can fail because the source is untidy.
+/// Checks format, lints, documentation, packaging and types.
 pub(crate) fn check() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
+    beside("check-scripts", check_rust)
+}
+
+/// The part of [`check`] that is about TypeScript. It builds the wasm, whose last crates are compiled one at a time.
+pub(crate) fn check_scripts() -> Result<(), String> {
+    site::check_types()?;
+    exec(&["biome", "ci", "--error-on-warnings"])
+}
+
+fn check_rust() -> Result<(), String> {
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
-    // Not among all targets, because `cargo test` leaves it to [`fuzz`].
+    // `--all-targets` omits it, since its manifest sets `test = false`.
     let fuzz = ["clippy", "--workspace", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
     run("cargo", &fuzz, &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
@@ -59,17 +81,15 @@ pub(crate) fn check() -> Result<(), String> {
     prose::check()?;
     deny::check()?;
     one_version()?;
-    // Names what a package lacks; `cargo publish --dry-run` builds them as well, once before a release.
+    // Fails if a package lacks metadata or files. `cargo publish --dry-run` also builds them, once before a release.
     let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
     for name in ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-gpu"] {
         package.extend(["-p", name]);
     }
-    run("cargo", &package, &[])?;
-    site::check_types()?;
-    exec(&["biome", "ci", "--error-on-warnings"])
+    run("cargo", &package, &[])
 }
 
-/// Packages have the version of the workspace.
+/// Checks that the npm packages have the version of the workspace.
 fn one_version() -> Result<(), String> {
     let own = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
     for path in ["package.json", "web/package/package.json"] {
@@ -81,12 +101,12 @@ fn one_version() -> Result<(), String> {
     Ok(())
 }
 
-/// Exported GLBs must pass the Khronos glTF validator, and play in three.js as they do here.
+/// Checks that exported GLBs pass the Khronos glTF validator, and play in three.js as in Cagework.
 fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
-    // Built with the workspace's features, as `cargo test` has done already; `cargo run` would build with its package's.
+    // With the features of `cargo test`; `cargo run` would build dependencies again for this package.
     run(
         "cargo",
         &[&["build", "--quiet", "--locked"], &TESTED[..], &["--example", "export_samples"]].concat(),
@@ -95,6 +115,31 @@ fn validate_exports() -> Result<(), String> {
     let export = wasm::target_folder()?.join("debug/examples/export_samples");
     run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
     run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])?;
-    // What plays a clip here must be what others show.
     run("node", &["crates/cagework-io/tests/three.mjs", folder], &[])
+}
+
+/// Runs a task of this program beside `work`, and shows its output once both have ended.
+///
+/// # Errors
+/// That of `work`, which stops the task, or else when the task fails.
+fn beside(task: &str, work: impl FnOnce() -> Result<(), String>) -> Result<(), String> {
+    let log = wasm::target_folder()?.join(format!("{task}.log"));
+    let fault = |e: std::io::Error| format!("cannot run `xtask {task}`: {e}");
+    let file = std::fs::File::create(&log).map_err(fault)?;
+    let program = std::env::current_exe().map_err(fault)?;
+    let mut child = Command::new(program)
+        .arg(task)
+        .stdout(file.try_clone().map_err(fault)?)
+        .stderr(file)
+        .spawn()
+        .map_err(fault)?;
+    let outcome = work();
+    if outcome.is_err() {
+        // Fails if the task has ended already. What the task has started goes on.
+        child.kill().ok();
+    }
+    let status = child.wait().map_err(fault)?;
+    outcome?;
+    eprint!("\n$ xtask {task}\n{}", std::fs::read_to_string(&log).map_err(fault)?);
+    if status.success() { Ok(()) } else { Err(format!("`xtask {task}` failed ({status})")) }
 }
