@@ -1,7 +1,7 @@
-//! Notices of everything that is compiled into the page, the command, the Python and the npm package, as their licences ask for.
+//! Licences of everything compiled into the page, the command, the Python and the npm package.
 //!
-//! From what is there anyhow: `cargo tree` knows what is compiled in, the registry's sources hold the licence files, and Vite
-//! writes those of the npm packages that it bundles. So nothing has to be installed and nothing is asked of a network.
+//! `cargo tree` lists the crates, the sources in the registry contain their licence files, and Vite writes the licences of npm
+//! packages that it bundles. This needs no other tool and no network.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,13 +10,13 @@ use serde_json::Value;
 
 use crate::command::{output, root};
 
-/// What the notices begin with.
+/// Head of the notices.
 const HEAD: &str = include_str!("licences.txt");
-/// Name of the notices, beside what they are about.
+/// File name of the notices.
 const NOTICES: &str = "licences.txt";
-/// Name of what belongs to the standard library.
+/// File name of the licences of the standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
-/// What Vite says of the npm packages in the page and in its workers, below the page's folder; see vite.config.ts.
+/// Files in which Vite lists the npm packages of the page and its workers, below the folder of the page; see vite.config.ts.
 const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
 /// How files begin that hold a licence or what it asks to be kept, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];

@@ -10,12 +10,12 @@ use crate::npm::{self, exec};
 use crate::wasm::{self, target_folder};
 
 const PACKAGE: &str = "web/package";
-/// What is compiled and bundled into the package, for those who get it; ignored by git.
+/// Licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
-/// What the tests run in the blank project, and its pages.
+/// Tests and pages of the blank project.
 const COPIED: [&str; 2] = ["web/package/examples", "web/package/test"];
 
-/// Tests the package. The page's build has made its wasm, `cargo test` the command that it is compared with.
+/// Tests the package, after a build of the page and `cargo test`, which make its wasm and the command for comparisons.
 ///
 /// # Errors
 /// When a step fails.
@@ -62,14 +62,14 @@ pub(crate) fn pack() -> Result<String, String> {
     Ok(tarball)
 }
 
-/// A project that has nothing but the package and three.js; returns its folder.
+/// Makes a project that depends on the package and three.js only; returns its folder.
 fn blank_project(tarball: &str) -> Result<String, String> {
     let folder = target_folder()?.join("npm/project");
     emptied(&folder)?;
     std::fs::write(folder.join("package.json"), "{ \"private\": true, \"type\": \"module\" }\n")
         .map_err(|e| format!("cannot write package.json: {e}"))?;
     let project = path(&folder)?;
-    // The version that is locked here: it comes out of npm's cache where there is no network.
+    // The locked version, which npm finds in its cache without a network.
     let lock = read(&root().join("package-lock.json"))?;
     let lock: Value = serde_json::from_str(&lock).map_err(|e| format!("package-lock.json: {e}"))?;
     let three = lock["packages"]["node_modules/three"]["version"].as_str().ok_or("no three.js is locked")?;

@@ -7,12 +7,12 @@ use crate::licences;
 use crate::wasm::target_folder;
 
 const PACKAGE: &str = "crates/cagework-py";
-/// What is compiled into the wheel, for those who get it; ignored by git.
+/// Licences of everything compiled into the wheel; ignored by git.
 const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
-/// Modules are compiled when they are first imported: to compile all of SciPy takes as long as to install it.
+/// Python compiles modules when they are first imported. Compiling all of SciPy would double the time of the installation.
 const INSTALL: [&str; 6] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"];
 
-/// Tests the wheel. `cargo test` has built the command that it is compared with.
+/// Tests the wheel, after `cargo test`, which builds the command for comparisons.
 ///
 /// # Errors
 /// When a step fails.
@@ -25,7 +25,7 @@ pub(crate) fn test() -> Result<(), String> {
     run(&python, &["-m", "pytest", PACKAGE], &[("CAGEWORK_COMMAND", &command)])
 }
 
-/// Builds the wheel to be given to others, into `target/wheels`. `args`: for maturin.
+/// Builds the release wheel into `target/wheels`. `args` go to maturin.
 ///
 /// # Errors
 /// When a step fails.
@@ -33,7 +33,7 @@ pub(crate) fn wheel(args: &[&str]) -> Result<(), String> {
     build(&environment()?, &[&["--release"], args].concat()).map(drop)
 }
 
-/// An empty environment of Python with what builds and tests the package; returns its interpreter.
+/// Makes a virtual environment with the tools that build and test the package; returns its interpreter.
 fn environment() -> Result<String, String> {
     let folder = target_folder()?.join("python");
     run("python3", &["-m", "venv", "--clear", &path(folder.clone())?], &[])?;
@@ -44,7 +44,7 @@ fn environment() -> Result<String, String> {
     Ok(python)
 }
 
-/// Builds the wheel; returns its folder, where no other one is.
+/// Builds the wheel; returns its folder, which contains nothing else.
 fn build(python: &str, args: &[&str]) -> Result<String, String> {
     let wheels = target_folder()?.join("wheels");
     let notices = root().join(NOTICES);

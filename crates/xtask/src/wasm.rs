@@ -1,4 +1,4 @@
-//! The browser's half: Rust to wasm to JavaScript.
+//! Compiles Rust to wasm, and generates its JavaScript.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -25,18 +25,18 @@ impl Profile {
     }
 }
 
-/// One of the page's two artifacts: the same crate for what a browser may have.
+/// One of the two builds of `cagework-web`, for browsers with and without WebGPU.
 struct Artifact {
-    /// What of `cagework-web` is built.
+    /// Arguments of Cargo that select features.
     features: &'static [&'static str],
-    /// Where the JavaScript package goes: beside the page's sources, ignored by git.
+    /// Folder of the JavaScript package, ignored by git.
     package: &'static str,
     /// Its name.
     name: &'static str,
 }
 
-/// The second is downloaded only where WebGPU is missing; the last one built is the one that Cargo keeps, so the one
-/// that changes with every edit comes last.
+/// Browsers without WebGPU download the first only. Cargo keeps the artifact of the last build, which should be the one that
+/// developers build most often.
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],
@@ -46,12 +46,11 @@ const ARTIFACTS: [Artifact; 2] = [
     Artifact { features: &[], package: "web/package/src/pkg", name: "cagework" },
 ];
 
-/// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU or WebGL2 are. The pass that makes them of
-/// the kernels' loops is asked for by name: without, all loops stayed scalar, whatever the core's own level is (a bind took 1.6
-/// times as long).
+/// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 have vectors of 128 bits. The vectorizer must be named: otherwise
+/// all loops of the kernels stay scalar at any optimization level, and a bind takes 1.6 times as long.
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
-/// What the packages are made of.
+/// Sources of the packages.
 const SOURCES: [&str; 9] = [
     "crates/cagework-core",
     "crates/cagework-cage",
@@ -64,7 +63,7 @@ const SOURCES: [&str; 9] = [
     "Cargo.lock",
 ];
 
-/// Says in each package how it was built.
+/// File in each package that names its profile.
 const PROFILE: &str = "profile.txt";
 
 /// Builds the packages as visitors get them, unless that has been done of the sources as they are now: Cargo keeps one artifact
@@ -134,7 +133,7 @@ fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), Str
         .map_err(|e| format!("cannot write in {}: {e}", package.display()))
 }
 
-/// Cargo's target folder, wherever the user has put it.
+/// Cargo's target folder.
 pub(crate) fn target_folder() -> Result<std::path::PathBuf, String> {
     let metadata = output("cargo", &["metadata", "--format-version", "1", "--no-deps", "--locked"])?;
     let key = "\"target_directory\":\"";

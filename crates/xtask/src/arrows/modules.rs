@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use crate::command::root;
 use read::Crate;
 
-/// Who uses whom, and the first line that says so (`file:line`).
+/// Which module uses which, and the first line that does (`file:line`).
 type Edges = BTreeMap<(String, String), String>;
 
 /// Checks every crate, the tests and the benches.
