@@ -5,6 +5,7 @@
 
 pub mod parts;
 pub mod pull;
+pub mod symmetry;
 
 pub use parts::Parts;
 

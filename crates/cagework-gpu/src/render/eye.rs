@@ -1,6 +1,6 @@
 //! [`Camera`] as the editing code's [`View`].
 
-use cagework_core::edit::View;
+use cagework_core::view::View;
 use glam::{Vec2, Vec3};
 
 use super::camera::Camera;

@@ -7,7 +7,7 @@ use super::anderson::Anderson;
 use super::energy::Pull;
 use super::grip::{Grip, check as check_index};
 use super::{MAX_HANDLES, PullError};
-use cagework_core::edit::Symmetry;
+use crate::symmetry::Symmetry;
 use cagework_core::rotation::nearest_rotation;
 
 /// Weight of the cage's own edges in the energy; results are flat from 0.02 to 0.4. Below, the cage spikes where it

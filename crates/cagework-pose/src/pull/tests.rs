@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::*;
 use cagework_cage::samples;
 use cagework_core::cage::Cage;
-use cagework_core::edit::Symmetry;
+use crate::symmetry::Symmetry;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, Weights, bind, subdivided_box};

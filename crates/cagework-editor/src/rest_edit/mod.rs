@@ -11,9 +11,8 @@ mod tests;
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::cage::{Cage, CageError, CageNotice};
-use crate::contact::{Corners, meeting};
-use crate::mesh::PolygonMesh;
+use cagework_core::contact::{Corners, meeting};
+use cagework_core::{Cage, CageError, CageNotice, PolygonMesh};
 
 pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
 

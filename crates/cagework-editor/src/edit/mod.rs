@@ -1,15 +1,13 @@
-//! Editing a cage: picking, selection, gestures and poses, independent of rendering and input events.
+//! Picking, selecting and moving the vertices of a cage.
 //!
-//! Operates on cage positions `[n_cage]` in object units and on the faces of a [`crate::Cage`]. Pixels are those of the
-//! [`View`], from the top left corner, x right and y down.
+//! Functions take cage positions `[n_cage]` in object units and the faces of a [`cagework_core::Cage`]. Pixels are those of the
+//! [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
 
 mod gesture;
 mod pick;
 mod playback;
 mod pull;
 mod selection;
-mod symmetry;
-mod view;
 
 pub use gesture::{Constraint, Gesture, GestureKind};
 pub use pick::{
@@ -18,7 +16,5 @@ pub use pick::{
 pub use playback::{PoseError, blend, moment, reblend};
 pub use pull::{Pull, SharedPull};
 pub use selection::{Pivot, SelectMode, Selection};
-pub use symmetry::Symmetry;
-pub use view::View;
 #[cfg(test)]
-pub(crate) use view::tests::Flat;
+mod tests;

@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use super::{CageEdit, RestEditError, finish};
-use crate::fill::{loops, triangulate};
-use crate::mesh::PolygonMesh;
+use cagework_core::PolygonMesh;
+use cagework_core::fill::{loops, triangulate};
 
 /// Moves vertices: `(vertex, new position in object units)`.
 ///

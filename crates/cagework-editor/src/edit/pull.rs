@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use cagework_pose::symmetry::{Symmetry, reflect};
+
 use super::selection::Selection;
-use super::symmetry::{Symmetry, reflect};
 
 /// Vertices that move with the selection.
 #[derive(Clone, Copy, Debug, Default)]
@@ -107,8 +108,8 @@ fn share(i: usize, leads: &[bool], positions: &[Vec3], radius: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::shapes::cuboid;
     use crate::edit::SelectMode;
+    use crate::edit::tests::cuboid;
 
     fn selection(n: usize, vertices: &[u32]) -> Selection {
         let mut selection = Selection::new(n);

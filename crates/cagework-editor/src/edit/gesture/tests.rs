@@ -1,8 +1,8 @@
 //! Gestures on the corners of a cube, seen from +z at 100 pixels per unit.
 
 use super::*;
-use crate::cage::shapes::cuboid;
-use crate::edit::{Flat, SelectMode, Selection, SharedPull};
+use crate::edit::tests::{Flat, cuboid};
+use crate::edit::{SelectMode, Selection, SharedPull};
 
 /// Rounding of a few f32 operations on positions of size 1.
 const ROUNDING: f32 = 1e-5;

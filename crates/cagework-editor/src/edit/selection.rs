@@ -166,7 +166,7 @@ impl Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::shapes::cube;
+    use crate::edit::tests::cube;
 
     #[test]
     fn modes_are_set_operations() {

@@ -2,10 +2,8 @@ use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
 use super::{CageEdit, RestEditError, collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
-use crate::cage::Cage;
-use crate::cage::subdivided_box;
-use crate::crossing::{crossings_of, notices};
-use crate::mesh::{Bounds, PolygonMesh};
+use cagework_core::crossing::{crossings_of, notices};
+use cagework_core::{Bounds, Cage, PolygonMesh, subdivided_box};
 
 /// f32 rounding of positions of size 1.
 const ROUNDING: f32 = 1e-6;

@@ -1,40 +1,39 @@
-//! Smooth cages and controls inside, as the page says them beside a cage's positions and faces.
+//! The cage at rest, with its subdivision and its interior controls.
 //!
-//! Controls inside are vertices of no face at the end of the positions: what is selected, dragged, posed, undone and saved does
-//! not tell them from the cage's.
+//! Interior controls are the last of the cage's positions and belong to no face. Selection, gestures, poses, undo and projects
+//! treat them as they treat the cage's own vertices.
 
-use cagework_core::cage::CageError;
-use cagework_core::{Cage, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh};
+use cagework_core::{Cage, CageError, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
-use wasm_bindgen::JsValue;
 
-use crate::arrays::polygon_mesh;
-use crate::error::{Answer, Fault};
-use crate::options::taken;
+use crate::error::EditError;
 
-/// What is said of a cage besides its positions and faces.
+/// Subdivision and interior controls of a cage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct CageControls {
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct CageControls {
     /// Steps of subdivision.
-    pub(crate) smooth: u32,
-    /// So many of the positions, the last ones, are controls inside.
-    pub(crate) inner: usize,
-    /// What they are corners of; counted from the first of them.
-    pub(crate) elements: Vec<InnerElement>,
+    pub smooth: u32,
+    /// Number of interior controls: the last of the cage's positions.
+    pub inner: usize,
+    /// Points, lines and faces between interior controls, which are counted from the first of them.
+    pub elements: Vec<InnerElement>,
     /// Radius of points and lines, object units; null for a share of the cage.
-    pub(crate) radius: Option<f32>,
+    pub radius: Option<f32>,
 }
 
-/// A kind of control inside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+/// A kind of interior control.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) enum InnerKind {
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum InnerKind {
+    /// A ball around a point.
     Point,
+    /// A tube around a polyline.
     Line,
+    /// A sheet.
     Face,
 }
 
@@ -48,31 +47,39 @@ impl InnerKind {
     }
 }
 
-/// A cage, or a draft of one, with its controls.
-#[derive(Clone)]
-pub(crate) struct MadeCage {
-    /// Positions of cage and controls inside; faces of the cage.
-    pub(crate) mesh: PolygonMesh,
-    pub(crate) controls: CageControls,
-    /// Why it is no cage yet, if it is none.
-    pub(crate) set: Result<ControlSet, CageError>,
-    /// What became of controls that did not fit.
-    pub(crate) notice: Option<String>,
+/// A cage at rest, or a draft that is no cage yet, with its interior controls.
+#[derive(Clone, Debug)]
+pub struct RestCage {
+    /// Positions of the cage's vertices, then of interior controls; faces of the cage.
+    pub mesh: PolygonMesh,
+    /// Subdivision and interior controls.
+    pub controls: CageControls,
+    /// The controls of a bind, or why the mesh is no cage yet.
+    pub set: Result<ControlSet, CageError>,
+    /// Interior controls that were dropped because they do not fit, and what the generator reported.
+    pub notices: Vec<String>,
 }
 
-impl Default for MadeCage {
-    fn default() -> Self {
-        let set = Err(CageError::Empty);
-        Self { mesh: PolygonMesh::default(), controls: CageControls::default(), set, notice: None }
+/// Equal meshes and controls make equal cages.
+impl PartialEq for RestCage {
+    fn eq(&self, other: &Self) -> bool {
+        self.mesh == other.mesh && self.controls == other.controls
     }
 }
 
-impl MadeCage {
+impl Default for RestCage {
+    fn default() -> Self {
+        let set = Err(CageError::Empty);
+        Self { mesh: PolygonMesh::default(), controls: CageControls::default(), set, notices: Vec::new() }
+    }
+}
+
+impl RestCage {
     /// A cage whose last positions are those of controls inside.
     ///
     /// # Errors
     /// When the controls do not fit into it.
-    pub(crate) fn new(mut mesh: PolygonMesh, controls: CageControls) -> Answer<Self> {
+    pub fn new(mut mesh: PolygonMesh, controls: CageControls) -> Result<Self, EditError> {
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
@@ -94,11 +101,11 @@ impl MadeCage {
             mesh = set.cage().to_polygon_mesh();
         }
         mesh.positions.extend(positions);
-        Ok(Self { mesh, controls, set, notice: None })
+        Ok(Self { mesh, controls, set, notices: Vec::new() })
     }
 
     /// Another cage in its place: controls stay as far as they fit into it.
-    pub(crate) fn replaced(&self, cage: &PolygonMesh) -> Self {
+    pub fn replaced(&self, cage: &PolygonMesh) -> Self {
         let with = |inner: &[Vec3], controls: CageControls| {
             let mut mesh = cage.clone();
             mesh.positions.extend(inner);
@@ -108,22 +115,24 @@ impl MadeCage {
         let (made, fault) = match with(self.inner_positions(), self.controls.clone()) {
             Ok(made) => return made,
             Err(fault) if self.controls.inner > 0 => match with(&[], smooth) {
-                Ok(made) => return Self { notice: Some(dropped("The controls inside are", &fault)), ..made },
+                Ok(made) => {
+                    return Self { notices: vec![dropped("The controls inside are", &fault)], ..made };
+                }
                 Err(fault) => (with(&[], CageControls::default()), fault),
             },
             Err(fault) => (with(&[], CageControls::default()), fault),
         };
-        let notice = Some(dropped("The smooth surface is", &fault));
-        made.map_or_else(|_| Self::default(), |made| Self { notice, ..made })
+        let notices = vec![dropped("The smooth surface is", &fault)];
+        made.map_or_else(|_| Self::default(), |made| Self { notices, ..made })
     }
 
     /// Positions of controls inside.
-    pub(crate) fn inner_positions(&self) -> &[Vec3] {
+    pub fn inner_positions(&self) -> &[Vec3] {
         &self.mesh.positions[self.n_cage()..]
     }
 
     /// Vertices of the cage alone.
-    pub(crate) fn n_cage(&self) -> usize {
+    pub fn n_cage(&self) -> usize {
         self.mesh.positions.len().saturating_sub(self.controls.inner)
     }
 
@@ -132,7 +141,7 @@ impl MadeCage {
     ///
     /// # Errors
     /// When it does not fit.
-    pub(crate) fn with(&self, kind: InnerKind, places: &[Vec3]) -> Answer<Self> {
+    pub fn with(&self, kind: InnerKind, places: &[Vec3]) -> Result<Self, EditError> {
         let (mut mesh, mut controls) = (self.mesh.clone(), self.controls.clone());
         let (first, radius) = (self.n_cage(), self.radius());
         let mut corners: Vec<u32> = Vec::new();
@@ -155,7 +164,7 @@ impl MadeCage {
     ///
     /// # Errors
     /// Never; what fits with more fits with less.
-    pub(crate) fn without(&self, vertices: &[u32]) -> Answer<Self> {
+    pub fn without(&self, vertices: &[u32]) -> Result<Self, EditError> {
         let (mut mesh, mut controls) = (self.mesh.clone(), self.controls.clone());
         let first = self.n_cage();
         let is_gone = |i: u32| vertices.contains(&(first as u32 + i));
@@ -198,14 +207,14 @@ impl MadeCage {
     }
 
     /// Radius of points and lines, object units.
-    pub(crate) fn radius(&self) -> f32 {
+    pub fn radius(&self) -> f32 {
         let inner = InnerControls { radius: self.controls.radius, ..InnerControls::default() };
         let longest = |set: &ControlSet| Controls::from(set).surface().bounds().extent().max_element();
         inner.radius_in(self.set.as_ref().map_or(0.0, longest))
     }
 
     /// Lines between controls, and around faces inside, as pairs of positions.
-    pub(crate) fn inner_edges(&self) -> Vec<[u32; 2]> {
+    pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let first = self.n_cage() as u32;
         let mut edges = Vec::new();
         for element in &self.controls.elements {
@@ -219,22 +228,8 @@ impl MadeCage {
     }
 }
 
-fn dropped(what: &str, fault: &Fault) -> String {
-    format!("{what} gone: {}. Undo brings it back", fault.message())
-}
-
-/// A cage with its controls from arrays: see [`CageControls`]. Undefined controls are none.
-///
-/// # Errors
-/// When the arrays are no cage, or the controls do not fit into it.
-pub(crate) fn control_set(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<ControlSet> {
-    let mesh = polygon_mesh(positions, corners)?;
-    Ok(MadeCage::new(mesh, said(controls)?.unwrap_or_default())?.set?)
-}
-
-/// Controls that JavaScript says; none for undefined.
-pub(crate) fn said(controls: JsValue) -> Answer<Option<CageControls>> {
-    if controls.is_undefined() { Ok(None) } else { taken(controls).map(Some) }
+fn dropped(what: &str, error: &EditError) -> String {
+    format!("{what} gone: {error}. Undo brings it back")
 }
 
 #[cfg(test)]
@@ -243,9 +238,9 @@ mod tests {
 
     use super::*;
 
-    fn made() -> MadeCage {
+    fn made() -> RestCage {
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-        MadeCage::new(subdivided_box(bounds, 0.0, [1; 3]), CageControls::default()).unwrap()
+        RestCage::new(subdivided_box(bounds, 0.0, [1; 3]), CageControls::default()).unwrap()
     }
 
     fn at(x: f32) -> Vec3 {
@@ -261,7 +256,7 @@ mod tests {
         assert_eq!((made.mesh.positions.len(), made.n_cage(), made.inner_positions()[2]), (11, 8, at(0.5)));
         assert_eq!(made.inner_edges(), [[8, 9], [9, 10]]);
         let overlap = made.with(InnerKind::Point, &[at(0.05)]).err().unwrap();
-        assert!(overlap.message().contains("overlap"), "{overlap:?}");
+        assert!(overlap.to_string().contains("overlap"), "{overlap:?}");
     }
 
     #[test]
@@ -288,10 +283,10 @@ mod tests {
             subdivided_box(Bounds { min: Vec3::splat(min), max: Vec3::splat(max) }, 0.0, [2; 3])
         };
         let larger = made.replaced(&of(-2.0, 2.0));
-        assert_eq!((larger.controls.inner, larger.mesh.positions.len(), larger.notice), (1, 27, None));
+        assert_eq!((larger.controls.inner, larger.mesh.positions.len(), larger.notices.len()), (1, 27, 0));
         let beside = made.replaced(&of(1.0, 2.0));
         assert_eq!((beside.controls.inner, beside.mesh.positions.len()), (0, 26));
-        assert!(beside.notice.unwrap().contains("outside"));
+        assert!(beside.notices[0].contains("outside"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::view::View;
+use cagework_core::view::View;
 
 /// Ray hits whose distance is below this, over their distance from the eye, count as one.
 const HIT_TOLERANCE: f32 = 1e-5;
@@ -218,8 +218,7 @@ fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::shapes::cube;
-    use crate::edit::Flat;
+    use crate::edit::tests::{Flat, cube};
 
     fn pixel(x: f32, y: f32) -> Vec2 {
         Vec2::new(200.0 + 100.0 * x, 100.0 - 100.0 * y)

@@ -2,8 +2,9 @@
 
 use glam::{Quat, Vec2, Vec3};
 
+use cagework_core::view::View;
+
 use super::pull::Pull;
-use super::view::View;
 
 /// Sine of the angle between view and plane below which the view plane is used instead: a pixel would move too far.
 const MIN_PLANE_SINE: f32 = 0.05;
@@ -258,5 +259,4 @@ fn in_plane(view: &dyn View, pointer: Vec2, through: Vec3, normal: Vec3) -> Opti
 }
 
 #[cfg(test)]
-#[path = "gesture_tests.rs"]
 mod tests;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::mesh::Bounds;
+use cagework_core::Bounds;
 
 /// Tolerance of mirror images over the diagonal: covers grid snapping and rounding by exporters.
 const IMAGE_TOLERANCE: f32 = 2e-3;
@@ -70,19 +70,24 @@ fn reflect_point(p: Vec3, plane: f32) -> Vec3 {
 }
 
 /// Mirror image of a displacement.
-pub(crate) fn reflect(d: Vec3) -> Vec3 {
+pub fn reflect(d: Vec3) -> Vec3 {
     Vec3::new(-d.x, d.y, d.z)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage::shapes::{cube, cuboid};
+
+    /// Corners of a box; corner `x + 2 y + 4 z` with 0 for `min` and 1 for `max`.
+    fn cuboid(min: Vec3, max: Vec3) -> Vec<Vec3> {
+        let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        (0..8).map(|v| Vec3::new(at(v, 0), at(v, 1), at(v, 2))).collect()
+    }
 
     #[test]
     fn pairs_are_found_about_the_origin_and_about_the_middle() {
         for min_x in [-1.0, 3.0] {
-            let rest = cuboid(Vec3::new(min_x, 0.0, 0.0), Vec3::new(min_x + 2.0, 1.0, 1.0)).positions;
+            let rest = cuboid(Vec3::new(min_x, 0.0, 0.0), Vec3::new(min_x + 2.0, 1.0, 1.0));
             let symmetry = Symmetry::new(&rest);
             assert!(symmetry.is_complete() && (symmetry.plane() - (min_x + 1.0)).abs() < 1e-6);
             // Vertices are x + 2 y + 4 z: mirror images differ in the lowest bit.
@@ -101,7 +106,7 @@ mod tests {
 
     #[test]
     fn mirror_images_are_matched_within_a_tolerance() {
-        let mut rest = cube().positions;
+        let mut rest = cuboid(Vec3::ZERO, Vec3::ONE);
         rest[1].y += 1e-3;
         assert!(Symmetry::new(&rest).is_complete());
         rest[1].y += 0.1;

@@ -1,0 +1,432 @@
+//! Commands: what changes a document. They are data, so that a panel, a script and a test drive the editor alike.
+
+use std::sync::Arc;
+
+use cagework_core::{InnerElement, PolygonMesh};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::controls::{CageControls, InnerKind, RestCage};
+use crate::document::NamedPose;
+use crate::edit::{SelectMode, reblend};
+use crate::editor::Editor;
+use crate::error::EditError;
+use crate::models::PartOptions;
+use crate::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
+use crate::surface::SurfacePoint;
+
+/// How far a face is extruded, in diagonals of model and cage.
+const EXTRUSION: f32 = 0.08;
+/// Sizes that are tried for a sheet, each four fifths of the previous one.
+const SHEET_SIZES: i32 = 16;
+
+/// An edit of the cage where it is selected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum RestEdit {
+    /// Puts a vertex in the middle of each selected edge.
+    SplitEdge,
+    /// Merges the two ends of a selected edge.
+    CollapseEdge,
+    /// Pulls selected faces outwards.
+    ExtrudeFace,
+    /// Removes selected vertices, and closes the holes; selected interior controls are removed instead if there are any.
+    DeleteVertex,
+    /// Removes selected faces, and closes the holes.
+    DeleteFace,
+}
+
+/// A change of the document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Command {
+    /// Moves the cage. `[n_controls]`, finite
+    SetPose {
+        /// Where its vertices and interior controls go, object units.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
+        positions: Vec<Vec3>,
+    },
+    /// Moves the cage to its rest position.
+    ResetPose,
+    /// Saves the pose under a name.
+    SavePose {
+        /// The name.
+        name: String,
+    },
+    /// Moves the cage to a saved pose, with its pins.
+    ApplyPose {
+        /// Which one, from 0.
+        index: usize,
+    },
+    /// Gives a saved pose another name.
+    RenamePose {
+        /// Which one, from 0.
+        index: usize,
+        /// The name.
+        name: String,
+    },
+    /// Deletes a saved pose.
+    RemovePose {
+        /// Which one, from 0.
+        index: usize,
+    },
+    /// Changes the share of a saved pose in the blend. What was moved by hand since the last step stays.
+    Blend {
+        /// Which one, from 0.
+        index: usize,
+        /// Its share, 0 to 1.
+        share: f32,
+    },
+    /// Takes poses that were carried over from another cage of the models: positions of the pose, then of each saved pose with
+    /// `from` controls, one after the other.
+    CarryPoses {
+        /// Controls of the other cage.
+        from: usize,
+        /// Positions for the controls of this cage.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
+        positions: Vec<Vec3>,
+        /// Shares of the saved poses in the pose.
+        shares: Vec<f32>,
+    },
+    /// Sets the points that pulls leave in place.
+    SetPins {
+        /// The points.
+        pins: Vec<SurfacePoint>,
+    },
+    /// Takes another cage, or a draft of one. The pose is its rest position.
+    ReplaceCage {
+        /// Positions of its vertices, then of interior controls, and its faces.
+        #[cfg_attr(feature = "typescript", ts(type = "unknown"))]
+        mesh: PolygonMesh,
+        /// Subdivision and interior controls; none to keep those that fit.
+        controls: Option<CageControls>,
+        /// What the generator reported.
+        notices: Vec<String>,
+    },
+    /// Takes the positions of the moved cage as its rest position.
+    MoveRest,
+    /// Edits the cage where it is selected, and selects the result.
+    EditRest {
+        /// The edit.
+        edit: RestEdit,
+    },
+    /// Subdivides the cage before values are prescribed on its surface.
+    Subdivide {
+        /// Steps, 0 to 3.
+        steps: u32,
+    },
+    /// Sets the radius of interior points and lines.
+    SetRadius {
+        /// Object units; none for a share of the cage.
+        radius: Option<f32>,
+    },
+    /// Adds an interior control, and selects it.
+    AddControl {
+        /// A point, a line through places, or a sheet between them.
+        kind: InnerKind,
+        /// Where, object units.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
+        places: Vec<Vec3>,
+    },
+    /// Adds the largest rectangular sheet that fits, and selects it.
+    AddSheet {
+        /// Its centre.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly [number, number, number]"))]
+        center: Vec3,
+        /// Its half axes at the largest size.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
+        axes: [Vec3; 2],
+    },
+    /// Takes other interior controls in place of the present ones.
+    ReplaceControls {
+        /// Their positions.
+        #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
+        positions: Vec<Vec3>,
+        /// Points, lines and faces between them.
+        elements: Vec<InnerElement>,
+    },
+    /// Removes a model from the cage.
+    RemoveModel {
+        /// Its number.
+        id: u32,
+    },
+    /// Sets visibility and parts of a model.
+    SetParts {
+        /// Its number.
+        id: u32,
+        /// Visibility and parts.
+        options: PartOptions,
+    },
+    /// Sets how much of each vertex of a model stays in place.
+    SetPainted {
+        /// Its number.
+        id: u32,
+        /// Amounts, 0 to 255. `[n_vertices]`, or empty for an unpainted model
+        amounts: Vec<u8>,
+    },
+}
+
+impl Editor {
+    /// Changes the document; [`Editor::commit`] makes a step of it.
+    ///
+    /// # Errors
+    /// When the command cannot be applied; nothing changes then.
+    pub fn apply(&mut self, command: Command) -> Result<(), EditError> {
+        let before = self.document().clone();
+        let result = self.run(command);
+        if result.is_err() {
+            self.set_document(before);
+        }
+        result
+    }
+
+    fn run(&mut self, command: Command) -> Result<(), EditError> {
+        match command {
+            Command::SetPose { positions } => self.set_pose(positions)?,
+            Command::ResetPose => self.reset_pose(),
+            Command::SavePose { name } => {
+                let pose = self.document().pose.clone();
+                let pins = Some(self.document().pins.clone());
+                let document = self.document_mut();
+                // The pose is all of the new one.
+                document.shares = std::iter::repeat_n(0.0, document.poses.len()).chain([1.0]).collect();
+                Arc::make_mut(&mut document.poses).push(NamedPose {
+                    name: name.into(),
+                    positions: pose,
+                    pins,
+                });
+            }
+            Command::ApplyPose { index } => {
+                let NamedPose { positions, pins, .. } = self.pose(index)?.clone();
+                self.set_pose(positions.to_vec())?;
+                let document = self.document_mut();
+                document.shares =
+                    (0..document.poses.len()).map(|k| f32::from(u8::from(k == index))).collect();
+                if let Some(pins) = pins {
+                    document.pins = pins;
+                }
+            }
+            Command::RenamePose { index, name } => {
+                self.pose(index)?;
+                Arc::make_mut(&mut self.document_mut().poses)[index].name = name.into();
+            }
+            Command::RemovePose { index } => {
+                self.pose(index)?;
+                let document = self.document_mut();
+                Arc::make_mut(&mut document.poses).remove(index);
+                let shares = document.shares.iter().enumerate().filter(|(k, _)| *k != index);
+                document.shares = shares.map(|(_, share)| *share).collect();
+            }
+            Command::Blend { index, share } => self.blend(index, share)?,
+            Command::CarryPoses { from, positions, shares } => {
+                self.take_carried(from, &positions, &shares)?
+            }
+            Command::SetPins { pins } => self.document_mut().pins = pins.into(),
+            Command::ReplaceCage { mesh, controls, notices } => {
+                let mut cage = match controls {
+                    Some(controls) => RestCage::new(mesh, controls)?,
+                    None => self.document().cage.replaced(&mesh),
+                };
+                cage.notices.extend(notices);
+                self.set_cage(cage);
+                self.document_mut().has_sample_cage = false;
+            }
+            Command::MoveRest => {
+                let document = self.document();
+                let mesh = PolygonMesh {
+                    positions: document.pose.to_vec(),
+                    faces: document.cage.mesh.faces.clone(),
+                };
+                let cage = RestCage::new(mesh, document.cage.controls.clone())?;
+                if let (Ok(_), Err(error)) = (&document.cage.set, &cage.set) {
+                    return Err(error.clone().into());
+                }
+                let selection = self.selection.clone();
+                self.set_cage(cage);
+                self.selection = selection;
+                self.document_mut().has_sample_cage = false;
+            }
+            Command::EditRest { edit } => self.edit_rest(edit)?,
+            Command::Subdivide { steps } => {
+                self.change_controls(|now| CageControls { smooth: steps, ..now })?;
+            }
+            Command::SetRadius { radius } => self.change_controls(|now| CageControls { radius, ..now })?,
+            Command::AddControl { kind, places } => {
+                self.require_cage()?;
+                let cage = self.document().cage.with(kind, &places)?;
+                self.add_control(cage);
+            }
+            Command::AddSheet { center, axes: [right, up] } => {
+                self.require_cage()?;
+                let sheet = |k: i32| {
+                    let size = 0.8_f32.powi(k);
+                    let corner = |(x, y): (f32, f32)| center + size * (x * right + y * up);
+                    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
+                    self.document().cage.with(InnerKind::Face, &corners)
+                };
+                let largest = (1..SHEET_SIZES).find_map(|k| sheet(k).ok());
+                let cage = largest.map_or_else(|| sheet(SHEET_SIZES), Ok)?;
+                self.add_control(cage);
+            }
+            Command::ReplaceControls { positions, elements } => {
+                let cage = &self.document().cage;
+                let mut mesh = cage.mesh.clone();
+                mesh.positions.truncate(cage.n_cage());
+                mesh.positions.extend(&positions);
+                let controls = CageControls { inner: positions.len(), elements, ..cage.controls };
+                let cage = RestCage::new(mesh, controls)?;
+                self.set_cage(cage);
+            }
+            Command::RemoveModel { id } => self.change_models(|models| models.remove(id))?,
+            Command::SetParts { id, options } => {
+                self.change_parts(|models| models.set_options(id, options))?;
+            }
+            Command::SetPainted { id, amounts } => {
+                self.change_parts(|models| models.set_painted(id, amounts))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn pose(&self, index: usize) -> Result<&NamedPose, EditError> {
+        let poses = &self.document().poses;
+        let missing = EditError::NoSuchPose { number: index + 1, count: poses.len() };
+        poses.get(index).ok_or(missing)
+    }
+
+    fn require_cage(&self) -> Result<(), EditError> {
+        if self.document().cage.set.is_ok() { Ok(()) } else { Err(EditError::NoCage) }
+    }
+
+    /// From the pose and the shares of the last step: a slider sends many shares, and each replaces the one before.
+    fn blend(&mut self, index: usize, share: f32) -> Result<(), EditError> {
+        self.pose(index)?;
+        if !share.is_finite() {
+            return Err(EditError::NotFinite { what: "shares of a pose" });
+        }
+        let (document, committed) = (self.document(), self.committed());
+        let rest = &document.cage.mesh.positions;
+        let mut shares = document.shares.to_vec();
+        shares.resize(document.poses.len(), 0.0);
+        shares[index] = share;
+        let fitting: Vec<usize> =
+            (0..document.poses.len()).filter(|&k| document.fits(&document.poses[k])).collect();
+        let poses: Vec<Vec<Vec3>> = fitting.iter().map(|&k| document.poses[k].positions.to_vec()).collect();
+        let of = |all: &[f32]| -> Vec<f32> {
+            fitting.iter().map(|&k| all.get(k).copied().unwrap_or_default()).collect()
+        };
+        let from = if committed.pose.len() == rest.len() { &committed.pose } else { &document.pose };
+        let mixed = reblend(rest, &poses, from, &of(&committed.shares), &of(&shares))?;
+        self.set_pose(mixed)?;
+        self.document_mut().shares = shares.into();
+        Ok(())
+    }
+
+    fn take_carried(&mut self, from: usize, positions: &[Vec3], shares: &[f32]) -> Result<(), EditError> {
+        let n = self.document().cage.mesh.positions.len();
+        let mut carried = positions.chunks_exact(n.max(1));
+        let pose = carried.next().map(<[Vec3]>::to_vec).unwrap_or_default();
+        self.set_pose(pose)?;
+        let document = self.document_mut();
+        for pose in Arc::make_mut(&mut document.poses).iter_mut().filter(|pose| pose.positions.len() == from)
+        {
+            if let Some(carried) = carried.next() {
+                pose.positions = carried.into();
+            }
+        }
+        if shares.len() == document.poses.len() {
+            document.shares = shares.into();
+        }
+        Ok(())
+    }
+
+    /// The same cage with other controls; the pose stays.
+    fn change_controls(
+        &mut self,
+        change: impl FnOnce(CageControls) -> CageControls,
+    ) -> Result<(), EditError> {
+        let (cage, pose) = (&self.document().cage, self.document().pose.clone());
+        let cage = RestCage::new(cage.mesh.clone(), change(cage.controls.clone()))?;
+        let shares = self.document().shares.clone();
+        self.set_cage(cage);
+        self.set_pose(pose.to_vec())?;
+        self.document_mut().shares = shares;
+        Ok(())
+    }
+
+    /// The same cage with one more interior control, which is selected.
+    fn add_control(&mut self, cage: RestCage) {
+        let first = cage.n_cage() as u32;
+        let corners = cage.controls.elements.last().map(|element| element.corners().to_vec());
+        self.set_cage(cage);
+        let corners: Vec<u32> = corners.unwrap_or_default().iter().map(|&i| first + i).collect();
+        self.selection.change(&corners, SelectMode::Replace);
+    }
+
+    fn edit_rest(&mut self, edit: RestEdit) -> Result<(), EditError> {
+        let cage = &self.document().cage;
+        let inner: Vec<u32> =
+            self.selection.vertices().into_iter().filter(|&v| v as usize >= cage.n_cage()).collect();
+        if edit == RestEdit::DeleteVertex && !inner.is_empty() {
+            let without = cage.without(&inner)?;
+            self.set_cage(without);
+            return Ok(());
+        }
+        let Edited { mesh, touched, .. } = self.edited(edit)?;
+        let replaced = self.document().cage.replaced(&mesh);
+        self.set_cage(replaced);
+        self.document_mut().has_sample_cage = false;
+        self.selection.change(&touched, SelectMode::Replace);
+        Ok(())
+    }
+
+    fn edited(&self, edit: RestEdit) -> Result<Edited, EditError> {
+        let mesh = self.cage_as_shown();
+        let topology = self.topology();
+        let (mut edges, faces) = (self.selection.edges(topology), self.selection.faces(topology));
+        edges.retain(|edge| edge.iter().all(|&i| (i as usize) < mesh.positions.len()));
+        let edge = EditError::NothingSelected { what: "an edge, or both its ends," };
+        let face = EditError::NothingSelected { what: "a face, or all its corners," };
+        Ok(match edit {
+            RestEdit::SplitEdge => {
+                each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?.ok_or(edge)?
+            }
+            // Merging moves vertices together: one edge at a time.
+            RestEdit::CollapseEdge => collapse_edge(&mesh, *edges.first().ok_or(edge)?, 0.5)?,
+            RestEdit::ExtrudeFace => {
+                let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
+                each(&mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?.ok_or(face)?
+            }
+            RestEdit::DeleteFace if faces.is_empty() => return Err(face),
+            RestEdit::DeleteFace => delete_faces(&mesh, &faces)?,
+            RestEdit::DeleteVertex if self.selection.is_empty() => {
+                return Err(EditError::NothingSelected { what: "a vertex" });
+            }
+            RestEdit::DeleteVertex => {
+                let around =
+                    |f: &u32| topology.faces[*f as usize].iter().any(|&i| self.selection.contains(i));
+                let faces: Vec<u32> = (0..topology.faces.len() as u32).filter(around).collect();
+                delete_faces(&mesh, &faces)?
+            }
+        })
+    }
+}
+
+/// Applies an edit to each item in turn; none for no items. An edit keeps the numbers of the items that follow.
+fn each<T, E>(
+    mesh: &PolygonMesh,
+    items: &[T],
+    edit: impl Fn(&PolygonMesh, &T) -> Result<Edited, E>,
+) -> Result<Option<Edited>, E> {
+    let mut all: Option<Edited> = None;
+    for item in items {
+        let mut next = edit(all.as_ref().map_or(mesh, |e| &e.mesh), item)?;
+        if let Some(before) = all {
+            next.touched.splice(0..0, before.touched);
+        }
+        all = Some(next);
+    }
+    Ok(all)
+}

@@ -1,0 +1,137 @@
+//! The document: everything that a person changes, undoes and saves.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use crate::controls::RestCage;
+use crate::models::Models;
+use crate::surface::SurfacePoint;
+
+/// A saved pose of the cage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPose {
+    /// Its name.
+    pub name: Arc<str>,
+    /// Positions of the cage and its interior controls. `[n_controls]` of the cage that it was saved for
+    pub positions: Arc<[Vec3]>,
+    /// Points of the model that pulls left in place; none if unknown.
+    pub pins: Option<Arc<[SurfacePoint]>>,
+}
+
+/// Everything that can be changed, undone and saved. Clones share their contents.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    /// The models in the cage.
+    pub models: Models,
+    /// The cage at rest.
+    pub cage: Arc<RestCage>,
+    /// Positions of the cage and its interior controls as posed; while the cage is reshaped, as they will be at rest.
+    /// `[n_controls]`
+    pub pose: Arc<[Vec3]>,
+    /// Saved poses.
+    pub poses: Arc<Vec<NamedPose>>,
+    /// Share of each saved pose in `pose`. `[n_poses]`
+    pub shares: Arc<[f32]>,
+    /// Points of the model that pulls leave in place.
+    pub pins: Arc<[SurfacePoint]>,
+    /// Identifier of the built-in sample that is open.
+    pub sample: Option<Arc<str>>,
+    /// Whether the cage is that sample's own.
+    pub has_sample_cage: bool,
+    /// Identifies the joined mesh of the models: documents with equal keys have equal meshes.
+    pub(crate) mesh_key: u64,
+    /// Identifies the cage at rest in the same way.
+    pub(crate) cage_key: u64,
+    /// Identifies the models with their options and painted amounts.
+    pub(crate) models_key: u64,
+}
+
+/// Equal contents, whatever their keys.
+impl PartialEq for Document {
+    fn eq(&self, other: &Self) -> bool {
+        self.models == other.models
+            && self.cage == other.cage
+            && self.pose == other.pose
+            && self.poses == other.poses
+            && self.shares == other.shares
+            && self.pins == other.pins
+            && self.sample == other.sample
+            && self.has_sample_cage == other.has_sample_cage
+    }
+}
+
+impl Document {
+    /// Identifies what weights are computed from: the joined mesh of the models and the cage at rest.
+    #[must_use]
+    pub fn key(&self) -> Key {
+        Key { mesh: self.mesh_key, cage: self.cage_key }
+    }
+
+    /// Whether the cage is posed.
+    #[must_use]
+    pub fn is_posed(&self) -> bool {
+        *self.pose != *self.cage.mesh.positions
+    }
+
+    /// Whether a saved pose belongs to the cage.
+    #[must_use]
+    pub fn fits(&self, pose: &NamedPose) -> bool {
+        pose.positions.len() == self.cage.mesh.positions.len()
+    }
+
+    /// Saved poses that belong to the cage.
+    pub fn fitting_poses(&self) -> impl Iterator<Item = &NamedPose> {
+        self.poses.iter().filter(|pose| self.fits(pose))
+    }
+
+    /// Whether clones share all contents: a comparison of pointers and keys.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.pose, &other.pose)
+            && self.key() == other.key()
+            && self.models_key == other.models_key
+            && Arc::ptr_eq(&self.cage, &other.cage)
+            && Arc::ptr_eq(&self.poses, &other.poses)
+            && Arc::ptr_eq(&self.shares, &other.shares)
+            && Arc::ptr_eq(&self.pins, &other.pins)
+            && self.sample == other.sample
+            && self.has_sample_cage == other.has_sample_cage
+    }
+
+    /// Bytes of what another document does not share, about.
+    pub(crate) fn bytes_beyond(&self, other: &Self) -> usize {
+        let points = |own: &Arc<[Vec3]>, other: &Arc<[Vec3]>| {
+            if Arc::ptr_eq(own, other) { 0 } else { size_of_val(&**own) }
+        };
+        // Mesh, controls, triangles and the surface that a bind subdivides.
+        let cage =
+            if Arc::ptr_eq(&self.cage, &other.cage) { 0 } else { 256 * self.cage.mesh.positions.len() };
+        let shares = |pose: &NamedPose| {
+            let mut others = other.poses.iter();
+            others.any(|o| Arc::ptr_eq(&o.positions, &pose.positions))
+        };
+        let poses = if Arc::ptr_eq(&self.poses, &other.poses) {
+            0
+        } else {
+            let of = |pose: &NamedPose| {
+                size_of::<NamedPose>() + if shares(pose) { 0 } else { size_of_val(&*pose.positions) }
+            };
+            self.poses.iter().map(of).sum()
+        };
+        size_of::<Self>()
+            + points(&self.pose, &other.pose)
+            + cage
+            + poses
+            + self.models.bytes_beyond(&other.models)
+    }
+}
+
+/// Identifies what weights and checks are computed from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Key {
+    /// The joined mesh of the models.
+    pub mesh: u64,
+    /// The cage at rest.
+    pub cage: u64,
+}

@@ -1,0 +1,50 @@
+//! A camera and small cages for the tests of this folder.
+
+use cagework_core::PolygonMesh;
+use cagework_core::view::View;
+use glam::{Vec2, Vec3};
+
+/// A box of quads; vertex `x + 2 y + 4 z` with 0 for `min` and 1 for `max`.
+pub(crate) fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
+    let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
+    PolygonMesh {
+        positions: (0..8).map(|v| Vec3::new(at(v, 0), at(v, 1), at(v, 2))).collect(),
+        faces: [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+            .iter()
+            .map(|f: &[u32; 4]| f.to_vec())
+            .collect(),
+    }
+}
+
+/// `[0, 1]^3`.
+pub(crate) fn cube() -> PolygonMesh {
+    cuboid(Vec3::ZERO, Vec3::ONE)
+}
+
+/// Looks along -z, 100 pixels a unit, the origin at pixel (200, 100).
+pub(crate) struct Flat;
+
+impl View for Flat {
+    fn project(&self, point: Vec3) -> Option<(Vec2, f32)> {
+        Some((Vec2::new(200.0 + 100.0 * point.x, 100.0 - 100.0 * point.y), 10.0 - point.z))
+    }
+    fn ray(&self, pixel: Vec2) -> (Vec3, Vec3) {
+        (Vec3::new((pixel.x - 200.0) / 100.0, (100.0 - pixel.y) / 100.0, 10.0), Vec3::NEG_Z)
+    }
+    fn units_per_pixel(&self, _point: Vec3) -> f32 {
+        0.01
+    }
+    fn right(&self) -> Vec3 {
+        Vec3::X
+    }
+    fn up(&self) -> Vec3 {
+        Vec3::Y
+    }
+}
+
+#[test]
+fn pointer_to_the_right_and_down_moves_in_the_view_plane() {
+    assert_eq!(Flat.backward(), Vec3::Z);
+    let moved = Flat.in_view_plane(Vec3::ZERO, Vec2::new(50.0, 20.0));
+    assert!(moved.abs_diff_eq(Vec3::new(0.5, -0.2, 0.0), 1e-6));
+}

@@ -1,0 +1,84 @@
+//! Undo as a list of documents.
+
+use std::collections::VecDeque;
+
+use crate::document::Document;
+
+/// Bytes of documents kept unless told otherwise.
+pub const HISTORY_BYTES: usize = 256 << 20;
+
+/// A step and the document before it, or after it once it was undone.
+#[derive(Clone, Debug)]
+struct Step {
+    label: String,
+    document: Document,
+    /// Bytes of it that the neighbouring document does not share.
+    bytes: usize,
+}
+
+/// Steps that can be undone and redone.
+#[derive(Clone, Debug)]
+pub(crate) struct History {
+    done: VecDeque<Step>,
+    undone: Vec<Step>,
+    limit: usize,
+    forgotten: usize,
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self { done: VecDeque::new(), undone: Vec::new(), limit: HISTORY_BYTES, forgotten: 0 }
+    }
+}
+
+impl History {
+    pub(crate) fn with_limit(limit: usize) -> Self {
+        Self { limit, ..Self::default() }
+    }
+
+    /// Records a step that led from `before` to `after`, and forgets undone ones. The oldest steps go when the bytes of all exceed
+    /// the limit; the latest stays.
+    pub(crate) fn push(&mut self, label: String, before: Document, after: &Document) {
+        let bytes = before.bytes_beyond(after);
+        self.undone.clear();
+        self.done.push_back(Step { label, document: before, bytes });
+        let mut bytes: usize = self.done.iter().map(|step| step.bytes).sum();
+        while bytes > self.limit && self.done.len() > 1 {
+            bytes -= self.done.pop_front().map_or(0, |step| step.bytes);
+            self.forgotten += 1;
+        }
+    }
+
+    /// Swaps `now` for the document before the last step.
+    pub(crate) fn undo(&mut self, now: &mut Document) -> bool {
+        let Some(mut step) = self.done.pop_back() else { return false };
+        std::mem::swap(now, &mut step.document);
+        self.undone.push(step);
+        true
+    }
+
+    /// Swaps `now` for the document after the step that was undone last.
+    pub(crate) fn redo(&mut self, now: &mut Document) -> bool {
+        let Some(mut step) = self.undone.pop() else { return false };
+        std::mem::swap(now, &mut step.document);
+        self.done.push_back(step);
+        true
+    }
+
+    pub(crate) fn undo_label(&self) -> Option<&str> {
+        self.done.back().map(|step| step.label.as_str())
+    }
+
+    pub(crate) fn redo_label(&self) -> Option<&str> {
+        self.undone.last().map(|step| step.label.as_str())
+    }
+
+    pub(crate) fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// Steps that were dropped because of the limit.
+    pub(crate) fn forgotten(&self) -> usize {
+        self.forgotten
+    }
+}

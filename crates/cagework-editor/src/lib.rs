@@ -1,0 +1,28 @@
+//! What a person edits, and how: models, cage, pose and saved poses as one [`Document`], changed by [`Command`]s and taken back
+//! by undo.
+//!
+//! No GPU, no browser. Weights, checks and pictures are derived from a document and not part of it.
+
+pub mod cache;
+mod command;
+mod controls;
+mod document;
+pub mod edit;
+mod editor;
+mod error;
+mod history;
+mod models;
+pub mod rest_edit;
+mod surface;
+mod view;
+
+pub use cache::Cache;
+pub use command::{Command, RestEdit};
+pub use controls::{CageControls, InnerKind, RestCage};
+pub use document::{Document, Key, NamedPose};
+pub use editor::{Contents, Editor};
+pub use error::EditError;
+pub use history::HISTORY_BYTES;
+pub use models::{Member, MemberSettings, Models, NewModel, PartOptions};
+pub use surface::SurfacePoint;
+pub use view::{DocumentView, PoseView, SelectionView};

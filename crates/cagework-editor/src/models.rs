@@ -1,0 +1,437 @@
+//! The models in one cage, joined to one mesh: vertices and triangles of the first model, then those of the next.
+//!
+//! A point of the surface is stored as a triangle's number and barycentric coordinates. Triangles are numbered through all models
+//! that a document has held, so that a point stays on its triangle when other models are added or removed.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use cagework_core::TriMesh;
+use cagework_io::{Model, UpAxis};
+use cagework_pose::Parts;
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::error::EditError;
+
+/// Largest number of a first triangle that a project may ask for; it leaves room for the triangles of later models.
+const MAX_FIRST: u32 = u32::MAX / 2;
+/// The name that stands for all of a model.
+const WHOLE: &str = "all";
+
+/// Visibility of a model, and which of its parts the cage does not bend.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct PartOptions {
+    /// Whether it is drawn and can be picked.
+    pub shown: bool,
+    /// Names of parts that keep their shape; "all" for the whole model.
+    pub rigid: Vec<String>,
+    /// Names of parts that stay in place; "all" for the whole model.
+    pub stays: Vec<String>,
+}
+
+impl Default for PartOptions {
+    fn default() -> Self {
+        Self { shown: true, rigid: Vec::new(), stays: Vec::new() }
+    }
+}
+
+/// What a project stores of a model besides its file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct MemberSettings {
+    /// Number of its first triangle in points of the surface.
+    first_triangle: u32,
+    options: PartOptions,
+    /// Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
+    painted: Vec<(u8, u32)>,
+}
+
+/// One of the models.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// Its number, which no other model of the document has.
+    pub id: u32,
+    /// The file.
+    pub model: Arc<Model>,
+    /// Visibility and parts.
+    pub options: PartOptions,
+    /// How much of each vertex is painted to stay in place, 0 to 255; empty for an unpainted model. `[n_vertices]`
+    pub painted: Arc<Vec<u8>>,
+    first_triangle: u32,
+    /// Its vertices in the joined mesh.
+    pub vertices: Range<usize>,
+    /// Its triangles in the joined mesh.
+    pub triangles: Range<usize>,
+}
+
+/// Members are equal when they are the same file with the same options.
+impl PartialEq for Member {
+    fn eq(&self, other: &Self) -> bool {
+        let is_same_file = Arc::ptr_eq(&self.model, &other.model)
+            || (self.model.name == other.model.name
+                && self.model.positions == other.model.positions
+                && self.model.triangles == other.model.triangles);
+        is_same_file
+            && self.first_triangle == other.first_triangle
+            && self.options == other.options
+            && self.painted == other.painted
+    }
+}
+
+/// A model to add, and what a project stores of it.
+pub type NewModel = (Model, Option<MemberSettings>);
+
+/// The models in one cage. Clones share files and the joined mesh.
+#[derive(Clone, Debug, Default)]
+pub struct Models {
+    members: Arc<Vec<Member>>,
+    mesh: Arc<TriMesh>,
+    next_id: u32,
+    next_triangle: u32,
+    /// That of the first model that was opened; it stays when that model is removed.
+    origin: DVec3,
+}
+
+/// Equal members make equal models.
+impl PartialEq for Models {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.members, &other.members) || self.members == other.members
+    }
+}
+
+impl Models {
+    /// Adds models at the end.
+    pub fn add(&mut self, models: impl IntoIterator<Item = NewModel>) {
+        for (model, settings) in models {
+            self.push(model, settings);
+        }
+        self.join();
+    }
+
+    fn push(&mut self, model: Model, settings: Option<MemberSettings>) {
+        if self.next_id == 0 {
+            self.origin = model.origin();
+        }
+        // Each triangle has one number.
+        let asked = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST);
+        let first_triangle = asked.max(self.next_triangle);
+        self.next_triangle = first_triangle + model.triangles.len() as u32;
+        let mut member = Member {
+            id: self.next_id,
+            options: PartOptions::default(),
+            painted: Arc::default(),
+            first_triangle,
+            vertices: 0..0,
+            triangles: 0..0,
+            model: Arc::new(model),
+        };
+        self.next_id += 1;
+        if let Some(MemberSettings { options, painted, .. }) = settings {
+            let kept = |names: &[String]| names.iter().filter(|name| member.selects(name)).cloned().collect();
+            member.options = PartOptions {
+                shown: options.shown,
+                rigid: kept(&options.rigid),
+                stays: kept(&options.stays),
+            };
+            let n: u64 = painted.iter().map(|&(_, n)| u64::from(n)).sum();
+            if n == member.model.positions.len() as u64 {
+                let runs = painted.iter().flat_map(|&(amount, n)| std::iter::repeat_n(amount, n as usize));
+                member.painted = Arc::new(runs.collect());
+            }
+        }
+        Arc::make_mut(&mut self.members).push(member);
+    }
+
+    /// Removes a model.
+    ///
+    /// # Errors
+    /// When there is no such model, or it is the only one; nothing changes then.
+    pub fn remove(&mut self, id: u32) -> Result<(), EditError> {
+        self.get(id)?;
+        if self.members.len() == 1 {
+            return Err(EditError::OnlyModel);
+        }
+        Arc::make_mut(&mut self.members).retain(|member| member.id != id);
+        self.join();
+        Ok(())
+    }
+
+    fn join(&mut self) {
+        let mut mesh = TriMesh::default();
+        for member in Arc::make_mut(&mut self.members) {
+            let Model { positions, triangles, .. } = &*member.model;
+            let (v, t) = (mesh.positions.len(), mesh.triangles.len());
+            mesh.positions.extend(positions);
+            mesh.triangles.extend(triangles.iter().map(|corners| corners.map(|c| v as u32 + c)));
+            member.vertices = v..mesh.positions.len();
+            member.triangles = t..mesh.triangles.len();
+        }
+        self.mesh = Arc::new(mesh);
+    }
+
+    /// All models in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Member> {
+        self.members.iter()
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Whether no model is open.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// Vertices at rest. `[n_vertices]`
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        &self.mesh.positions
+    }
+
+    /// Triangles of the joined mesh. `[n_triangles]`
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.mesh.triangles
+    }
+
+    /// Whether the joined meshes are one: the same models in the same order.
+    #[must_use]
+    pub fn has_mesh_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.mesh, &other.mesh)
+    }
+
+    /// A model by its number.
+    ///
+    /// # Errors
+    /// When there is no such model.
+    pub fn get(&self, id: u32) -> Result<&Member, EditError> {
+        self.iter().find(|member| member.id == id).ok_or(EditError::NoModel)
+    }
+
+    /// The first model.
+    ///
+    /// # Errors
+    /// When no model is open.
+    pub fn first(&self) -> Result<&Member, EditError> {
+        self.iter().next().ok_or(EditError::NoModel)
+    }
+
+    fn member_mut(&mut self, id: u32) -> Result<&mut Member, EditError> {
+        self.get(id)?;
+        let members = Arc::make_mut(&mut self.members).iter_mut();
+        members.into_iter().find(|member| member.id == id).ok_or(EditError::NoModel)
+    }
+
+    /// Sets visibility and parts of a model.
+    ///
+    /// # Errors
+    /// When there is no such model, or a name is that of no part; nothing changes then.
+    pub fn set_options(&mut self, id: u32, options: PartOptions) -> Result<(), EditError> {
+        let model = &self.get(id)?.model;
+        for name in options.rigid.iter().chain(&options.stays).filter(|name| *name != WHOLE) {
+            model.select(name)?;
+        }
+        self.member_mut(id)?.options = options;
+        Ok(())
+    }
+
+    /// Sets how much of each vertex of a model stays in place, 0 to 255. `[n_vertices]`, or empty for an unpainted model.
+    ///
+    /// # Errors
+    /// When there is no such model, or it has another number of vertices; nothing changes then.
+    pub fn set_painted(&mut self, id: u32, amounts: Vec<u8>) -> Result<(), EditError> {
+        let expected = self.get(id)?.model.positions.len();
+        if !amounts.is_empty() && amounts.len() != expected {
+            return Err(EditError::Amounts { given: amounts.len(), expected });
+        }
+        let is_any = amounts.iter().any(|&amount| amount > 0);
+        self.member_mut(id)?.painted = Arc::new(if is_any { amounts } else { Vec::new() });
+        Ok(())
+    }
+
+    /// Origin of all positions in the files' axes: that of the model that was opened first.
+    #[must_use]
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Says where the origin is, if it is not the world's.
+    #[must_use]
+    pub fn origin_notice(&self) -> Option<String> {
+        let [x, y, z] = self.up().vector_turned(self.origin).to_array();
+        (self.origin != DVec3::ZERO).then(|| {
+            format!(
+                "the model is far from the world's origin: coordinates are shown as seen from {x}, {y}, {z}, and files keep \
+                 those of the world"
+            )
+        })
+    }
+
+    /// Up axis of the files: the same in all of them.
+    #[must_use]
+    pub fn up(&self) -> UpAxis {
+        self.iter().next().map_or_else(UpAxis::default, |member| member.model.up())
+    }
+
+    /// Triangles of models that are not shown.
+    #[must_use]
+    pub fn hidden(&self) -> Vec<Range<u32>> {
+        let hidden = self.iter().filter(|member| !member.options.shown);
+        hidden.map(|member| member.triangles.start as u32..member.triangles.end as u32).collect()
+    }
+
+    /// Triangles of shown models, each with its index in the joined mesh.
+    pub fn shown_triangles(&self) -> impl Iterator<Item = (u32, [u32; 3])> {
+        let shown = self.iter().filter(|member| member.options.shown);
+        shown.flat_map(|member| {
+            let own = self.mesh.triangles[member.triangles.clone()].iter().copied();
+            (member.triangles.start as u32..).zip(own)
+        })
+    }
+
+    /// Corners of a numbered triangle in the joined mesh; none if its model was removed.
+    #[must_use]
+    pub fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
+        let place = |member: &Member| {
+            let own = triangle.checked_sub(member.first_triangle)? as usize;
+            self.mesh.triangles[member.triangles.clone()].get(own).copied()
+        };
+        self.iter().find_map(place)
+    }
+
+    /// Number of a triangle of the joined mesh.
+    #[must_use]
+    pub fn number_of(&self, triangle: u32) -> u32 {
+        let of = |member: &&Member| member.triangles.contains(&(triangle as usize));
+        let number = |m: &Member| m.first_triangle + triangle - m.triangles.start as u32;
+        self.iter().find(of).map_or(triangle, number)
+    }
+
+    /// Points of rigs, which are bound after the vertices: those of the first model, then those of the next. `[n_points]`
+    ///
+    /// # Errors
+    /// When a rig cannot be read.
+    pub fn extra_points(&self) -> Result<Vec<Vec3>, EditError> {
+        let mut points = Vec::new();
+        for member in self.iter() {
+            points.extend(member.model.extra_points()?);
+        }
+        Ok(points)
+    }
+
+    /// Which of [`Self::extra_points`] belong to a model.
+    ///
+    /// # Errors
+    /// When there is no such model, or a rig cannot be read.
+    pub fn extra_of(&self, id: u32) -> Result<Range<usize>, EditError> {
+        let mut first = 0;
+        for member in self.iter() {
+            let n = member.model.extra_points()?.len();
+            if member.id == id {
+                return Ok(first..first + n);
+            }
+            first += n;
+        }
+        Err(EditError::NoModel)
+    }
+
+    /// Parts of all models that the cage does not bend.
+    #[must_use]
+    pub fn parts(&self) -> Parts {
+        let mut all = Parts::default();
+        for member in self.iter() {
+            // `set_options` has refused names that select nothing.
+            let own = member.parts().unwrap_or_default();
+            if !own.stays.is_empty() {
+                all.stays.resize(self.mesh.positions.len(), 0.0);
+                all.stays[member.vertices.clone()].copy_from_slice(&own.stays);
+            }
+            let first = member.vertices.start as u32;
+            all.rigid
+                .extend(own.rigid.into_iter().map(|piece| piece.into_iter().map(|v| first + v).collect()));
+        }
+        all
+    }
+
+    /// What a project stores of the models besides their files; empty for one model with default options.
+    #[must_use]
+    pub fn settings(&self) -> Vec<MemberSettings> {
+        let of = |member: &Member| MemberSettings {
+            first_triangle: member.first_triangle,
+            options: member.options.clone(),
+            painted: member.painted.chunk_by(|a, b| a == b).map(|run| (run[0], run.len() as u32)).collect(),
+        };
+        let all: Vec<_> = self.iter().map(of).collect();
+        if all == [MemberSettings::default()] { Vec::new() } else { all }
+    }
+
+    /// Bytes of what another document does not share, about.
+    pub(crate) fn bytes_beyond(&self, other: &Self) -> usize {
+        if Arc::ptr_eq(&self.members, &other.members) {
+            return 0;
+        }
+        let shares = |m: &Member| other.iter().any(|o| Arc::ptr_eq(&o.model, &m.model));
+        let of = |m: &Member| {
+            let file =
+                if shares(m) { 0 } else { 4 * (12 * m.model.positions.len() + 12 * m.model.triangles.len()) };
+            file + m.painted.len()
+        };
+        let mesh = if self.has_mesh_of(other) {
+            0
+        } else {
+            12 * (self.mesh.positions.len() + self.mesh.triangles.len())
+        };
+        mesh + self.iter().map(of).sum::<usize>()
+    }
+}
+
+impl Member {
+    fn selects(&self, name: &str) -> bool {
+        name == WHOLE || self.model.select(name).is_ok()
+    }
+
+    /// Its parts that the cage does not bend. Vertices are its own.
+    ///
+    /// # Errors
+    /// When a name is that of no part.
+    pub fn parts(&self) -> Result<Parts, EditError> {
+        let of_parts = |names: &[String]| -> Vec<String> {
+            names.iter().filter(|name| *name != WHOLE).cloned().collect()
+        };
+        let is_whole = |names: &[String]| names.iter().any(|name| name == WHOLE);
+        let PartOptions { rigid, stays, .. } = &self.options;
+        let named: Vec<(String, f32)> = of_parts(stays).into_iter().map(|name| (name, 1.0)).collect();
+        let mut parts = self.model.parts(&named, &of_parts(rigid))?;
+        let n = self.model.positions.len();
+        if is_whole(rigid) {
+            // One rigid piece, even where the mesh has several components: a suit of armour moves as one.
+            parts.rigid = vec![(0..n as u32).collect()];
+        }
+        if is_whole(stays) {
+            parts.stays = vec![1.0; n];
+        }
+        if !self.painted.is_empty() {
+            parts.stays.resize(n, 0.0);
+            let painted = self.painted.iter().map(|&amount| f32::from(amount) / 255.0);
+            parts.stays.iter_mut().zip(painted).for_each(|(stays, painted)| *stays = stays.max(painted));
+        }
+        Ok(parts)
+    }
+
+    /// Its part of a list over all vertices.
+    #[must_use]
+    pub fn share<'a, T>(&self, of_all: &'a [T]) -> &'a [T] {
+        &of_all[self.vertices.clone()]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,130 @@
+//! Models that come and go.
+
+use super::*;
+
+/// A tetrahedron `at` a place, of a material each for its first two triangles and the rest.
+fn model(name: &str, at: f32) -> Model {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut text = String::new();
+    for [x, y, z] in corners {
+        text += &format!("v {} {y} {z}\n", x + at);
+    }
+    text += "usemtl skin\nf 1 3 2\nusemtl cloth\nf 1 2 4\nf 2 3 4\n";
+    let mut model = Model::read(name, text.as_bytes(), &mut |_| None).unwrap();
+    model.see_from(DVec3::ZERO);
+    model
+}
+
+fn three() -> Models {
+    let mut models = Models::default();
+    for (name, at) in [("body.obj", 0.0), ("shirt.obj", 10.0), ("hat.obj", 20.0)] {
+        models.add([(model(name, at), None)]);
+    }
+    models
+}
+
+/// A model as a project that kept it brings it.
+fn again((member, settings): (&Member, &MemberSettings)) -> NewModel {
+    ((*member.model).clone(), Some(settings.clone()))
+}
+
+fn names(models: &Models) -> Vec<&str> {
+    models.iter().map(|member| member.model.name.as_str()).collect()
+}
+
+#[test]
+fn points_of_the_surface_mean_the_same_triangle_whatever_comes_and_goes() {
+    let mut models = three();
+    let of_hat = 7;
+    let at = |models: &Models| models.corners(of_hat).map(|c| c.map(|v| models.positions()[v as usize]));
+    let before = at(&models).unwrap();
+    models.remove(1).unwrap();
+    assert_eq!((names(&models), models.triangles().len()), (vec!["body.obj", "hat.obj"], 6));
+    assert_eq!(at(&models).unwrap(), before);
+    assert_eq!(models.number_of(4), of_hat, "the hat's second triangle is the fifth of the mesh now");
+    assert_eq!(models.corners(4), None, "the shirt is not in the cage");
+    // A project has only what is in the cage; its points are counted as they were.
+    models.remove(0).unwrap();
+    let saved = models.settings();
+    let mut opened = Models::default();
+    opened.add(models.iter().zip(&saved).map(again));
+    assert_eq!(at(&opened).unwrap(), before);
+}
+
+#[test]
+fn the_last_model_stays() {
+    let mut models = three();
+    models.remove(0).unwrap();
+    models.remove(2).unwrap();
+    let error = models.remove(1).unwrap_err();
+    assert!(error.to_string().contains("only model"), "{error}");
+    assert!(models.remove(9).is_err());
+    assert_eq!(names(&models), ["shirt.obj"]);
+}
+
+#[test]
+fn models_in_one_cage_have_the_origin_of_the_first() {
+    let at = |name: &str, x: f64| {
+        let text = format!("v {} 0 0\nv {} 0 0\nv {x} 1 0\nf 1 2 3\n", x + 0.25, x + 1.0);
+        Model::read(name, text.as_bytes(), &mut |_| None).unwrap()
+    };
+    let mut models = Models::default();
+    assert_eq!((models.origin(), models.origin_notice()), (DVec3::ZERO, None));
+    for mut one in [at("a.obj", 4.5e6), at("b.obj", 4.6e6)] {
+        if !models.is_empty() {
+            one.see_from(models.origin());
+        }
+        models.add([(one, None)]);
+    }
+    let origin = models.origin();
+    assert_eq!(models.positions()[3].as_dvec3().x + origin.x, 4.6e6 + 0.25);
+    models.remove(0).unwrap();
+    assert_eq!(models.origin(), origin, "the cage stays where it is");
+    assert!(models.origin_notice().unwrap().contains("seen from 4500000.5, 0, 0"));
+}
+
+#[test]
+fn parts_are_named_painted_and_kept_in_settings() {
+    let mut models = three();
+    assert!(models.parts().is_empty());
+    let options = |rigid: &[&str], stays: &[&str]| PartOptions {
+        rigid: rigid.iter().map(|&s| s.to_owned()).collect(),
+        stays: stays.iter().map(|&s| s.to_owned()).collect(),
+        ..PartOptions::default()
+    };
+    models.set_options(0, options(&[], &["material:skin"])).unwrap();
+    models.set_options(1, options(&["all"], &[])).unwrap();
+    let error = models.set_options(2, options(&["material:gold"], &[])).unwrap_err();
+    assert!(error.to_string().contains("material:skin"), "it names what there is: {error}");
+    assert_eq!(models.get(2).unwrap().options, PartOptions::default());
+    models.set_painted(2, vec![0, 255, 255, 51]).unwrap();
+    assert!(models.set_painted(2, vec![1; 3]).is_err());
+    let expected = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.2];
+    let parts = models.parts();
+    assert_eq!((parts.stays.as_slice(), &parts.rigid), (&expected[..], &vec![vec![4, 5, 6, 7]]));
+    // Through JSON, as a project keeps them.
+    let text = serde_json::to_string(&models.settings()).unwrap();
+    let saved: Vec<MemberSettings> = serde_json::from_str(&text).unwrap();
+    let mut opened = Models::default();
+    opened.add(models.iter().zip(&saved).map(again));
+    assert_eq!(opened.parts(), parts);
+    assert_eq!(opened.settings(), saved);
+    // What another program wrote is left out as far as it does not fit.
+    let odd =
+        r#"{"first_triangle": 4294967295, "options": {"rigid": ["nobody"]}, "painted": [[255, 4000000000]]}"#;
+    let mut other = Models::default();
+    let odd: MemberSettings = serde_json::from_str(odd).unwrap();
+    other.add([(model("a.obj", 0.0), Some(odd.clone()))]);
+    // A second one once ended in a panic: it is counted on from the first.
+    other.add([(model("b.obj", 0.0), Some(odd.clone()))]);
+    assert!(other.parts().is_empty());
+    assert_eq!(other.settings().len(), 2);
+    assert_eq!([MAX_FIRST, MAX_FIRST + 3].map(|t| other.corners(t)), [Some([0, 2, 1]), Some([4, 6, 5])]);
+}
+
+#[test]
+fn one_model_has_nothing_to_keep() {
+    let mut models = Models::default();
+    models.add([(model("a.obj", 0.0), None)]);
+    assert_eq!(models.settings(), Vec::new());
+}
