@@ -43,6 +43,12 @@ impl<T> Cache<T> {
         self.entries.back().map(|entry| &entry.result)
     }
 
+    /// Whether there is a result of a key.
+    #[must_use]
+    pub fn contains(&self, key: Key) -> bool {
+        self.entries.iter().any(|entry| entry.key == key)
+    }
+
     /// Drops everything.
     pub fn clear(&mut self) {
         self.entries.clear();

@@ -12,7 +12,7 @@ use crate::edit::{SelectMode, reblend};
 use crate::editor::Editor;
 use crate::error::EditError;
 use crate::models::PartOptions;
-use crate::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
+use crate::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_face, split_edge};
 use crate::surface::SurfacePoint;
 
 /// How far a face is extruded, in diagonals of model and cage.
@@ -374,7 +374,7 @@ impl Editor {
             self.set_cage(without);
             return Ok(());
         }
-        let Edited { mesh, touched, .. } = self.edited(edit)?;
+        let CageEdit { mesh, touched, .. } = self.edited(edit)?;
         let replaced = self.document().cage.replaced(&mesh);
         self.set_cage(replaced);
         self.document_mut().has_sample_cage = false;
@@ -382,7 +382,7 @@ impl Editor {
         Ok(())
     }
 
-    fn edited(&self, edit: RestEdit) -> Result<Edited, EditError> {
+    fn edited(&self, edit: RestEdit) -> Result<CageEdit, EditError> {
         let mesh = self.cage_as_shown();
         let topology = self.topology();
         let (mut edges, faces) = (self.selection.edges(topology), self.selection.faces(topology));
@@ -418,9 +418,9 @@ impl Editor {
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],
-    edit: impl Fn(&PolygonMesh, &T) -> Result<Edited, E>,
-) -> Result<Option<Edited>, E> {
-    let mut all: Option<Edited> = None;
+    edit: impl Fn(&PolygonMesh, &T) -> Result<CageEdit, E>,
+) -> Result<Option<CageEdit>, E> {
+    let mut all: Option<CageEdit> = None;
     for item in items {
         let mut next = edit(all.as_ref().map_or(mesh, |e| &e.mesh), item)?;
         if let Some(before) = all {

@@ -85,16 +85,15 @@ impl Document {
         self.poses.iter().filter(|pose| self.fits(pose))
     }
 
-    /// Whether clones share all contents: a comparison of pointers and keys.
+    /// Whether nothing was changed between two clones. Meshes are compared by their keys.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.pose, &other.pose)
+        self.pose == other.pose
             && self.key() == other.key()
             && self.models_key == other.models_key
-            && Arc::ptr_eq(&self.cage, &other.cage)
-            && Arc::ptr_eq(&self.poses, &other.poses)
-            && Arc::ptr_eq(&self.shares, &other.shares)
-            && Arc::ptr_eq(&self.pins, &other.pins)
+            && (Arc::ptr_eq(&self.poses, &other.poses) || self.poses == other.poses)
+            && self.shares == other.shares
+            && self.pins == other.pins
             && self.sample == other.sample
             && self.has_sample_cage == other.has_sample_cage
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::view::View;
 use cagework_core::{Bounds, PolygonMesh};
+use cagework_io::{Model, write_project};
 use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
@@ -15,6 +16,7 @@ use crate::edit::{
 use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
+use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
 
@@ -27,11 +29,15 @@ pub struct Editor {
     /// The document at the last step.
     committed: Document,
     history: History,
+    /// Counts steps, undos and redos.
+    steps: u64,
     /// The last key that was given out.
     keys: u64,
     topology: Topology,
     symmetry: Symmetry,
     editing_rest: bool,
+    /// Whether a model was painted since the last step.
+    is_painting: bool,
     gesture: Option<Gesture>,
     /// Selected vertices of the cage and its interior controls.
     pub selection: Selection,
@@ -87,10 +93,10 @@ impl Editor {
     /// Opens other models; the history starts anew.
     pub fn open(&mut self, models: impl IntoIterator<Item = NewModel>, contents: Contents) {
         let Contents { cage, poses, mut shares, pins, sample } = contents;
-        let (element, pivot) = (Element::default(), self.pivot);
-        let (keys, limit) = (self.keys, self.history.limit());
+        let (pivot, radius, keys, steps) = (self.pivot, self.radius, self.keys, self.steps + 1);
+        let limit = self.history.limit();
         shares.resize(poses.len(), 0.0);
-        *self = Self { keys, element, pivot, ..Self::with_history_limit(limit) };
+        *self = Self { pivot, radius, keys, steps, ..Self::with_history_limit(limit) };
         let has_sample_cage = sample.is_some() && cage.is_some();
         let mut all = Models::default();
         all.add(models);
@@ -110,22 +116,51 @@ impl Editor {
         self.amend();
     }
 
-    /// Adds models; cage and pose stay.
-    pub fn add_models(&mut self, models: impl IntoIterator<Item = NewModel>) {
+    /// Takes the pose of a project without a step of the history. Without a pose nothing is blended.
+    ///
+    /// # Errors
+    /// When it is damaged, or belongs to another cage: the cage is at rest then.
+    pub fn take_pose(&mut self, settings: &DocumentSettings) -> Result<(), &'static str> {
+        let pose = settings.pose_of(&self.document);
+        match &pose {
+            Ok(Some(pose)) if self.set_pose(pose.clone()).is_ok() => {}
+            _ => self.reset_pose(),
+        }
+        self.amend();
+        pose.map(|_| ())
+    }
+
+    /// Adds models; cage and pose stay. Returns their numbers.
+    pub fn add_models(&mut self, models: impl IntoIterator<Item = NewModel>) -> std::ops::Range<u32> {
+        let first = self.document.models.next_id();
         // Adding does not fail.
         let _ = self.change_models(|all| {
             all.add(models);
             Ok(())
         });
+        first..self.document.models.next_id()
+    }
+
+    /// Paints a model: changes how much of each vertex stays in place, 0 to 255. The key of the models follows with the next step, so that
+    /// a stroke derives nothing from each of its dabs.
+    pub fn paint(&mut self, id: u32, change: impl FnOnce(&mut Vec<u8>)) {
+        if let Some(painted) = self.document.models.painted_mut(id) {
+            change(painted);
+            self.is_painting = true;
+        }
     }
 
     /// Makes one step of all changes since the last step; false if there were none.
     pub fn commit(&mut self, label: impl Into<String>) -> bool {
+        if std::mem::take(&mut self.is_painting) && self.document.models != self.committed.models {
+            self.document.models_key = self.next_key();
+        }
         if self.document.is_same(&self.committed) {
             return false;
         }
         let before = std::mem::replace(&mut self.committed, self.document.clone());
         self.history.push(label.into(), before, &self.document);
+        self.steps += 1;
         true
     }
 
@@ -136,6 +171,7 @@ impl Editor {
 
     /// Takes back all changes since the last step.
     pub fn revert(&mut self) {
+        self.is_painting = false;
         self.set_document(self.committed.clone());
     }
 
@@ -153,6 +189,7 @@ impl Editor {
         let mut document = self.committed.clone();
         let went = way(&mut self.history, &mut document);
         if went {
+            self.steps += 1;
             self.set_document(document);
             self.amend();
             if self.document.is_posed() {
@@ -165,6 +202,11 @@ impl Editor {
     /// Drops all steps.
     pub fn clear_history(&mut self) {
         self.history = History::with_limit(self.history.limit());
+    }
+
+    /// Shows a document in place of the present one; [`Self::commit`] makes a step of it.
+    pub fn show(&mut self, document: Document) {
+        self.set_document(document);
     }
 
     /// Takes another document, and drops a selection in another cage.
@@ -219,6 +261,11 @@ impl Editor {
     fn next_key(&mut self) -> u64 {
         self.keys += 1;
         self.keys
+    }
+
+    /// Extends the selection to whole connected components.
+    pub fn select_linked(&mut self) {
+        self.selection.linked(&self.topology);
     }
 
     /// Identifies what weights are computed from.
@@ -387,6 +434,19 @@ impl Editor {
         self.set_pose(moved).is_ok()
     }
 
+    /// The document and other settings, a JSON object, as a project.
+    ///
+    /// # Errors
+    /// When no model is open or the file would be too large.
+    pub fn write_project(&self, settings: &str) -> Result<Vec<u8>, EditError> {
+        let Document { models, cage, poses, .. } = &self.document;
+        let models: Vec<&Model> = models.iter().map(|member| &*member.model).collect();
+        let poses: Vec<(String, Vec<Vec3>)> =
+            poses.iter().map(|pose| (pose.name.to_string(), pose.positions.to_vec())).collect();
+        let settings = DocumentSettings::of(&self.document).beside(settings);
+        Ok(write_project(&models, &cage.mesh, &poses, &settings)?)
+    }
+
     /// What panels show.
     #[must_use]
     pub fn view(&self) -> DocumentView {
@@ -411,6 +471,7 @@ impl Editor {
                 last: self.selection.last(),
                 center: if self.gesture.is_some() { None } else { center() },
             },
+            steps: self.steps,
             undo: self.history.undo_label().map(str::to_owned),
             redo: self.history.redo_label().map(str::to_owned),
             forgotten: self.history.forgotten(),

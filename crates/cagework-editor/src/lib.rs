@@ -13,6 +13,7 @@ mod error;
 mod history;
 mod models;
 pub mod rest_edit;
+mod settings;
 mod surface;
 mod view;
 
@@ -24,5 +25,6 @@ pub use editor::{Contents, Editor};
 pub use error::EditError;
 pub use history::HISTORY_BYTES;
 pub use models::{Member, MemberSettings, Models, NewModel, PartOptions};
+pub use settings::DocumentSettings;
 pub use surface::SurfacePoint;
 pub use view::{DocumentView, PoseView, SelectionView};

@@ -257,6 +257,15 @@ impl Models {
         Ok(())
     }
 
+    pub(crate) fn painted_mut(&mut self, id: u32) -> Option<&mut Vec<u8>> {
+        let members = Arc::make_mut(&mut self.members).iter_mut();
+        members.into_iter().find(|member| member.id == id).map(|member| Arc::make_mut(&mut member.painted))
+    }
+
+    pub(crate) fn next_id(&self) -> u32 {
+        self.next_id
+    }
+
     /// Origin of all positions in the files' axes: that of the model that was opened first.
     #[must_use]
     pub fn origin(&self) -> DVec3 {

@@ -31,6 +31,8 @@ pub struct DocumentView {
     pub sample_cage: bool,
     /// The selection.
     pub selected: SelectionView,
+    /// Changes with each step, undo and redo.
+    pub steps: u64,
     /// Label of the step that undo takes back.
     pub undo: Option<String>,
     /// Label of the step that redo repeats.

@@ -160,7 +160,12 @@ impl Session {
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if sizes do not match them;
     /// otherwise as [`crate::buffers::Allocator::zeros`].
-    pub async fn adopt(&mut self, weights: Weights, frames: Frames) -> Result<(), GpuError> {
+    pub async fn adopt(
+        &mut self,
+        weights: impl Into<Arc<Weights>>,
+        frames: impl Into<Arc<Frames>>,
+    ) -> Result<(), GpuError> {
+        let (weights, frames) = (weights.into(), frames.into());
         let (model, controls) = self.parts()?;
         let (rows, columns) = (model.positions.len(), controls.n_controls());
         if !frames.fits(columns) {
@@ -168,7 +173,7 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         check_size(&weights, rows, columns + frames.n_columns())?;
-        self.bound(weights.into(), frames.into(), false, None).await
+        self.bound(weights, frames, false, None).await
     }
 
     fn parts(&self) -> Result<(&Arc<DrawModel>, Controls<'_>), GpuError> {

@@ -22,7 +22,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, points, polygon_mesh};
 use crate::clock::Listener;
-use crate::controls::{CageControls, control_set, said};
+use cagework_editor::CageControls;
+
+use crate::controls::{control_set, from_js};
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{BindAsked, CageAsked, Coordinates, READ_LIMIT, taken};
 use crate::problems::{self, Check};
@@ -285,7 +287,7 @@ impl Binder {
 /// A cage's mesh without the controls inside it, and its steps of subdivision.
 fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(PolygonMesh, u32)> {
     let mut mesh = polygon_mesh(positions, corners)?;
-    let CageControls { smooth, inner, .. } = said(controls)?.unwrap_or_default();
+    let CageControls { smooth, inner, .. } = from_js(controls)?.unwrap_or_default();
     mesh.positions.truncate(mesh.positions.len().saturating_sub(inner));
     Ok((mesh, smooth))
 }

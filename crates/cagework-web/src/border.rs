@@ -9,7 +9,6 @@ use cagework_cage::generate::{
     CageOptions, DETAILS, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
 };
 use cagework_core::deform::OutsideVertex;
-use cagework_core::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_core::options::{
     Backend, CellShape, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
 };
@@ -17,23 +16,27 @@ use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
 use cagework_core::{BindOptions, Frames, InnerElement, Stage};
+use cagework_editor::edit::{Element, GestureKind, Pivot, SelectMode};
+use cagework_editor::{
+    CageControls, Command, DocumentSettings, DocumentView, InnerKind, MemberSettings, PartOptions, PoseView,
+    RestEdit, SelectionView, SurfacePoint,
+};
 use cagework_io::{ModelFormat, UpAxis};
 use serde::Serialize;
 use ts_rs::{Config, TS};
 
 use crate::binder::Offsets;
 use crate::clock::Event;
-use crate::controls::{CageControls, InnerKind};
 use crate::error::ErrorName;
-use crate::models::{MemberSettings, PartOptions};
+use crate::opening::{CageContents, OpenContents, PoseContents};
 use crate::options::{
-    BindAsked, CageAsked, Colour, Coordinates, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RestEdit,
-    RigAsked, SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
+    BindAsked, CageAsked, Colour, Coordinates, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RigAsked,
+    SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
 };
 use crate::settings::Settings;
 use crate::views::{
     BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, MemberInfo,
-    Mend, ModelInfo, Problem, SurfacePoint, TargetView,
+    Mend, ModelInfo, Problem, TargetView, View,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
@@ -105,6 +108,15 @@ fn the_page_has_the_types_of_rust() {
         MemberInfo,
         MemberSettings,
         ModelInfo,
+        DocumentSettings,
+        Command,
+        PoseView,
+        SelectionView,
+        DocumentView,
+        View,
+        CageContents,
+        PoseContents,
+        OpenContents,
         Settings,
         ThemeAsked,
         Colour,

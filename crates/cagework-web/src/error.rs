@@ -5,11 +5,10 @@ use std::fmt::Display;
 use cagework_cage::check::RepairError;
 use cagework_cage::generate::CageGenError;
 use cagework_core::cage::CageError;
-use cagework_core::edit::PoseError;
-use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, ClosedFormError, ControlError};
+use cagework_editor::EditError;
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
 use cagework_pose::pull::PullError;
@@ -71,7 +70,7 @@ impl Fault {
         self.name == name
     }
 
-    /// Its sentence.
+    #[cfg(test)]
     pub(crate) fn message(&self) -> &str {
         &self.message
     }
@@ -109,10 +108,8 @@ plain!(
     NpzError,
     ObjError,
     PoseCodeError,
-    PoseError,
     PullError,
     RepairError,
-    RestEditError,
     SliceError,
     WeightsError,
     WriteError,
@@ -130,6 +127,13 @@ impl From<BindError> for Fault {
             _ => ErrorName::Error,
         };
         Self::new(name, error)
+    }
+}
+
+impl From<EditError> for Fault {
+    fn from(error: EditError) -> Self {
+        let is_missing = matches!(error, EditError::NoModel | EditError::NoCage);
+        Self::new(if is_missing { ErrorName::Missing } else { ErrorName::Error }, error)
     }
 }
 

@@ -1,14 +1,17 @@
-//! What is on the GPU, and taking turns at it.
+//! Sessions on the GPU, and the upload that brings them to the document.
 //!
-//! Frames are drawn at once or not at all; what allocates waits for the GPU's answer and holds the lock meanwhile.
+//! A frame is skipped while the lock is held; an allocation holds the lock until the GPU has answered.
 
+use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use async_lock::Mutex;
 use cagework_gpu::Session;
 
+use crate::error::Answer;
 use crate::options::Coordinates;
-use crate::state::State;
+use crate::state::{OnGpu, State, Upload};
 use crate::surface::Surface;
 
 /// Sessions and the canvas they are drawn into.
@@ -41,3 +44,61 @@ impl Gpu {
 
 /// Empty only while it is rebuilt after a loss, and after that failed.
 pub(crate) type SharedGpu = Rc<Mutex<Option<Gpu>>>;
+
+/// Brings the GPU to what the document refers to: mesh, cage, weights that were computed before, and parts that the cage does not
+/// bend. Looks again after each upload, because the document may have changed while the GPU answered.
+///
+/// # Errors
+/// When the GPU has no room. What was not uploaded is tried again after the next change.
+pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
+    loop {
+        let Some(next) = state.borrow().next_upload() else { return Ok(()) };
+        let (key, models_key) = {
+            let state = state.borrow();
+            (state.editor.key(), state.editor.models_key())
+        };
+        match next {
+            Upload::Mesh => {
+                let draw = state.borrow().draw_model();
+                gpu.others.clear();
+                {
+                    let on_gpu = &mut state.borrow_mut().on_gpu;
+                    *on_gpu = OnGpu { cage: on_gpu.cage, ..OnGpu::default() };
+                }
+                gpu.main.set_shared_model(draw).await?;
+                state.borrow_mut().on_gpu.mesh = Some(key.mesh);
+            }
+            Upload::Cage => {
+                let Some(set) = state.borrow().set().cloned() else { return Ok(()) };
+                gpu.others.clear();
+                {
+                    let on_gpu = &mut state.borrow_mut().on_gpu;
+                    (on_gpu.cage, on_gpu.bound) = (None, None);
+                }
+                gpu.main.set_cage(&set).await?;
+                state.borrow_mut().on_gpu.cage = Some(key.cage);
+            }
+            Upload::Weights => {
+                let Some(bound) = state.borrow_mut().cache.get(key).cloned() else { continue };
+                let (weights, frames) = (Arc::clone(&bound.weights), Arc::clone(&bound.frames));
+                gpu.main.adopt(weights, frames).await?;
+                let mut state = state.borrow_mut();
+                if state.editor.key() == key {
+                    state.set_bound(bound);
+                }
+            }
+            Upload::Parts => {
+                let parts = state.borrow().models().parts();
+                let Gpu { main, others, .. } = gpu;
+                for session in std::iter::once(main).chain(others.iter_mut().map(|(_, session)| session)) {
+                    session.set_parts(parts.clone()).await?;
+                }
+                let mut state = state.borrow_mut();
+                state.on_gpu.parts = Some(models_key);
+                state.held.posed_for.clear();
+            }
+        }
+        let mut state = state.borrow_mut();
+        (state.is_moved, state.is_changed) = (true, true);
+    }
+}

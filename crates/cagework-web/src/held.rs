@@ -1,13 +1,14 @@
-//! What a hand holds of the models, and where they are now.
+//! Grabbed points of the models, and positions of the models for picking.
 
-use cagework_core::edit::pick_surface;
 use cagework_core::{Frames, Weights};
+use cagework_editor::SurfacePoint;
+use cagework_editor::edit::pick_surface;
 use cagework_gpu::Session;
 use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
 
 use crate::state::State;
-use crate::views::{Grip, SurfacePoint};
+use crate::views::Grip;
 
 /// A mirror image may be off by this share of the model's diagonal.
 const MIRROR_OFF: f32 = 0.02;
@@ -15,27 +16,25 @@ const MIRROR_OFF: f32 = 0.02;
 impl State {
     /// Brings the models in memory to where the cage is.
     pub(crate) fn pose_models(&mut self, session: &Session) {
-        if self.held.posed_for != self.positions {
-            self.held.posed = session.deformed(&self.positions).unwrap_or_default();
-            self.held.posed_for.clone_from(&self.positions);
+        if self.held.posed_for != self.pose() {
+            self.held.posed = session.deformed(self.pose()).unwrap_or_default();
+            self.held.posed_for = self.pose().to_vec();
         }
     }
 
     /// The point of the posed model under the pointer.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
-        if self.held.posed.len() != self.models.positions.len() {
+        if self.held.posed.len() != self.models().positions().len() {
             return None;
         }
         let (triangle, bary) =
-            pick_surface(&self.held.posed, self.models.shown_triangles(), &self.camera, at)?;
-        Some(SurfacePoint { triangle: self.models.counted(triangle), bary })
+            pick_surface(&self.held.posed, self.models().shown_triangles(), &self.camera, at)?;
+        Some(SurfacePoint { triangle: self.models().number_of(triangle), bary })
     }
 
     /// Where a point of the model is; none if there is no such point.
     pub(crate) fn place_of(&self, point: SurfacePoint) -> Option<Vec3> {
-        let corners = self.models.corners(point.triangle)?;
-        let at = |k: usize| Some(point.bary[k] * *self.held.posed.get(corners[k] as usize)?);
-        Some(at(0)? + at(1)? + at(2)?)
+        point.at(self.models(), &self.held.posed)
     }
 
     /// How a point of the model follows the cage.
@@ -44,7 +43,7 @@ impl State {
         point: SurfacePoint,
         (weights, frames): (&Weights, &Frames),
     ) -> Option<Grip> {
-        let corners = self.models.corners(point.triangle)?;
+        let corners = self.models().corners(point.triangle)?;
         let rows = frames.folded(&weights.with_rows(&corners));
         let mut row = vec![0.0; rows.n_columns()];
         for (k, share) in point.bary.into_iter().enumerate() {
@@ -60,36 +59,36 @@ impl State {
 
     /// The point of the model that is a point's mirror image at rest, if there is one, and it is another.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
-        let models = &self.models;
-        let corners = models.corners(point.triangle)?;
-        let at: Vec3 = corners.iter().zip(point.bary).map(|(&v, b)| b * models.positions[v as usize]).sum();
-        let limit = MIRROR_OFF * self.bounds()?.diagonal();
-        let image = Vec3::new(2.0 * self.symmetry.plane() - at.x, at.y, at.z);
-        let near = |v: u32| models.positions[v as usize].distance(image);
+        let models = self.models();
+        let at = point.at(models, models.positions())?;
+        let limit = MIRROR_OFF * self.editor.bounds()?.diagonal();
+        let image = Vec3::new(2.0 * self.editor.symmetry().plane() - at.x, at.y, at.z);
+        let near = |v: u32| models.positions()[v as usize].distance(image);
         let (t, k) = (0u32..)
-            .zip(&models.triangles)
+            .zip(models.triangles())
             .flat_map(|(t, corners)| (0..3).map(move |k| (t, k, corners[k])))
             .min_by(|a, b| near(a.2).total_cmp(&near(b.2)))
             .filter(|found| near(found.2) < limit && image.distance(at) > limit)
             .map(|(t, k, _)| (t, k))?;
         let mut bary = [0.0; 3];
         bary[k] = 1.0;
-        Some(SurfacePoint { triangle: models.counted(t), bary })
+        Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
     /// What is held, as it is drawn, where the cage is now; nothing before there are weights.
     pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
         let place = |point: &SurfacePoint| {
-            let corners = self.models.corners(point.triangle)?;
+            let corners = self.models().corners(point.triangle)?;
             let follow = |v: u32| {
                 let (columns, values) = weights?.row(v as usize);
                 let moved =
-                    columns.iter().zip(values).map(|(&c, &w)| Some(w * *self.positions.get(c as usize)?));
+                    columns.iter().zip(values).map(|(&c, &w)| Some(w * *self.pose().get(c as usize)?));
                 moved.sum::<Option<Vec3>>()
             };
             corners.iter().zip(point.bary).map(|(&v, share)| Some(share * follow(v)?)).sum::<Option<Vec3>>()
         };
-        let mut points: Vec<Vec3> = self.held.points.iter().filter_map(place).collect();
+        let mut points: Vec<Vec3> =
+            self.held.points.iter().chain(&*self.editor.document().pins).filter_map(place).collect();
         let line = self.held.target.zip(points.first()).map(|(to, from)| [*from, to]);
         let placed = self.held.placed.windows(2).map(|pair| [pair[0], pair[1]]);
         let segments = line.into_iter().chain(placed).collect();

@@ -7,7 +7,7 @@ use cagework_io::JointPoint;
 use glam::Vec3;
 
 use crate::error::Answer;
-use crate::models::Models;
+use cagework_editor::Models;
 
 /// The joints of bound models.
 pub(crate) struct JointDots {

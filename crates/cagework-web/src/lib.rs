@@ -25,7 +25,7 @@ mod held;
 mod incoming;
 mod joints;
 pub mod loaded;
-mod models;
+mod opening;
 mod options;
 mod playing;
 mod problems;
@@ -43,10 +43,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 /// The types of `unchecked_*_type` below: serde's, as `border.rs` writes them for TypeScript.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Coordinates, Element, Gesture, GizmoHandle,
-  Grip, InnerKind, Legend, MemberSettings, ModelFormat, ModelInfo, PartOptions, Pivot, Problem, Progress, PullOptions,
-  Repair, RestEdit, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint,
-  CameraView, UpAxis } from "../contract/generated";
+import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, Element, Gesture,
+  GizmoHandle, Grip, Legend, ModelFormat, ModelInfo, OpenContents, Pivot, Problem, Progress, PullOptions, Repair, RigOptions,
+  SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, UpAxis, View } from "../contract/generated";
 "#;
 
 #[wasm_bindgen]

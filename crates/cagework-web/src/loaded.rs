@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use cagework_core::PolygonMesh;
+use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{Look, LookAlpha, LookWrap, Model, UpAxis, read_project};
 use glam::{DVec3, Vec3};
@@ -14,9 +15,7 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use crate::arrays::flat;
 use crate::binder::Polygons;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::models::MemberSettings;
 use crate::options::{READ_LIMIT, taken};
-use crate::settings::{controls_of, has_controls, member_settings};
 
 /// A model with its looks, and what else was in its file.
 #[wasm_bindgen]
@@ -120,8 +119,8 @@ impl Loaded {
     #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
         self.cage.clone().map(|mesh| {
-            let controls = controls_of(self.settings.as_deref(), &mesh);
-            Polygons { controls, ..mesh.into() }
+            let (cage, _) = self.document_settings().cage(mesh.clone());
+            Polygons { controls: cage.map(|cage| cage.controls), ..mesh.into() }
         })
     }
 
@@ -162,20 +161,6 @@ impl Loaded {
         }
     }
 
-    /// Names of the poses in a project.
-    #[wasm_bindgen(js_name = poseNames)]
-    #[must_use]
-    pub fn pose_names(&self) -> Vec<String> {
-        self.poses.iter().map(|(name, _)| name.clone()).collect()
-    }
-
-    /// Cage positions of one of them. `[n_cage, 3]`
-    #[wasm_bindgen(js_name = posePositions)]
-    #[must_use]
-    pub fn pose_positions(&self, index: usize) -> Vec<f32> {
-        self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
-    }
-
     /// What the page remembered in a project; undefined in any other file.
     #[wasm_bindgen(getter)]
     #[must_use]
@@ -195,13 +180,8 @@ impl Loaded {
             loaded.more = models.collect();
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
-            let settings = loaded.settings.as_deref();
-            if has_controls(settings) && loaded.cage.as_ref().and_then(|c| controls_of(settings, c)).is_none()
-            {
-                loaded.model.notices.push(
-                    "The smooth surface or the controls inside of this project's cage cannot be used: they are left out.".into(),
-                );
-            }
+            let notice = loaded.document_settings().cage(loaded.cage.clone().unwrap_or_default()).1;
+            loaded.model.notices.extend(notice.map(str::to_owned));
             return Ok(loaded);
         }
         let mut resolve = |path: &str| {
@@ -219,6 +199,15 @@ impl Loaded {
         Self { model, cage: None, look, textures, poses: Vec::new(), settings: None, number: 0, more }
     }
 
+    /// Poses of a project.
+    pub(crate) fn poses(&self) -> &[(String, Vec<Vec3>)] {
+        &self.poses
+    }
+
+    fn document_settings(&self) -> DocumentSettings {
+        self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default()
+    }
+
     /// Turns everything in it to what points up.
     pub(crate) fn turn_to(&mut self, up: UpAxis) {
         let before = self.model.up();
@@ -233,7 +222,7 @@ impl Loaded {
 
     /// What a project says of this model besides its file.
     pub(crate) fn member_settings(&self) -> Option<MemberSettings> {
-        member_settings(self.settings.as_deref()).into_iter().nth(self.number)
+        self.document_settings().models.into_iter().nth(self.number)
     }
 
     /// What the renderer takes; a texture that was not decoded is left out.

@@ -230,18 +230,6 @@ pub(crate) enum GizmoHandle {
     All,
 }
 
-/// Edits of the rest cage, on the selection.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) enum RestEdit {
-    SplitEdge,
-    CollapseEdge,
-    ExtrudeFace,
-    DeleteVertex,
-    DeleteFace,
-}
-
 /// How the model is pulled.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]

@@ -7,7 +7,7 @@ use cagework_core::skin::{Skin, skin_vertices};
 use cagework_io::{Player, Posed};
 use glam::{Mat4, Vec3};
 
-use crate::models::Models;
+use cagework_editor::Models;
 
 /// A clip, of all models that have one of this name.
 pub(crate) struct SharedClip {

@@ -1,9 +1,9 @@
 //! The puller's half, in a worker of its own: a bind or a long frame of the page does not stop the hand.
 
-use cagework_core::edit::Symmetry;
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
+use cagework_pose::symmetry::Symmetry;
 use glam::{DVec3, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;

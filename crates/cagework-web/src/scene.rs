@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::Weights;
 use cagework_core::dynamic::bend_vertices;
-use cagework_core::edit::Element;
+use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
 use glam::{Quat, Vec3};
 
@@ -18,8 +18,8 @@ impl State {
             _ if !self.view.model => MeshStyle::Hidden,
             Colour::Material => MeshStyle::Solid,
             Colour::Clay => MeshStyle::Clay,
-            Colour::Error if self.is_bound => MeshStyle::Errors,
-            Colour::Weight if self.is_bound => match self.selection.last() {
+            Colour::Error if self.bound.is_some() => MeshStyle::Errors,
+            Colour::Weight if self.bound.is_some() => match self.editor.selection.last() {
                 Some(column) => MeshStyle::Weights { column },
                 None => MeshStyle::Clay,
             },
@@ -45,7 +45,7 @@ impl State {
             gizmo: self.gizmo().filter(|_| cage),
             slice: self.shown_slice(),
             marks: self.marks(),
-            hidden: self.models.hidden(),
+            hidden: self.models().hidden(),
             greyed: self
                 .painting
                 .as_ref()
@@ -63,12 +63,14 @@ impl State {
 
     /// Whether the model itself can be pulled: then what it hides is not taken in its place.
     pub(crate) fn pulls(&self) -> bool {
-        self.view.pull && self.is_bound && !self.editing_rest
+        self.view.pull && self.bound.is_some() && !self.editor.is_editing_rest()
     }
 
     /// Whether no part of the cage is chosen or pointed at.
     fn is_nothing_chosen(&self) -> bool {
-        self.hovered.is_empty() && self.selection.vertices().is_empty() && self.gesture.is_none()
+        self.editor.hovered.is_empty()
+            && self.editor.selection.vertices().is_empty()
+            && self.editor.gesture().is_none()
     }
 
     /// The same for a picture: `alone` without anything but the model, transparent around it.
@@ -81,7 +83,7 @@ impl State {
             backdrop: false,
             mesh: self.mesh_style(),
             weights_to_one: self.view.weights_to_one,
-            hidden: self.models.hidden(),
+            hidden: self.models().hidden(),
             cage_lines: false,
             handles: false,
             floor: false,
@@ -90,24 +92,24 @@ impl State {
     }
 
     fn shown_selection(&self) -> Selection {
-        let mut shown = Selection { vertices: self.selection.vertices(), ..Selection::default() };
-        match self.element {
-            Element::Vertex => shown.hovered_vertex = self.hovered.first().copied(),
+        let mut shown = Selection { vertices: self.editor.selection.vertices(), ..Selection::default() };
+        match self.editor.element {
+            Element::Vertex => shown.hovered_vertex = self.editor.hovered.first().copied(),
             Element::Edge => {
-                shown.edges = self.selection.edges(&self.topology);
-                shown.hovered_edge = match self.hovered[..] {
+                shown.edges = self.editor.selection.edges(self.editor.topology());
+                shown.hovered_edge = match self.editor.hovered[..] {
                     [a, b] => Some([a, b]),
                     _ => None,
                 };
             }
             Element::Face => {
-                shown.faces = self.selection.faces(&self.topology);
-                let hovered = |f: &Vec<u32>| !self.hovered.is_empty() && *f == self.hovered;
-                shown.hovered_face = self.topology.faces.iter().position(hovered).map(|f| f as u32);
+                shown.faces = self.editor.selection.faces(self.editor.topology());
+                let hovered = |f: &Vec<u32>| !self.editor.hovered.is_empty() && *f == self.editor.hovered;
+                shown.hovered_face = self.editor.topology().faces.iter().position(hovered).map(|f| f as u32);
             }
         }
-        if self.is_mirrored {
-            shown.unmatched = self.symmetry.unmatched();
+        if self.editor.is_mirrored {
+            shown.unmatched = self.editor.symmetry().unmatched();
         }
         shown
     }
@@ -120,13 +122,13 @@ impl State {
             GizmoAsked::Rotate => GizmoMode::Rotate,
             GizmoAsked::Scale => GizmoMode::Scale,
         };
-        let center = self.selection.pivot(&self.positions, &self.topology, self.pivot)?;
+        let center = self.editor.selection.pivot(self.pose(), self.editor.topology(), self.editor.pivot)?;
         Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
     }
 
     fn shown_slice(&self) -> Option<SliceView> {
         let slice = self.slice.as_ref().filter(|_| self.view.slice != SliceShown::Off)?;
-        let column = self.selection.last().filter(|_| self.view.slice == SliceShown::Value);
+        let column = self.editor.selection.last().filter(|_| self.view.slice == SliceShown::Value);
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
@@ -135,12 +137,13 @@ impl State {
         if !self.view.problems {
             return Marks::default();
         }
-        self.faults.marks(self.rest(), &self.positions, self.set().is_none())
+        self.faults.marks(self.rest(), self.pose(), self.set().is_none())
     }
 
     /// The joints as they are drawn: dots, and rings outside the cage; nothing before the model is bound.
     fn joint_marks(&self) -> Marks {
-        let (Some(asked), Some(dots)) = (self.view.joints, &self.joints) else { return Marks::default() };
+        let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
+        let (Some(asked), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };
         let at = match &self.playing {
             Some(playing) => {
                 let joints = dots.joints.iter().zip(&dots.models);
@@ -151,8 +154,10 @@ impl State {
                 }
                 at
             }
-            None if asked == JointsAsked::Stay || self.view.original || self.editing_rest => dots.at.clone(),
-            None => dots.posed(&self.rest().positions, &self.positions),
+            None if asked == JointsAsked::Stay || self.view.original || self.editor.is_editing_rest() => {
+                dots.at.clone()
+            }
+            None => dots.posed(&self.rest().positions, self.pose()),
         };
         let mut marks = Marks::default();
         for (k, at) in at.into_iter().enumerate() {

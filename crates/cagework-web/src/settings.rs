@@ -3,9 +3,7 @@
 use std::mem::discriminant;
 
 use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
-use cagework_cage::samples;
 use cagework_core::BindOptions;
-use cagework_core::PolygonMesh;
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
 use cagework_io::value_fault;
 use serde::Serialize;
@@ -13,11 +11,9 @@ use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::controls::{CageControls, MadeCage};
 use crate::error::{ErrorName, Fault};
-use crate::models::MemberSettings;
 use crate::options::{BindAsked, CageAsked, RigAsked};
-use crate::views::{SurfacePoint, object};
+use crate::views::object;
 
 /// Longest value that is repeated in a notice, characters.
 const SHOWN: usize = 40;
@@ -49,34 +45,7 @@ pub(crate) struct Settings {
     rig: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
-    sample: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional))]
     symmetry: Option<bool>,
-    /// Read with the cage, whose last positions they are.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional))]
-    controls: Option<CageControls>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    /// `Engine.encodePose`, base 64.
-    #[cfg_attr(test, ts(optional))]
-    pose: Option<String>,
-    /// Points that pulls leave where they are.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[cfg_attr(test, ts(optional, as = "Option<Vec<SurfacePoint>>"))]
-    pins: Vec<SurfacePoint>,
-    /// The same for each pose of the project, in turn.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[cfg_attr(test, ts(optional, as = "Option<Vec<Vec<SurfacePoint>>>"))]
-    pose_pins: Vec<Vec<SurfacePoint>>,
-    /// Share of each pose of the project in the blend that `pose` is made of, 0 to 1, in turn.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[cfg_attr(test, ts(optional, as = "Option<Vec<f32>>"))]
-    pose_shares: Vec<f32>,
-    /// What of its models the cage does not bend: read with the models.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[cfg_attr(test, ts(optional, as = "Option<Vec<MemberSettings>>"))]
-    models: Vec<MemberSettings>,
     /// What was wrong, in whole sentences.
     notices: Vec<String>,
 }
@@ -94,31 +63,6 @@ pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
     Ok(object(&Settings::read(text, &defaults))?)
 }
 
-/// Whether a project says what its controls are.
-pub(crate) fn has_controls(settings: Option<&str>) -> bool {
-    let given = settings.and_then(|text| serde_json::from_str::<Map<String, Value>>(text).ok());
-    given.is_some_and(|given| given.contains_key("controls"))
-}
-
-/// Controls of a project's cage; none if it has none, or they do not fit it: then the last positions are vertices of no face,
-/// which a cage may have.
-pub(crate) fn controls_of(settings: Option<&str>, cage: &PolygonMesh) -> Option<CageControls> {
-    let given: Map<String, Value> = serde_json::from_str(settings?).ok()?;
-    let controls: CageControls = serde_json::from_value(given.get("controls")?.clone()).ok()?;
-    MadeCage::new(cage.clone(), controls.clone()).is_ok().then_some(controls)
-}
-
-/// What a project says of its models; nothing of what cannot be read.
-pub(crate) fn member_settings(settings: Option<&str>) -> Vec<MemberSettings> {
-    let given = settings.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-    list(&given, "models")
-}
-
-/// A list in settings; empty if it cannot be read.
-fn list<T: serde::de::DeserializeOwned + Default>(given: &Map<String, Value>, key: &str) -> T {
-    given.get(key).and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default()
-}
-
 impl Settings {
     fn read(text: &str, defaults: &Map<String, Value>) -> Self {
         let mut settings = Self::default();
@@ -134,13 +78,6 @@ impl Settings {
             CageOptions::from(asked).check().map_err(|wrong| wrong.allowed)
         });
         settings.rig = settings.group("rig", &mut given, defaults, |_: RigAsked| Ok(()));
-        let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
-        settings.pose = word("pose");
-        settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
-        settings.pins = list(&given, "pins");
-        settings.pose_pins = list(&given, "pose_pins");
-        settings.pose_shares = list::<Vec<f32>>(&given, "pose_shares");
-        settings.pose_shares.iter_mut().for_each(|share| *share = share.clamp(0.0, 1.0));
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
         settings
     }
@@ -227,7 +164,7 @@ mod tests {
         saved["bind"]["tau"] = json!(0.001);
         saved["cage"]["vertices"] = json!(120);
         saved["rig"] = json!({ "joints": "stay", "keep_travel": true, "rigid": ["hat"], "plain": false, "dynamic": true });
-        let rest = json!({ "symmetry": true, "pose": "AAEC", "pose_shares": [0.0, 0.5], "sample": "rat" });
+        let rest = json!({ "symmetry": true });
         saved.extend(rest.as_object().cloned().unwrap());
         let settings = read(&Value::Object(saved.clone()));
         assert_eq!(settings.notices, Vec::<String>::new());
@@ -280,13 +217,6 @@ mod tests {
                 assert_eq!(settings["bind"]["grid"], 32);
             }
         }
-    }
-
-    #[test]
-    fn shares_of_poses_are_from_0_to_1() {
-        let shares = |given: Value| read(&json!({ "pose_shares": given })).pose_shares;
-        assert_eq!(shares(json!([0.25, -3, 1e300])), [0.25, 0.0, 1.0]);
-        assert_eq!(shares(json!(["half"])), [0.0; 0]);
     }
 
     #[test]

@@ -1,196 +1,257 @@
-//! What the page works on, on the CPU: always complete and at once; the GPU follows with the next frame.
+//! The page's state on the CPU: the editor, what is derived from its document, and the view. The GPU follows with the next frame.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::dynamic::Lattice;
-use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, ControlSet, Frames, PolygonMesh, Weights};
+use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
-use cagework_gpu::render::{Camera, GizmoPart};
+use cagework_gpu::render::{Camera, DrawModel, GizmoPart};
 use cagework_io::{Model, UpAxis};
 use glam::{Vec2, Vec3};
+use wasm_bindgen::JsValue;
 
-use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::joints::JointDots;
-use crate::models::Models;
 use crate::options::{Coordinates, SceneAsked};
 use crate::playing::Playing;
 use crate::problems::Faults;
-use crate::views::{CageInfo, CageState, SurfacePoint};
+use crate::views::{CageInfo, CageState, View};
 
-/// Model, cage, selection, gesture and camera of a page.
-#[derive(Default)]
+/// Bytes of weights that are kept for documents that undo and redo come back to.
+const CACHE_BYTES: usize = 256 << 20;
+
+/// Document, camera, and what is derived from them.
 pub(crate) struct State {
-    pub(crate) models: Models,
-    /// How many points their rigs have, once they were counted.
+    pub(crate) editor: Editor,
+    /// How each model is drawn, by its number.
+    pub(crate) draws: BTreeMap<u32, Arc<DrawModel>>,
+    /// Number of points of the models' rigs, once they were counted.
     pub(crate) n_rig: Option<usize>,
-    /// Whether the GPU has to be told what the cage does not bend.
-    pub(crate) other_parts: bool,
-    /// What stays of the model that is being painted, and its number. `[n_vertices]` of all models
+    /// The model that is painted, and how much of each vertex of all models stays in place. `[n_vertices]`
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
-    /// The cage at rest, or a draft of one, with the controls inside.
-    pub(crate) made: MadeCage,
-    pub(crate) topology: Topology,
-    pub(crate) symmetry: Symmetry,
-    /// Where something is wrong with the cage, once it was checked.
+    /// Faults of the cage, once it was checked.
     pub(crate) faults: Faults,
-    /// Some vertices of the model, to be watched while the rest cage is dragged; made when first asked.
+    /// Some vertices of the model to count outside the cage while it is reshaped; made when first needed.
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
-    /// Where the cage and controls inside are. `[n_controls]`
-    pub(crate) positions: Vec<Vec3>,
-    pub(crate) editing_rest: bool,
-    pub(crate) is_bound: bool,
-    /// What the last export did to the rig.
+    /// The weights in use; none before the models are bound to the cage as it is.
+    pub(crate) bound: Option<Arc<BoundModels>>,
+    /// Weights of documents that undo and redo come back to.
+    pub(crate) cache: Cache<Arc<BoundModels>>,
+    /// What the last export did not keep.
     pub(crate) rig_notices: Vec<String>,
-    /// The clip that plays, in place of the cage.
+    /// The clip that is shown in place of the pose.
     pub(crate) playing: Option<Playing>,
-    /// What is needed for the cage to bend the moving model: a lattice around it, weights of its points, their frames.
+    /// Lattice by which the cage bends a moving model, the weights of its points, and their offsets.
     pub(crate) lattice: Option<(Lattice, Weights, Frames)>,
-    /// Weights of the points of the model's rig.
-    pub(crate) rig: Option<Weights>,
-    /// Vertices outside the cage, then points of the rig that are, counted after all vertices.
-    pub(crate) outside: Vec<OutsideVertex>,
-    /// The joints among them; none before the model is bound.
-    pub(crate) joints: Option<JointDots>,
-    /// What there are weights of to compare with.
+    /// Kinds of coordinates to compare with.
     pub(crate) others: Vec<Coordinates>,
-    pub(crate) element: Element,
-    pub(crate) selection: Selection,
-    pub(crate) hovered: Vec<u32>,
-    pub(crate) pivot: Pivot,
-    pub(crate) is_mirrored: bool,
-    /// Of proportional editing, fraction of the cage's diagonal.
-    pub(crate) radius: f32,
-    pub(crate) gesture: Option<Gesture>,
     pub(crate) active_part: Option<GizmoPart>,
     pub(crate) slice: Option<Arc<Slice>>,
-    /// What a hand holds of the model.
     pub(crate) held: Held,
     pub(crate) view: SceneAsked,
     pub(crate) camera: Camera,
     /// The viewport, CSS pixels.
     pub(crate) size: Vec2,
-    /// Pixels of a CSS pixel.
+    /// Device pixels of a CSS pixel.
     pub(crate) scale: f32,
-    /// Counts changes of model and rest cage: each job is for one of them.
+    /// Counts changes of mesh and cage: the result of a job is for one of them.
     pub(crate) revision: u32,
-    /// The revision of the cage that the GPU has.
-    pub(crate) on_gpu: Option<u32>,
+    /// The document that everything derived here belongs to.
+    derived: Derived,
+    /// What the GPU holds.
+    pub(crate) on_gpu: OnGpu,
+    /// Whether an upload is in progress; it looks again when it is done.
+    pub(crate) is_uploading: bool,
     pub(crate) is_moved: bool,
     pub(crate) is_changed: bool,
-    /// What went wrong on the way to the GPU, for the next frame to tell.
+    /// An error of an upload, for the next frame to report.
     pub(crate) fault: Option<Fault>,
 }
 
-/// What is held, and what stays.
+/// Weights of all models for a cage.
+pub(crate) struct BoundModels {
+    pub(crate) weights: Arc<Weights>,
+    pub(crate) frames: Arc<Frames>,
+    /// Weights of the points of the models' rigs.
+    pub(crate) rig: Option<Weights>,
+    /// Vertices outside the cage, then points of rigs outside, counted after all vertices.
+    pub(crate) outside: Vec<OutsideVertex>,
+    /// The joints among them.
+    pub(crate) joints: Option<JointDots>,
+    /// The report of the bind, as the page shows it.
+    pub(crate) report: JsValue,
+}
+
+/// Keys of the document that derived state belongs to, and its pose.
+#[derive(Default)]
+struct Derived {
+    key: Key,
+    models: u64,
+    pose: Arc<[Vec3]>,
+}
+
+/// Keys of what the GPU holds; none for what it does not hold.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub(crate) struct OnGpu {
+    pub(crate) mesh: Option<u64>,
+    pub(crate) parts: Option<u64>,
+    pub(crate) cage: Option<u64>,
+    /// The weights.
+    pub(crate) bound: Option<Key>,
+}
+
+/// Grabs, and positions of the models for picking.
 #[derive(Default)]
 pub(crate) struct Held {
-    /// Points that are grabbed, pinned or pointed at.
+    /// Points that are grabbed or pointed at.
     pub(crate) points: Vec<SurfacePoint>,
-    /// Where the grab should be, where it cannot follow.
+    /// Where the grab should be, if the cage cannot bring it there.
     pub(crate) target: Option<Vec3>,
-    /// Of each vertex of the model how much it stays; none without a drag.
+    /// How much of each vertex of the model stays in place during the drag.
     pub(crate) stays: Option<Arc<Vec<f32>>>,
-    /// Places of a control inside that is being put in.
+    /// Places of an interior control that is being added.
     pub(crate) placed: Vec<Vec3>,
-    /// The model where it was asked for last, and the cage for it.
+    /// The models as posed, and the pose that it was computed for.
     pub(crate) posed: Vec<Vec3>,
     pub(crate) posed_for: Vec<Vec3>,
 }
 
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            editor: Editor::default(),
+            draws: BTreeMap::new(),
+            n_rig: None,
+            painting: None,
+            faults: Faults::default(),
+            watched: None,
+            bound: None,
+            cache: Cache::new(CACHE_BYTES),
+            rig_notices: Vec::new(),
+            playing: None,
+            lattice: None,
+            others: Vec::new(),
+            active_part: None,
+            slice: None,
+            held: Held::default(),
+            view: SceneAsked::default(),
+            camera: Camera::default(),
+            size: Vec2::default(),
+            scale: 0.0,
+            revision: 0,
+            derived: Derived::default(),
+            on_gpu: OnGpu::default(),
+            is_uploading: false,
+            is_moved: false,
+            is_changed: false,
+            fault: None,
+        }
+    }
+}
+
 impl State {
-    /// Another model, without a cage.
-    pub(crate) fn set_models(&mut self, models: Models) {
-        self.models = models;
-        (self.n_rig, self.painting) = (None, None);
-        self.set_cage(MadeCage::default());
-        self.camera = Camera::default();
-        self.fit_camera();
-        self.frame_all();
+    pub(crate) fn models(&self) -> &Models {
+        &self.editor.document().models
     }
 
-    /// Other models in the same cage: its pose stays, the weights are of others.
-    pub(crate) fn change_models(&mut self, models: Models) {
-        self.models = models;
-        let (on_gpu, selection) = (self.is_on_gpu(), self.selection.clone());
-        let (made, positions) = (std::mem::take(&mut self.made), std::mem::take(&mut self.positions));
-        (self.n_rig, self.painting) = (None, None);
-        self.set_cage(made);
-        // The cage itself is the same.
-        self.on_gpu = on_gpu.then_some(self.revision);
-        (self.positions, self.selection) = (positions, selection);
+    /// The cage at rest, or a draft of one.
+    pub(crate) fn cage(&self) -> &RestCage {
+        &self.editor.document().cage
     }
 
-    /// Another cage, or a draft of one.
-    pub(crate) fn set_cage(&mut self, made: MadeCage) {
-        self.faults = Faults::default();
-        self.made = made;
-        self.topology = Topology::new(&self.rest().faces);
-        self.topology.edges.extend(self.made.inner_edges());
-        self.symmetry = Symmetry::new(&self.rest().positions);
-        self.positions.clone_from(&self.made.mesh.positions);
-        self.watched = None;
-        self.selection = Selection::new(self.positions.len());
-        self.hovered.clear();
-        self.gesture = None;
-        self.active_part = None;
-        self.slice = None;
-        self.held = Held::default();
-        self.playing = None;
-        self.lattice = None;
-        (self.is_bound, self.rig, self.joints) = (false, None, None);
-        self.outside.clear();
-        self.others.clear();
-        self.revision += 1;
-        self.is_moved = true;
-        self.is_changed = true;
-        self.fit_camera();
+    /// Positions of the cage and its interior controls. `[n_controls]`
+    pub(crate) fn pose(&self) -> &[Vec3] {
+        &self.editor.document().pose
     }
 
-    /// The cage at rest; none while there is only a draft of one.
+    /// The controls of a bind; none while there is only a draft of a cage.
     pub(crate) fn set(&self) -> Option<&ControlSet> {
-        self.made.set.as_ref().ok()
+        self.cage().set.as_ref().ok()
     }
 
-    /// Positions of cage and controls inside at rest, and the cage's faces; or the draft's.
-    pub(crate) fn rest(&self) -> &PolygonMesh {
-        &self.made.mesh
-    }
-
-    /// Drops what was computed for a model or cage of before.
+    /// The controls of a bind.
     ///
     /// # Errors
-    /// `Cancelled` when there is another one by now.
+    /// When there is no cage.
+    pub(crate) fn the_set(&self) -> Answer<&ControlSet> {
+        self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
+    }
+
+    /// Positions of cage and interior controls at rest, and the cage's faces; or the draft's.
+    pub(crate) fn rest(&self) -> &PolygonMesh {
+        &self.cage().mesh
+    }
+
+    /// Drops what was derived from another document. Called after each change.
+    pub(crate) fn follow_document(&mut self) {
+        let document = self.editor.document();
+        let (key, models, pose) = (document.key(), self.editor.models_key(), Arc::clone(&document.pose));
+        let Derived { key: before, models: models_before, pose: pose_before } =
+            std::mem::replace(&mut self.derived, Derived { key, models, pose: Arc::clone(&pose) });
+        if key != before {
+            self.revision += 1;
+            self.watched = None;
+            self.active_part = None;
+            (self.slice, self.lattice, self.playing) = (None, None, None);
+            self.held = Held::default();
+            self.others.clear();
+            self.faults = Faults::default();
+            self.bound = None;
+            if key.mesh != before.mesh {
+                self.n_rig = None;
+                self.painting = None;
+            }
+            self.fit_camera();
+        }
+        if models != models_before {
+            self.held.posed_for.clear();
+            self.show_painting();
+            self.is_changed = true;
+        }
+        if !Arc::ptr_eq(&pose, &pose_before) {
+            self.playing = None;
+        }
+        if key != before || !Arc::ptr_eq(&pose, &pose_before) {
+            // The gizmo is drawn in the middle of the selection.
+            (self.is_moved, self.is_changed) = (true, true);
+        }
+    }
+
+    /// Whether the result of a job that was started at a revision is still wanted.
+    ///
+    /// # Errors
+    /// `Cancelled` when mesh or cage have changed since.
     pub(crate) fn require(&self, revision: u32) -> Answer<()> {
         let is_current = self.revision == revision;
         is_current
             .then_some(())
-            .ok_or_else(|| Fault::new(ErrorName::Cancelled, "there is another model or cage by now"))
+            .ok_or_else(|| Fault::new(ErrorName::Cancelled, "the model or the cage has changed"))
     }
 
-    /// What points up in the model's file.
+    /// Up axis of the models' files.
     pub(crate) fn up(&self) -> UpAxis {
-        self.models.up()
+        self.models().up()
     }
 
     /// Tells the camera where everything is.
-    fn fit_camera(&mut self) {
+    pub(crate) fn fit_camera(&mut self) {
         self.place_viewport();
-        if let Some(bounds) = self.bounds() {
+        if let Some(bounds) = self.editor.bounds() {
             self.camera.set_scene(bounds);
         }
     }
 
-    /// Tells the camera how large the picture is: a part of the view when several are compared.
+    /// Tells the camera the size of one picture: a part of the view when several are compared.
     pub(crate) fn place_viewport(&mut self) {
         self.camera.set_viewport(Vec2::new(self.part_width(), self.size.y));
     }
 
-    /// What is shown side by side.
+    /// Kinds of coordinates that are shown side by side.
     pub(crate) fn shown(&self) -> Vec<Coordinates> {
         let is_there = |one: &Coordinates| *one == Coordinates::Harmonic || self.others.contains(one);
         let shown: Vec<_> = self.view.compare.iter().copied().filter(is_there).collect();
@@ -203,12 +264,15 @@ impl State {
 
     /// A pointer's place in the picture it is over.
     pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
-        let width = self.part_width();
-        let last = self.shown().len() as f32 - 1.0;
-        Vec2::new(x - width * (x / width).floor().clamp(0.0, last), y)
+        self.pointers().at(x, y)
     }
 
-    /// Where a model will be seen from when it opens, and the pixels of its picture.
+    /// How pointers of the view become those of one picture.
+    pub(crate) fn pointers(&self) -> Pointers {
+        Pointers { width: self.part_width(), last: self.shown().len() as f32 - 1.0 }
+    }
+
+    /// The camera that a model is first seen from, and the size of its picture, pixels.
     pub(crate) fn view_of(&self, model: &Model) -> (Camera, [u32; 2]) {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
@@ -220,55 +284,94 @@ impl State {
         (camera, size.as_uvec2().to_array())
     }
 
-    /// Where model and cage are at rest.
-    pub(crate) fn bounds(&self) -> Option<Bounds> {
-        match (Bounds::of(&self.models.positions), Bounds::of(&self.rest().positions)) {
-            (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
-            (one, other) => one.or(other),
-        }
-    }
-
     pub(crate) fn frame_all(&mut self) {
-        if let Some(bounds) = self.bounds() {
+        if let Some(bounds) = self.editor.bounds() {
             self.camera.frame(bounds);
         }
     }
 
-    /// What JavaScript is told about the cage; nothing without one.
+    /// Greys what stays of the model that is painted.
+    pub(crate) fn show_painting(&mut self) {
+        let Some((id, _)) = self.painting else { return };
+        let mut stays = vec![0.0; self.models().positions().len()];
+        if let Ok(member) = self.models().get(id) {
+            let own = member.parts().unwrap_or_default();
+            stays[member.vertices.clone()].iter_mut().zip(own.stays).for_each(|(to, from)| *to = from);
+        }
+        self.painting = Some((id, Arc::new(stays)));
+        self.is_changed = true;
+    }
+
+    /// The cage as panels show it; none without a cage.
     pub(crate) fn cage_state(&self) -> Option<CageState> {
         (!self.rest().faces.is_empty()).then(|| CageState {
             usable: self.set().is_some(),
-            info: CageInfo::of(&self.made),
-            controls: self.made.controls.clone(),
-            radius: self.made.radius(),
+            info: CageInfo::of(self.cage()),
+            controls: self.cage().controls.clone(),
+            radius: self.cage().radius(),
         })
     }
 
-    /// How the selection of the moment pulls the others along.
-    pub(crate) fn pull(&self, positions: &[Vec3]) -> Pull {
-        let diagonal = Bounds::of(&self.rest().positions).map_or(0.0, |b| b.diagonal());
-        let symmetry = self.is_mirrored.then_some(&self.symmetry);
-        let shared = SharedPull { radius: self.radius * diagonal, symmetry };
-        Pull::new(&self.selection, positions, &self.rest().positions, shared)
+    /// What panels show.
+    pub(crate) fn document_view(&self) -> View {
+        View { document: self.editor.view(), bound: self.bound.is_some() }
     }
 
-    /// Moves the cage.
-    pub(crate) fn move_to(&mut self, positions: Vec<Vec3>) {
-        if positions.len() == self.positions.len() && positions.iter().all(|p| p.is_finite()) {
-            self.positions = positions;
-            self.playing = None;
-            self.is_moved = true;
-            // The gizmo sits in the middle of the selection.
-            self.is_changed = true;
+    /// Takes weights of the present document.
+    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
+        self.bound = Some(bound);
+        self.on_gpu.bound = Some(self.editor.key());
+        self.playing = None;
+        (self.is_moved, self.is_changed) = (true, true);
+    }
+
+    /// The models as they are drawn, as one.
+    pub(crate) fn draw_model(&self) -> Arc<DrawModel> {
+        joined(&self.models().iter().filter_map(|member| self.draws.get(&member.id)).collect::<Vec<_>>())
+    }
+
+    /// Whether the GPU holds mesh and cage of the document.
+    pub(crate) fn is_on_gpu(&self) -> bool {
+        let key = self.editor.key();
+        self.set().is_some() && self.on_gpu.cage == Some(key.cage) && self.on_gpu.mesh == Some(key.mesh)
+    }
+
+    /// Whether the GPU lacks something that the document has.
+    pub(crate) fn needs_upload(&self) -> bool {
+        self.next_upload().is_some()
+    }
+
+    /// What is to be uploaded next. Each upload may drop what is uploaded after it.
+    pub(crate) fn next_upload(&self) -> Option<Upload> {
+        if self.models().is_empty() {
+            return None;
+        }
+        let (key, parts, gpu) = (self.editor.key(), self.editor.models_key(), self.on_gpu);
+        if gpu.mesh != Some(key.mesh) {
+            Some(Upload::Mesh)
+        } else if gpu.cage != Some(key.cage) && self.set().is_some() {
+            Some(Upload::Cage)
+        } else if self.bound.is_none() && self.is_on_gpu() && self.cache.contains(key) {
+            Some(Upload::Weights)
+        } else if gpu.parts != Some(parts) {
+            Some(Upload::Parts)
+        } else {
+            None
         }
     }
 
-    /// Whether the GPU has this cage.
-    pub(crate) fn is_on_gpu(&self) -> bool {
-        self.set().is_some() && self.on_gpu == Some(self.revision)
+    /// The device holds nothing.
+    pub(crate) fn forget_gpu(&mut self) {
+        self.on_gpu = OnGpu::default();
     }
 
-    /// Brings what changed to the GPU.
+    /// The GPU holds the mesh of the document, and nothing else.
+    pub(crate) fn has_uploaded_mesh(&mut self) {
+        let cage = self.on_gpu.cage;
+        self.on_gpu = OnGpu { mesh: Some(self.editor.key().mesh), cage, ..OnGpu::default() };
+    }
+
+    /// Brings moved cage, camera and scene to the GPU.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
@@ -282,12 +385,13 @@ impl State {
         for session in std::iter::once(main).chain(others) {
             *session.camera_mut() = self.camera;
             if self.is_moved && self.is_on_gpu() {
-                let at_rest = self.view.original || self.editing_rest;
-                // Closed forms, of the other one, know the plain cage alone.
+                let editing = self.editor.is_editing_rest();
+                let at_rest = self.view.original || editing;
+                // Closed forms know the plain cage alone.
                 let n = session.cage_positions().len();
-                session.pose(if at_rest { &self.made.mesh.positions[..n] } else { &self.positions[..n] });
-                if self.editing_rest && !self.view.original {
-                    session.show_cage(&self.positions[..n]);
+                session.pose(if at_rest { &self.rest().positions[..n] } else { &self.pose()[..n] });
+                if editing && !self.view.original {
+                    session.show_cage(&self.pose()[..n]);
                 }
             }
             if let Some(scene) = &scene {
@@ -297,4 +401,34 @@ impl State {
         self.is_moved &= !self.is_on_gpu() && self.set().is_some();
         self.is_changed = false;
     }
+}
+
+/// Pictures side by side: their width, CSS pixels, and the index of the last.
+pub(crate) struct Pointers {
+    width: f32,
+    last: f32,
+}
+
+impl Pointers {
+    /// A pointer's place in the picture it is over.
+    pub(crate) fn at(&self, x: f32, y: f32) -> Vec2 {
+        Vec2::new(x - self.width * (x / self.width).floor().clamp(0.0, self.last), y)
+    }
+}
+
+/// Models as they are drawn, as one.
+pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
+    match draws {
+        [only] => Arc::clone(only),
+        _ => Arc::new(DrawModel::joined(&draws.iter().map(|draw| &***draw).collect::<Vec<_>>())),
+    }
+}
+
+/// What is uploaded at once.
+#[derive(Clone, Copy)]
+pub(crate) enum Upload {
+    Mesh,
+    Cage,
+    Weights,
+    Parts,
 }

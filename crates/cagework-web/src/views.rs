@@ -2,15 +2,14 @@
 
 use cagework_cage::check::{Code, Repair, Severity};
 use cagework_core::cage::CageNotice;
-use cagework_core::edit::Topology;
 use cagework_core::{Bounds, ControlSet};
+use cagework_editor::edit::Topology;
+use cagework_editor::{CageControls, DocumentView, Member, Models, PartOptions, RestCage};
 use cagework_io::{Model, ModelFormat, UpAxis};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
-use crate::controls::{CageControls, MadeCage};
 use crate::error::Answer;
-use crate::models::{Member, Models, PartOptions};
 use crate::playing::SharedClip;
 
 /// Corners of a box.
@@ -45,15 +44,6 @@ pub(crate) struct CameraView {
     pub(crate) parallel: bool,
 }
 
-/// A point of the model's surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct SurfacePoint {
-    pub(crate) triangle: u32,
-    /// Barycentric coordinates in it.
-    pub(crate) bary: [f32; 3],
-}
-
 /// How a point of the model follows the cage.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -62,6 +52,16 @@ pub(crate) struct Grip {
     pub(crate) row: Vec<f64>,
     /// The nearest vertex of the model.
     pub(crate) seed: u32,
+}
+
+/// What panels show.
+#[derive(Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct View {
+    #[serde(flatten)]
+    pub(crate) document: DocumentView,
+    /// Whether the models follow the cage: there are weights for both as they are.
+    pub(crate) bound: bool,
 }
 
 /// `ModelInfo`.
@@ -116,8 +116,8 @@ impl ModelInfo {
             // What is wrong with a rig is said where it is used.
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
-            bounds: BoundsView::of(Bounds::of(&models.positions)),
-            notices: all().flat_map(|model| model.notices.clone()).chain(models.place_notice()).collect(),
+            bounds: BoundsView::of(Bounds::of(models.positions())),
+            notices: all().flat_map(|model| model.notices.clone()).chain(models.origin_notice()).collect(),
             members: models.iter().map(MemberInfo::of).collect(),
         })
     }
@@ -217,7 +217,7 @@ pub(crate) struct CageInfo {
 }
 
 impl CageInfo {
-    pub(crate) fn of(made: &MadeCage) -> Self {
+    pub(crate) fn of(made: &RestCage) -> Self {
         let (mesh, cage) = (&made.mesh, made.set.as_ref().ok().map(ControlSet::cage));
         let notices = cage.into_iter().flat_map(|c| c.notices().iter().map(CageNotice::to_string));
         let fan: usize = mesh.faces.iter().map(|f| f.len().saturating_sub(2)).sum();
@@ -228,7 +228,7 @@ impl CageInfo {
             quads: mesh.faces.iter().filter(|face| face.len() == 4).count(),
             triangles: cage.map_or(fan, |c| c.triangles().len()),
             bounds: BoundsView::of(Bounds::of(&mesh.positions)),
-            notices: notices.chain(made.notice.clone()).collect(),
+            notices: notices.chain(made.notices.clone()).collect(),
         }
     }
 }

@@ -40,6 +40,12 @@ const RULES: &[Rule] = &[
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
+        name: "cagework-editor",
+        may_use: &["cagework-core", "cagework-io", "cagework-pose"],
+        // As cagework-io.
+        must_not_use: &["wgpu", "naga", "web-sys", "clap"],
+    },
+    Rule {
         name: "cagework-cli",
         may_use: &["cagework-cage", "cagework-core", "cagework-gpu", "cagework-io", "cagework-pose"],
         must_not_use: &[],
@@ -56,7 +62,14 @@ const RULES: &[Rule] = &[
     },
     Rule {
         name: "cagework-web",
-        may_use: &["cagework-cage", "cagework-core", "cagework-gpu", "cagework-io", "cagework-pose"],
+        may_use: &[
+            "cagework-cage",
+            "cagework-core",
+            "cagework-editor",
+            "cagework-gpu",
+            "cagework-io",
+            "cagework-pose",
+        ],
         must_not_use: &["clap", "rayon"],
     },
     Rule { name: "cagework-tests", may_use: &["cagework-core"], must_not_use: &[] },
@@ -65,6 +78,7 @@ const RULES: &[Rule] = &[
         may_use: &[
             "cagework-cage",
             "cagework-core",
+            "cagework-editor",
             "cagework-gpu",
             "cagework-io",
             "cagework-pose",

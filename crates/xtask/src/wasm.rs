@@ -51,11 +51,12 @@ const ARTIFACTS: [Artifact; 2] = [
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// Sources of the packages.
-const SOURCES: [&str; 9] = [
+const SOURCES: [&str; 10] = [
     "crates/cagework-core",
     "crates/cagework-cage",
     "crates/cagework-pose",
     "crates/cagework-io",
+    "crates/cagework-editor",
     "crates/cagework-gpu",
     "crates/cagework-web",
     "shaders",

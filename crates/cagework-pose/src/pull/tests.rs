@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3, Vec3};
 
 use super::*;
+use crate::symmetry::Symmetry;
 use cagework_cage::samples;
 use cagework_core::cage::Cage;
-use crate::symmetry::Symmetry;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, Weights, bind, subdivided_box};

@@ -8,8 +8,8 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{corners, flat};
-use crate::controls::CageControls;
 use crate::views::object;
+use cagework_editor::CageControls;
 
 /// Offsets of a bind: what weights of controls alone miss.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

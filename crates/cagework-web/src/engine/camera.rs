@@ -92,7 +92,7 @@ impl Engine {
     pub fn frame_selection(&self) {
         self.change(|state| {
             let selected: Vec<Vec3> =
-                state.selection.vertices().iter().map(|&i| state.positions[i as usize]).collect();
+                state.editor.selection.vertices().iter().map(|&i| state.pose()[i as usize]).collect();
             match Bounds::of(&selected) {
                 Some(bounds) => state.camera.frame(bounds),
                 None => state.frame_all(),

@@ -4,11 +4,10 @@ use std::ops::Range;
 
 use cagework_core::deform::{OutsideVertex, displacements};
 use cagework_core::dynamic::bend_vertices;
-use cagework_core::{ControlSet, Frames, InnerControls, PolygonMesh, Weights};
+use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
-    Clip, Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project,
-    write_weights_npz,
+    Clip, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint32Array};
@@ -16,7 +15,6 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use super::gesture::pose_list;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{RigAsked, taken};
@@ -39,7 +37,7 @@ impl Engine {
         clip: u32,
     ) -> Result<Vec<u8>, JsValue> {
         let asked: RigAsked = taken(options)?;
-        let clips = self.read(|state| SharedClip::all(&state.models));
+        let clips = self.read(|state| SharedClip::all(state.models()));
         let (bytes, notices) = match clips.get(clip as usize).and_then(|clip| clip.of(id)) {
             Some(clip) if asked.dynamic => self.baked(id, clip)?,
             _ => self.posed_glb(id, &asked)?,
@@ -59,11 +57,11 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
         let format: ModelFormat = taken(format)?;
-        let pose = self.read(|state| state.positions.clone());
+        let pose = self.read(|state| state.pose().to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         let (bytes, lost) = self.read(|state| {
-            let model = &state.models.get(id)?.model;
-            Answer::Ok((model.write(format, state.models.get(id)?.share(&posed))?, model.lost_in(format)))
+            let model = &state.models().get(id)?.model;
+            Answer::Ok((model.write(format, state.models().get(id)?.share(&posed))?, model.lost_in(format)))
         })?;
         self.state.borrow_mut().rig_notices = lost.into_iter().collect();
         Ok(bytes)
@@ -76,7 +74,7 @@ impl Engine {
         std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
 
-    /// A model as GLB with a morph target for each pose and an animation through all of them.
+    /// A model as GLB with a morph target for each saved pose of the cage and an animation through all of them.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -84,19 +82,20 @@ impl Engine {
     pub fn export_poses(
         &self,
         id: u32,
-        #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
-        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
-        let poses = pose_list(poses);
-        let rest = self.read(|state| state.rest().positions.clone());
-        let pairs: Vec<_> = names.iter().cloned().zip(poses.iter().cloned()).collect();
-        if let Some((bytes, _)) = self.reshaped(id, &rest, &pairs, &taken(options)?)? {
+        let (rest, named): (Vec<Vec3>, Vec<(String, Vec<Vec3>)>) = self.read(|state| {
+            let poses = state.editor.document().fitting_poses();
+            let named = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec()));
+            (state.rest().positions.clone(), named.collect())
+        });
+        if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &taken(options)?)? {
             return Ok(bytes);
         }
+        let (names, poses): (Vec<String>, Vec<Vec<Vec3>>) = named.into_iter().unzip();
         let posed = self.deformed(&poses)?;
         Ok(self.read(|state| {
-            let member = state.models.get(id)?;
+            let member = state.models().get(id)?;
             let own = posed.iter().map(|posed| member.share(posed).to_vec());
             let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(own).collect();
             Answer::Ok(member.model.write_glb_poses(&member.model.positions, &named)?)
@@ -110,13 +109,13 @@ impl Engine {
     #[wasm_bindgen(js_name = exportCage)]
     pub fn export_cage(&self) -> Result<Vec<u8>, JsValue> {
         let mesh = self.read(|state| PolygonMesh {
-            positions: state.positions[..state.made.n_cage()].to_vec(),
+            positions: state.pose()[..state.cage().n_cage()].to_vec(),
             faces: state.rest().faces.clone(),
         });
         if mesh.faces.is_empty() {
             return Err(Fault::missing("cage", "make one first").into());
         }
-        let (up, origin) = self.read(|state| (state.up(), state.models.origin()));
+        let (up, origin) = self.read(|state| (state.up(), state.models().origin()));
         Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
@@ -127,13 +126,13 @@ impl Engine {
     #[wasm_bindgen(js_name = exportControls)]
     pub fn export_controls(&self) -> Result<Vec<u8>, JsValue> {
         Ok(self.read(|state| {
-            if state.made.controls.inner == 0 {
+            if state.cage().controls.inner == 0 {
                 return Err(Fault::missing("control inside", "put one there first"));
             }
-            let positions = state.up().turned_back(&state.positions[state.made.n_cage()..]).into_owned();
-            let elements = state.made.controls.elements.clone();
+            let positions = state.up().turned_back(&state.pose()[state.cage().n_cage()..]).into_owned();
+            let elements = state.cage().controls.elements.clone();
             let controls = InnerControls { positions, elements, radius: None };
-            Ok(write_inner_controls(&controls, state.models.origin()))
+            Ok(write_inner_controls(&controls, state.models().origin()))
         })?)
     }
 
@@ -148,30 +147,21 @@ impl Engine {
                 let Some(Own { mut weights, frames, outside, rig }) = state.own_rows(id, session)? else {
                     return Err(Fault::missing("weights", "bind the model first"));
                 };
-                let inner = state.made.inner_positions();
+                let inner = state.cage().inner_positions();
                 weights.append(&rig);
-                let points = state.models.get(id)?.model.extra_points()?;
+                let points = state.models().get(id)?.model.extra_points()?;
                 Ok(write_weights_npz(&weights, &frames, &outside, &points, inner))
             })
         })?)
     }
 
-    /// Models, cage, poses and the page's settings as one file.
+    /// The document and the page's settings, a JSON object, as one file.
     ///
     /// # Errors
     /// When there is no model or the file would be too large.
     #[wasm_bindgen(js_name = writeProject)]
-    pub fn write_project(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
-        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
-        settings: &str,
-    ) -> Result<Vec<u8>, JsValue> {
-        let poses: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(pose_list(poses)).collect();
-        Ok(self.read(|state| {
-            let models: Vec<&Model> = state.models.iter().map(|member| &*member.model).collect();
-            Answer::Ok(write_project(&models, state.rest(), &poses, settings)?)
-        })?)
+    pub fn write_project(&self, settings: &str) -> Result<Vec<u8>, JsValue> {
+        Ok(self.read(|state| state.editor.write_project(settings)).map_err(Fault::from)?)
     }
 
     /// What points up in the models' files.
@@ -186,14 +176,14 @@ impl Engine {
     /// What all positions are seen from, in the axes of the models' files: zero unless they are far away. `[3]`
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
-        self.read(|state| state.models.origin().to_array().to_vec())
+        self.read(|state| state.models().origin().to_array().to_vec())
     }
 
     /// The models' vertices at rest, one model after the other. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
     #[must_use]
     pub fn model_positions(&self) -> Vec<f32> {
-        self.read(|state| flat(&state.models.positions))
+        self.read(|state| flat(state.models().positions()))
     }
 
     /// All that is bound: the models' vertices, then the points of their rigs. `[n_points, 3]`
@@ -203,8 +193,8 @@ impl Engine {
     #[wasm_bindgen(js_name = boundPoints)]
     pub fn bound_points(&self) -> Result<Vec<f32>, JsValue> {
         Ok(self.read(|state| {
-            let mut points = flat(&state.models.positions);
-            points.extend(flat(&state.models.extra_points()?));
+            let mut points = flat(state.models().positions());
+            points.extend(flat(&state.models().extra_points()?));
             Answer::Ok(points)
         })?)
     }
@@ -218,8 +208,8 @@ impl Engine {
     pub fn model_states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         self.read(|state| {
-            let is_alone = state.models.iter().nth(1).is_none();
-            for member in state.models.iter() {
+            let is_alone = state.models().iter().nth(1).is_none();
+            for member in state.models().iter() {
                 // One that lacks the clip stays where it is, as it does when the others play.
                 let has = |name: &&str| is_alone || Clip::named(&member.model.clips(), name).is_ok();
                 let states = member.model.states(clip.as_deref().filter(has));
@@ -239,20 +229,20 @@ impl Engine {
     #[wasm_bindgen(js_name = modelTriangles)]
     #[must_use]
     pub fn model_triangles(&self) -> Vec<u32> {
-        self.read(|state| state.models.triangles.as_flattened().to_vec())
+        self.read(|state| state.models().triangles().as_flattened().to_vec())
     }
 }
 
 impl Engine {
     /// A model as posed, and what became of its rig.
     pub(super) fn posed_glb(&self, id: u32, asked: &RigAsked) -> Answer<(Vec<u8>, Vec<String>)> {
-        let pose = self.read(|state| state.positions.clone());
+        let pose = self.read(|state| state.pose().to_vec());
         if let Some((bytes, report)) = self.reshaped(id, &pose, &[], asked)? {
             return Ok((bytes, report.notices()));
         }
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
-            let member = state.models.get(id)?;
+            let member = state.models().get(id)?;
             Ok((member.model.write_glb(member.share(&posed))?, Vec::new()))
         })
     }
@@ -261,7 +251,7 @@ impl Engine {
     fn baked(&self, id: u32, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
         let field = self.field()?;
         self.read(|state| {
-            let model = &state.models.get(id)?.model;
+            let model = &state.models().get(id)?.model;
             let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
             frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
             let told = format!("{} frames became morph targets; the skeleton is left out", frames.len());
@@ -278,13 +268,13 @@ impl Engine {
         poses: &[(String, Vec<Vec3>)],
         asked: &RigAsked,
     ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
-        let is_rigged = |state: &State| Answer::Ok(state.models.get(id)?.model.is_rigged());
+        let is_rigged = |state: &State| Answer::Ok(state.models().get(id)?.model.is_rigged());
         if asked.plain || !self.read(is_rigged)? {
             return Ok(None);
         }
         self.with_session(|session| {
             self.read(|state| {
-                let (member, rest) = (state.models.get(id)?, &state.rest().positions);
+                let (member, rest) = (state.models().get(id)?, &state.rest().positions);
                 let (model, own) = (&member.model, state.own_rows(id, session)?);
                 let by = |pose: &[Vec3]| match &own {
                     Some(Own { weights, frames, rig, .. }) if pose.len() == rest.len() => {
@@ -313,7 +303,7 @@ impl Engine {
     /// All vertices in poses of the cage; at rest while they are not bound.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let (rest, controls) =
-            self.read(|state| (state.models.positions.clone(), state.rest().positions.clone()));
+            self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
         self.with_session(|session| {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
             let n_frames = session.frames().map_or(0, Frames::n_columns);
@@ -344,9 +334,10 @@ impl State {
     /// Rows of one model; none before there are weights.
     fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<Own>> {
         let Some(all) = session.weights() else { return Ok(None) };
-        let n = self.models.positions.len();
-        let (own, of_rig) = (self.models.get(id)?.vertices.clone(), self.models.extra_of(id)?);
-        let rig = match &self.rig {
+        let n = self.models().positions().len();
+        let (own, of_rig) = (self.models().get(id)?.vertices.clone(), self.models().extra_of(id)?);
+        let bound = self.bound.as_ref();
+        let rig = match bound.and_then(|bound| bound.rig.as_ref()) {
             Some(rows) => rows_of(rows, of_rig.clone()),
             None => Weights::with_room(all.n_columns() as u32, 0, 0),
         };
@@ -357,15 +348,10 @@ impl State {
                 || v.checked_sub(n).filter(|v| of_rig.contains(v)).map(|v| v - of_rig.start + own.len());
             in_own.or_else(in_rig).map(|v| OutsideVertex { vertex: v as u32, ..*o })
         };
-        let outside = self.outside.iter().filter_map(numbered).collect();
+        let outside = bound.iter().flat_map(|bound| &bound.outside).filter_map(numbered).collect();
         let frames = session.frames().cloned().unwrap_or_default();
         let weights = rows_of(all, own.clone());
         Ok(Some(Own { weights, frames, outside, rig }))
-    }
-
-    /// The cage, which a bind needs.
-    pub(crate) fn the_set(&self) -> Answer<&ControlSet> {
-        self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
     }
 }
 

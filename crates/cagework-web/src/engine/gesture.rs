@@ -1,15 +1,13 @@
 //! Moving the cage: gestures, exact numbers, poses.
 
-use cagework_core::edit::{Constraint, Gesture, GestureKind, View as _, moment, reblend};
+use cagework_core::view::View as _;
+use cagework_editor::edit::{Constraint, Gesture, GestureKind};
 use cagework_gpu::render::{GizmoPart, pick_gizmo};
 use glam::{Vec2, Vec3};
-use js_sys::{Array, Float32Array};
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
-use wasm_bindgen::{JsCast as _, JsValue};
 
 use super::Engine;
-use crate::arrays::points;
-use crate::error::Fault;
 use crate::options::{GizmoAsked, GizmoHandle, taken};
 use crate::state::State;
 use crate::views::object;
@@ -31,7 +29,10 @@ impl Engine {
         y: f32,
     ) -> Result<bool, JsValue> {
         let kind = taken(kind)?;
-        Ok(self.change(|state| state.begin(kind, x, y)))
+        Ok(self.change(|state| {
+            let at = state.pointer(x, y);
+            state.editor.begin(kind, at, Constraint::Free)
+        }))
     }
 
     /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; undefined for none.
@@ -44,7 +45,7 @@ impl Engine {
             let gizmo = state.gizmo().filter(|_| state.has_cage_in_view())?;
             pick_gizmo(&state.camera, &gizmo, state.pointer(x, y), radius)
         });
-        if self.read(|state| state.gesture.is_none() && state.active_part != part) {
+        if self.read(|state| state.editor.gesture().is_none() && state.active_part != part) {
             self.change(|state| {
                 state.active_part = part;
                 state.is_changed = true;
@@ -71,9 +72,9 @@ impl Engine {
                 GizmoAsked::Rotate => GestureKind::Rotate,
                 GizmoAsked::Scale => GestureKind::Scale,
             };
-            let began = state.begin(kind, x, y);
-            if let Some(gesture) = state.gesture.as_mut().filter(|_| began) {
-                gesture.constrain(constraint);
+            let at = state.pointer(x, y);
+            let began = state.editor.begin(kind, at, constraint);
+            if began {
                 state.active_part = Some(part);
             }
             began
@@ -103,25 +104,17 @@ impl Engine {
         self.with_gesture(|gesture, _| gesture.type_amount(amount));
     }
 
-    /// How far gestures draw others along, in diagonals of the cage; 0 for not at all.
+    /// Radius of proportional editing, diagonals of the cage; 0 for none.
     #[wasm_bindgen(js_name = setProportional)]
     pub fn set_proportional(&self, radius: f32) {
-        self.change(|state| {
-            state.radius = radius.max(0.0);
-            if let Some(mut gesture) = state.gesture.take() {
-                gesture.set_pull(state.pull(gesture.start()));
-                let positions = gesture.positions(&state.camera);
-                state.gesture = Some(gesture);
-                state.move_to(positions);
-            }
-        });
+        self.change(|state| state.editor.set_radius(radius, &state.camera));
     }
 
     /// What the gesture does now.
     #[wasm_bindgen(js_name = transformLabel)]
     #[must_use]
     pub fn transform_label(&self) -> String {
-        self.read(|state| state.gesture.as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
+        self.read(|state| state.editor.gesture().as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
     }
 
     /// Ends the gesture; true when it moved something and is kept.
@@ -129,23 +122,18 @@ impl Engine {
     #[must_use]
     pub fn end_transform(&self, keep: bool) -> bool {
         self.change(|state| {
-            let Some(gesture) = state.gesture.take() else { return false };
             state.active_part = None;
             state.is_changed = true;
-            let moved = gesture.start() != state.positions;
-            if !keep {
-                state.move_to(gesture.start().to_vec());
-            }
-            keep && moved
+            state.editor.end(keep)
         })
     }
 
-    /// Moves the selection's middle to a point.
+    /// Moves the selection's centre to a point.
     #[wasm_bindgen(js_name = moveSelectionTo)]
     #[must_use]
     pub fn move_selection_to(&self, x: f32, y: f32, z: f32) -> bool {
         self.change(|state| {
-            let Some(center) = state.selection.center(&state.positions) else { return false };
+            let Some(center) = state.editor.selection.center(state.pose()) else { return false };
             state.shift(Vec3::new(x, y, z) - center)
         })
     }
@@ -154,7 +142,7 @@ impl Engine {
     #[must_use]
     pub fn nudge(&self, right: f32, up: f32) -> bool {
         self.change(|state| {
-            let Some(center) = state.selection.center(&state.positions) else { return false };
+            let Some(center) = state.editor.selection.center(state.pose()) else { return false };
             let by = state.camera.in_view_plane(center, Vec2::new(right, -up));
             state.shift(by)
         })
@@ -171,45 +159,16 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let pivot = taken(pivot)?;
         self.change(|state| {
-            state.pivot = pivot;
+            state.editor.pivot = pivot;
             state.is_changed = true;
         });
         Ok(())
     }
 
-    /// Mixes poses by their shares: `from` had the shares `before`, and keeps what a hand has moved since.
-    ///
-    /// # Errors
-    /// When a pose belongs to another cage.
-    pub fn blend(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
-        from: &[f32],
-        before: &[f32],
-        shares: &[f32],
-    ) -> Result<(), JsValue> {
-        let poses = pose_list(poses);
-        let mixed = self
-            .read(|state| reblend(&state.rest().positions, &poses, &points(from), before, shares))
-            .map_err(Fault::from)?;
-        self.change(|state| state.move_to(mixed));
-        Ok(())
-    }
-
-    /// A moment of the animation through the poses.
-    ///
-    /// # Errors
-    /// When a pose belongs to another cage.
+    /// Moves the cage to a moment of the animation through all saved poses.
     #[wasm_bindgen(js_name = playAt)]
-    pub fn play_at(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
-        seconds: f32,
-    ) -> Result<(), JsValue> {
-        let poses = pose_list(poses);
-        let now = self.read(|state| moment(&state.rest().positions, &poses, seconds)).map_err(Fault::from)?;
-        self.change(|state| state.move_to(now));
-        Ok(())
+    pub fn play_at(&self, seconds: f32) {
+        self.change(|state| state.editor.play_at(seconds));
     }
 }
 
@@ -240,44 +199,19 @@ fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
 }
 
 impl Engine {
-    /// Changes the gesture under way, and the cage with it.
+    /// Changes the gesture in progress, and moves the cage with it.
     fn with_gesture(&self, change: impl FnOnce(&mut Gesture, &dyn Fn(f32, f32) -> Vec2)) {
         self.change(|state| {
-            let Some(mut gesture) = state.gesture.take() else { return };
-            change(&mut gesture, &|x, y| state.pointer(x, y));
-            let positions = gesture.positions(&state.camera);
-            state.gesture = Some(gesture);
-            state.move_to(positions);
+            let pointers = state.pointers();
+            state.editor.drag(&state.camera, |gesture| change(gesture, &|x, y| pointers.at(x, y)));
         });
     }
 }
 
 impl State {
-    fn begin(&mut self, kind: GestureKind, x: f32, y: f32) -> bool {
-        let pivot = self.selection.pivot(&self.positions, &self.topology, self.pivot);
-        let Some(pivot) = pivot else { return false };
-        let pull = self.pull(&self.positions);
-        let at = self.pointer(x, y);
-        self.gesture = Some(Gesture::new(kind, self.positions.clone(), pull, pivot, at));
-        true
-    }
-
-    /// Moves the selection, and what goes along with it.
+    /// Moves the selection; false for less than a visible movement.
     fn shift(&mut self, by: Vec3) -> bool {
         let smallest = STILL * self.camera.units_per_pixel(self.camera.target);
-        if !by.is_finite() || by.length() < smallest {
-            return false;
-        }
-        let moved = self.pull(&self.positions).apply(&self.positions, &|p, share| p + share * by);
-        self.move_to(moved);
-        true
+        by.length() >= smallest && self.editor.shift(by)
     }
-}
-
-/// Poses as arrays of JavaScript to points.
-pub(super) fn pose_list(poses: &Array) -> Vec<Vec<Vec3>> {
-    poses
-        .iter()
-        .map(|pose| pose.dyn_into::<Float32Array>().map(|p| points(&p.to_vec())).unwrap_or_default())
-        .collect()
 }

@@ -19,11 +19,12 @@ mod slice;
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use async_lock::Mutex;
 use cagework_core::{Frames, Weights};
 use cagework_gpu::Session;
-use cagework_gpu::render::check_layers;
+use cagework_gpu::render::{Camera, check_layers};
 use js_sys::{Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -31,76 +32,139 @@ use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
 use crate::binder::Offsets;
-use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::gpu::{Gpu, SharedGpu};
+use crate::gpu::{Gpu, SharedGpu, upload};
 use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
 use crate::loaded::Loaded;
-use crate::models::Models;
+use crate::opening::OpenContents;
 use crate::options::{Coordinates, taken};
-use crate::state::State;
+use crate::state::{BoundModels, State, joined};
 use crate::surface::Surface;
+use crate::views::{View, object};
 
 /// Models, cage, camera and picture of one page.
 #[wasm_bindgen]
+#[derive(Clone)]
 pub struct Engine {
     state: Rc<RefCell<State>>,
     gpu: SharedGpu,
     /// Asks the page for a frame.
     invalidate: Function,
+    /// Gives the page what panels show, after it has changed.
+    changed: Function,
+    /// What the page was given last.
+    told: Rc<RefCell<View>>,
 }
 
 #[wasm_bindgen]
 impl Engine {
-    /// An engine that draws into a canvas; `invalidate` is called when a frame is needed.
+    /// An engine that draws into a canvas. `invalidate` is called when a frame is needed, `changed` with a `View` when the document, the
+    /// selection or the weights have changed.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`.
-    pub async fn create(canvas: HtmlCanvasElement, invalidate: Function) -> Result<Engine, JsValue> {
+    pub async fn create(
+        canvas: HtmlCanvasElement,
+        invalidate: Function,
+        #[wasm_bindgen(unchecked_param_type = "(view: View) => void")] changed: Function,
+    ) -> Result<Engine, JsValue> {
         let (surface, context) = Surface::open(canvas).await?;
         let gpu = Gpu { main: Session::new(context), others: Vec::new(), surface };
-        Ok(Self { state: Rc::default(), gpu: Rc::new(Mutex::new(Some(gpu))), invalidate })
+        Ok(Self {
+            state: Rc::default(),
+            gpu: Rc::new(Mutex::new(Some(gpu))),
+            invalidate,
+            changed,
+            told: Rc::default(),
+        })
     }
 
-    /// Shows the model of a file that was read. The file's handle is used up.
+    /// What panels show.
     ///
     /// # Errors
-    /// When the GPU has no room for it, or draws too slowly for its many layers; what was open stays open.
-    #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
-    pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
-        let (camera, size) = self.read(|state| state.view_of(&loaded.model));
-        let draw = loaded.draw_model();
-        let settings = loaded.member_settings();
-        page_turn().await;
-        let models = Models::one(loaded.model, draw, settings);
+    /// Never.
+    #[wasm_bindgen(unchecked_return_type = "View")]
+    pub fn view(&self) -> Result<JsValue, JsValue> {
+        Ok(self.read(|state| object(&state.document_view()))?)
+    }
+
+    /// Opens models in place of those that are open, with what `contents` says; the history starts again. Returns notices. The models'
+    /// handles are used up.
+    ///
+    /// # Errors
+    /// When the GPU has no room for them, or draws too slowly for their many layers; what was open stays open.
+    pub async fn open(
+        &self,
+        models: Vec<Loaded>,
+        #[wasm_bindgen(unchecked_param_type = "OpenContents")] contents: JsValue,
+    ) -> Result<Vec<String>, JsValue> {
+        let contents: OpenContents = taken(contents)?;
+        let mut models = models;
+        let Some(first) = models.first_mut() else {
+            return Err(Fault::missing("model", "open one first").into());
+        };
+        let (camera, size) = self.read(|state| state.view_of(&first.model));
+        let (contents, settings, mut notices) = contents.read(first)?;
+        let (up, origin) = (first.model.up(), first.model.origin());
+        let mut draws = Vec::new();
+        for (k, loaded) in models.iter_mut().enumerate() {
+            if k > 0 {
+                loaded.turn_to(up);
+                loaded.model.see_from(origin);
+            }
+            draws.push(Arc::new(loaded.draw_model()));
+            page_turn().await;
+        }
+        let models: Vec<_> = models
+            .into_iter()
+            .map(|loaded| {
+                let settings = loaded.member_settings();
+                (loaded.model, settings)
+            })
+            .collect();
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
-            let Models { positions, triangles, .. } = &models;
-            check_layers(gpu.main.context(), &camera, positions, triangles, size).map_err(Fault::from)?;
-            gpu.main.set_shared_model(models.draw()).await.map_err(Fault::from)?;
-            gpu.main.set_parts(models.parts()).await.map_err(Fault::from)?;
+            for (model, _) in &models {
+                check_layers(gpu.main.context(), &camera, &model.positions, &model.triangles, size)
+                    .map_err(Fault::from)?;
+            }
+            let draw = joined(&draws.iter().collect::<Vec<_>>());
             gpu.others.clear();
+            self.state.borrow_mut().forget_gpu();
+            gpu.main.set_shared_model(draw).await.map_err(Fault::from)?;
+            self.change(|state| {
+                state.editor.open(models, contents);
+                state.draws = (0..).zip(draws).collect();
+                state.cache.clear();
+                state.has_uploaded_mesh();
+                state.camera = Camera::default();
+                state.fit_camera();
+                state.frame_all();
+                notices.extend(state.editor.take_pose(&settings).err().map(str::to_owned));
+            });
         }
-        page_turn().await;
-        self.change(|state| state.set_models(models));
-        Ok(self.info()?)
+        Ok(notices)
     }
 
-    /// Takes what the worker has bound: rows, columns and weights, and the columns of offsets.
+    /// Takes what the worker has bound: rows, columns and weights, the columns of offsets, and the report. Those of a `final` pass are kept
+    /// for undo.
     ///
     /// # Errors
-    /// When the arrays do not fit model and cage, or the GPU has no room for them; `Cancelled` when another cage came meanwhile.
+    /// When the arrays do not fit models and cage, or the GPU has no room for them; `Cancelled` when they have changed meanwhile.
     pub async fn adopt(
         &self,
         indptr: Vec<u32>,
         indices: Uint32Array,
         data: Float32Array,
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "BindReport")] report: JsValue,
+        is_final: bool,
     ) -> Result<(), JsValue> {
-        let (revision, n_columns) = self.read(|state| (state.revision, state.rest().positions.len() as u32));
-        let n_vertices = self.read(|state| state.models.positions.len());
+        let (revision, key) = self.read(|state| (state.revision, state.editor.key()));
+        let n_columns = self.read(|state| state.rest().positions.len() as u32);
+        let n_vertices = self.read(|state| state.models().positions().len());
         let Offsets { frames, outside } = taken(offsets)?;
         let n_columns = n_columns + frames.n_columns() as u32;
         let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
@@ -108,24 +172,34 @@ impl Engine {
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        // The cage may still be waiting for its turn, and would take the weights away again.
-        upload_cage(&self.state, gpu).await?;
+        // The upload of the cage may still be waiting, and would drop the weights again.
+        upload(&self.state, gpu).await?;
         is_current()?;
-        gpu.main.adopt(weights, frames.clone()).await.map_err(Fault::from)?;
+        let (weights, frames) = (Arc::new(weights), Arc::new(frames));
+        gpu.main.adopt(Arc::clone(&weights), Arc::clone(&frames)).await.map_err(Fault::from)?;
         is_current()?;
         self.change(|state| {
-            state.is_bound = true;
-            state.joints = rig.as_ref().and_then(|weights| {
+            let joints = rig.as_ref().and_then(|weights| {
                 let of_rig = outside.iter().filter_map(|o| o.vertex.checked_sub(n_vertices as u32));
                 let of_rig: Vec<u32> = of_rig.collect();
-                // What is wrong with a rig is said when it is exported.
-                JointDots::new(&state.models, weights, frames, &of_rig).ok()
+                // Faults of a rig are reported when it is exported.
+                JointDots::new(state.models(), weights, (*frames).clone(), &of_rig).ok()
             });
-            (state.rig, state.outside) = (rig, outside);
-            state.playing = None;
-            (state.is_moved, state.is_changed) = (true, true);
+            let bytes = weights.bytes() + rig.as_ref().map_or(0, Weights::bytes);
+            let bound = Arc::new(BoundModels { weights, frames, rig, outside, joints, report });
+            if is_final {
+                state.cache.insert(key, Arc::clone(&bound), bytes);
+            }
+            state.set_bound(bound);
         });
         Ok(())
+    }
+
+    /// The report of the weights in use; undefined without weights.
+    #[wasm_bindgen(js_name = boundReport, unchecked_return_type = "BindReport | undefined")]
+    #[must_use]
+    pub fn bound_report(&self) -> JsValue {
+        self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
     }
 
     /// Takes coordinates by formula to compare with; the arrays are those of `adopt`.
@@ -145,7 +219,7 @@ impl Engine {
             // Closed forms know the plain cage alone.
             let n_faces = state.set().map_or(0, |set| set.cage().triangles().len());
             let n_more = if kind == Coordinates::Green { n_faces } else { 0 };
-            (state.revision, (state.made.n_cage() + n_more) as u32)
+            (state.revision, (state.cage().n_cage() + n_more) as u32)
         });
         let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         self.read(|state| state.require(revision))?;
@@ -201,7 +275,7 @@ impl Engine {
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn bound(&self) -> bool {
-        self.read(|state| state.is_bound)
+        self.read(|state| state.bound.is_some())
     }
 
     /// Resolves with the reason when the GPU is lost.
@@ -234,8 +308,8 @@ impl Engine {
             let gpu = shared.as_mut().ok_or_else(lost)?;
             let main = gpu.main.recover(context).await.map_err(Fault::from)?;
             *gpu = Gpu { main, others: Vec::new(), surface };
-            // A cage may have come while there was no device to take it.
-            upload_cage(&self.state, gpu).await?;
+            // The document may have changed while there was no device.
+            upload(&self.state, gpu).await?;
         }
         self.change(|state| {
             state.others.clear();
@@ -251,28 +325,53 @@ impl Engine {
         read(&self.state.borrow())
     }
 
-    /// Changes something, and asks for a frame.
+    /// Changes the state: what was derived from another document is dropped, the page is told and asked for a frame, and the GPU is
+    /// brought to the document.
     fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
-        let changed = change(&mut self.state.borrow_mut());
-        // The page only notes that it has something to draw: there is nothing that could fail.
-        let _ = self.invalidate.call0(&JsValue::NULL);
+        let changed = {
+            let mut state = self.state.borrow_mut();
+            let changed = change(&mut state);
+            state.follow_document();
+            changed
+        };
+        self.announce();
+        self.start_upload();
         changed
     }
 
-    /// Another cage, here at once and on the GPU when it has answered.
-    fn take_cage(&self, made: MadeCage) {
-        self.change(|state| state.set_cage(made));
-        let (state, gpu, invalidate) =
-            (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
+    /// Tells the page what panels show, if that has changed, and asks for a frame.
+    fn announce(&self) {
+        let view = self.read(State::document_view);
+        if *self.told.borrow() != view {
+            let given = object(&view);
+            *self.told.borrow_mut() = view;
+            // An error in the page's own function is the page's.
+            let _ = given.map(|view| self.changed.call1(&JsValue::NULL, &view));
+        }
+        let _ = self.invalidate.call0(&JsValue::NULL);
+    }
+
+    /// Brings the GPU to the document when it has answered; one upload at a time.
+    fn start_upload(&self) {
+        {
+            let mut state = self.state.borrow_mut();
+            if state.is_uploading || !state.needs_upload() {
+                return;
+            }
+            state.is_uploading = true;
+        }
+        let engine = self.clone();
         spawn_local(async move {
-            let mut gpu = gpu.lock().await;
-            let Some(gpu) = gpu.as_mut() else { return };
-            let outcome = upload_cage(&state, gpu).await;
-            let mut state = state.borrow_mut();
-            state.fault = outcome.err().or_else(|| state.fault.take());
-            (state.is_moved, state.is_changed) = (true, true);
-            drop(state);
-            let _ = invalidate.call0(&JsValue::NULL);
+            let outcome = match engine.gpu.lock().await.as_mut() {
+                Some(gpu) => upload(&engine.state, gpu).await,
+                None => Ok(()),
+            };
+            {
+                let mut state = engine.state.borrow_mut();
+                state.is_uploading = false;
+                state.fault = outcome.err().or_else(|| state.fault.take());
+            }
+            engine.announce();
         });
     }
 
@@ -295,20 +394,6 @@ fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     let rows =
         |range: std::ops::Range<usize>| weights.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>());
     (rows(0..n_vertices), Some(rows(n_vertices..n)))
-}
-
-/// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.
-async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
-    let (revision, set) = {
-        let state = state.borrow();
-        let missing = state.set().filter(|_| !state.is_on_gpu());
-        (state.revision, missing.cloned())
-    };
-    let Some(set) = set else { return Ok(()) };
-    gpu.others.clear();
-    gpu.main.set_cage(&set).await?;
-    state.borrow_mut().on_gpu = Some(revision);
-    Ok(())
 }
 
 fn lost() -> Fault {

@@ -27,9 +27,9 @@ impl Engine {
         let revision = self.revision();
         let asked: RigAsked = taken(options)?;
         let field = if asked.dynamic { Some(self.field()?) } else { None };
-        let ids: Vec<u32> = self.read(|state| state.models.iter().map(|member| member.id).collect());
+        let ids: Vec<u32> = self.read(|state| state.models().iter().map(|member| member.id).collect());
         let parts = ids.into_iter().map(|id| Ok((id, self.part(id, &asked)?))).collect::<Answer<Vec<_>>>()?;
-        let (clips, up) = self.read(|state| (SharedClip::all(&state.models), state.up().turn()));
+        let (clips, up) = self.read(|state| (SharedClip::all(state.models()), state.up().turn()));
         let playing = Playing::new(parts, clips, up, field.clone());
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
@@ -124,21 +124,21 @@ impl Engine {
     /// What plays a model: its export, or the file itself where the cage bends what moves.
     fn part(&self, id: u32, asked: &RigAsked) -> Answer<Part> {
         let is_gltf =
-            self.read(|state| Answer::Ok(state.models.get(id)?.model.format() == ModelFormat::Gltf))?;
+            self.read(|state| Answer::Ok(state.models().get(id)?.model.format() == ModelFormat::Gltf))?;
         if is_gltf && !asked.dynamic {
             let bytes = self.posed_glb(id, asked)?.0;
-            let player = self.read(|state| Answer::Ok(state.models.get(id)?.model.player_of(&bytes)?))?;
+            let player = self.read(|state| Answer::Ok(state.models().get(id)?.model.player_of(&bytes)?))?;
             return Ok(Part::Player(Box::new(player)));
         }
-        if let Some(player) = self.read(|state| Answer::Ok(state.models.get(id)?.model.player()?))? {
+        if let Some(player) = self.read(|state| Answer::Ok(state.models().get(id)?.model.player()?))? {
             return Ok(Part::Player(Box::new(player)));
         }
         // Other formats move only with the cage.
         let pose =
-            self.read(|state| if asked.dynamic { &state.rest().positions } else { &state.positions }.clone());
+            self.read(|state| if asked.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
-            let own = state.models.get(id)?.share(&posed);
+            let own = state.models().get(id)?.share(&posed);
             Ok(Part::Still(state.up().turned_back(own).into_owned()))
         })
     }
@@ -152,7 +152,7 @@ impl Engine {
             let Some((lattice, weights, frames)) = &state.lattice else {
                 return Err(Fault::missing("lattice", "bind it first"));
             };
-            let (rest, posed) = (&state.rest().positions, &state.positions);
+            let (rest, posed) = (&state.rest().positions, state.pose());
             Ok(DisplacementField::new(lattice.clone(), weights, frames, rest, posed))
         })
     }

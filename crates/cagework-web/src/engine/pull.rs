@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use cagework_core::edit::View as _;
+use cagework_core::view::View as _;
+use cagework_editor::SurfacePoint;
 use cagework_gpu::Session;
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
@@ -12,7 +13,7 @@ use super::Engine;
 use crate::error::{Answer, Fault};
 use crate::options::taken;
 use crate::state::State;
-use crate::views::{SurfacePoint, object};
+use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {

@@ -1,6 +1,6 @@
 //! Pointing at the cage and selecting.
 
-use cagework_core::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
+use cagework_editor::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -22,8 +22,8 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let element = taken(element)?;
         self.change(|state| {
-            state.element = element;
-            state.hovered.clear();
+            state.editor.element = element;
+            state.editor.hovered.clear();
             state.is_changed = true;
         });
         Ok(())
@@ -37,8 +37,8 @@ impl Engine {
                 return Vec::new();
             }
             let (at, positions, topology, view) =
-                (state.pointer(x, y), &state.positions, &state.topology, &state.camera);
-            match state.element {
+                (state.pointer(x, y), state.pose(), state.editor.topology(), &state.camera);
+            match state.editor.element {
                 Element::Vertex => {
                     pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
                 }
@@ -54,9 +54,9 @@ impl Engine {
 
     /// Marks the element of these vertices.
     pub fn hover(&self, vertices: Vec<u32>) {
-        if self.read(|state| state.hovered != vertices) {
+        if self.read(|state| state.editor.hovered != vertices) {
             self.change(|state| {
-                state.hovered = vertices;
+                state.editor.hovered = vertices;
                 state.is_changed = true;
             });
         }
@@ -72,7 +72,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
     ) -> Result<(), JsValue> {
         let mode = taken(mode)?;
-        self.change_selection(|state| state.selection.change(vertices, mode));
+        self.change_selection(|state| state.editor.selection.change(vertices, mode));
         Ok(())
     }
 
@@ -92,8 +92,8 @@ impl Engine {
         let mode = taken(mode)?;
         self.change_selection(|state| {
             let corners = [state.pointer(x0, y0), state.pointer(x1, y1)];
-            let vertices = vertices_in_box(&state.positions, &state.camera, corners);
-            state.selection.change(&vertices, mode);
+            let vertices = vertices_in_box(state.pose(), &state.camera, corners);
+            state.editor.selection.change(&vertices, mode);
         });
         Ok(())
     }
@@ -101,39 +101,39 @@ impl Engine {
     /// Selects everything.
     #[wasm_bindgen(js_name = selectAll)]
     pub fn select_all(&self) {
-        self.change_selection(|state| state.selection.all());
+        self.change_selection(|state| state.editor.selection.all());
     }
 
     /// Extends the selection to whole parts.
     #[wasm_bindgen(js_name = selectLinked)]
     pub fn select_linked(&self) {
-        self.change_selection(|state| state.selection.linked(&state.topology));
+        self.change_selection(|state| state.editor.select_linked());
     }
 
     /// Selected vertices, ascending.
     #[must_use]
     pub fn selection(&self) -> Vec<u32> {
-        self.read(|state| state.selection.vertices())
+        self.read(|state| state.editor.selection.vertices())
     }
 
     /// The vertex selected last, or -1.
     #[must_use]
     pub fn last(&self) -> i32 {
-        self.read(|state| state.selection.last().map_or(-1, |v| v as i32))
+        self.read(|state| state.editor.selection.last().map_or(-1, |v| v as i32))
     }
 
     /// Middle of the selection; empty without one.
     #[wasm_bindgen(js_name = selectionCenter)]
     #[must_use]
     pub fn selection_center(&self) -> Vec<f32> {
-        self.read(|state| state.selection.center(&state.positions).map(|c| flat(&[c])).unwrap_or_default())
+        self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
     }
 
     /// Whether mirror images move along.
     #[wasm_bindgen(js_name = setSymmetry)]
     pub fn set_symmetry(&self, on: bool) {
         self.change(|state| {
-            state.is_mirrored = on;
+            state.editor.is_mirrored = on;
             state.is_changed = true;
         });
     }
@@ -141,7 +141,7 @@ impl Engine {
     /// Vertices without a mirror image.
     #[must_use]
     pub fn unmatched(&self) -> Vec<u32> {
-        self.read(|state| state.symmetry.unmatched())
+        self.read(|state| state.editor.symmetry().unmatched())
     }
 
     fn change_selection(&self, change: impl FnOnce(&mut State)) {

@@ -1,0 +1,179 @@
+//! The document's part of a project's settings. The project file itself holds models, cage and saved poses.
+
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use cagework_core::PolygonMesh;
+use cagework_io::{decode_pose, encode_pose};
+use glam::Vec3;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::controls::{CageControls, RestCage};
+use crate::document::{Document, NamedPose};
+use crate::models::MemberSettings;
+use crate::surface::SurfacePoint;
+
+/// The document's part of a project's settings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct DocumentSettings {
+    /// Identifier of the built-in sample whose own cage it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// Subdivision and interior controls of the cage, whose last positions the controls are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controls: Option<CageControls>,
+    /// The pose in the axes of the model's file: [`cagework_io::encode_pose`] in base 64 for URLs. None at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<String>,
+    /// Points of the model that pulls leave in place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pins: Vec<SurfacePoint>,
+    /// The same of each saved pose.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pose_pins: Vec<Vec<SurfacePoint>>,
+    /// Share of each saved pose in the pose, 0 to 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pose_shares: Vec<f32>,
+    /// Visibility, parts and paint of each model.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<MemberSettings>,
+}
+
+impl DocumentSettings {
+    /// Those of a document.
+    #[must_use]
+    pub fn of(document: &Document) -> Self {
+        let Document { cage, poses, shares, pins, sample, has_sample_cage, models, .. } = document;
+        let up = models.up();
+        let in_file = |positions| up.turned_back(positions);
+        let pose = document.is_posed().then(|| {
+            URL_SAFE_NO_PAD.encode(encode_pose(&in_file(&cage.mesh.positions), &in_file(&document.pose)))
+        });
+        let has_pins = poses.iter().any(|pose| pose.pins.as_ref().is_some_and(|pins| !pins.is_empty()));
+        let pins_of = |pose: &NamedPose| pose.pins.as_ref().map_or_else(Vec::new, |pins| pins.to_vec());
+        let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
+        Self {
+            sample: sample.as_deref().filter(|_| *has_sample_cage).map(str::to_owned),
+            controls: (cage.controls != CageControls::default()).then(|| cage.controls.clone()),
+            pose,
+            pins: pins.to_vec(),
+            pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
+            pose_shares: if is_blended { shares.to_vec() } else { Vec::new() },
+            models: models.settings(),
+        }
+    }
+
+    /// Those of a project; what cannot be read is left out.
+    #[must_use]
+    pub fn read(text: &str) -> Self {
+        let given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
+        Self {
+            sample: field(&given, "sample"),
+            controls: field(&given, "controls"),
+            pose: field(&given, "pose"),
+            pins: field(&given, "pins").unwrap_or_default(),
+            pose_pins: field(&given, "pose_pins").unwrap_or_default(),
+            pose_shares: field::<Vec<f32>>(&given, "pose_shares")
+                .unwrap_or_default()
+                .into_iter()
+                .map(|share| share.clamp(0.0, 1.0))
+                .collect(),
+            models: field(&given, "models").unwrap_or_default(),
+        }
+    }
+
+    /// These settings and others, a JSON object, as one. Those here replace others of the same name.
+    #[must_use]
+    pub fn beside(&self, others: &str) -> String {
+        let mut all: Map<String, Value> = serde_json::from_str(others).unwrap_or_default();
+        // A structure of numbers and text is always written.
+        if let Ok(Value::Object(own)) = serde_json::to_value(self) {
+            all.extend(own);
+        }
+        Value::Object(all).to_string()
+    }
+
+    /// The cage of a project's mesh, and what was left out. A mesh without faces is no cage yet.
+    #[must_use]
+    pub fn cage(&self, mesh: PolygonMesh) -> (Option<RestCage>, Option<&'static str>) {
+        if mesh.faces.is_empty() {
+            return (None, None);
+        }
+        let with = |controls| RestCage::new(mesh.clone(), controls);
+        match self.controls.clone().map(with) {
+            Some(Ok(cage)) => (Some(cage), None),
+            Some(Err(_)) => {
+                let notice = "The smooth surface or the interior controls of this project's cage cannot be used: they are left out.";
+                (with(CageControls::default()).ok(), Some(notice))
+            }
+            None => (with(CageControls::default()).ok(), None),
+        }
+    }
+
+    /// Saved poses with their pins.
+    #[must_use]
+    pub fn poses(&self, poses: impl IntoIterator<Item = (String, Vec<Vec3>)>) -> Vec<NamedPose> {
+        let pins = |k: usize| {
+            let all =
+                (!self.pose_pins.is_empty()).then(|| self.pose_pins.get(k).cloned().unwrap_or_default());
+            all.map(Into::into)
+        };
+        let named = |(k, (name, positions)): (usize, (String, Vec<Vec3>))| NamedPose {
+            name: name.into(),
+            positions: Arc::from(positions),
+            pins: pins(k),
+        };
+        poses.into_iter().enumerate().map(named).collect()
+    }
+
+    /// The pose; none at rest. `[n_controls]`
+    ///
+    /// # Errors
+    /// When it is damaged, or belongs to another cage: the sentence for the user.
+    pub fn pose_of(&self, document: &Document) -> Result<Option<Vec<Vec3>>, &'static str> {
+        let Some(text) = &self.pose else { return Ok(None) };
+        let damaged = "The pose of this project is damaged: the cage is at rest.";
+        let bytes = URL_SAFE_NO_PAD.decode(text.trim_end_matches('=')).map_err(|_| damaged)?;
+        let up = document.models.up();
+        let pose =
+            decode_pose(&up.turned_back(&document.cage.mesh.positions), &bytes).map_err(|_| damaged)?;
+        Ok(Some(up.turned(&pose).into_owned()))
+    }
+}
+
+fn field<T: DeserializeOwned>(given: &Map<String, Value>, key: &str) -> Option<T> {
+    serde_json::from_value(given.get(key)?.clone()).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn fields_that_cannot_be_read_are_left_out() {
+        let read = |given: Value| DocumentSettings::read(&given.to_string());
+        assert_eq!(read(json!({ "pose_shares": [0.25, -3, 1e300] })).pose_shares, [0.25, 0.0, 1.0]);
+        assert_eq!(
+            read(json!({ "pose_shares": ["half"], "sample": 7, "pins": {}, "pose": [] })),
+            DocumentSettings::default()
+        );
+        for text in ["not json", "[1]", ""] {
+            assert_eq!(DocumentSettings::read(text), DocumentSettings::default());
+        }
+    }
+
+    #[test]
+    fn damaged_poses_are_refused_with_a_sentence() {
+        let document = Document::default();
+        for pose in ["!", "AAEC", ""] {
+            let settings = DocumentSettings { pose: Some(pose.to_owned()), ..DocumentSettings::default() };
+            assert!(settings.pose_of(&document).unwrap_err().contains("at rest"), "{pose}");
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! A whole session: open, make a cage, bind, pull, pose, blend, reshape, undo, redo, save, reopen.
+
+use cagework_cage::generate::{CageOptions, generate};
+use cagework_core::progress::Silent;
+use cagework_core::{BindOptions, Bounds, TriMesh, Weights, bind, subdivided_box};
+use cagework_editor::edit::{GestureKind, SelectMode};
+use cagework_editor::{
+    Cache, Command, Contents, Document, DocumentSettings, Editor, InnerKind, Key, NewModel, PartOptions,
+    RestEdit, SurfacePoint,
+};
+use cagework_io::{Model, read_project};
+use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
+use glam::{DVec3, Vec3};
+
+/// A box of quads as an OBJ file.
+fn block(name: &str, min: Vec3, max: Vec3) -> NewModel {
+    let mesh = subdivided_box(Bounds { min, max }, 0.0, [3; 3]);
+    let mut text = String::new();
+    for p in &mesh.positions {
+        text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+    }
+    for f in &mesh.faces {
+        text += &format!("f {} {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1, f[3] + 1);
+    }
+    (Model::read(name, text.as_bytes(), &mut |_| None).unwrap(), None)
+}
+
+fn two_blocks() -> [NewModel; 2] {
+    [
+        block("body.obj", Vec3::ZERO, Vec3::ONE),
+        block("hat.obj", Vec3::new(0.0, 1.1, 0.0), Vec3::new(1.0, 1.5, 1.0)),
+    ]
+}
+
+fn bound(document: &Document, grid: u32) -> Weights {
+    let set = document.cage.set.as_ref().unwrap();
+    let options = BindOptions { grid, ..BindOptions::default() };
+    let bound = bind(document.models.positions(), set, &options, &Silent).unwrap();
+    bound.frames.folded(&bound.weights)
+}
+
+/// Where the cage goes when a vertex of the models is pulled.
+fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec<Vec3> {
+    let models = &document.models;
+    let mesh = TriMesh { positions: models.positions().to_vec(), triangles: models.triangles().to_vec() };
+    let cage = document.cage.set.as_ref().unwrap().cage();
+    let probes = Probes::new(&mesh, cage).unwrap();
+    let options = BindOptions { grid: 16, ..BindOptions::default() };
+    let of_probes = bind(probes.points(), cage, &options, &Silent).unwrap();
+    let of_probes = of_probes.frames.folded(&of_probes.weights);
+    let pull = Pull::new(&mesh, cage, probes, &of_probes).unwrap();
+    let grab = Grip::new(Handle::Vertex(vertex), &pull, &mesh.triangles, weights).unwrap();
+    let rest: Vec<DVec3> = document.pose.iter().map(|p| p.as_dvec3()).collect();
+    let mut drag = Drag::new(&pull, &rest, &[grab], &[], DragOptions::default()).unwrap();
+    let to = drag.start()[0] + by;
+    drag.settle(&[to]);
+    drag.cage().iter().map(|p| p.as_vec3()).collect()
+}
+
+/// Applies a command as one step, and remembers the document after it.
+fn step(editor: &mut Editor, documents: &mut Vec<Document>, command: Command) {
+    let label = format!("step {}", documents.len());
+    editor.apply(command).unwrap();
+    assert!(editor.commit(label.as_str()), "{label}");
+    assert_eq!(editor.view().undo.as_deref(), Some(label.as_str()));
+    documents.push(editor.document().clone());
+}
+
+#[test]
+fn session_can_be_undone_redone_saved_and_reopened() {
+    let mut editor = Editor::default();
+    let [body, hat] = two_blocks();
+    editor.open([body], Contents { sample: Some("clamp".to_owned()), ..Contents::default() });
+    editor.add_models([hat]);
+    editor.amend();
+    let models = editor.document().models.clone();
+    let options = CageOptions { target: 40, ..CageOptions::default() };
+    let made = generate(models.positions(), models.triangles(), &options, &Silent).unwrap();
+    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
+    editor.apply(cage(made.cage.to_polygon_mesh())).unwrap();
+    editor.amend();
+    assert_eq!((editor.view().undo, editor.document().sample.as_deref()), (None, None));
+
+    let mut documents = vec![editor.document().clone()];
+    let mut cache: Cache<Weights> = Cache::new(1 << 20);
+    let first_key = editor.key();
+    let weights = bound(editor.document(), 16);
+    cache.insert(first_key, weights.clone(), weights.bytes());
+
+    let positions = pulled(editor.document(), &weights, 0, DVec3::new(-0.3, 0.1, 0.0));
+    step(&mut editor, &mut documents, Command::SetPose { positions });
+    step(&mut editor, &mut documents, Command::SavePose { name: "left".to_owned() });
+    let pin = SurfacePoint { triangle: 3, bary: [0.5, 0.5, 0.0] };
+    step(&mut editor, &mut documents, Command::SetPins { pins: vec![pin] });
+    let positions = pulled(editor.document(), &weights, 5, DVec3::new(0.0, 0.2, 0.2));
+    step(&mut editor, &mut documents, Command::SetPose { positions });
+    step(&mut editor, &mut documents, Command::SavePose { name: "up".to_owned() });
+    assert_eq!(*editor.document().shares, [0.0, 1.0]);
+    // A slider sends many shares; all of them are one step, from the pose at its beginning.
+    for share in [0.9, 0.4, 0.25] {
+        editor.apply(Command::Blend { index: 1, share }).unwrap();
+    }
+    step(&mut editor, &mut documents, Command::Blend { index: 0, share: 0.5 });
+    let rest = &editor.document().cage.mesh.positions;
+    let [left, up] = [0, 1].map(|k| editor.document().poses[k].positions.clone());
+    for (k, p) in editor.document().pose.iter().enumerate() {
+        // The formula of a blend: rest + sum of share times offset.
+        let expected = rest[k] + 0.5 * (left[k] - rest[k]) + 0.25 * (up[k] - rest[k]);
+        assert!(p.distance(expected) < 1e-5, "{p} {expected}");
+    }
+    step(&mut editor, &mut documents, Command::RenamePose { index: 0, name: "to the left".to_owned() });
+    let hat = editor.document().models.iter().nth(1).unwrap().id;
+    let options = PartOptions { rigid: vec!["all".to_owned()], ..PartOptions::default() };
+    step(&mut editor, &mut documents, Command::SetParts { id: hat, options });
+    assert_eq!(editor.key(), first_key, "weights do not depend on parts");
+    step(&mut editor, &mut documents, Command::ResetPose);
+
+    editor.set_editing_rest(true);
+    assert!(!editor.commit("nothing was posed"));
+    editor.selection.change(&[0, 1, 2], SelectMode::Replace);
+    assert!(editor.shift(Vec3::new(-0.05, -0.05, -0.05)));
+    step(&mut editor, &mut documents, Command::MoveRest);
+    assert_ne!(editor.key(), first_key);
+    let edge = editor.topology().edges[0];
+    editor.selection.change(&edge, SelectMode::Replace);
+    step(&mut editor, &mut documents, Command::EditRest { edit: RestEdit::SplitEdge });
+    assert!(editor.document().fitting_poses().next().is_none(), "the cage has another vertex");
+    let place = editor.bounds().unwrap().center();
+    step(&mut editor, &mut documents, Command::AddControl { kind: InnerKind::Point, places: vec![place] });
+    editor.set_editing_rest(false);
+    step(&mut editor, &mut documents, Command::RemoveModel { id: hat });
+
+    // To the start and back, with the same document at every step.
+    for k in (0..documents.len() - 1).rev() {
+        assert!(editor.undo());
+        assert_eq!(*editor.document(), documents[k], "undo to {k}");
+        assert_eq!(editor.key(), documents[k].key());
+    }
+    assert!(!editor.undo());
+    assert!(cache.get(editor.key()).is_some(), "weights of the first cage are found again");
+    for (k, document) in documents.iter().enumerate().skip(1) {
+        assert!(editor.redo());
+        assert_eq!(editor.document(), document, "redo to {k}");
+    }
+    assert!(!editor.redo());
+
+    // Every document can be saved and opened again.
+    for (k, document) in documents.iter().enumerate() {
+        let reopened = saved_and_opened(document);
+        assert_eq!(reopened.models.settings(), document.models.settings(), "{k}");
+        assert_eq!(reopened.cage.mesh.faces, document.cage.mesh.faces, "{k}");
+        assert_eq!((reopened.poses.len(), &reopened.pins), (document.poses.len(), &document.pins), "{k}");
+        for (a, b) in reopened.poses.iter().zip(&*document.poses) {
+            assert_eq!((&a.name, &a.positions), (&b.name, &b.positions), "{k}");
+        }
+        // A pose is stored in 16 bits for each coordinate of its largest movement.
+        let largest = document
+            .pose
+            .iter()
+            .zip(&document.cage.mesh.positions)
+            .map(|(p, r)| p.distance(*r))
+            .fold(0.0, f32::max);
+        for (a, b) in reopened.pose.iter().zip(&*document.pose) {
+            assert!(a.distance(*b) <= 1e-4 * largest, "{k}: {a} {b}");
+        }
+        let is_blended = document.is_posed();
+        assert_eq!(is_blended, reopened.is_posed(), "{k}");
+        if is_blended {
+            assert_eq!(reopened.shares, document.shares, "{k}");
+        }
+    }
+}
+
+/// A document through a project file.
+fn saved_and_opened(document: &Document) -> Document {
+    let mut editor = Editor::default();
+    editor.open([], Contents::default());
+    let bytes = editor_with(document).write_project(r#"{"bind": {"grid": 32}}"#).unwrap();
+    let project = read_project("saved.glb", &bytes, 1 << 28).unwrap().unwrap();
+    assert!(project.settings.contains("\"grid\":32"), "settings of others are kept: {}", project.settings);
+    let settings = DocumentSettings::read(&project.settings);
+    let (cage, notice) = settings.cage(project.cage);
+    assert_eq!(notice, None);
+    let contents = Contents {
+        cage,
+        poses: settings.poses(project.poses),
+        shares: settings.pose_shares.clone(),
+        pins: settings.pins.clone(),
+        sample: settings.sample.clone(),
+    };
+    let mut members = settings.models.iter().cloned();
+    let models: Vec<_> = project.models.into_iter().map(|model| (model, members.next())).collect();
+    editor.open(models, contents);
+    editor.take_pose(&settings).unwrap();
+    editor.document().clone()
+}
+
+/// An editor with a document: what `write_project` needs.
+fn editor_with(document: &Document) -> Editor {
+    let mut editor = Editor::default();
+    editor.show(document.clone());
+    editor
+}
+
+#[test]
+fn gestures_end_in_one_step_or_in_none() {
+    struct Flat;
+    impl cagework_core::view::View for Flat {
+        fn project(&self, point: Vec3) -> Option<(glam::Vec2, f32)> {
+            Some((point.truncate(), 1.0))
+        }
+        fn ray(&self, pixel: glam::Vec2) -> (Vec3, Vec3) {
+            (pixel.extend(10.0), Vec3::NEG_Z)
+        }
+        fn units_per_pixel(&self, _: Vec3) -> f32 {
+            0.01
+        }
+        fn right(&self) -> Vec3 {
+            Vec3::X
+        }
+        fn up(&self) -> Vec3 {
+            Vec3::Y
+        }
+    }
+    let mut editor = opened_with_box();
+    let free = cagework_editor::edit::Constraint::Free;
+    assert!(!editor.begin(GestureKind::Grab, glam::Vec2::ZERO, free), "nothing is selected");
+    editor.selection.change(&[7], SelectMode::Replace);
+    let start = editor.document().pose.clone();
+    for keep in [false, true] {
+        assert!(editor.begin(GestureKind::Grab, glam::Vec2::ZERO, free));
+        assert!(!editor.begin(GestureKind::Scale, glam::Vec2::ZERO, free), "one at a time");
+        for x in 1..=10 {
+            editor.drag(&Flat, |gesture| gesture.drag(glam::Vec2::new(x as f32, 0.0)));
+        }
+        assert_eq!(editor.view().selected.center, None);
+        assert_eq!(editor.end(keep), keep);
+        assert_eq!(editor.commit("Move 1 vertex"), keep);
+    }
+    let moved = editor.document().pose[7] - start[7];
+    assert!(moved.distance(Vec3::new(0.1, 0.0, 0.0)) < 1e-6, "ten pixels of 0.01: {moved}");
+    assert!(editor.undo());
+    assert_eq!(editor.document().pose, start);
+    assert!(!editor.undo());
+}
+
+fn opened_with_box() -> Editor {
+    let mut editor = Editor::default();
+    editor.open(two_blocks(), Contents::default());
+    let bounds = editor.bounds().unwrap();
+    let mesh = subdivided_box(bounds, 0.1, [1; 3]);
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor.amend();
+    editor
+}
+
+#[test]
+fn refused_commands_change_nothing_and_say_why() {
+    let mut editor = opened_with_box();
+    let before = editor.document().clone();
+    let nan = vec![Vec3::NAN; 8];
+    let line = vec![Vec3::splat(50.0), Vec3::splat(60.0)];
+    for (command, sentence) in [
+        (Command::SetPose { positions: vec![Vec3::ZERO; 3] }, "belongs to another cage"),
+        (Command::SetPose { positions: nan }, "finite"),
+        (Command::ApplyPose { index: 4 }, "no pose number 5: 0 are saved"),
+        (Command::Blend { index: 0, share: 0.5 }, "no pose number 1"),
+        (Command::RemoveModel { id: 9 }, "no such model"),
+        (Command::SetPainted { id: 0, amounts: vec![1, 2] }, "2 amounts for 56 vertices"),
+        (Command::EditRest { edit: RestEdit::SplitEdge }, "select an edge"),
+        (Command::EditRest { edit: RestEdit::DeleteVertex }, "select a vertex"),
+        (Command::AddControl { kind: InnerKind::Line, places: line }, "outside"),
+        (
+            Command::SetParts {
+                id: 0,
+                options: PartOptions { rigid: vec!["material:gold".into()], ..PartOptions::default() },
+            },
+            "gold",
+        ),
+    ] {
+        let error = editor.apply(command.clone()).unwrap_err().to_string();
+        assert!(error.contains(sentence), "{command:?}: {error}");
+        assert_eq!(*editor.document(), before, "{command:?}");
+        assert!(!editor.commit("nothing"), "{command:?}");
+    }
+    editor.apply(Command::RemoveModel { id: 0 }).unwrap();
+    let error = editor.apply(Command::RemoveModel { id: 1 }).unwrap_err();
+    assert!(error.to_string().contains("only model"));
+}
+
+#[test]
+fn history_is_bounded_by_bytes_and_says_what_it_forgot() {
+    let mut editor = Editor::with_history_limit(100_000);
+    editor.open(two_blocks(), Contents::default());
+    let bounds = editor.bounds().unwrap();
+    for k in 1..=4 {
+        let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);
+        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        assert!(editor.commit(format!("cage {k}")));
+    }
+    // A cage of 98 vertices takes 25 kB, and its pose 1 kB: the first step replaced none.
+    assert_eq!(editor.view().forgotten, 0);
+    for k in 5..=9 {
+        let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);
+        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        assert!(editor.commit(format!("cage {k}")));
+    }
+    let view = editor.view();
+    assert!((4..=6).contains(&view.forgotten), "{}", view.forgotten);
+    let mut n = 0;
+    while editor.undo() {
+        n += 1;
+    }
+    assert_eq!(n + view.forgotten, 9);
+}
+
+#[test]
+fn keys_tell_what_weights_depend_on() {
+    let mut editor = opened_with_box();
+    let key = editor.key();
+    editor.apply(Command::ResetPose).unwrap();
+    editor.paint(0, |amounts| amounts.resize(56, 255));
+    assert!(editor.commit("Paint"));
+    assert_eq!(editor.key(), key);
+    editor.apply(Command::SetRadius { radius: Some(0.1) }).unwrap();
+    assert_ne!(editor.key().cage, key.cage);
+    assert_eq!(editor.key().mesh, key.mesh);
+    editor.revert();
+    assert_eq!(editor.key(), key);
+    editor.apply(Command::RemoveModel { id: 1 }).unwrap();
+    assert!(editor.commit("Remove"));
+    assert_ne!(editor.key().mesh, key.mesh);
+    assert!(editor.undo() && editor.key() == key);
+    assert!(!editor.document().models.iter().next().unwrap().painted.is_empty());
+    assert!(editor.undo() && editor.document().models.iter().next().unwrap().painted.is_empty());
+    assert_ne!(Key::default(), key);
+}
+
+#[test]
+fn poses_are_carried_to_another_cage_by_one_step() {
+    let mut editor = opened_with_box();
+    let moved: Vec<Vec3> = editor.document().pose.iter().map(|p| *p + Vec3::X).collect();
+    editor.apply(Command::SetPose { positions: moved }).unwrap();
+    editor.apply(Command::SavePose { name: "there".to_owned() }).unwrap();
+    assert!(editor.commit("Save"));
+    let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [2; 3]);
+    let n = mesh.positions.len();
+    let there: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X).collect();
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    assert!(editor.commit("Make a cage"));
+    assert_eq!((editor.view().poses[0].fits, editor.view().shares), (false, vec![0.0]));
+    let carried = [there.clone(), there.clone()].concat();
+    editor.apply(Command::CarryPoses { from: 8, positions: carried, shares: vec![1.0] }).unwrap();
+    assert!(editor.commit("Carry"));
+    assert_eq!(*editor.document().pose, *there);
+    assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, n));
+    assert!(editor.undo() && editor.undo());
+    assert_eq!((editor.view().poses[0].fits, *editor.document().shares == [1.0]), (true, true));
+}

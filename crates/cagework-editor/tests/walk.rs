@@ -1,0 +1,172 @@
+//! Random commands, undo and redo: documents come back as they were, and nothing panics.
+
+use cagework_core::{Bounds, subdivided_box};
+use cagework_editor::edit::SelectMode;
+use cagework_editor::{Command, Contents, Document, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint};
+use cagework_io::Model;
+use glam::Vec3;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed, TestRunner};
+
+/// One thing that a person does.
+#[derive(Clone, Debug)]
+enum Act {
+    Do(Command),
+    Select(Vec<u32>),
+    Reshape(bool),
+    Shift(Vec3),
+    Commit,
+    Revert,
+    Undo,
+    Redo,
+}
+
+fn vector() -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(prop_oneof![9 => -0.2..0.2_f32, 1 => -9.0..9.0_f32]).prop_map(Vec3::from_array)
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    let index = || 0..4_usize;
+    let share = prop_oneof![9 => 0.0..1.0_f32, 1 => Just(f32::NAN)];
+    let pin = (0..40_u32, 0.0..1.0_f32)
+        .prop_map(|(triangle, a)| SurfacePoint { triangle, bary: [a, 1.0 - a, 0.0] });
+    let edit = prop::sample::select(vec![
+        RestEdit::SplitEdge,
+        RestEdit::CollapseEdge,
+        RestEdit::ExtrudeFace,
+        RestEdit::DeleteVertex,
+        RestEdit::DeleteFace,
+    ]);
+    let kind = prop::sample::select(vec![InnerKind::Point, InnerKind::Line, InnerKind::Face]);
+    let word = prop::sample::select(vec!["all", "material:none", "nobody"]);
+    let command = prop_oneof![
+        prop::collection::vec(vector(), 0..9).prop_map(|positions| Command::SetPose { positions }),
+        Just(Command::ResetPose),
+        index().prop_map(|k| Command::SavePose { name: format!("pose {k}") }),
+        index().prop_map(|index| Command::ApplyPose { index }),
+        index().prop_map(|index| Command::RenamePose { index, name: "another".to_owned() }),
+        index().prop_map(|index| Command::RemovePose { index }),
+        (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
+        (6..10_usize, prop::collection::vec(vector(), 0..30))
+            .prop_map(|(from, positions)| Command::CarryPoses { from, positions, shares: vec![0.5] }),
+        prop::collection::vec(pin, 0..3).prop_map(|pins| Command::SetPins { pins }),
+        (1..3_u32, 0.0..0.4_f32).prop_map(|(n, margin)| Command::ReplaceCage {
+            mesh: subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, margin, [n; 3]),
+            controls: None,
+            notices: Vec::new(),
+        }),
+        Just(Command::MoveRest),
+        edit.prop_map(|edit| Command::EditRest { edit }),
+        (0..5_u32).prop_map(|steps| Command::Subdivide { steps }),
+        prop::option::of(-0.1..0.3_f32).prop_map(|radius| Command::SetRadius { radius }),
+        (kind, prop::collection::vec(vector().prop_map(|v| v + Vec3::splat(0.5)), 0..5))
+            .prop_map(|(kind, places)| Command::AddControl { kind, places }),
+        vector().prop_map(|v| Command::AddSheet { center: v + Vec3::splat(0.5), axes: [Vec3::X, Vec3::Y] }),
+        (0..4_u32).prop_map(|id| Command::RemoveModel { id }),
+        (0..4_u32, word).prop_map(|(id, word)| Command::SetParts {
+            id,
+            options: PartOptions { rigid: vec![word.to_owned()], ..PartOptions::default() }
+        }),
+        (0..4_u32, 0..10_usize).prop_map(|(id, n)| Command::SetPainted { id, amounts: vec![200; n] }),
+    ];
+    prop_oneof![
+        12 => command.prop_map(Act::Do),
+        4 => prop::collection::vec(0..12_u32, 0..5).prop_map(Act::Select),
+        2 => any::<bool>().prop_map(Act::Reshape),
+        3 => vector().prop_map(Act::Shift),
+        8 => Just(Act::Commit),
+        1 => Just(Act::Revert),
+        3 => Just(Act::Undo),
+        2 => Just(Act::Redo),
+    ]
+}
+
+fn opened() -> Editor {
+    let mut text = String::new();
+    let mesh = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1; 3]);
+    for p in &mesh.positions {
+        text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+    }
+    for f in &mesh.faces {
+        text += &format!("f {} {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1, f[3] + 1);
+    }
+    let model = |name: &str| (Model::read(name, text.as_bytes(), &mut |_| None).unwrap(), None);
+    let mut editor = Editor::default();
+    editor.open([model("a.obj"), model("b.obj"), model("c.obj")], Contents::default());
+    let mesh = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.1, [1; 3]);
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor.amend();
+    editor
+}
+
+/// Undoes everything, then redoes it: the same documents the other way round.
+fn undo_and_redo_are_inverse(editor: &mut Editor) {
+    editor.revert();
+    while editor.redo() {}
+    let mut documents = vec![editor.document().clone()];
+    while editor.undo() {
+        documents.push(editor.document().clone());
+    }
+    documents.pop();
+    while let Some(document) = documents.pop() {
+        assert!(editor.redo());
+        assert_eq!(*editor.document(), document);
+    }
+    assert!(!editor.redo());
+}
+
+#[test]
+fn two_thousand_random_acts_can_be_undone_and_redone() {
+    // The same acts in every run. 40 sessions of 50 acts.
+    let config =
+        Config { cases: 40, rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..Config::default() };
+    let steps = std::cell::Cell::new(0);
+    let done = std::cell::Cell::new(0);
+    TestRunner::new(config)
+        .run(&prop::collection::vec(act(), 50), |acts| {
+            let mut editor = opened();
+            for act in acts {
+                let before = editor.document().clone();
+                match act {
+                    Act::Do(command) => {
+                        if editor.apply(command).is_ok() {
+                            done.set(done.get() + 1);
+                        } else {
+                            prop_assert_eq!(editor.document(), &before);
+                        }
+                    }
+                    Act::Select(vertices) => {
+                        let n = editor.document().pose.len() as u32;
+                        let there: Vec<u32> = vertices.into_iter().filter(|&v| v < n).collect();
+                        editor.selection.change(&there, SelectMode::Replace);
+                    }
+                    Act::Reshape(on) => editor.set_editing_rest(on),
+                    Act::Shift(by) => drop(editor.shift(by)),
+                    Act::Commit => {
+                        let was_committed = editor.commit("step");
+                        steps.set(steps.get() + usize::from(was_committed));
+                        // A document that was committed comes back from undo, equal.
+                        if was_committed {
+                            let now = editor.document().clone();
+                            prop_assert!(editor.undo() && editor.redo());
+                            prop_assert_eq!(editor.document(), &now);
+                        }
+                    }
+                    Act::Revert => editor.revert(),
+                    Act::Undo => drop(editor.undo()),
+                    Act::Redo => drop(editor.redo()),
+                }
+                let document = editor.document();
+                prop_assert_eq!(document.pose.len(), document.cage.mesh.positions.len());
+                prop_assert_eq!(document.shares.len(), document.poses.len());
+                prop_assert!(document.pose.iter().all(|p| p.is_finite()));
+                prop_assert!(editor.selection.vertices().iter().all(|&v| (v as usize) < document.pose.len()));
+                let _ = editor.view();
+            }
+            undo_and_redo_are_inverse(&mut editor);
+            Ok(())
+        })
+        .unwrap();
+    // Most commands are not refused, or the walk would test nothing.
+    assert!(done.get() > 400 && steps.get() > 150, "{} commands, {} steps", done.get(), steps.get());
+}

@@ -1,0 +1,77 @@
+//! What is opened besides models: a cage, poses, and what a project stores.
+
+use cagework_cage::samples;
+use cagework_editor::{CageControls, Contents, DocumentSettings, RestCage};
+use glam::Vec3;
+use serde::Deserialize;
+
+use crate::arrays::{points, polygon_mesh};
+use crate::error::Answer;
+use crate::loaded::Loaded;
+
+/// What is opened besides models.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+pub(crate) struct OpenContents {
+    /// Identifier of the built-in sample that it is.
+    sample: Option<String>,
+    /// Settings that a project was saved with.
+    settings: Option<String>,
+    cage: Option<CageContents>,
+    /// Poses of a sample; those of a project are in its `Loaded`.
+    poses: Vec<PoseContents>,
+}
+
+/// A cage.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+pub(crate) struct CageContents {
+    /// `[n_controls, 3]`
+    #[cfg_attr(test, ts(type = "Float32Array"))]
+    positions: Vec<f32>,
+    /// For each face the number of its corners, then them.
+    #[cfg_attr(test, ts(type = "Uint32Array"))]
+    corners: Vec<u32>,
+    #[cfg_attr(test, ts(optional = nullable))]
+    controls: Option<CageControls>,
+    notices: Vec<String>,
+}
+
+/// A pose.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+pub(crate) struct PoseContents {
+    name: String,
+    /// `[n_controls, 3]`
+    #[cfg_attr(test, ts(type = "Float32Array"))]
+    positions: Vec<f32>,
+}
+
+impl OpenContents {
+    /// Contents for the editor, the project's settings, and what was left out. `first`: the first model that is opened with them.
+    pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings, Vec<String>)> {
+        let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
+        let of_project = self.poses.is_empty();
+        let given: Vec<(String, Vec<Vec3>)> = if of_project {
+            first.poses().to_vec()
+        } else {
+            self.poses.into_iter().map(|pose| (pose.name, points(&pose.positions))).collect()
+        };
+        let cage = match self.cage {
+            Some(CageContents { positions, corners, controls, notices }) if !positions.is_empty() => {
+                let mesh = polygon_mesh(&positions, &corners)?;
+                Some(RestCage { notices, ..RestCage::new(mesh, controls.unwrap_or_default())? })
+            }
+            _ => None,
+        };
+        let is_known = |id: &String| samples::all().iter().any(|sample| sample.id == id);
+        let contents = Contents {
+            cage,
+            poses: settings.poses(given),
+            shares: settings.pose_shares.clone(),
+            pins: settings.pins.clone(),
+            sample: settings.sample.clone().or(self.sample).filter(is_known),
+        };
+        Ok((contents, settings, Vec::new()))
+    }
+}
