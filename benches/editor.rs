@@ -25,7 +25,8 @@ fn model() -> Model {
     }
     positions.truncate(VERTICES);
     triangles.retain(|t: &[u32; 3]| t.iter().all(|&v| (v as usize) < VERTICES));
-    let glb = write_mesh_glb("animals", &TriMesh { positions, triangles }, &[], None).expect("it has triangles");
+    let glb =
+        write_mesh_glb("animals", &TriMesh { positions, triangles }, &[], None).expect("it has triangles");
     Model::read("animals.glb", &glb, &mut |_| None).expect("the file was written here")
 }
 
@@ -38,12 +39,24 @@ fn main() {
     editor.apply(replace(cage(0.1))).expect("a box is a cage");
     editor.amend();
     let n = editor.document().pose.len();
-    println!("{} vertices, {n} controls; median and largest of {RUNS} runs, ms", editor.document().models.positions().len());
+    println!(
+        "{} vertices, {n} controls; median and largest of {RUNS} runs, ms",
+        editor.document().models.positions().len()
+    );
     let moved = |editor: &Editor, k: usize| -> Vec<Vec3> {
-        editor.document().cage.mesh.positions.iter().map(|p| *p + Vec3::splat(1e-3 * (k + 1) as f32)).collect()
+        editor
+            .document()
+            .cage
+            .mesh
+            .positions
+            .iter()
+            .map(|p| *p + Vec3::splat(1e-3 * (k + 1) as f32))
+            .collect()
     };
     let positions: Vec<Vec<Vec3>> = (0..RUNS).map(|k| moved(&editor, k)).collect();
-    report("apply: pose", |k| editor.apply(Command::SetPose { positions: positions[k].clone() }).expect("finite"));
+    report("apply: pose", |k| {
+        editor.apply(Command::SetPose { positions: positions[k].clone() }).expect("finite")
+    });
     report("commit", |k| {
         editor.apply(Command::SetPose { positions: positions[RUNS - 1 - k].clone() }).expect("finite");
         editor.commit("step");
@@ -62,7 +75,9 @@ fn main() {
         editor.undo();
         editor.redo();
     });
-    report("apply: another cage", |k| editor.apply(replace(cage(0.1 + 1e-3 * k as f32))).expect("a box is a cage"));
+    report("apply: another cage", |k| {
+        editor.apply(replace(cage(0.1 + 1e-3 * k as f32))).expect("a box is a cage")
+    });
     editor.selection.change(&[0], SelectMode::Replace);
     report("nudge the selection", |_| drop(editor.shift(Vec3::splat(1e-4))));
 }

@@ -6,20 +6,20 @@ import { type ClipActions, createClips } from "./actions/clips";
 import type { Context, Tell } from "./actions/context";
 import { type ControlActions, createControls } from "./actions/controls";
 import { createEdit, type Edit } from "./actions/edit";
-import { copyLink, createExports, type Exports } from "./actions/exports";
+import { createExports, type Exports } from "./actions/exports";
 import { createFiles, type Files } from "./actions/files";
 import { followCage } from "./actions/follow";
 import { createModels, type Models } from "./actions/models";
 import { createPainting, type PaintActions } from "./actions/painting";
 import { createPoses, type PoseActions } from "./actions/poses";
-import { createProject, type Project, poseOf } from "./actions/project";
+import { createProject } from "./actions/project";
 import { createPulling, type Pulling } from "./actions/pull";
 import { createTour, type TourActions } from "./actions/tour";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
-import type { Session } from "./contract";
+import type { NamedFile, Session } from "./contract";
 import { MODEL_ENDINGS, RANGES } from "./defaults";
-import { createHistory } from "./history";
+import { type DocumentMirror, followDocument } from "./document";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
@@ -32,6 +32,8 @@ import { T } from "./words";
 export interface App {
   readonly ctx: Context;
   readonly store: Store;
+  /** Takes what the engine reports after a change of the document. */
+  readonly take: DocumentMirror["take"];
   readonly edit: Edit;
   readonly pull: Pulling;
   readonly cage: CageActions;
@@ -41,7 +43,6 @@ export interface App {
   readonly clips: ClipActions;
   readonly view: View;
   readonly files: Files;
-  readonly project: Project;
   readonly models: Models;
   readonly painting: PaintActions;
   readonly works: WorkActions;
@@ -59,11 +60,6 @@ export interface App {
   chooseCage(): void;
   /** Controls inside, of a file. */
   chooseControls(): void;
-  share(): void;
-  /** Puts a link to the tour's stop in the clipboard. */
-  shareStop(): void;
-  /** How to switch WebGPU on, where it is missing. */
-  showWays(): void;
   /** Begins with the first sample; what is open stays kept. */
   startFresh(): void;
   /** Where the pointer was last, CSS pixels in the view. */
@@ -85,90 +81,46 @@ export interface Needs {
 }
 
 export function createApp({ store, session, tell, viewport }: Needs): App {
-  const history = createHistory(() => {
-    store.set({ undoLabel: history.undoLabel ?? null, redoLabel: history.redoLabel ?? null });
-  });
   const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
-  const ctx: Context = { session, store, history, queue: createQueue(), tell, fixFor, viewport };
+  const ctx: Context = { session, store, queue: createQueue(), tell, fixFor, viewport };
   const bind = createBind(ctx);
-  const cage = createCage(ctx, {
-    refine(grid) {
-      bind.setOptions({ grid });
-      void bind.start();
-    },
-    carry: (before) => poses.carry(before),
-    carryAlong: (before) => poses.carryAlong(before),
-  });
-  const edit = createEdit(ctx, cage.adopt);
-  const controls = createControls(ctx, cage, edit);
+  const { take, know, checked } = followDocument(ctx);
+  const edit = createEdit(ctx);
+  const poses = createPoses(ctx, edit);
+  const cage = createCage(ctx, { bind, edit, know, poses });
+  const controls = createControls(ctx, cage.change, edit.setEditingRest);
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
   const pull = createPulling(ctx, edit);
   followCage(ctx, { bind, edit, view, pull });
-  const poses = createPoses(ctx, edit);
-  const clips = createClips(ctx, () => {
-    poses.stop();
-    edit.settle();
-    edit.setEditingRest(false);
-  });
+  const clips = createClips(ctx, () => edit.setEditingRest(false));
   const settle = () => {
-    poses.stop();
     clips.stop();
     edit.end(true);
-    edit.settle();
     edit.setEditingRest(false);
     if (store.get().placing) controls.arm(null);
   };
-  const models = createModels(ctx, { cage, openFiles: (list) => files.openFiles(list), settle });
-  const painting = createPainting(ctx, settle);
+  const openFiles = (list: readonly NamedFile[]) => files.openFiles(list);
+  const models = createModels(ctx, { cage, edit, checked, openFiles, settle });
+  const painting = createPainting(ctx, edit, settle);
   const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project);
   const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
-  const works = createWorks(ctx, {
-    write: project.write,
-    openFiles: (list) => files.openFiles(list),
-    startFresh,
-  });
+  const works = createWorks(ctx, { write: project.write, openFiles, startFresh });
   const files = createFiles(ctx, {
-    adoptCage: (opened) => cage.adopt(opened.cage, opened.check),
-    makeCage: () => cage.make(true),
-    loadCage: (list) => cage.load(list, true),
-    join: models.join,
-    loadControls: (list) => controls.load(list),
-    bind: () => bind.start(true),
-    applySettings(settings) {
-      store.set({
-        ...(settings.bind ? { bindOptions: settings.bind } : {}),
-        ...(settings.cage ? { cageOptions: settings.cage } : {}),
-        ...(settings.rig ? { rigOptions: settings.rig } : {}),
-      });
-      view.symmetry(settings.symmetry ?? store.get().symmetry);
-      if (settings.pins) store.set({ pins: settings.pins });
-    },
-    applyPose(settings) {
-      const pose = poseOf(settings);
-      try {
-        if (pose) session().engine.decodePose(pose);
-      } catch {
-        // The cage is at rest, and no pose has a share in that.
-        store.set({ shares: store.get().shares.map(() => 0) });
-        tell.say(T.opening.damagedPose);
-      }
-      edit.sync();
-    },
+    know,
+    bind,
+    cage,
+    controls,
+    models,
+    project,
+    view,
+    works,
     settle,
-    writeProject: project.write,
-    keep(sample) {
-      tour.guide()?.overtaken(sample);
-      return works.flush();
-    },
-    leave: works.leave,
+    overtaken: (sample) => tour.guide()?.overtaken(sample),
   });
-  const tour = createTour(ctx, { bind, edit, poses, view, files, works });
+  const tour = createTour(ctx, { bind, edit, view, files, works });
   const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
-    coarser() {
-      bind.setOptions({ grid: Math.max(16, store.get().bindOptions.grid / 2) });
-      void bind.start();
-    },
+    coarser: () => void bind.again({ grid: Math.max(16, store.get().bindOptions.grid / 2) }),
     fewer() {
       const { cage: found, cageOptions } = store.get();
       const vertices = Math.min(cageOptions.vertices, found?.info.vertices ?? cageOptions.vertices);
@@ -177,10 +129,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       });
       void cage.regenerate().then((made) => made && bind.start());
     },
-    cpu() {
-      bind.setOptions({ backend: "cpu" });
-      void bind.start();
-    },
+    cpu: () => void bind.again({ backend: "cpu" }),
     file: () => app.chooseModel(),
     add: () => app.chooseMore(),
     regenerate: () => void cage.regenerate(),
@@ -190,6 +139,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const app: App = {
     ctx,
     store,
+    take,
     edit,
     pull,
     cage,
@@ -199,7 +149,6 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     clips,
     view,
     files,
-    project,
     models,
     painting,
     works,
@@ -218,9 +167,6 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     chooseMore: () => choose(MODELS, false, (list) => void models.add(list)),
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
     chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
-    share: () => void exports.share(),
-    shareStop: () => void copyLink(ctx, location.href, T.tour.copied),
-    showWays: () => store.set({ waysOpen: true }),
     startFresh,
     pointer: () => ({ x: 0, y: 0 }),
     key: (command) => shortcutText(command, mac),

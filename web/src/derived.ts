@@ -1,6 +1,6 @@
 /** What follows from the state of the page. */
 
-import type { BindOptions, Element as CageElement, Pose, RigOptions, SceneOptions } from "./contract";
+import type { BindOptions, Element as CageElement, PoseView, RigOptions, SceneOptions } from "./contract";
 import type { AppState } from "./state";
 
 /** What becomes of the rig of the model that is open. */
@@ -30,10 +30,9 @@ export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
 
-/** Poses of the cage that is open; others wait for theirs to come back by undo. */
-export function fittingPoses(state: AppState): readonly Pose[] {
-  const n = controlCount(state) * 3;
-  return state.poses.filter((pose) => pose.positions.length === n);
+/** Saved poses of the cage that is open. */
+export function fittingPoses(state: AppState): readonly PoseView[] {
+  return state.poses.filter((pose) => pose.fits);
 }
 
 /** What clicks select: pulling takes single vertices, whatever is selected while reshaping. */

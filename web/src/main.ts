@@ -59,7 +59,7 @@ async function main(): Promise<void> {
   });
   mount({ app, Toasts, Lost: lost.Lost, byId });
   try {
-    session = await openSession(stage, isFresh());
+    session = await openSession(stage, { fresh: isFresh(), changed: app.take });
   } catch (error) {
     store.set({ busy: null });
     const lack = lackOf(error);

@@ -8,8 +8,8 @@ import type { ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenedOn, openOn } from "@cagework/core/session/open";
 import { createApart, load } from "@cagework/core/session/reader";
 import { polygons } from "@cagework/core/session/reading";
-import type { BindOptions, Check, CheckedCage, Job, ModelInfo, Opened, ReadFile, Session } from "./contract";
-import { BIND_DEFAULTS } from "./defaults";
+import type { BindOptions, Job, OpenContents, Opened, ReadFile, Session, View } from "./contract";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./defaults";
 import { once, prepareSample, samples } from "./session/opening";
 
 declare global {
@@ -25,29 +25,39 @@ const OWN = {
   siblings: new Map(),
   up: undefined,
   textures: [],
-  cage: undefined,
   notices: [],
   took: 0,
   vertices: 0,
 };
 
-/** Opens the page: see `openOn`. `fresh`: whether the first sample is what will be opened first. */
-export function openSession(canvases: Canvases, fresh: Promise<boolean>): Promise<Session> {
-  return openOn(canvases, (opened) => start({ ...opened, fresh }));
+/** Opens the page: see `openOn`. */
+export function openSession(canvases: Canvases, needs: Needs): Promise<Session> {
+  return openOn(canvases, (opened) => start({ ...opened, ...needs }));
 }
 
-interface Start extends OpenedOn {
+interface Needs {
   /** Whether the first sample is what will be opened first. */
   readonly fresh: Promise<boolean>;
+  /** Called after each change of the document. */
+  changed(view: View): void;
 }
 
-async function start({ artifact, module, canvas, adapter, lack, fresh }: Start): Promise<Session> {
+async function start(opened: OpenedOn & Needs): Promise<Session> {
+  const { artifact, module, canvas, adapter, lack, fresh, changed } = opened;
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
   const client = createClient(module, openWorker);
   const buildSample = prepareSample(client, samples(pkg)[0]?.id, fresh);
   const frames = createFrames();
-  const engine = await pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
+  /** Rust drops errors of its callbacks. */
+  const report = (view: View) => {
+    try {
+      changed(view);
+    } catch (error) {
+      reportError(error);
+    }
+  };
+  const engine = await pkg.Engine.create(canvas, frames.ask, report).catch((error: unknown) => {
     client.close();
     throw error;
   });
@@ -94,8 +104,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     puller ??= openApart();
     return puller;
   };
-  const mark = ({ vertices, edges, faces, points, outside }: Check) =>
-    engine.showFaults(vertices, edges, faces, points, outside);
   /** Drops the result if model or cage have changed meanwhile. */
   const ofNow = <T>(job: Job<T>): Job<T> => {
     const { revision } = engine;
@@ -104,23 +112,26 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       return result;
     });
   };
-  const takeCage = ({ positions, corners, controls, check }: CheckedCage) => {
-    const state = engine.setCage(positions, corners, controls);
-    if (check) mark(check);
-    return state;
-  };
 
-  async function openRead(read: ReadModel): Promise<Opened> {
-    const [loaded, ...further] = await load(pkg, read);
-    const { settings } = loaded;
-    const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
-    let info: ModelInfo = await engine.open(loaded);
-    if (further.length > 0) info = await engine.add(further);
+  async function openRead(
+    read: ReadModel,
+    sample: string | null,
+    poses: OpenContents["poses"] = [],
+  ): Promise<Opened> {
+    const models = await load(pkg, read);
+    const settings = models[0].settings ?? null;
     // A project of a model that has no cage yet has an empty one.
-    const cage = read.cage?.positions.length ? takeCage(read.cage) : null;
+    const cage = read.cage?.positions.length ? read.cage : undefined;
+    const contents: OpenContents = {
+      sample,
+      settings,
+      cage: cage ? { ...cage, notices: [...(cage.notices ?? [])] } : null,
+      poses,
+    };
+    const notices = await engine.open(models, contents);
+    const info = engine.modelInfo();
     const model = { ...info, notices: [...info.notices, ...read.notices] };
-    const project = settings === undefined ? null : { poses, settings };
-    return { model, cage, check: read.cage?.check ?? null, project };
+    return { model, check: cage?.check ?? null, settings, notices };
   }
 
   const session: Session = {
@@ -130,8 +141,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     samples: samples(pkg),
     readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
     shareReader: reading.share,
-    open: (read: ReadFile) => openRead(read as ReadModel).finally(begin),
-    add(reads: readonly ReadFile[], hear) {
+    open: (read: ReadFile) => openRead(read as ReadModel, null).finally(begin),
+    add(reads: readonly ReadFile[], label, hear) {
       let isGivenUp = false;
       const work = async () => {
         const all: Awaited<ReturnType<typeof load>>[number][] = [];
@@ -146,9 +157,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
           for (const loaded of all) loaded.free();
           throw error;
         }
-        const info: ModelInfo = await engine.add(all);
-        const notices = reads.flatMap((read) => (read as ReadModel).notices);
-        return { ...info, notices: [...info.notices, ...notices] };
+        await engine.add(all, label?.(all.length));
+        return reads.flatMap((read) => (read as ReadModel).notices);
       };
       return {
         done: work(),
@@ -161,17 +171,15 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
       const name = `${label}.glb`;
-      const opened = await openRead({ ...OWN, name, bytes: glb });
-      const state = takeCage(cage);
-      begin();
-      return { ...opened, cage: state, check: cage.check, poses };
+      return openRead({ ...OWN, name, bytes: glb, cage }, id, [...poses]).finally(begin);
     },
     async turn(bytes, up) {
       const name = "turned.glb";
       const file = new Blob([new Uint8Array(bytes)]);
-      return openRead(await reading("read", { files: [{ name, path: name, file }], up }).done);
+      return openRead(await reading("read", { files: [{ name, path: name, file }], up }).done, null);
     },
-    readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
+    readSettings: (text, bind) =>
+      pkg.readSettings(text, JSON.stringify({ bind, cage: CAGE_DEFAULTS, rig: RIG_DEFAULTS })),
     readCage(files, hear) {
       const { smooth } = engine.cageControls();
       const input = {
@@ -184,20 +192,15 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       return reading("readCage", input, hear);
     },
     boxCage: (divisions) => polygons(engine.boxCage(divisions)),
-    checkCage: () =>
-      chain(ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })), (check) => {
-        mark(check);
-        return check;
-      }),
+    checkCage: () => ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
     repair: (kind) => ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
-    takeCage,
-    carryPoses: (old, poses) => {
-      const all = Float32Array.from(poses.flatMap((pose) => [...pose]));
-      const [model, rest] = [engine.modelPositions(), engine.restPositions()];
-      return chain(ofNow(client.run("carry", { model, cage: rest, old, poses: all })), (carried) =>
-        poses.map((_, k) => carried.slice(k * rest.length, (k + 1) * rest.length)),
-      );
-    },
+    takeCage: ({ positions, corners, controls, notices = [] }, label) =>
+      engine.setCage(positions, corners, controls, [...notices], label),
+    cageArrays: cage,
+    carryPoses: (old, poses) =>
+      ofNow(
+        client.run("carry", { model: engine.modelPositions(), cage: engine.restPositions(), old, poses }),
+      ),
     generateCage(options, onProgress, clip) {
       const [positions, triangles] = engine.modelStates(clip);
       const model = engine.modelPositions();
@@ -223,14 +226,10 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       });
     },
     loadLattice(grid) {
-      const { revision } = engine;
       const options = possible({ ...BIND_DEFAULTS, grid });
       return chain(
         ofNow(client.run("lattice", { cage: cage(), options })),
-        ({ indptr, indices, data, offsets }) => {
-          engine.requireCurrent(revision);
-          engine.takeLattice(indptr, indices, data, offsets);
-        },
+        ({ indptr, indices, data, offsets }) => engine.takeLattice(indptr, indices, data, offsets),
       );
     },
     preparePull: () =>

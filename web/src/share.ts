@@ -34,7 +34,6 @@ const LONGEST = 16_384;
 /** The fragment of a link, including the #. */
 export async function encodeShare(shared: Shared): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
-  if (shared.cage !== undefined) fields.set("cage", shared.cage);
   if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
   for (const key of ["seen", "controls"] as const) {
     const value = shared[key];
@@ -47,7 +46,6 @@ export async function encodeShare(shared: Shared): Promise<string> {
 export async function decodeShare(fragment: string): Promise<Shared | undefined> {
   const fields = new URLSearchParams(fragment.slice(1));
   const sample = fields.get("sample");
-  const cage = fields.get("cage");
   const pose = fields.get("pose");
   const seen = fields.get("seen");
   const controls = fields.get("controls");
@@ -56,7 +54,6 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} characters`);
   return {
     sample,
-    ...(cage === null ? {} : { cage }),
     ...(pose === null ? {} : { pose: await read("pose", pose) }),
     ...(seen === null ? {} : { seen: parse(await read("view", seen)) }),
     ...(controls === null ? {} : { controls: parseControls(await read("controls", controls)) }),

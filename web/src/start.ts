@@ -33,7 +33,6 @@ export function startUp({ app, stage, crashes }: Start): void {
     const { clientWidth, clientHeight } = stage.viewport;
     if (clientWidth === 0 || clientHeight === 0) return;
     session.engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
-    session.draw();
   };
   new ResizeObserver(resize).observe(stage.viewport);
   resize();
@@ -47,14 +46,13 @@ export function startUp({ app, stage, crashes }: Start): void {
     document.title = share === null ? name : `${percent(share)} - ${name}`;
   });
   effect(() => {
-    const { model, cage, poses, posed, selected, appliedOptions, symmetry } = store.get();
+    const { model, cage, steps, appliedOptions, symmetry } = store.get();
     const { bound, undoLabel, sampleCage, tour } = store.get();
     // An unmodified sample is not worth saving.
     const isUntouched = sampleCage && undoLabel === null;
     const isWork = bound && !isUntouched && tour === null;
     // Reading these keys subscribes to their changes: all of them are part of the work.
-    if (isWork && [model, cage, poses, posed, selected, appliedOptions, symmetry])
-      untracked(() => app.works.touch());
+    if (isWork && [model, cage, steps, appliedOptions, symmetry]) untracked(() => app.works.touch());
   });
   effect(() => {
     if (store.get().step) untracked(() => app.view.scene({}));
@@ -121,9 +119,10 @@ async function openShared(app: App): Promise<Link> {
     if (!opened) return { opened };
     app.store.set({ step: "pose" });
     if (controls) app.controls.takeShared(controls);
-    if (pose) app.ctx.session().engine.decodePose(pose);
+    const { engine } = app.ctx.session();
+    if (pose) engine.decodePose(pose);
+    engine.amend();
     if (seen) app.view.show(seen);
-    app.edit.sync();
     return { opened };
   } catch (damage) {
     return { opened, damage };

@@ -12,12 +12,11 @@ import type {
   Legend,
   ModelInfo,
   Pivot,
-  Pose,
   RigOptions,
   Sample,
   SceneOptions,
   Stage,
-  SurfacePoint,
+  View,
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
@@ -42,13 +41,6 @@ export interface BindRun {
   curve: readonly (readonly [iteration: number, delta: number])[];
 }
 
-export interface Selected {
-  count: number;
-  /** The vertex selected last, -1 for none. */
-  last: number;
-  center: readonly [number, number, number] | null;
-}
-
 export interface Slice {
   axis: 0 | 1 | 2;
   /** Along the cage's box, 0 to 1. */
@@ -61,7 +53,7 @@ export type DropPlace = "page" | "cage" | "list";
 
 export type CageSource = "auto" | "hull" | "box" | "file";
 
-export interface AppState {
+export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo" | "redo" | "forgotten"> {
   step: StepName;
   adapter: string;
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
@@ -76,14 +68,10 @@ export interface AppState {
   /** Goes on with it, where the user is asked before; null otherwise. */
   goOn: (() => void) | null;
   model: ModelInfo | null;
-  /** The sample that is open, null for a file of the user's. */
-  sample: string | null;
   cage: CageState | null;
   /** What is wrong with it; null while that is not known. */
   check: Check | null;
   cageSource: CageSource;
-  /** The cage is the one that the sample came with, so that a link can refer to it. */
-  sampleCage: boolean;
   cageOptions: CageOptions;
   /** Name of a clip that generated cages enclose as well. */
   cageClip: string | null;
@@ -98,17 +86,13 @@ export interface AppState {
   report: BindReport | null;
   /** Reports of earlier binds of this cage, latest first: to compare methods. */
   earlier: readonly BindReport[];
-  /** Weights are there and belong to the cage as it is. */
-  bound: boolean;
   /** Bytes the next bind needs, or why it cannot run. */
   memory: number | string;
   scene: SceneOptions;
   seeOpen: boolean;
   legend: Legend | null;
   slice: Slice;
-  editingRest: boolean;
   element: CageElement;
-  selected: Selected;
   symmetry: boolean;
   unmatched: number;
   /** Radius as a share of the cage's diagonal; kept while `proportionalOn` is false. */
@@ -126,16 +110,10 @@ export interface AppState {
   gesture: string | null;
   /** Vertices of the model that the gesture under way leaves outside of the rest cage: of some that are watched. */
   strays: number;
-  posed: boolean;
   /** The model can be pulled: what is needed for it belongs to the cage as it is. */
   pullReady: boolean;
   /** Pulls move the whole model. */
   pullWhole: boolean;
-  /** Points of the model that pulls leave where they are. */
-  pins: readonly SurfacePoint[];
-  poses: readonly Pose[];
-  /** Shares of `poses` in the blend. */
-  shares: readonly number[];
   playing: boolean;
   /** What stays of a model is painted; null when nothing is. */
   painting: Painting | null;
@@ -174,14 +152,32 @@ export const NO_CLIP: ClipState = {
   targets: [],
 };
 
-/** What belongs to the model that is open, as it is for the next one: see docs/page.md. */
-export const MODEL_STATE = {
+/** What Rust decides: `document.ts` sets it whenever the document changes. */
+export const DOCUMENT_STATE = {
   model: null,
   sample: null,
   cage: null,
   check: null,
-  cageSource: "auto",
   sampleCage: false,
+  report: null,
+  earlier: [],
+  bound: false,
+  legend: null,
+  editingRest: false,
+  selected: { count: 0, last: null, center: null },
+  posed: false,
+  pullReady: false,
+  pins: [],
+  poses: [],
+  shares: [],
+  steps: 0,
+  undoLabel: null,
+  redoLabel: null,
+} satisfies Partial<AppState>;
+
+/** What belongs to the model that is open, as it is for the next one: see docs/page.md. */
+export const MODEL_STATE = {
+  cageSource: "auto",
   cageOptions: CAGE_DEFAULTS,
   cageClip: null,
   boxDivisions: 2,
@@ -189,15 +185,9 @@ export const MODEL_STATE = {
   bindOptions: BIND_DEFAULTS,
   appliedOptions: null,
   bindRun: null,
-  report: null,
-  earlier: [],
-  bound: false,
   memory: 0,
-  legend: null,
   slice: { axis: 2, position: 0.5, busy: false },
-  editingRest: false,
   element: "vertex",
-  selected: { count: 0, last: -1, center: null },
   symmetry: false,
   unmatched: 0,
   boxArmed: false,
@@ -205,27 +195,20 @@ export const MODEL_STATE = {
   ortho: false,
   gesture: null,
   strays: 0,
-  posed: false,
-  pullReady: false,
   pullWhole: false,
-  pins: [],
-  poses: [],
-  shares: [],
   playing: false,
   painting: null,
   clip: NO_CLIP,
   exportOnly: null,
   rigOptions: RIG_DEFAULTS,
   playingPose: null,
-  undoLabel: null,
-  redoLabel: null,
   savedAt: null,
 } satisfies Partial<AppState>;
 
 type ModelState = Pick<AppState, keyof typeof MODEL_STATE>;
 
 /** What stays when another model is opened: the person's choices, and what the page itself is doing. */
-export const PERSON_STATE: Omit<AppState, keyof ModelState> = {
+export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeof DOCUMENT_STATE> = {
   step: "model",
   adapter: "",
   lack: null,
@@ -249,7 +232,7 @@ export const PERSON_STATE: Omit<AppState, keyof ModelState> = {
   hovering: null,
 };
 
-export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE };
+export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
 
 /** The model's part of the state for another model. Where a bind is computed and how much memory it may take is the computer's. */
 export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): ModelState {

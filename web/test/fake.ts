@@ -7,14 +7,16 @@ import type {
   CageControls,
   CageState,
   CheckedCage,
+  Command,
   Engine,
   Job,
   MemberInfo,
   ModelInfo,
   Opened,
   Session,
+  View,
 } from "../src/contract";
-import { createHistory } from "../src/history";
+import { type DocumentMirror, followDocument } from "../src/document";
 import { createQueue } from "../src/queue";
 import { createStore, type Store } from "../src/signals";
 import { INITIAL } from "../src/state";
@@ -33,6 +35,7 @@ export interface Fake {
   readonly ctx: Context;
   readonly store: Store;
   readonly engine: Engine;
+  readonly mirror: DocumentMirror;
   readonly asked: Asked[];
   readonly said: string[];
   /** Buttons of the last message. */
@@ -42,6 +45,16 @@ export interface Fake {
   readonly others: string[];
   /** Names of engine calls that the fake only records. */
   readonly calls: string[];
+  /** Commands that the engine was given. */
+  readonly commands: Command[];
+  /** Labels of steps. */
+  readonly did: string[];
+  /** Changes the document as the page sees it. */
+  show(patch: Partial<View>): void;
+  /** Changes the models. */
+  showModel(model: ModelInfo): void;
+  /** Takes a cage that was checked. */
+  showCage(cage: CheckedCage): void;
   /** Replaces a function of the engine. */
   teach(functions: Partial<Engine>): void;
 }
@@ -98,7 +111,7 @@ export function cageOf(n: number, height = 0): CheckedCage {
 /** Controls of a plain cage. */
 export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
-export const OPENED: Opened = { model: MODEL, cage: null, check: null, project: null };
+export const OPENED: Opened = { model: MODEL, check: null, settings: null, notices: [] };
 
 /** The report of a bind with these options. */
 export function reportOf(patch: Partial<BindReport> = {}): BindReport {
@@ -151,7 +164,8 @@ export function createFake(): Fake {
   const problems: Fake["problems"] = [];
   const calls: string[] = [];
   const store = createStore(INITIAL);
-  const history = createHistory(() => undefined);
+  const commands: Command[] = [];
+  const did: string[] = [];
 
   function job<T>(kind: string, input: unknown): Job<T> {
     let entry: Asked | undefined;
@@ -171,6 +185,7 @@ export function createFake(): Fake {
 
   let rest = cageOf(0);
   let posed = rest.positions;
+  let committed = posed;
   let revision = 0;
   const controlsNow = () => rest.controls ?? PLAIN;
   const stateOf = (): CageState => ({
@@ -184,55 +199,92 @@ export function createFake(): Fake {
       faces: 0,
       triangles: 0,
       bounds: BOUNDS,
-      notices: [],
+      notices: [...(rest.notices ?? [])],
     },
   });
-  const put = (positions: Float32Array, corners: Uint32Array, controls?: CageControls) => {
-    rest = { positions: positions.slice(), corners, controls, check: null };
-    posed = rest.positions.slice();
-    revision += 1;
-    return stateOf();
+  let view: View = {
+    models: 0,
+    mesh: 0,
+    cage: 0,
+    poses: [],
+    shares: [],
+    pins: [],
+    posed: false,
+    editingRest: false,
+    sample: null,
+    sampleCage: false,
+    selected: { count: 0, last: null, center: null },
+    steps: 0,
+    undo: null,
+    redo: null,
+    forgotten: 0,
+    bound: false,
+  };
+  let model = MODEL;
+  const show = (patch: Partial<View>) => {
+    view = { ...view, ...patch };
+    mirror.take(view);
+  };
+  const step = (label: string | undefined) => {
+    if (label === undefined) return;
+    did.push(label);
+    show({ steps: view.steps + 1, undo: label });
   };
   const known: Partial<Engine> = {
     get revision() {
       return revision;
     },
     requireCurrent(asked) {
-      if (asked !== revision) throw named("Cancelled", "the model or cage was replaced");
+      if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
     },
-    setCage: put,
-    commitRest: () => put(posed, rest.corners, rest.controls),
+    setCage(positions, corners, controls, notices, label) {
+      rest = {
+        positions: Float32Array.from(positions),
+        corners: Uint32Array.from(corners),
+        controls,
+        check: null,
+        notices,
+      };
+      posed = rest.positions.slice();
+      committed = posed;
+      revision += 1;
+      show({ cage: view.cage + 1, bound: false });
+      step(label);
+      return stateOf();
+    },
+    apply(command, label) {
+      commands.push(command);
+      if (command.do === "set_pins") show({ pins: command.pins });
+      step(label);
+    },
+    commit(label) {
+      committed = posed;
+      step(label);
+      return true;
+    },
+    revert() {
+      calls.push("revert");
+      posed = committed;
+    },
+    undo: () => false,
+    modelInfo: () => model,
+    cageState: () => (rest.positions.length > 0 ? stateOf() : undefined),
+    boundReport: () => undefined,
+    carriable: () => posed.slice(),
+    setEditingRest: (editingRest) => show({ editingRest }),
     cageControls: controlsNow,
-    setSmooth(smooth) {
-      const pose = posed;
-      const state = put(rest.positions, rest.corners, { ...controlsNow(), smooth });
-      posed = pose;
-      return state;
-    },
-    addControl(kind, places) {
-      const { inner, elements, ...others } = controlsNow();
-      const corners = Array.from(places.slice(0, places.length / 3), (_, k) => inner + k);
-      const element =
-        kind === "point" ? { point: inner } : kind === "line" ? { line: corners } : { face: corners };
-      const positions = Float32Array.of(...rest.positions, ...places);
-      const controls = { ...others, inner: inner + corners.length, elements: [...elements, element] };
-      return put(positions, rest.corners, controls);
-    },
     middleAt: (x, y) => Float32Array.of(x, y, 0),
     cageCorners: () => rest.corners,
     restPositions: () => rest.positions.slice(),
     cagePositions: () => posed.slice(),
-    setCagePositions(positions: Float32Array) {
-      posed = positions.slice();
+    setCagePositions(positions) {
+      posed = Float32Array.from(positions);
     },
     selection: () => Uint32Array.of(0),
-    selectionCenter: () => Float32Array.of(0, 0, 0),
-    last: () => 0,
     unmatched: () => new Uint32Array(),
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
-    memberSettings: () => [],
     transformLabel: () => "Move",
   };
   const engine = new Proxy({} as Engine, {
@@ -245,7 +297,7 @@ export function createFake(): Fake {
     readFiles: (files) => job("read", files),
     open: (read) => job<Opened>("open", read).done,
     shareReader: () => () => {},
-    add: (reads) => job<ModelInfo>("add", reads),
+    add: (reads, label) => job("add", { reads, label }),
     openSample: (id) => job<Opened>("sample", id).done,
     turn: (project, up) => job<Opened>("turn", { project, up }).done,
     readCage: (files) => job("readCage", files),
@@ -253,8 +305,10 @@ export function createFake(): Fake {
     generateCage: (options) => job("cage", options),
     checkCage: () => job("check", null),
     repair: (kind) => job("repair", kind),
-    carryPoses: (old, poses) => job<Float32Array[]>("carry", { old, poses }),
-    takeCage: ({ positions, corners, controls }) => put(positions, corners, controls),
+    carryPoses: (old, poses) => job<Float32Array>("carry", { old, poses }),
+    takeCage: ({ positions, corners, controls, notices = [] }, label) =>
+      engine.setCage(positions, corners, controls, [...notices], label),
+    cageArrays: () => rest,
     bind: (options, listener) => job("bind", { options, listener }),
     estimateMemory: () => 1000,
     bindByFormula: (kind) => job("formula", kind),
@@ -264,7 +318,7 @@ export function createFake(): Fake {
     pullGrab: (grab) => job("pullGrab", grab),
     pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
-    readSettings(text, { bind }) {
+    readSettings(text, bind) {
       const given = JSON.parse(text);
       return { notices: [], ...given, bind: { ...given.bind, memory_limit: bind.memory_limit } };
     },
@@ -272,7 +326,6 @@ export function createFake(): Fake {
   const ctx: Context = {
     session: () => session as Session,
     store,
-    history,
     queue: createQueue(),
     viewport: () => ({ width: 400, height: 300 }) as DOMRect,
     tell: {
@@ -286,16 +339,29 @@ export function createFake(): Fake {
     },
     fixFor: (fix) => ({ label: fix, run: () => undefined }),
   };
+  const mirror = followDocument(ctx);
   const fake: Fake = {
     ctx,
     store,
     engine,
+    mirror,
     asked,
     said,
     offered: [],
     problems,
     others: [],
     calls,
+    commands,
+    did,
+    show,
+    showModel(info) {
+      model = info;
+      show({ models: view.models + 1 });
+    },
+    showCage(cage) {
+      engine.setCage(cage.positions, cage.corners, cage.controls, [], undefined);
+      if (cage.check) mirror.know(cage.check);
+    },
     teach: (functions) => Object.assign(known, functions),
   };
   return fake;

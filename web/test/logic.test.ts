@@ -3,7 +3,6 @@ import { pinch } from "@cagework/core/session/touch";
 import { describe, expect, it } from "vitest";
 import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
-import { poseOf } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
 import type { BindReport, CageState } from "../src/contract";
 import { drawn } from "../src/derived";
@@ -50,11 +49,6 @@ describe("two fingers", () => {
     ];
     expect(pinch(same, same)?.factor).toBe(1);
   });
-});
-
-it("the pose of a project is decoded to bytes, or undefined if invalid", () => {
-  expect(poseOf({ pose: "AAEC" })).toEqual(Uint8Array.of(0, 1, 2));
-  expect(poseOf({ pose: "***" })).toBeUndefined();
 });
 
 describe("the plot", () => {
@@ -156,7 +150,7 @@ describe("words", () => {
     expect(isCancelled(error)).toBe(true);
   });
   it("choose an unused name for a pose", () => {
-    const poses = ["Pose 2", "Jump"].map((name) => ({ name, positions: new Float32Array() }));
+    const poses = ["Pose 2", "Jump"].map((name) => ({ name }));
     expect(freshName(poses)).toBe("Pose 3");
     expect(freshName(poses.slice(0, 1))).toBe("Pose 3");
   });

@@ -9,15 +9,10 @@ import { cageOf, createFake, MODEL, reportOf } from "./fake";
 /** A page with the unmodified rat, and a tour whose binds end at once. */
 function page() {
   const fake = createFake();
-  const { store, engine } = fake;
-  const { positions, corners } = cageOf(8);
-  store.set({
-    model: MODEL,
-    cage: engine.setCage(positions, corners),
-    sample: "rat",
-    sampleCage: true,
-    bound: true,
-  });
+  const { store } = fake;
+  fake.showModel(MODEL);
+  fake.showCage(cageOf(8));
+  fake.show({ sample: "rat", sampleCage: true, bound: true });
   const opened: string[] = [];
   const binds: BindOptions[] = [];
   vi.stubGlobal("location", { hash: "", pathname: "/", search: "" });
@@ -36,14 +31,13 @@ function page() {
         return true;
       },
     },
-    edit: { settle: () => undefined, setEditingRest: () => undefined, sync: () => undefined },
-    poses: { stop: () => undefined },
+    edit: { setEditingRest: () => undefined },
     view: view as View,
     files: {
       async openSample(id) {
         guide.overtaken(id);
         opened.push(id);
-        store.set({ sample: id, sampleCage: true });
+        fake.show({ sample: id, sampleCage: true });
         return true;
       },
     },

@@ -175,7 +175,7 @@ impl Editor {
         self.set_document(self.committed.clone());
     }
 
-    /// Takes back the last step; false if there is none.
+    /// Takes back the last step; false if there is none. Which models are shown stays as it is.
     pub fn undo(&mut self) -> bool {
         self.go(History::undo)
     }
@@ -190,6 +190,9 @@ impl Editor {
         let went = way(&mut self.history, &mut document);
         if went {
             self.steps += 1;
+            if document.models.show_as(&self.document.models) {
+                document.models_key = self.next_key();
+            }
             self.set_document(document);
             self.amend();
             if self.document.is_posed() {

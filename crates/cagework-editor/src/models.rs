@@ -243,6 +243,19 @@ impl Models {
         Ok(())
     }
 
+    /// Shows and hides models as in another document; false if that changes nothing.
+    pub(crate) fn show_as(&mut self, other: &Self) -> bool {
+        let shown = |id: u32| other.get(id).ok().map(|member| member.options.shown);
+        let differs = |member: &Member| shown(member.id).is_some_and(|shown| shown != member.options.shown);
+        let is_other = self.iter().any(differs);
+        if is_other {
+            for member in Arc::make_mut(&mut self.members) {
+                member.options.shown = shown(member.id).unwrap_or(member.options.shown);
+            }
+        }
+        is_other
+    }
+
     /// Sets how much of each vertex of a model stays in place, 0 to 255. `[n_vertices]`, or empty for an unpainted model.
     ///
     /// # Errors

@@ -337,6 +337,23 @@ fn keys_tell_what_weights_depend_on() {
 }
 
 #[test]
+fn undo_leaves_hidden_models_hidden() {
+    let mut editor = opened_with_box();
+    editor.apply(Command::SavePose { name: "one".to_owned() }).unwrap();
+    assert!(editor.commit("Save"));
+    let hidden = PartOptions { shown: false, ..PartOptions::default() };
+    editor.apply(Command::SetParts { id: 1, options: hidden }).unwrap();
+    editor.amend();
+    let key = editor.models_key();
+    assert!(editor.undo());
+    let shown =
+        |editor: &Editor| editor.document().models.iter().map(|m| m.options.shown).collect::<Vec<_>>();
+    assert_eq!((shown(&editor), editor.models_key() == key), (vec![true, false], false));
+    assert!(editor.redo());
+    assert_eq!(shown(&editor), [true, false]);
+}
+
+#[test]
 fn poses_are_carried_to_another_cage_by_one_step() {
     let mut editor = opened_with_box();
     let moved: Vec<Vec3> = editor.document().pose.iter().map(|p| *p + Vec3::X).collect();

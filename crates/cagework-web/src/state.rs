@@ -67,6 +67,8 @@ pub(crate) struct State {
     pub(crate) on_gpu: OnGpu,
     /// Whether an upload is in progress; it looks again when it is done.
     pub(crate) is_uploading: bool,
+    /// Whether models of the document are being added, and may still be refused.
+    pub(crate) is_adding: bool,
     pub(crate) is_moved: bool,
     pub(crate) is_changed: bool,
     /// An error of an upload, for the next frame to report.
@@ -147,6 +149,7 @@ impl Default for State {
             derived: Derived::default(),
             on_gpu: OnGpu::default(),
             is_uploading: false,
+            is_adding: false,
             is_moved: false,
             is_changed: false,
             fault: None,

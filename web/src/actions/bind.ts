@@ -14,6 +14,8 @@ export interface BindActions {
   /** True when it ended with weights. Problems on screen stay when nobody asked for this bind: they are about
    * something else. */
   start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
+  /** Changes options, and binds. */
+  again(patch: Partial<BindOptions>): Promise<boolean>;
   cancel(): void;
   /** Whether the cage that is open is bound or about to be. */
   covers(): boolean;
@@ -38,17 +40,13 @@ export function createBind(ctx: Context): BindActions {
   };
   effect(estimate);
 
-  /** The report that is shown is of a coarse pass, which nobody asked for and no bind is compared with. */
-  let isCoarse = false;
+  /** The report of a coarse pass: later binds are not compared with it. */
+  let coarse: BindReport | undefined;
   const adopted = (report: BindReport, pass: BindRun["pass"]) => {
     const { report: last, earlier } = store.get();
-    const before = last && !isCoarse ? [last, ...earlier] : earlier;
-    isCoarse = pass === "coarse";
-    store.set({
-      bound: true,
-      report,
-      earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER),
-    });
+    const before = last && last !== coarse ? [last, ...earlier] : earlier;
+    if (pass === "coarse") coarse = report;
+    store.set({ report, earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER) });
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
     // Colours were asked for before there were weights to show.
@@ -102,7 +100,7 @@ export function createBind(ctx: Context): BindActions {
     }
   };
 
-  return {
+  const actions: BindActions = {
     async start(unasked = false, options = store.get().bindOptions) {
       if (!store.get().cage || cageBroken(store.get())) return false;
       if (!unasked) ctx.tell.clear();
@@ -115,14 +113,19 @@ export function createBind(ctx: Context): BindActions {
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;
     },
+    again(patch) {
+      actions.setOptions(patch);
+      return actions.start();
+    },
     cancel() {
-      const { bindRun, bound } = store.get();
+      const { bindRun, bound, report } = store.get();
       ctx.queue.cancel("bind");
-      if (bindRun && bound && !isCoarse) ctx.tell.say(T.bind.cancelled);
+      if (bindRun && bound && report !== coarse) ctx.tell.say(T.bind.cancelled);
     },
     covers() {
       const { bound, bindRun } = store.get();
-      return bound || bindRun?.revision === ctx.session().engine.revision;
+      const { engine } = ctx.session();
+      return bound || engine.hasWeights || bindRun?.revision === engine.revision;
     },
     setOptions(patch) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
@@ -141,6 +144,7 @@ export function createBind(ctx: Context): BindActions {
       return true;
     },
   };
+  return actions;
 }
 
 function start(pass: BindRun["pass"], revision: number, options: BindOptions): BindRun {

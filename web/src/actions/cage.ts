@@ -1,158 +1,67 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type {
-  CageOptions,
-  CageState,
-  Check,
-  CheckedCage,
-  Mend,
-  NamedFile,
-  Reading,
-  Repair,
-} from "../contract";
-import { SCENE_DEFAULTS } from "../defaults";
+import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
+import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
 import type { CageSource } from "../state";
 import { T } from "../words";
-import { attempt, type Context, report, waitFor } from "./context";
+import type { BindActions } from "./bind";
+import { attempt, type Context, waitFor } from "./context";
+import type { Edit } from "./edit";
+import { carriableOf, type PoseActions } from "./poses";
 
 export interface CageActions {
-  /** Subdivides the cage so often (0 to 3) for a smooth surface; false when that is not possible. */
+  /** Subdivides the cage 0 to 3 times for a smooth surface; false when that is not possible. */
   setSmooth(steps: number): boolean;
-  /** Another value beside the same cage, as a step of the history; false when it does not fit. */
-  change(label: string, work: () => CageState, failed?: string): boolean;
-  /** Makes a cage the way the Cage panel says. True when there is a new one. Problems on screen stay when nobody asked
-   * for it. */
+  /** Changes what belongs to the cage, as one step; poses come along. False, with an error shown, when it does not fit. */
+  change(label: string, change: Command | (() => void), failed?: string): boolean;
+  /** Makes a cage as the Cage panel says. True when there is a new one. `unasked`: leaves problems on screen. */
   make(unasked?: boolean): Promise<boolean>;
   cancel(): void;
   load(files: readonly NamedFile[], unasked?: boolean): Promise<boolean>;
   repair(kind: Repair): Promise<boolean>;
-  /** Another one, by itself. */
+  /** Makes one that follows the model, whatever the panel says. */
   regenerate(): Promise<boolean>;
   /** What the button beside a problem does. */
   mend(fix: Mend): void;
-  /** The page's side of a new or changed cage; one that was not checked yet is now, and true when that is done. */
-  adopt(state: CageState | null, check: Check | null): Promise<boolean>;
 }
 
 /** A hull needs few vertices: it has no limbs to follow. */
 const HULL_VERTICES = 24;
 
-/** A cage as it is posed, for a step of the history. */
-export interface Posed {
-  readonly cage: CheckedCage;
-  readonly positions: Float32Array;
-  readonly shares: readonly number[];
-  readonly sampleCage: boolean;
-}
-
 export interface CageNeeds {
-  /** Binds with so many cells. */
-  refine(grid: number): void;
-  /** Brings pose and poses of another cage to the one that is open. */
-  carry(before: Posed): Promise<unknown>;
-  /** Brings poses along to a cage with other controls, as part of a step that there is. */
-  carryAlong(before: Posed): Promise<boolean>;
+  readonly edit: Pick<Edit, "settle" | "step">;
+  readonly know: DocumentMirror["know"];
+  readonly bind: Pick<BindActions, "again">;
+  readonly poses: Pick<PoseActions, "carry">;
 }
 
-export function createCage(ctx: Context, does: CageNeeds): CageActions {
-  const look = () =>
-    attempt(ctx, T.failed.check, () =>
-      ctx.queue.replace("check", async (signal) =>
-        ctx.store.set({ check: await follow(signal, ctx.session().checkCage()) }),
-      ),
-    );
+export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds): CageActions {
+  const engine = () => ctx.session().engine;
 
-  const adopt = async (state: CageState | null, check: Check | null) => {
-    ctx.store.set({
-      cage: state,
-      check,
-      sampleCage: false,
-      bound: false,
-      pullReady: false,
-      report: null,
-      earlier: [],
-      scene: { ...ctx.store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
-    });
-    return state !== null && check === null && look();
-  };
-
-  const now = (): CheckedCage | undefined => {
-    const { engine } = ctx.session();
-    const { cage, check } = ctx.store.get();
-    if (!cage) return undefined;
-    const controls = engine.cageControls();
-    const { notices } = cage.info;
-    return { positions: engine.restPositions(), corners: engine.cageCorners(), controls, check, notices };
-  };
-
-  const set = (cage: CheckedCage) => {
-    const state = ctx.session().takeCage(cage);
-    const notices = [...new Set([...state.info.notices, ...(cage.notices ?? [])])];
-    adopt({ ...state, info: { ...state.info, notices } }, cage.check);
-  };
-
-  const posedNow = (): Posed | undefined => {
-    const cage = now();
-    const { shares, sampleCage } = ctx.store.get();
-    return cage && { cage, positions: ctx.session().engine.cagePositions(), shares, sampleCage };
-  };
-  const setPosed = ({ cage, positions, shares, sampleCage }: Posed) => {
-    set(cage);
-    ctx.session().engine.setCagePositions(positions);
-    ctx.store.set({ shares, sampleCage });
-  };
-
-  const change = (label: string, work: () => CageState, failed: string = T.failed.controls): boolean => {
-    const before = posedNow();
-    if (!before) return false;
-    try {
-      void adopt(work(), null);
-    } catch (error) {
-      report(ctx, failed, error);
-      return false;
-    }
-    // The sample's cage is still the same.
-    ctx.store.set({ sampleCage: before.sampleCage });
-    const { poses } = ctx.store.get();
-    let next = posedNow();
-    let carried = poses;
-    ctx.history.push({
-      label,
-      undo() {
-        setPosed(before);
-        ctx.store.set({ poses });
-      },
-      redo() {
-        if (next) setPosed(next);
-        ctx.store.set({ poses: carried });
-      },
-    });
-    if (next?.positions.length !== before.positions.length) {
-      void does.carryAlong(before).then((went) => {
-        // Undone meanwhile: what is there now is not what this step leads to.
-        if (!went) return;
-        next = posedNow();
-        carried = ctx.store.get().poses;
-      });
-    }
+  const change: CageActions["change"] = (label, change, failed = T.failed.controls) => {
+    edit.settle();
+    const before = carriableOf(ctx);
+    const work = typeof change === "function" ? change : () => engine().apply(change, label);
+    if (!before || !edit.step(work, failed)) return false;
+    if (engine().restPositions().length !== before.cage.positions.length) void poses.carry(before);
     return true;
   };
 
-  /** Takes a new cage as a step of the history; the first cage of a model is none. */
+  /** Takes a new cage as a step; the first cage of a model is none. */
   const take = (label: string, cage: CheckedCage) => {
-    const before = posedNow();
-    const { posed, poses } = ctx.store.get();
-    set(cage);
+    edit.settle();
+    const before = carriableOf(ctx);
+    const { posed, poses: saved } = ctx.store.get();
+    const isFirst = !before && ctx.store.get().undoLabel === null;
+    ctx.session().takeCage(cage, isFirst ? undefined : label);
+    if (cage.check) know(cage.check);
     // A cage from elsewhere may reach beyond the view.
-    if (!before || label === T.did.loadCage) ctx.session().engine.frameAll();
-    const next = posedNow();
-    if (!before || !next) return;
-    ctx.history.push({ label, undo: () => setPosed(before), redo: () => setPosed(next) });
-    // What was posed belongs to the cage before.
-    const back = { label: T.pose.backToCage, run: () => void ctx.history.undo() };
-    const carry = { label: T.pose.carry, run: () => void does.carry(before) };
-    if (posed || poses.length > 0) ctx.tell.say(T.cage.posesWait, carry, back);
+    if (!before || label === T.did.loadCage) engine().frameAll();
+    if (!before || !(posed || saved.length > 0)) return;
+    const back = { label: T.pose.backToCage, run: () => void engine().undo() };
+    const carry = { label: T.pose.carry, run: () => void poses.carry(before, T.did.carry) };
+    ctx.tell.say(T.cage.posesWait, carry, back);
   };
 
   const generate = async (source: CageSource, signal: AbortSignal) => {
@@ -185,7 +94,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
 
   const actions: CageActions = {
     change,
-    setSmooth: (steps) => change(T.did.smooth(steps), () => ctx.session().engine.setSmooth(steps)),
+    setSmooth: (steps) => change(T.did.smooth(steps), { do: "subdivide", steps }),
     make(unasked = false) {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
@@ -223,10 +132,9 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
     },
     mend(fix) {
       if (fix.kind === "repair") void actions.repair(fix.repair);
-      else if (fix.kind === "grid") does.refine(fix.cells);
-      else void actions.regenerate();
+      else if (fix.kind === "regenerate") void actions.regenerate();
+      else void bind.again({ grid: fix.cells });
     },
-    adopt,
   };
   return actions;
 }

@@ -59,8 +59,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
 
   // A step of the history, a gesture, a blend: another pose of the cage has ended a clip that was paused.
   effect(() => {
-    store.get().undoLabel;
-    store.get().redoLabel;
+    store.get().steps;
     store.get().gesture;
     store.get().shares;
     untracked(() => {

@@ -1,8 +1,7 @@
-/** What every action needs: the session, the state, the history and a voice. */
+/** What every action needs: the session, the state and messages. */
 
 import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
-import type { History } from "../history";
 import { onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
 import { type Explained, explain, isCancelled } from "../strings";
@@ -25,7 +24,6 @@ export interface Tell {
 export interface Context {
   readonly session: () => Session;
   readonly store: Store;
-  readonly history: History;
   readonly queue: Queue;
   readonly tell: Tell;
   /** The view's place in the window. */

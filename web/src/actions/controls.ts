@@ -1,6 +1,7 @@
 /** Controls inside the cage: points, bones and sheets, put there by clicks. Each change is one step of the history. */
 
-import type { InnerKind, NamedFile } from "../contract";
+import type { Command, InnerKind, NamedFile } from "../contract";
+import { triples } from "../points";
 import type { SharedControls } from "../share";
 import { T } from "../words";
 import type { CageActions } from "./cage";
@@ -39,8 +40,8 @@ const SAME_PX = 6;
 
 export function createControls(
   ctx: Context,
-  cage: Pick<CageActions, "adopt" | "change">,
-  edit: Pick<Edit, "setEditingRest" | "settle" | "sync">,
+  change: CageActions["change"],
+  setEditingRest: Edit["setEditingRest"],
 ): ControlActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
@@ -53,36 +54,29 @@ export function createControls(
     return [a, b, c];
   };
   const show = (all: readonly Place[]) => engine().showPlaced(Float32Array.from(all.flat()));
-  const change: typeof cage.change = (...what) => {
-    edit.settle();
-    const went = cage.change(...what);
-    edit.sync();
-    return went;
-  };
+  const remove = (command: Command) => change(T.did.removeControls, command);
 
   const actions: ControlActions = {
-    add: (kind, at) =>
-      change(T.did.controls[kind], () => engine().addControl(kind, Float32Array.from(at.flat()))),
-    addSheet: (center) => change(T.did.controls.face, () => engine().addSheet(Float32Array.from(center))),
+    add: (kind, places) => change(T.did.controls[kind], { do: "add_control", kind, places }),
+    addSheet(center) {
+      const label = T.did.controls.face;
+      return change(label, () => engine().addSheet(Float32Array.from(center), label));
+    },
     load: (files) =>
       attempt(ctx, T.failed.controlsFile, async () => {
         const bytes = await files[0]?.file.arrayBuffer();
-        const read = (bytes: ArrayBuffer) => () => engine().readControls(new Uint8Array(bytes));
-        if (bytes) change(T.did.loadControls, read(bytes), T.failed.controlsFile);
+        if (!bytes) return;
+        const read = () => engine().readControls(new Uint8Array(bytes), T.did.loadControls);
+        change(T.did.loadControls, read, T.failed.controlsFile);
       }),
-    setRadius: (radius) => change(T.did.radius, () => engine().setRadius(radius ?? undefined)),
-    remove: () => change(T.did.removeControls, () => engine().editRest("delete_vertex")),
-    clear() {
-      const { vertices = 0 } = store.get().cage?.info ?? {};
-      const all = Uint32Array.from({ length: store.get().cage?.controls.inner ?? 0 }, (_, k) => vertices + k);
-      engine().select(all, "replace");
-      return actions.remove();
-    },
+    setRadius: (radius) => change(T.did.radius, { do: "set_radius", radius }),
+    remove: () => remove({ do: "edit_rest", edit: "delete_vertex" }),
+    clear: () => remove({ do: "replace_controls", positions: [], elements: [] }),
     arm(kind) {
       places = [];
       last = undefined;
       show([]);
-      if (kind) edit.setEditingRest(true);
+      if (kind) setEditingRest(true);
       store.set({ placing: kind, boxArmed: false });
     },
     place(x, y) {
@@ -112,22 +106,21 @@ export function createControls(
     shared() {
       const controls = engine().cageControls();
       if (controls.smooth === 0 && controls.inner === 0) return undefined;
-      const inner =
-        controls.inner > 0
-          ? engine()
-              .restPositions()
-              .slice(-3 * controls.inner)
-          : [];
+      const rest = engine().restPositions();
+      const inner = rest.slice(rest.length - 3 * controls.inner);
       return { controls, inner: Array.from(inner, (x) => Math.fround(x)) };
     },
     takeShared({ controls, inner }) {
-      const positions = Float32Array.from([...engine().restPositions(), ...inner]);
-      const { sampleCage } = store.get();
-      cage.adopt(
-        ctx.session().takeCage({ positions, corners: engine().cageCorners(), controls, check: null }),
-        null,
-      );
-      store.set({ sampleCage });
+      const { smooth, radius, elements } = controls;
+      try {
+        engine().apply({ do: "subdivide", steps: smooth });
+        engine().apply({ do: "set_radius", radius });
+        engine().apply({ do: "replace_controls", positions: triples(inner), elements });
+        engine().amend();
+      } catch (error) {
+        engine().revert();
+        throw error;
+      }
     },
   };
   return actions;

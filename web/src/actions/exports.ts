@@ -2,7 +2,7 @@
 
 import type { ModelInfo, NamedFile } from "../contract";
 import { SHAPE_FORMATS } from "../defaults";
-import { fittingPoses, rigOf } from "../derived";
+import { rigOf } from "../derived";
 import { stem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -24,11 +24,6 @@ export interface Exports {
   shapeIn(format: ShapeFormatName): void;
 }
 
-/** Files of which each model has its own. */
-const OWN = ["glb", "shape", "poses", "weights"] as const satisfies readonly ExportKind[];
-type OwnKind = (typeof OWN)[number];
-const isOwn = (kind: ExportKind): kind is OwnKind => (OWN as readonly string[]).includes(kind);
-
 /** Browsers drop downloads that begin at the same time, ms. */
 const BETWEEN_MS = 250;
 
@@ -40,48 +35,28 @@ export function createExports(ctx: Context, project: Project): Exports {
   let alone = false;
   let format: ShapeFormatName = SHAPE_FORMATS[0];
 
-  const ownBytes = (kind: OwnKind, id: number): Uint8Array => {
-    const { engine } = ctx.session();
-    const rig = rigOf(ctx.store.get());
-    switch (kind) {
-      case "glb":
-        return engine.exportGlb(id, rig, ctx.store.get().clip.clip ?? 0);
-      case "shape":
-        return engine.exportShape(id, format);
-      case "poses": {
-        const poses = fittingPoses(ctx.store.get());
-        return engine.exportPoses(
-          id,
-          poses.map((pose) => pose.name),
-          poses.map((pose) => pose.positions),
-          rig,
-        );
-      }
-      case "weights":
-        return engine.exportWeights(id);
-      default:
-        return kind satisfies never;
-    }
-  };
+  const engine = () => ctx.session().engine;
+  const rig = () => rigOf(ctx.store.get());
 
-  const bytesOf = (kind: Exclude<ExportKind, OwnKind | "picture">): Uint8Array => {
-    switch (kind) {
-      case "cage":
-        return ctx.session().engine.exportCage();
-      case "controls":
-        return ctx.session().engine.exportControls();
-      case "project":
-        return project.write();
-      default:
-        return kind satisfies never;
-    }
+  /** Files that each model has of its own. */
+  const own = {
+    glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
+    shape: (id: number) => engine().exportShape(id, format),
+    poses: (id: number) => engine().exportPoses(id, rig()),
+    weights: (id: number) => engine().exportWeights(id),
+  };
+  const isOwn = (kind: ExportKind): kind is keyof typeof own => kind in own;
+  const shared = {
+    cage: () => engine().exportCage(),
+    controls: () => engine().exportControls(),
+    project: () => project.write(),
   };
 
   const suffix = (kind: Exclude<ExportKind, "project">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
   /** A file for each model that is asked for. */
-  const saveOwn = async (kind: OwnKind, model: ModelInfo) => {
+  const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
     if (kind === "glb") await loadLattice(ctx);
     const { members } = model;
     const { exportOnly } = ctx.store.get();
@@ -96,9 +71,8 @@ export function createExports(ctx: Context, project: Project): Exports {
       // A VRM stays one.
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
       const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
-      const blob = new Blob([new Uint8Array(ownBytes(kind, id))]);
-      if (kind === "glb" || kind === "shape")
-        for (const notice of ctx.session().engine.rigNotices()) notices.add(notice);
+      const blob = new Blob([new Uint8Array(own[kind](id))]);
+      if (kind === "glb" || kind === "shape") for (const notice of engine().rigNotices()) notices.add(notice);
       if (files.length > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
       download(blob, file);
       files.push(file);
@@ -119,11 +93,11 @@ export function createExports(ctx: Context, project: Project): Exports {
       const { model } = ctx.store.get();
       await attempt(ctx, T.failed.write, async () => {
         // The moment after a bind its weights are still on the way to the GPU.
-        await ctx.session().engine.ready();
+        await engine().ready();
         if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
-        const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
-        const own = stem(model?.name ?? "model");
-        const file = kind === "project" ? project.fileName() : `${own}${suffix(kind)}`;
+        const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(shared[kind]())]);
+        const name = stem(model?.name ?? "model");
+        const file = kind === "project" ? project.fileName() : `${name}${suffix(kind)}`;
         download(blob, file);
         ctx.tell.say(T.exports.saved([file], blob.size));
       });

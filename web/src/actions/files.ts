@@ -1,14 +1,22 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
 import type { BindOptions, NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "../defaults";
+import { BIND_DEFAULTS } from "../defaults";
+import type { DocumentMirror } from "../document";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import { type StepName, stateOfNextModel } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
+import type { BindActions } from "./bind";
+import type { CageActions } from "./cage";
 import { attempt, type Context } from "./context";
+import type { ControlActions } from "./controls";
+import type { Models } from "./models";
+import type { Project } from "./project";
 import { modelsOf, type Named, readModels } from "./read";
+import type { View } from "./view";
+import type { WorkActions } from "./works";
 
 export interface Files {
   /** `bind`: how it is bound, in place of the usual options. */
@@ -19,27 +27,19 @@ export interface Files {
   turn(up: UpAxis): Promise<boolean>;
 }
 
-export interface Follow {
-  /** The page's side of a cage that came along. */
-  adoptCage(opened: Opened): void;
-  makeCage(): Promise<boolean>;
-  loadCage(files: readonly NamedFile[]): Promise<boolean>;
-  loadControls(files: readonly NamedFile[]): Promise<boolean>;
-  bind(): Promise<boolean>;
-  /** Puts other models into the cage that there will be; says what does not work. */
-  join(others: readonly Named[], signal: AbortSignal): Promise<unknown>;
-  /** Takes a project's settings, before the bind. */
-  applySettings(settings: Partial<Settings>): void;
-  /** And its pose. */
-  applyPose(settings: Partial<Settings>): void;
-  /** Ends what plays or is under way: something else will be open. */
+export interface FileNeeds {
+  readonly know: DocumentMirror["know"];
+  readonly bind: Pick<BindActions, "start">;
+  readonly cage: Pick<CageActions, "load" | "make">;
+  readonly controls: Pick<ControlActions, "load">;
+  readonly models: Pick<Models, "join">;
+  readonly project: Pick<Project, "write">;
+  readonly view: Pick<View, "symmetry">;
+  readonly works: Pick<WorkActions, "flush" | "leave">;
+  /** Ends what plays or is in progress, because something else will be open. */
   settle(): void;
-  /** What is open, as a project. */
-  writeProject(): Uint8Array;
-  /** Keeps what is open: something else will be, a sample or a file (null). */
-  keep(sample: string | null): Promise<void>;
-  /** Something else is open. */
-  leave(): void;
+  /** Called before a sample, or a file (null), is opened. */
+  overtaken(sample: string | null): void;
 }
 
 /** What comes along with a model. */
@@ -50,50 +50,41 @@ interface Along {
   readonly bind: BindOptions | undefined;
 }
 
-export function createFiles(ctx: Context, follow: Follow): Files {
+export function createFiles(ctx: Context, needs: FileNeeds): Files {
   const { store } = ctx;
   const take = async (opened: Opened, sample: string | null, along: Partial<Along> = {}) => {
     const { others = [], cageFiles, signal, bind } = along;
     // Nobody needs the cage and the weights of what was open.
     for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
     const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
-    const of = settings.pose_pins;
-    const poses =
-      opened.project?.poses.map((pose, k) => (of ? { ...pose, pins: of[k] ?? [] } : pose)) ??
-      opened.poses ??
-      [];
-    ctx.history.clear();
     store.set({
       ...stateOfNextModel(store.get()),
       model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
-      sample,
-      poses,
-      shares: poses.map((_, k) => settings.pose_shares?.[k] ?? 0),
       busy: others.length > 0 ? store.get().busy : null,
     });
-    follow.applySettings(settings);
-    follow.adoptCage(opened);
-    const ofSample = settings.sample ?? sample;
-    store.set({ sample: ofSample, sampleCage: ofSample !== null && opened.cage !== null });
-    follow.applyPose(settings);
-    for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
+    if (opened.check) needs.know(opened.check);
+    const { bind: bindOptions, cage: cageOptions, rig: rigOptions, symmetry } = settings;
+    store.set({
+      ...(bindOptions ? { bindOptions } : {}),
+      ...(cageOptions ? { cageOptions } : {}),
+      ...(rigOptions ? { rigOptions } : {}),
+    });
+    needs.view.symmetry(symmetry ?? false);
+    for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
     // Before there is a cage: it encloses all of them.
-    if (signal && others.length > 0) await follow.join(others, signal);
+    if (signal && others.length > 0) await needs.models.join(others, signal);
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
-    void prepare(cageFiles, sample !== null || opened.project !== null);
+    void prepare(cageFiles, sample !== null || opened.settings !== null);
   };
 
   const settingsOf = (opened: Opened): Settings => {
     // The memory limit is this computer's: no file says how much it has.
     const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
-    const { project } = opened;
-    return project
-      ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS, rig: RIG_DEFAULTS })
-      : { notices: [] };
+    return opened.settings === null ? { notices: [] } : ctx.session().readSettings(opened.settings, bind);
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {
@@ -103,17 +94,17 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   /** Cage, bind, pose: as far as it goes without the user. */
   const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     if (cageFiles) {
-      if (!(await follow.loadCage(cageFiles))) return;
+      if (!(await needs.cage.load(cageFiles, true))) return;
     } else if (!store.get().cage) {
       if (!familiar) goTo(["model", "bind", "pose", "export"], "cage");
-      if (!(await follow.makeCage())) return;
+      if (!(await needs.cage.make(true))) return;
     }
     if (!store.get().cage?.usable) {
       goTo(["model", "bind", "pose", "export"], "cage");
       return;
     }
     if (!familiar) goTo(["model", "cage"], "bind");
-    if ((await follow.bind()) && !familiar) goTo(["bind"], "pose");
+    if ((await needs.bind.start(true)) && !familiar) goTo(["bind"], "pose");
   };
 
   /** In the order asked for; who asks for another one gives up the one before. */
@@ -128,10 +119,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
 
   /** Opens something else; what is open until then stays kept. */
   const replace = async (open: () => Promise<Opened>, sample: string | null, along: Partial<Along>) => {
-    follow.settle();
-    await follow.keep(sample);
+    needs.settle();
+    needs.overtaken(sample);
+    await needs.works.flush();
     const opened = await open();
-    follow.leave();
+    needs.works.leave();
     await take(opened, sample, along);
   };
 
@@ -151,7 +143,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         ctx.tell.problem({ title: T.opening.nothing, message: plan.sentence }, ctx.fixFor("file"));
         return Promise.resolve(false);
       }
-      if (plan.kind === "controls" && store.get().cage) return follow.loadControls([main]);
+      if (plan.kind === "controls" && store.get().cage) return needs.controls.load([main]);
       const second = plan.second === undefined ? undefined : files[plan.second];
       return busy(T.opening.file(main.name), T.failed.open(main.name), async (signal) => {
         const models = modelsOf(files, plan);
@@ -164,8 +156,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     },
     turn(up) {
       return busy(T.opening.turning, T.failed.turn, async () => {
-        follow.settle();
-        await take(await ctx.session().turn(follow.writeProject(), up), null);
+        needs.settle();
+        await take(await ctx.session().turn(needs.project.write(), up), null);
       });
     },
   };
@@ -176,5 +168,5 @@ function shownName(opened: Opened, sample: string | null, samples: readonly Samp
   const { name } = opened.model;
   const label = samples.find(({ id }) => id === sample)?.label;
   // One with several models is called as they are.
-  return label ?? (opened.project && opened.model.members.length === 1 ? stem(name) : name);
+  return label ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
 }

@@ -15,7 +15,7 @@ const FINEST = 128;
 
 export interface Followers {
   bind: Pick<BindActions, "covers" | "start">;
-  edit: Pick<Edit, "active" | "sync">;
+  edit: Pick<Edit, "active">;
   view: Pick<View, "refresh">;
   pull: Pick<Pulling, "prepare">;
 }
@@ -37,7 +37,6 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
     store.get().cage;
     if (!isFirst) {
       untracked(() => {
-        edit.sync();
         view.refresh();
         bindSoon(PAUSE_MS);
       });
@@ -45,9 +44,9 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
     isFirst = false;
   });
   effect(() => {
-    const { bound, bindRun } = store.get();
+    const { bound, bindRun, cage } = store.get();
     // After the last pass: the worker that solves pulls would take time from it.
-    if (bound && bindRun === null) untracked(() => pull.prepare());
+    if (cage && bound && bindRun === null) untracked(() => pull.prepare());
   });
   effect(() => {
     if (!store.get().editingRest) untracked(() => store.get().cage && bindSoon(0));

@@ -1,83 +1,47 @@
 /** The models that share the cage: more of them, fewer, and which parts of them follow it. */
 
-import type { MemberInfo, ModelInfo, NamedFile, PartOptions } from "../contract";
+import type { MemberInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
-import type { Store } from "../signals";
 import { T } from "../words";
 import type { CageActions } from "./cage";
-import { attempt, type Context, report, waitFor } from "./context";
+import { attempt, type Context, waitFor } from "./context";
+import type { Edit } from "./edit";
 import { modelsOf, type Named, readModels } from "./read";
 
 /** What a part may do instead of following the cage. */
 export type How = "rigid" | "stays";
 
 export interface Models {
-  /** Puts models of files into the cage that is open. */
+  /** Adds models of files to the cage that is open. */
   add(files: readonly NamedFile[]): Promise<boolean>;
-  /** The same with those that were read, before there is a cage; not a step of the history. Can be cancelled. */
-  join(others: readonly Named[], signal: AbortSignal): Promise<boolean>;
-  /** Takes a model out of the cage. */
-  bin(id: number): Promise<boolean>;
-  /** Shows or hides it; no step of the history, as nothing else of the view is. */
+  /** Adds models that were read. `label` names the step for a number of models; without it, there is no step. Can be cancelled. */
+  join(others: readonly Named[], signal: AbortSignal, label?: (models: number) => string): Promise<boolean>;
+  /** Removes a model from the cage. */
+  bin(id: number): boolean;
+  /** Shows or hides a model; not a step of the history. */
   show(id: number, shown: boolean): void;
-  /** A part keeps its shape, or stays as it is; or follows the cage again. "all" is the whole model. */
+  /** Makes a part keep its shape or stay in place, or follow the cage again. "all" is the whole model. */
   part(id: number, name: string, how: How): void;
 }
 
 export interface ModelNeeds {
-  readonly cage: Pick<CageActions, "adopt" | "load" | "regenerate">;
+  readonly cage: Pick<CageActions, "load" | "regenerate">;
+  readonly edit: Pick<Edit, "apply" | "settle">;
+  /** Resolves when the cage was checked as it is now. */
+  checked(): Promise<unknown>;
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
-  /** Ends what plays or is under way: another model is another shape. */
+  /** Ends what plays or is in progress: another model is another shape. */
   settle(): void;
 }
 
-export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNeeds): Models {
+export function createModels(ctx: Context, { cage, edit, checked, openFiles, settle }: ModelNeeds): Models {
   const { store } = ctx;
-  const engine = () => ctx.session().engine;
   const members = (): readonly MemberInfo[] => store.get().model?.members ?? [];
-  const nameOf = (id: number) => members().find((member) => member.id === id)?.name ?? "";
+  const memberOf = (id: number) => members().find((member) => member.id === id);
 
-  const take = (info: ModelInfo) => takeModel(store, info);
-
-  /** Others are in the cage: it is looked at again, and bound again. */
-  const changed = async (info: ModelInfo) => {
-    take(info);
-    const { cage: state, cageClip } = store.get();
-    if (!info.clips.some(({ name }) => name === cageClip)) store.set({ cageClip: null });
-    if (!state) {
-      // One that was being made was for other models.
-      void cage.regenerate();
-      return false;
-    }
-    // Another value, so that whoever follows the cage hears of it.
-    const isChecked = await cage.adopt({ ...state }, null);
-    const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
-    return isChecked && isOut === true;
-  };
-
-  /** What belongs to a step besides the models. */
-  const now = () => {
-    const { sample, sampleCage } = store.get();
-    return { sample, sampleCage };
-  };
-  /** Some come, or go; `looked`: the cage was looked at again. */
-  const turn = async (ids: readonly number[], binned: boolean, others: ReturnType<typeof now>) => {
-    settle();
-    const info = await engine().bin(Uint32Array.from(ids), binned);
-    const looked = changed(info);
-    // What adopts a cage takes it for another one than the sample's.
-    store.set({ sample: others.sample, sampleCage: others.sampleCage });
-    return { looked };
-  };
-  /** The same, as undo and redo do it. */
-  const turnBack = async (...how: Parameters<typeof turn>) => {
-    await (await turn(...how)).looked;
-  };
-
-  const put = (id: number, options: Omit<PartOptions, "shown">) => {
-    settle();
-    const shown = members().find((member) => member.id === id)?.options.shown ?? true;
-    take(engine().setParts(id, { ...options, shown }));
+  /** A cage that was being made was for the previous models. */
+  const remakeCage = () => {
+    if (!store.get().cage) void cage.regenerate();
   };
 
   const models: Models = {
@@ -89,29 +53,19 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
         ctx.tell.problem({ title: T.models.notAdded, message });
         return false;
       }
-      const before = now();
       const went = await attempt(ctx, T.models.notAdded, () => {
         ctx.tell.clear();
         return ctx.queue.replace("open", async (signal) => {
           const reads = await readModels(ctx, signal, modelsOf(files, plan), "add");
           settle();
           const n = members().length;
-          await models.join(reads, signal);
+          await models.join(reads, signal, T.did.addModels);
           store.set({ busy: null });
-          const { model } = store.get();
-          const ids = members()
-            .slice(n)
-            .map(({ id }) => id);
-          if (!model || ids.length === 0) return;
-          store.set({ sample: null });
-          const after = { sample: null, sampleCage: false };
-          ctx.history.push({
-            label: T.did.addModels(ids.length),
-            undo: () => turnBack(ids, true, before),
-            redo: () => turnBack(ids, false, after),
-          });
-          void changed(model).then((isOut) => {
+          if (members().length === n) return;
+          remakeCage();
+          void checked().then(() => {
             const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
+            const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
             if (isOut) ctx.tell.say(T.models.outside, around);
           });
         });
@@ -119,7 +73,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       const second = files[plan.second ?? -1];
       return second && went ? cage.load([second], true) : went;
     },
-    join(others, signal) {
+    join(others, signal, label) {
       const [first] = others;
       if (!first) return Promise.resolve(true);
       const title = others.length > 1 ? T.models.notAdded : T.failed.open(first.name);
@@ -128,54 +82,38 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       return attempt(ctx, title, async () => {
         const reads = others.map(({ read }) => read);
         const what = T.opening.fileOf(first.name, 0, others.length);
-        take(await waitFor(ctx, signal, what, () => ctx.session().add(reads, say)));
+        const notices = await waitFor(ctx, signal, what, () => ctx.session().add(reads, label, say));
+        const { model } = store.get();
+        if (model) store.set({ model: { ...model, notices: [...new Set([...model.notices, ...notices])] } });
       });
     },
     bin(id) {
-      const label = T.did.binModel(nameOf(id));
-      const work = async () => {
-        const before = now();
-        const after = { sample: null, sampleCage: false };
-        const { looked } = await turn([id], true, after);
-        const [undo, redo] = [() => turnBack([id], false, before), () => turnBack([id], true, after)];
-        ctx.history.push({ label, undo, redo });
-        await looked;
-      };
-      return attempt(ctx, T.models.notBinned, () => ctx.queue.add("open", work));
+      settle();
+      const label = T.did.binModel(memberOf(id)?.name ?? "");
+      const went = edit.apply({ do: "remove_model", id }, label, T.models.notBinned);
+      if (went) remakeCage();
+      return went;
     },
     show(id, shown) {
-      const member = members().find((one) => one.id === id);
-      if (member) take(engine().setParts(id, { ...member.options, shown }));
+      const member = memberOf(id);
+      if (!member) return;
+      const { engine } = ctx.session();
+      edit.settle();
+      engine.apply({ do: "set_parts", id, options: { ...member.options, shown } });
+      engine.amend();
     },
     part(id, name, how) {
-      const before = members().find((member) => member.id === id)?.options;
-      if (!before) return;
-      const others = { rigid: rest(before.rigid, name), stays: rest(before.stays, name) };
-      const isOn = before[how].includes(name);
-      const after = { ...before, ...others, ...(isOn ? {} : { [how]: [...others[how], name] }) };
-      try {
-        put(id, after);
-        ctx.history.push({
-          label: T.did.parts(nameOf(id)),
-          undo: () => put(id, before),
-          redo: () => put(id, after),
-        });
-      } catch (error) {
-        report(ctx, T.models.notParts, error);
-      }
+      const member = memberOf(id);
+      if (!member) return;
+      const { options } = member;
+      const others = { rigid: rest(options.rigid, name), stays: rest(options.stays, name) };
+      const isOn = options[how].includes(name);
+      const next: PartOptions = { ...options, ...others, ...(isOn ? {} : { [how]: [...others[how], name] }) };
+      settle();
+      edit.apply({ do: "set_parts", id, options: next }, T.did.parts(member.name), T.models.notParts);
     },
   };
   return models;
-}
-
-/** The page's side of the models as they are now. */
-export function takeModel(store: Store, info: ModelInfo): void {
-  const { model } = store.get();
-  // What is open alone may be called otherwise: a sample by its label, a project by its file.
-  const name = info.members.length === 1 && model?.members.length === 1 ? model.name : info.name;
-  // Those of the files were said when they were read.
-  const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
-  store.set({ model: { ...info, name, notices } });
 }
 
 const rest = (names: readonly string[], name: string) => names.filter((other) => other !== name);

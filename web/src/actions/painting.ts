@@ -4,7 +4,7 @@ import { effect, untracked } from "@preact/signals";
 import type { Painting } from "../state";
 import { T } from "../words";
 import { type Context, report } from "./context";
-import { takeModel } from "./models";
+import type { Edit } from "./edit";
 
 export interface PaintActions {
   /** Begins to paint on a model, or ends it (null). */
@@ -29,22 +29,18 @@ const RADIUS = 0.05;
 /** What a dab leaves: all follows, or all stays. */
 const [FOLLOWS, STAYS] = [0, 255];
 
-/** `settle` ends what plays or is under way. */
-export function createPainting(ctx: Context, settle: () => void): PaintActions {
+/** `settle` ends what plays or is in progress. */
+export function createPainting(
+  ctx: Context,
+  edit: Pick<Edit, "apply" | "settle">,
+  settle: () => void,
+): PaintActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
   /** Kept from one time to the next. */
   let radius = RADIUS;
-  let stroke: { readonly before: Uint8Array; readonly x: number; readonly y: number } | undefined;
+  let stroke: { readonly x: number; readonly y: number } | undefined;
 
-  const put = (id: number, amounts: Uint8Array) => {
-    takeModel(store, engine().setPainted(id, amounts));
-    if (store.get().painting?.id === id) engine().showPainting(id);
-  };
-  const keep = (label: string, id: number, before: Uint8Array, after: Uint8Array) => {
-    put(id, after);
-    ctx.history.push({ label, undo: () => put(id, before), redo: () => put(id, after) });
-  };
   const dab = (x: number, y: number): boolean => {
     const { painting } = store.get();
     return painting !== null && engine().paint(x, y, painting.radius, painting.erase ? FOLLOWS : STAYS);
@@ -65,13 +61,13 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
     },
     clear(id) {
       actions.end(true);
-      const before = engine().painted(id);
-      if (before.length > 0) keep(T.did.clearPaint, id, before, new Uint8Array());
+      if (engine().painted(id).length > 0)
+        edit.apply({ do: "set_painted", id, amounts: [] }, T.did.clearPaint);
     },
     begin(x, y) {
       const { painting } = store.get();
       if (!painting || stroke) return false;
-      const before = engine().painted(painting.id);
+      edit.settle();
       try {
         if (!dab(x, y)) return false;
       } catch (error) {
@@ -81,7 +77,7 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
         }
         // The GPU is busy with the stroke before for a moment: this one paints from its first movement on.
       }
-      stroke = { before, x, y };
+      stroke = { x, y };
       return true;
     },
     drag(x, y) {
@@ -90,22 +86,19 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       const n = Math.max(1, Math.ceil(Math.hypot(x - x0, y - y0) / DAB_PX));
       try {
         for (let k = 0; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
-        stroke = { ...stroke, x, y };
+        stroke = { x, y };
       } catch {
         // The GPU was busy for a moment: the next movement goes on from here.
       }
     },
     end(keepIt) {
       const { painting } = store.get();
-      const ended = stroke;
+      const isOpen = stroke !== undefined && painting !== null;
       stroke = undefined;
-      // Something else may have been opened under the hand.
-      if (!ended || !painting) return;
-      const { id, erase } = painting;
-      const after = engine().painted(id);
-      if (String(after) === String(ended.before)) return;
-      if (keepIt) keep(erase ? T.did.erase : T.did.paint, id, ended.before, after);
-      else put(id, ended.before);
+      // Something else may have been opened during the stroke.
+      if (!isOpen) return;
+      if (keepIt) engine().commit(painting.erase ? T.did.erase : T.did.paint);
+      else engine().revert();
     },
     active: () => stroke !== undefined,
     radiusAt(x, y) {

@@ -1,30 +1,28 @@
-/** Points of the model that pulls leave where they are, and the marks of what is held. */
+/** Points of the model that pulls leave in place, and the marks of the point that is held. */
 
 import type { SurfacePoint } from "../contract";
 import { T } from "../words";
 import type { Context } from "./context";
+import type { Edit } from "./edit";
 
 export interface Pins {
-  /** Marks the pins, the point that is held or would be, and where it is to be. */
+  /** Marks the point that is held or would be, and where it is to be. */
   show(held?: SurfacePoint, target?: Float32Array): void;
-  /** Where a point of the model is in the view; undefined for one that is not there. */
+  /** Where a point of the model is in the view; undefined if its model was removed. */
   inView(point: SurfacePoint): { x: number; y: number } | undefined;
   /** Those that are not at a place of the view. */
   free(x: number, y: number): readonly SurfacePoint[];
-  /** Takes the pin there away, or pins the point there, if it may; false beside the model. */
+  /** Removes the pin there, or else pins the point there if `mayPin`; false beside the model. */
   toggle(x: number, y: number, mayPin: boolean): boolean;
   removeAll(): void;
 }
 
-/** A grab and a pin that are nearer to each other are one, CSS pixels. */
+/** A grab and a pin that are nearer to each other are the same point, CSS pixels. */
 const SAME_PX = 14;
 
-export function createPins(ctx: Context): Pins {
+export function createPins(ctx: Context, apply: Edit["apply"]): Pins {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-
-  const show = (held?: SurfacePoint, target?: Float32Array) =>
-    engine().showHeld([...(held ? [held] : []), ...store.get().pins], target);
 
   const inView = (point: SurfacePoint) => {
     const [x, y, z] = engine().placeOf(point);
@@ -39,36 +37,20 @@ export function createPins(ctx: Context): Pins {
       return place && Math.hypot(place.x - x, place.y - y) < SAME_PX;
     });
 
-  /** One step of the history. */
-  const change = (label: string, next: readonly SurfacePoint[]) => {
-    const { pins } = store.get();
-    const set = (list: readonly SurfacePoint[]) => {
-      store.set({ pins: list });
-      show();
-    };
-    set(next);
-    ctx.history.push({ label, undo: () => set(pins), redo: () => set(next) });
+  const free = (x: number, y: number) => {
+    const there = at(x, y);
+    return store.get().pins.filter((pin) => pin !== there);
   };
 
   return {
-    show,
+    show: (held, target) => engine().showHeld(held ? [held] : [], target),
     inView,
-    free(x, y) {
-      const there = at(x, y);
-      return store.get().pins.filter((pin) => pin !== there);
-    },
+    free,
     toggle(x, y, mayPin) {
-      const { pins } = store.get();
-      const there = at(x, y);
+      if (at(x, y)) return apply({ do: "set_pins", pins: free(x, y) }, T.did.unpin);
       const point = mayPin ? engine().surfaceAt(x, y) : undefined;
-      if (there)
-        change(
-          T.did.unpin,
-          pins.filter((pin) => pin !== there),
-        );
-      else if (point) change(T.did.pin, [...pins, point]);
-      return there !== undefined || point !== undefined;
+      return point !== undefined && apply({ do: "set_pins", pins: [...store.get().pins, point] }, T.did.pin);
     },
-    removeAll: () => change(T.did.unpin, []),
+    removeAll: () => void apply({ do: "set_pins", pins: [] }, T.did.unpin),
   };
 }

@@ -1,179 +1,125 @@
 /** Poses: saved, named, blended and played. */
 
-import type { Pose } from "../contract";
+import type { CageArrays, PoseView } from "../contract";
 import { fittingPoses } from "../derived";
+import { triples } from "../points";
 import { follow } from "../queue";
 import { T } from "../words";
-import type { Posed } from "./cage";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 
+/** Poses refer to saved poses by their index. */
 export interface PoseActions {
   save(): void;
-  apply(pose: Pose): void;
-  rename(pose: Pose, name: string): void;
-  remove(pose: Pose): void;
-  /** Sets one pose's share of the blend; `done` when the slider is let go, which makes it one step. */
-  blend(pose: Pose, share: number, done: boolean): void;
-  /** The pose and the poses that a cage of before had, for the one that is open. */
-  carry(before: Posed): Promise<boolean>;
-  /** The same as part of a step that there is already. */
-  carryAlong(before: Posed): Promise<boolean>;
+  apply(index: number): void;
+  rename(index: number, name: string): void;
+  remove(index: number): void;
+  /** Sets one pose's share of the blend; `done` when the slider is released, which makes it one step. */
+  blend(index: number, share: number, done: boolean): void;
+  /** Carries the poses of the previous cage over to the cage that is open: as a step with a label, or else with the last step. */
+  carry(before: Carriable, label?: string): Promise<boolean>;
   reset(): void;
   togglePlay(): void;
   stop(): void;
 }
 
+/** A cage and its poses, before another cage takes its place. */
+export interface Carriable {
+  readonly cage: CageArrays;
+  /** The pose, then each saved pose that fits. `[1 + n_poses, n_controls, 3]` */
+  readonly poses: Float32Array;
+  readonly shares: readonly number[];
+}
+
+/** What can be carried over from the cage that is open; undefined without one. */
+export function carriableOf(ctx: Context): Carriable | undefined {
+  const { cage, shares } = ctx.store.get();
+  const session = ctx.session();
+  return cage ? { cage: session.cageArrays(), poses: session.engine.carriable(), shares } : undefined;
+}
+
 export function createPoses(ctx: Context, edit: Edit): PoseActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  let beforeBlend: { readonly positions: Float32Array; readonly shares: readonly number[] } | undefined;
-  let playing: { frame: number; before: Float32Array } | undefined;
-
-  const setPoses = (poses: readonly Pose[], shares: readonly number[]) => store.set({ poses, shares });
-
-  /** Changes the list as a step of the history. */
-  const change = (label: string, poses: readonly Pose[], shares: readonly number[]) => {
-    const { poses: before, shares: sharesBefore } = store.get();
-    setPoses(poses, shares);
-    ctx.history.push({
-      label,
-      undo: () => setPoses(before, sharesBefore),
-      redo: () => setPoses(poses, shares),
-    });
-  };
+  let frame: number | undefined;
 
   const stop = () => {
-    if (!playing) return;
-    cancelAnimationFrame(playing.frame);
-    engine().setCagePositions(playing.before);
-    playing = undefined;
+    if (frame === undefined) return;
+    cancelAnimationFrame(frame);
+    frame = undefined;
+    engine().revert();
     store.set({ playing: false, playingPose: null });
-    edit.sync();
   };
+  // Steps must not contain a moment of the animation.
+  edit.alsoSettles(stop);
 
-  const carry = (before: Posed, isStep: boolean): Promise<boolean> => {
-    stop();
+  const carry: PoseActions["carry"] = ({ cage, poses, shares }, label) => {
+    const n = cage.positions.length;
+    const isAtRest = cage.positions.every((x, i) => x === poses[i]);
     return attempt(ctx, T.failed.carry, () =>
       ctx.queue.add("carry", async (signal) => {
-        const { poses, shares } = store.get();
-        const old = poses.filter((pose) => pose.positions.length === before.positions.length);
-        const rested = before.cage.positions.every((x, i) => x === before.positions[i]);
-        if (!isStep && rested && old.length === 0) return;
-        const all = [before.positions, ...old.map((pose) => pose.positions)];
-        const [positions, ...carried] = await follow(signal, ctx.session().carryPoses(before.cage, all));
-        if (!positions) return;
-        const set = (positions: Float32Array, poses: readonly Pose[], shares: readonly number[]) => {
-          if (isStep) edit.setEditingRest(false);
-          if (!store.get().editingRest) engine().setCagePositions(positions);
-          setPoses(poses, shares);
-          edit.sync();
-        };
-        const now = engine().cagePositions();
-        const next = poses.map((pose) => ({
-          ...pose,
-          positions: carried[old.indexOf(pose)] ?? pose.positions,
-        }));
-        const redo = () => set(rested && !isStep ? now : positions, next, before.shares);
-        redo();
-        if (isStep) ctx.history.push({ label: T.did.carry, undo: () => set(now, poses, shares), redo });
+        if (!label && isAtRest && poses.length === n) return;
+        const carried = await follow(signal, ctx.session().carryPoses(cage, poses));
+        stop();
+        if (label) edit.setEditingRest(false);
+        // A pose at rest stays at rest.
+        if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
+        const positions = triples(carried);
+        engine().apply({ do: "carry_poses", from: n / 3, positions, shares: [...shares] }, label);
+        if (!label) engine().amend();
       }),
     );
+  };
+
+  const step = (start: number) => (now: number) => {
+    const fitting = fittingPoses(store.get());
+    const seconds = ((now - start) / 1000) % (fitting.length + 1);
+    engine().playAt(seconds);
+    store.set({ playingPose: fitting[Math.floor(seconds)]?.name ?? null });
+    frame = requestAnimationFrame(step(start));
   };
 
   return {
     save() {
       if (!store.get().cage) return;
+      const moment = store.get().playing && triples(engine().cagePositions());
       edit.settle();
-      const { poses, shares, pins } = store.get();
-      const pose = { name: freshName(poses), positions: engine().cagePositions(), pins };
-      // It is what is shown: its slider leads from here to rest.
-      change(T.did.save, [...poses, pose], [...shares.map(() => 0), 1]);
-      ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(pose.name));
+      if (moment) engine().apply({ do: "set_pose", positions: moment });
+      const name = freshName(store.get().poses);
+      if (!edit.apply({ do: "save_pose", name }, T.did.save)) return;
+      ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(name));
     },
-    apply(pose) {
-      stop();
-      const { poses } = store.get();
-      edit.pose(
-        T.did.pose(pose.name),
-        pose.positions,
-        poses.map((other) => (other === pose ? 1 : 0)),
-        pose.pins,
-      );
-    },
-    rename(pose, name) {
-      const clean = name.trim();
-      if (clean === "" || clean === pose.name) return;
-      const { poses, shares } = store.get();
-      change(
-        T.did.rename,
-        poses.map((other) => (other === pose ? { ...pose, name: clean } : other)),
-        shares,
-      );
-    },
-    remove(pose) {
-      const { poses, shares } = store.get();
-      const index = poses.indexOf(pose);
-      change(
-        T.did.delete,
-        poses.filter((other) => other !== pose),
-        shares.filter((_, i) => i !== index),
-      );
-    },
-    blend(pose, share, done) {
-      stop();
+    apply(index) {
       edit.setEditingRest(false);
-      beforeBlend ??= { positions: edit.positions(), shares: store.get().shares };
-      const { poses } = store.get();
-      const shares = store.get().shares.map((old, i) => (poses[i] === pose ? share : old));
-      const fitting = fittingPoses(store.get());
-      const ofFitting = (all: readonly number[]) =>
-        Float32Array.from(fitting, (p) => all[poses.indexOf(p)] ?? 0);
-      engine().blend(
-        fitting.map((p) => p.positions),
-        beforeBlend.positions,
-        ofFitting(beforeBlend.shares),
-        ofFitting(shares),
-      );
-      store.set({ shares });
-      if (done) {
-        edit.posedSince(T.did.blend, beforeBlend.positions, beforeBlend.shares);
-        beforeBlend = undefined;
-      }
+      edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
     },
-    carry: (before) => carry(before, true),
-    carryAlong: (before) => carry(before, false),
+    rename(index, text) {
+      const name = text.trim();
+      if (name === "" || name === store.get().poses[index]?.name) return;
+      edit.apply({ do: "rename_pose", index, name }, T.did.rename);
+    },
+    remove: (index) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
+    blend(index, share, done) {
+      edit.setEditingRest(false);
+      engine().apply({ do: "blend", index, share });
+      if (done) engine().commit(T.did.blend);
+    },
+    carry,
     reset() {
       stop();
-      if (store.get().posed)
-        edit.pose(
-          T.did.reset,
-          engine().restPositions(),
-          store.get().shares.map(() => 0),
-        );
+      if (store.get().posed) edit.apply({ do: "reset_pose" }, T.did.reset);
     },
     togglePlay() {
-      if (playing) {
+      if (frame !== undefined) {
         stop();
         return;
       }
-      const fitting = fittingPoses(store.get());
-      const poses = fitting.map((pose) => pose.positions);
-      if (poses.length === 0) {
+      if (fittingPoses(store.get()).length === 0) {
         ctx.tell.say(T.pose.saveFirst);
         return;
       }
       edit.setEditingRest(false);
-      const start = performance.now();
-      const cycle = poses.length + 1;
-      const step = (now: number) => {
-        if (!playing) return;
-        const time = ((now - start) / 1000) % cycle;
-        engine().playAt(poses, time);
-        store.set({ playingPose: fitting[Math.floor(time)]?.name ?? null });
-        playing.frame = requestAnimationFrame(step);
-      };
-      playing = { before: edit.positions(), frame: requestAnimationFrame(step) };
+      frame = requestAnimationFrame(step(performance.now()));
       store.set({ playing: true });
     },
     stop,
@@ -181,7 +127,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
 }
 
 /** "Pose 3", or the next number that is free. */
-export function freshName(poses: readonly Pose[]): string {
+export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));
   let number = poses.length + 1;
   while (taken.has(T.did.poseName(number))) number += 1;

@@ -46,7 +46,6 @@ interface Drag {
   readonly before: Float32Array;
   /** Of the engine: what is held belongs to it. */
   readonly revision: number;
-  readonly shares: readonly number[];
   readonly grabs: readonly (SurfacePoint | number)[];
   /** Where the pointer took hold. */
   readonly from: { readonly x: number; readonly y: number };
@@ -61,14 +60,14 @@ interface Drag {
   by: { right: number; up: number };
 }
 
-export function createPulling(ctx: Context, edit: Edit): Pulling {
+export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "apply" | "settle">): Pulling {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
   let current: Drag | undefined;
   let held: SurfacePoint | undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  const pins = createPins(ctx);
+  const pins = createPins(ctx, edit.apply);
   const { show } = pins;
 
   const isReady = () => {
@@ -149,7 +148,7 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
     show();
     store.set({ gesture: null });
     if (isStale(drag)) return;
-    edit.posedSince(T.did.pull, drag.before, drag.shares);
+    engine().commit(T.did.pull);
   };
 
   edit.alsoSettles(() => {
@@ -161,9 +160,8 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
     edit.settle();
     const place = new Float32Array(3);
     const drag: Drag = {
-      before: edit.positions(),
+      before: engine().cagePositions(),
       revision: engine().revision,
-      shares: store.get().shares,
       grabs,
       from: { x, y },
       place,
@@ -226,11 +224,10 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
         return;
       }
       current = undefined;
-      if (!isStale(drag)) engine().setCagePositions(drag.before);
+      if (!isStale(drag)) engine().revert();
       engine().showStays();
       show();
       store.set({ gesture: null });
-      edit.sync();
     },
     active: () => current !== undefined && !current.letGo,
     reach(factor) {

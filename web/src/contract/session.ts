@@ -20,18 +20,9 @@ import type {
   PullFrame,
   Reading,
   Repair,
-  RigOptions,
   Settings,
-  SurfacePoint,
   UpAxis,
 } from "@cagework/core/contract";
-
-export interface Pose {
-  readonly name: string;
-  readonly positions: Float32Array;
-  /** Points that pulls left where they were; none: not known, the pins of the moment stay. */
-  readonly pins?: readonly SurfacePoint[];
-}
 
 export interface Session {
   /** Synchronous side: state, picking, gestures, exports. Never keep anything else of the wasm module. */
@@ -53,31 +44,36 @@ export interface Session {
   open(read: ReadFile): Promise<Opened>;
   /** Until what it returns is called, files are read by one worker as long as it does not break. */
   shareReader(): () => void;
-  /** Other models into the cage that is open: cage and pose stay, weights are dropped. `hear` is told which is next. */
-  add(reads: readonly ReadFile[], hear?: (next: number) => void): Job<ModelInfo>;
+  /**
+   * Adds models to the cage that is open; cage and pose stay. `label` names the step of the history for a number of models;
+   * without it, there is no step. `hear` is called with the index of each file. Resolves with notices.
+   */
+  add(
+    reads: readonly ReadFile[],
+    label?: (models: number) => string,
+    hear?: (next: number) => void,
+  ): Job<readonly string[]>;
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another axis up: model, cage and poses are turned. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
-  /**
-   * A project's settings, each checked as the options of a call are: what cannot be used is the default, and `notices` say
-   * so. The memory limit is the default's.
-   */
-  readSettings(text: string, defaults: Defaults): Settings;
+  /** Checks the page's part of a project's settings: defaults (`bind` for a bind) replace bad values, and `notices` name them. */
+  readSettings(text: string, bind: BindOptions): Settings;
   /** Reads a cage from a file as a model is read, and checks it. */
   readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
   /** A box around the model, its longest side cut into `divisions`. */
   boxCage(divisions: number): CageArrays;
-  /** Makes a cage for the model, in the worker. */
-  /** `clip`: the name of one that the cage encloses as well. */
+  /** Makes a cage for the model, in the worker. `clip` names a clip whose frames it encloses as well. */
   generateCage(options: CageOptions, onProgress: (fraction: number) => void, clip?: string): Job<CheckedCage>;
-  /** Checks the cage at rest as it is, in a worker of its own, and marks what is wrong. */
+  /** Checks the cage at rest as it is, in a worker of its own. */
   checkCage(): Job<Check>;
   /** The cage at rest, repaired, in that worker too. */
   repair(kind: Repair): Job<CheckedCage>;
-  /** Poses of another cage of the model for the cage that is open, in the worker. */
-  carryPoses(old: CageArrays, poses: readonly Float32Array[]): Job<Float32Array[]>;
-  /** Takes a cage, and marks what is wrong with it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
-  takeCage(cage: CheckedCage): CageState;
+  /** The cage at rest. */
+  cageArrays(): CageArrays;
+  /** Poses of another cage of the model, one after the other, for the cage that is open; in the worker. */
+  carryPoses(old: CageArrays, poses: Float32Array): Job<Float32Array>;
+  /** Takes a cage, as a step if there is a label. A mesh that is no cage yet is kept as a draft: `usable` is false. */
+  takeCage(cage: CheckedCage, label?: string): CageState;
 
   /**
    * Binds in the worker: coarse (g = 32) first if that is less than asked, then as asked; each result is adopted as
@@ -137,18 +133,10 @@ export interface ReadFile {
 
 export interface Opened {
   readonly model: ModelInfo;
-  /** The cage that came along (sample, project); null when there is none yet. */
-  readonly cage: CageState | null;
-  /** What is wrong with it; null without one. */
+  /** What is wrong with the cage that came along; null without one. */
   readonly check: Check | null;
-  /** Set when a project was opened. `settings` is what `writeProject` was given. */
-  readonly project: { readonly poses: readonly Pose[]; readonly settings: string } | null;
-  /** Prepared poses of a sample. */
-  readonly poses?: readonly Pose[];
-}
-
-export interface Defaults {
-  readonly bind: BindOptions;
-  readonly cage: CageOptions;
-  readonly rig: RigOptions;
+  /** The text that a project was saved with; null without a project. */
+  readonly settings: string | null;
+  /** What could not be restored, in sentences. */
+  readonly notices: readonly string[];
 }

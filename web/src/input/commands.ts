@@ -1,6 +1,5 @@
 /** What each command of the shortcut table does. */
 
-import { report } from "../actions/context";
 import type { App } from "../app";
 import type { Element as CageElement, Gesture } from "../contract";
 import { controlCount, elementInUse } from "../derived";
@@ -25,9 +24,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     if (!edit.begin(kind, x, y)) app.ctx.tell.say(T.pose.selectFirst);
   };
   const select = (work: () => void) => () => {
-    if (!hasCage()) return;
-    work();
-    edit.sync();
+    if (hasCage()) work();
   };
   const axis = (index: 0 | 1 | 2, plane: boolean) => () => edit.constrain(index, plane);
   const nudge = (right: number, up: number) => () => {
@@ -43,15 +40,14 @@ export function createCommands(app: App): Record<Command, () => void> {
       return;
     }
     edit.settle();
-    poses.stop();
-    app.ctx.history[way]().catch((error: unknown) => report(app.ctx, T.failed[way], error));
+    engine()[way]();
   };
   const neighbour = (step: 1 | -1) =>
     select(() => {
       const n = controlCount(store.get());
       if (n === 0) return;
-      const last = engine().last();
-      const next = last < 0 ? (step === 1 ? 0 : n - 1) : (last + step + n) % n;
+      const { last } = store.get().selected;
+      const next = last === null ? (step === 1 ? 0 : n - 1) : (last + step + n) % n;
       engine().select(Uint32Array.of(next), "replace");
     });
 

@@ -134,7 +134,6 @@ export function attachPointer(stage: Stage, app: App): void {
           const isOne = drag.vertices.length === 1 && engine().selection().length === 1;
           // A single handle is pulled like a point of the model, unless Alt, proportional editing or mirroring is on.
           if (scene.pull && isOne && !drag.bare && !proportionalOn && !symmetry) {
-            edit.sync();
             if (pull.beginCage(vertex, start.x, start.y)) {
               drag = { kind: "pull", started: true };
               pull.drag(at.x, at.y);
@@ -163,9 +162,7 @@ export function attachPointer(stage: Stage, app: App): void {
 
   /** A click on the background. */
   const selectNothing = () => {
-    if (!store.get().cage) return;
-    engine().select(new Uint32Array(), "replace");
-    edit.sync();
+    if (store.get().cage) engine().select(new Uint32Array(), "replace");
   };
 
   const release = (at: { x: number; y: number }, keep: boolean) => {
@@ -178,10 +175,7 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "handle":
         if (ended.started) edit.end(keep);
-        else if (keep) {
-          engine().select(ended.vertices, ended.mode);
-          edit.sync();
-        }
+        else if (keep) engine().select(ended.vertices, ended.mode);
         break;
       case "pull":
         clearTimeout(longPress);
@@ -203,7 +197,6 @@ export function attachPointer(stage: Stage, app: App): void {
         if (!keep || !moved) break;
         const box = rectangle(start, at);
         engine().selectBox(box.x, box.y, box.x + box.width, box.y + box.height, ended.mode);
-        edit.sync();
         break;
       }
       case "orbit":

@@ -1,9 +1,11 @@
 /** The tour's card, below the view: title, explanation, task and measurements of the current stop. */
 
 import { useLayoutEffect, useRef } from "preact/hooks";
+import { copyLink } from "../actions/exports";
 import type { App } from "../app";
 import type { TourState } from "../state";
 import { Button, IconButton } from "../ui/controls";
+import { T } from "../words";
 import { TOUR } from "../words/tour";
 import { TourFigure } from "./figures";
 import type { Guide } from "./guide";
@@ -33,7 +35,12 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
             onClick={() => go(stop + 1)}
             kind="small primary"
           />
-          <IconButton icon="share" label={TOUR.link} onClick={app.shareStop} kind="small" />
+          <IconButton
+            icon="share"
+            label={TOUR.link}
+            onClick={() => void copyLink(app.ctx, location.href, T.tour.copied)}
+            kind="small"
+          />
           <IconButton
             icon="close"
             label={TOUR.leave}

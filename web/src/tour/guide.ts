@@ -4,7 +4,6 @@ import type { BindActions } from "../actions/bind";
 import type { Context } from "../actions/context";
 import type { Edit } from "../actions/edit";
 import type { Files } from "../actions/files";
-import type { PoseActions } from "../actions/poses";
 import { linkOf } from "../actions/tour";
 import type { View } from "../actions/view";
 import type { WorkActions } from "../actions/works";
@@ -31,8 +30,7 @@ export interface Guide {
 
 export interface GuideNeeds {
   readonly bind: Pick<BindActions, "start">;
-  readonly edit: Pick<Edit, "settle" | "setEditingRest" | "sync">;
-  readonly poses: Pick<PoseActions, "stop">;
+  readonly edit: Pick<Edit, "setEditingRest">;
   readonly view: View;
   readonly files: Pick<Files, "openSample">;
   readonly works: Pick<WorkActions, "flush" | "open" | "restore">;
@@ -50,13 +48,13 @@ interface Before {
   readonly link: string;
 }
 
-export function createGuide(ctx: Context, { bind, edit, poses, view, files, works }: GuideNeeds): Guide {
+export function createGuide(ctx: Context, { bind, edit, view, files, works }: GuideNeeds): Guide {
   const { store } = ctx;
   let before: Before | undefined;
   /** Incremented at each stop. Async work with an older value is dropped. */
   let turn = 0;
-  /** The unmodified sample that is open, and its poses. */
-  let opened: { readonly sample: string; readonly poses: AppState["poses"] } | undefined;
+  /** The unmodified sample that is open. */
+  let opened: string | undefined;
   /** The sample that the tour is opening. */
   let opening: string | null = null;
 
@@ -74,32 +72,30 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
   const isOpened = (sample: string) => {
     const { sampleCage, cage } = store.get();
     const isPlain = cage?.controls.smooth === 0 && cage.controls.inner === 0;
-    return opened?.sample === sample && sampleCage && isPlain;
+    return opened === sample && sampleCage && isPlain;
   };
 
   const open = async (sample: string, mine: number) => {
     edit.setEditingRest(false);
-    poses.stop();
-    edit.settle();
     if (isOpened(sample)) return true;
     opening = sample;
     const isOpen = await files.openSample(sample, store.get().bindOptions);
     if (mine !== turn) return false;
     opening = null;
-    opened = isOpen ? { sample, poses: store.get().poses } : undefined;
+    opened = isOpen ? sample : undefined;
     return isOpen;
   };
 
   /** Undoes what the user did at the previous stop. */
   const rest = (pose: number | undefined) => {
     const { engine } = ctx.session();
-    const all = opened?.poses ?? [];
-    ctx.history.clear();
-    engine.setCagePositions(all[pose ?? -1]?.positions ?? engine.restPositions());
+    engine.revert();
+    while (engine.undo());
+    engine.apply(pose === undefined ? { do: "reset_pose" } : { do: "apply_pose", index: pose });
+    engine.amend();
+    engine.clearHistory();
     engine.select(new Uint32Array(), "replace");
     engine.showHeld([]);
-    store.set({ pins: [], poses: all, shares: all.map(() => 0) });
-    edit.sync();
   };
 
   const optionsOf = (way: Partial<BindOptions>): BindOptions => {
@@ -140,7 +136,6 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     if (mine !== turn) return;
     view.scene({ ...stop.scene, slice: "off" });
     if (stop.vertex !== undefined) engine.select(Uint32Array.of(stop.vertex), "replace");
-    edit.sync();
     if (stop.slice) view.slice(stop.slice, stop.scene?.slice);
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
@@ -154,7 +149,6 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
       engine.zoomAt(width / stop.compare.length / 2, height / 2, 0.8);
     }
     engine.select(new Uint32Array(), "replace");
-    edit.sync();
   };
 
   const guide: Guide = {
@@ -166,9 +160,8 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
         const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
         const work = state.works.find(({ where }) => where === "here");
         before = { settings, scene: state.scene, work, sample: state.sample, link: location.hash };
-        const { sample, poses } = state;
         const isUntouched = state.sampleCage && !state.posed && state.undoLabel === null && !work;
-        opened = sample && isUntouched ? { sample, poses } : undefined;
+        opened = isUntouched ? (state.sample ?? undefined) : undefined;
       }
       await guide.go(Math.min(stop, STOPS.length - 1));
     },
@@ -228,7 +221,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
       turn += 1;
       ctx.queue.cancel("bind");
       // The tour's steps are not work to keep.
-      ctx.history.clear();
+      ctx.session().engine.clearHistory();
       store.set({ tour: null });
       putBack(before);
       before = undefined;

@@ -52,7 +52,7 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
           shortcut={app.key("tour")}
           onClick={() => app.run("tour")}
         />
-        <IconButton icon="share" label={T.bar.share} onClick={app.share} />
+        <IconButton icon="share" label={T.bar.share} onClick={() => void app.exports.share()} />
         <IconButton
           icon={THEME_ICON[theme]}
           label={T.bar.theme[theme]}

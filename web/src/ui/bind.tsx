@@ -163,7 +163,7 @@ function Place({ app }: { app: App }) {
       {!lack && adapter !== "" && backend !== "cpu" && <p class="hint">{card}</p>}
       {lack && (
         <div class="row">
-          <Button label={T.without.title} onClick={app.showWays} kind="small" />
+          <Button label={T.without.title} onClick={() => app.store.set({ waysOpen: true })} kind="small" />
         </div>
       )}
     </>

@@ -46,7 +46,7 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
   const { placing, selected } = app.store.get();
   const { inner, elements } = cage.controls;
   const many = (kind: InnerKind) => elements.filter((element) => kind in element).length;
-  const isSelected = selected.last >= cage.info.vertices;
+  const isSelected = (selected.last ?? 0) >= cage.info.vertices;
   return (
     <Section title={T.cage.inside}>
       <div class="stack">

@@ -9,7 +9,7 @@ export function LegendOfColours({ app }: { app: App }) {
   const { legend, scene, selected } = app.store.get();
   if (!legend) return null;
   const isKinds = legend.map === "kinds";
-  const title = titleOf(scene, selected.last);
+  const title = titleOf(scene, selected.last ?? 0);
   const [low = "", middle = "", high = ""] = isKinds
     ? T.legend.kinds
     : [scientific(legend.low), "", scientific(legend.high)];

@@ -1,7 +1,7 @@
 /** Step 4: position of the selection, move options, and saved poses. */
 
 import type { App } from "../app";
-import type { Pivot, Pose } from "../contract";
+import type { Pivot } from "../contract";
 import { fittingPoses } from "../derived";
 import { coordinate, percent } from "../format";
 import { T } from "../words";
@@ -57,7 +57,7 @@ function PullOptions({ app }: { app: App }) {
 function Selection({ app }: { app: App }) {
   const { cage, selected, editingRest, pivot } = app.store.get();
   const { count, last, center } = selected;
-  const inner = last - (cage?.info.vertices ?? 0);
+  const inner = (last ?? 0) - (cage?.info.vertices ?? 0);
   const one = editingRest ? T.pose.vertexAtRest : T.pose.vertex;
   const move = (index: number, value: number) => {
     const [x = 0, y = 0, z = 0] = (center ?? []).map((old, i) => (i === index ? value : old));
@@ -70,7 +70,7 @@ function Selection({ app }: { app: App }) {
           ? T.pose.none
           : count === 1
             ? inner < 0
-              ? one(last)
+              ? one(last ?? 0)
               : T.pose.inner(inner + 1)
             : T.pose.middle(count)}
       </p>
@@ -151,9 +151,10 @@ function Poses({ app }: { app: App }) {
         </div>
       )}
       <ul class="poses">
-        {fitting.map((pose) => (
-          <PoseRow key={poses.indexOf(pose)} app={app} pose={pose} share={shares[poses.indexOf(pose)] ?? 0} />
-        ))}
+        {poses.map(
+          ({ name, fits }, index) =>
+            fits && <PoseRow key={index} app={app} index={index} name={name} share={shares[index] ?? 0} />,
+        )}
       </ul>
       {others > 0 && <p class="hint">{T.pose.waiting(others)}</p>}
       <div class="row">
@@ -177,8 +178,8 @@ function Poses({ app }: { app: App }) {
   );
 }
 
-function PoseRow({ app, pose, share }: { app: App; pose: Pose; share: number }) {
-  const { name } = pose;
+function PoseRow(props: { app: App; index: number; name: string; share: number }) {
+  const { app, index, name, share } = props;
   const isOn = app.store.get().playingPose === name;
   return (
     <li class="card pose" aria-current={isOn ? "true" : undefined}>
@@ -189,18 +190,18 @@ function PoseRow({ app, pose, share }: { app: App; pose: Pose; share: number }) 
           value={name}
           aria-label={T.pose.nameOf(name)}
           maxLength={60}
-          onChange={(event) => app.poses.rename(pose, event.currentTarget.value)}
+          onChange={(event) => app.poses.rename(index, event.currentTarget.value)}
         />
         <Button
           label={T.pose.show}
-          onClick={() => app.poses.apply(pose)}
+          onClick={() => app.poses.apply(index)}
           kind="small"
           tip={T.pose.showTip(name, app.key("undo"))}
         />
         <IconButton
           icon="trash"
           label={T.pose.delete(name)}
-          onClick={() => app.poses.remove(pose)}
+          onClick={() => app.poses.remove(index)}
           kind="small"
         />
       </div>
@@ -212,8 +213,8 @@ function PoseRow({ app, pose, share }: { app: App; pose: Pose; share: number }) 
         step={0.01}
         format={percent}
         value={share}
-        onInput={(value) => app.poses.blend(pose, value, false)}
-        onCommit={(value) => app.poses.blend(pose, value, true)}
+        onInput={(value) => app.poses.blend(index, value, false)}
+        onCommit={(value) => app.poses.blend(index, value, true)}
       />
     </li>
   );

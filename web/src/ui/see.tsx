@@ -73,7 +73,7 @@ export function See({ app }: { app: App }) {
 
 function Colours({ app }: { app: App }) {
   const { scene, selected, bound } = app.store.get();
-  const needsVertex = scene.colour === "weight" && selected.last < 0;
+  const needsVertex = scene.colour === "weight" && selected.last === null;
   return (
     <div class="stack">
       <Segments<SceneOptions["colour"]>
@@ -134,7 +134,11 @@ function Grid({ app }: { app: App }) {
   const { scene, slice, selected } = app.store.get();
   const { cells, coordinate, selectForCoordinate } = T.see;
   const about =
-    scene.slice !== "value" ? cells : selected.last < 0 ? selectForCoordinate : coordinate(selected.last);
+    scene.slice !== "value"
+      ? cells
+      : selected.last === null
+        ? selectForCoordinate
+        : coordinate(selected.last);
   return (
     <>
       <Segments<SceneOptions["slice"]>

@@ -26,8 +26,8 @@ export function underWay(state: AppState): string | null {
 
 function settled(state: AppState): string {
   const { count, last } = state.selected;
-  const inner = last - (state.cage?.info.vertices ?? 0);
-  if (count === 1) return inner < 0 ? T.status.selected(last) : T.status.innerSelected(inner + 1);
+  const inner = (last ?? 0) - (state.cage?.info.vertices ?? 0);
+  if (count === 1) return inner < 0 ? T.status.selected(last ?? 0) : T.status.innerSelected(inner + 1);
   if (count > 1) return T.status.manySelected(count);
   if (state.editingRest) return T.status.reshaping;
   if (state.bound) return T.status.ready;

@@ -117,7 +117,7 @@ export function Notice({ app }: { app: App }) {
       <Icon name="info" />
       <p>
         {T.without.notice(T.without.short[lack])}
-        <button type="button" class="as-link" onClick={app.showWays}>
+        <button type="button" class="as-link" onClick={() => app.store.set({ waysOpen: true })}>
           {T.without.how}
         </button>
       </p>

@@ -1,6 +1,7 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createBind } from "../../src/actions/bind";
+import type { BindReport } from "../../src/contract";
 import { hasUnappliedOptions, optionsInUse } from "../../src/derived";
 import { cageOf, createFake, MODEL, reportOf, settled } from "../fake";
 
@@ -8,38 +9,42 @@ import { cageOf, createFake, MODEL, reportOf, settled } from "../fake";
 function page() {
   const fake = createFake();
   const bind = createBind(fake.ctx);
-  const { positions, corners } = cageOf(8);
-  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
-  return { ...fake, bind };
+  fake.showModel(MODEL);
+  fake.showCage(cageOf(8));
+  /** Ends a bind. */
+  const finish = (at: number, report: BindReport) => {
+    fake.show({ bound: true });
+    fake.asked[at]?.resolve(report);
+  };
+  return { ...fake, bind, finish };
 }
 
 it("a finished bind provides weights and a report, valid until the cage changes", async () => {
-  const { bind, asked, store, engine } = page();
+  const { bind, finish, store, showCage } = page();
   const bound = bind.start();
   await settled();
   expect(store.get().bindRun).not.toBeNull();
   expect(bind.covers(), "while it runs").toBe(true);
-  asked[0]?.resolve(reportOf());
+  finish(0, reportOf());
   expect(await bound).toBe(true);
   expect(store.get()).toMatchObject({ bound: true, bindRun: null, report: { grid: 64 } });
-  const { positions, corners } = cageOf(8, 1);
-  store.set({ cage: engine.setCage(positions, corners), bound: false });
+  showCage(cageOf(8, 1));
   expect(bind.covers()).toBe(false);
 });
 
 it("a second bind cancels the first silently; the latest report of each solver is kept", async () => {
-  const { bind, asked, store, problems } = page();
+  const { bind, asked, finish, store, problems } = page();
   const first = bind.start();
   await settled();
   const second = bind.start();
   await settled();
   expect(asked.map(({ cancelled }) => cancelled)).toEqual([true, false]);
-  asked[1]?.resolve(reportOf({ solver: "jacobi" }));
+  finish(1, reportOf({ solver: "jacobi" }));
   expect(await Promise.all([first, second])).toEqual([false, true]);
   expect(problems).toEqual([]);
   const third = bind.start();
   await settled();
-  asked[2]?.resolve(reportOf());
+  finish(2, reportOf());
   await third;
   expect([store.get().report, ...store.get().earlier].map((report) => report?.solver)).toEqual([
     "multigrid",
@@ -48,10 +53,10 @@ it("a second bind cancels the first silently; the latest report of each solver i
 });
 
 it("a cancelled bind leaves the previous one, and the settings just chosen are marked as not applied", async () => {
-  const { bind, asked, store, said, problems } = page();
+  const { bind, finish, store, said, problems } = page();
   const first = bind.start();
   await settled();
-  asked[0]?.resolve(reportOf());
+  finish(0, reportOf());
   await first;
   expect(hasUnappliedOptions(store.get())).toBe(false);
   bind.setOptions({ grid: 256 });
@@ -65,7 +70,7 @@ it("a cancelled bind leaves the previous one, and the settings just chosen are m
   expect(problems).toEqual([]);
   const third = bind.start();
   await settled();
-  asked[2]?.resolve(reportOf({ grid: 256 }));
+  finish(2, reportOf({ grid: 256 }));
   await third;
   expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([false, 256]);
 });
@@ -82,10 +87,10 @@ it("an error is shown with its fix", async () => {
 });
 
 it("reports a solver at its iteration limit; does not bind a faulty cage", async () => {
-  const { bind, asked, said, store } = page();
+  const { bind, asked, finish, said, store } = page();
   const bound = bind.start();
   await settled();
-  asked[0]?.resolve(reportOf({ converged: false }));
+  finish(0, reportOf({ converged: false }));
   await bound;
   expect(said).toEqual([expect.stringContaining("iteration limit")]);
   const { cage } = store.get();

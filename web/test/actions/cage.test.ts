@@ -1,61 +1,63 @@
 import { named } from "@cagework/core/session/client";
-import { effect } from "@preact/signals";
 import { expect, it } from "vitest";
 import { createCage } from "../../src/actions/cage";
+import { createEdit } from "../../src/actions/edit";
+import type { Carriable } from "../../src/actions/poses";
 import { cageOf, createFake, settled } from "../fake";
 
 function page() {
   const fake = createFake();
   const grids: number[] = [];
-  let changes = 0;
+  const carried: Carriable[] = [];
   const cage = createCage(fake.ctx, {
-    refine: (grid) => grids.push(grid),
-    carry: () => Promise.resolve(),
-    carryAlong: () => Promise.resolve(true),
+    edit: createEdit(fake.ctx),
+    know: fake.mirror.know,
+    bind: { again: async ({ grid }) => grids.push(grid ?? 0) > 0 },
+    poses: { carry: async (before) => carried.push(before) > 0 },
   });
-  effect(() => {
-    if (fake.store.get().cage) changes += 1;
-  });
-  const heights = () => fake.engine.restPositions()[0];
-  return { ...fake, cage, grids, changes: () => changes, height: heights };
+  const height = () => fake.engine.restPositions()[0];
+  return { ...fake, cage, grids, carried, height, offers: () => fake.offered };
 }
 
-it("a generated cage replaces the previous one; undo restores that and its problems", async () => {
-  const { cage, asked, store, ctx, height } = page();
-  const first = cage.make();
+it("a generated cage replaces the previous one as a step; the first cage adds none", async () => {
+  const { cage, asked, store, did, height } = page();
+  const [first, second] = [cageOf(8, 1), cageOf(12, 2)];
+  for (const made of [first, second]) {
+    const making = cage.make();
+    await settled();
+    asked.at(-1)?.resolve(made);
+    await making;
+    expect([height(), store.get().check]).toEqual([made.positions[0], made.check]);
+  }
+  expect([did, store.get().cage?.info.vertices]).toEqual([["Make a cage"], 12]);
   await settled();
-  asked[0]?.resolve(cageOf(8, 1));
-  await first;
-  expect(ctx.history.undoLabel, "the first cage adds no undo step").toBeUndefined();
-  const checked = store.get().check;
-  const second = cage.make();
-  await settled();
-  asked[1]?.resolve(cageOf(12, 2));
-  await second;
-  expect([height(), store.get().cage?.info.vertices]).toEqual([2, 12]);
-  await ctx.history.undo();
-  expect([height(), store.get().cage?.info.vertices, store.get().check]).toEqual([1, 8, checked]);
-  await ctx.history.redo();
-  expect(height()).toBe(2);
-  expect(asked.length, "nothing is checked again").toBe(2);
+  expect(asked.length, "a worker has checked each already").toBe(2);
 });
 
-it("undoing a new cage restores pose and blend", async () => {
-  const { cage, asked, store, engine, said, ctx } = page();
-  const first = cage.make();
+it("poses wait for the previous cage: offers to carry them over, and to go back", async () => {
+  const { cage, asked, said, show, showCage, carried, teach, offers } = page();
+  showCage(cageOf(8, 1));
+  show({ poses: [{ name: "a", fits: true }], shares: [0.5] });
+  teach({ carriable: () => Float32Array.of(7) });
+  const made = cage.make();
   await settled();
-  asked[0]?.resolve(cageOf(8, 1));
-  await first;
-  engine.setCagePositions(new Float32Array(24).fill(7));
-  store.set({ posed: true, poses: [{ name: "a", positions: new Float32Array(24) }], shares: [0.5] });
-  const second = cage.make();
-  await settled();
-  asked[1]?.resolve(cageOf(12, 2));
-  await second;
-  expect(said).toEqual(["The pose and saved poses belong to the previous cage and are kept with it."]);
-  store.set({ shares: [0] });
-  await ctx.history.undo();
-  expect([engine.cagePositions()[0], engine.restPositions()[0], store.get().shares]).toEqual([7, 1, [0.5]]);
+  asked[0]?.resolve(cageOf(12, 2));
+  await made;
+  expect(said).toEqual([expect.stringMatching(/poses/i)]);
+  offers()[0]?.run();
+  expect(carried).toMatchObject([{ poses: Float32Array.of(7), shares: [0.5] }]);
+});
+
+it("a control that is added takes poses along; smoothing needs not", () => {
+  const { cage, engine, commands, carried, showCage, teach } = page();
+  showCage(cageOf(4));
+  expect(cage.setSmooth(2)).toBe(true);
+  expect([commands, carried]).toEqual([[{ do: "subdivide", steps: 2 }], []]);
+  teach({
+    apply: () => void engine.setCage(new Float32Array(15), new Uint32Array(), undefined, [], undefined),
+  });
+  cage.change("Put a point inside", { do: "add_control", kind: "point", places: [[0, 0, 0]] });
+  expect(carried.map(({ cage: { positions } }) => positions.length)).toEqual([12]);
 });
 
 it("of two requested cages only the later is used", async () => {
@@ -87,6 +89,7 @@ it("a box is checked; results of an older check are dropped", async () => {
   await cage.make();
   expect([store.get().cage?.usable, store.get().check]).toEqual([true, null]);
   await settled();
+  await settled();
   const { check } = cageOf(8);
   asked[0]?.resolve(check);
   await settled();
@@ -112,19 +115,14 @@ it("a generated cage lists the gaps that it closes", async () => {
 });
 
 it("offers one cage per part if a cage joins separate parts", async () => {
-  const fake = createFake();
-  const { asked, said, store } = fake;
-  const cage = createCage(fake.ctx, {
-    refine: () => undefined,
-    carry: () => Promise.resolve(),
-    carryAlong: () => Promise.resolve(true),
-  });
+  const all = page();
+  const { asked, cage, said, store } = all;
   const made = cage.make();
   await settled();
   asked[0]?.resolve({ ...cageOf(8), bridged: 3 });
   await made;
   expect(said).toEqual(["The model has 3 separate parts; this cage joins them."]);
-  fake.offered[0]?.run();
+  all.offers()[0]?.run();
   await settled();
   expect(asked[1]?.input).toMatchObject({ per_component: true });
   expect(store.get().cageOptions.per_component, "the switch shows it").toBe(true);
@@ -153,12 +151,12 @@ it("a problem's button repairs, refines the grid, or generates another cage", as
 });
 
 it("a file that is not a cage keeps the current cage and its source", async () => {
-  const { cage, asked, problems, store, changes } = page();
+  const { cage, asked, problems, store } = page();
   const file = { name: "cage.obj", path: "cage.obj", file: new Blob() };
   const loaded = cage.load([file]);
   await settled();
   asked[0]?.reject(named("Format", "cage.obj: no faces"));
   expect(await loaded).toBe(false);
   expect(problems).toMatchObject([{ title: "This cage cannot be used", fix: "file" }]);
-  expect([store.get().cageSource, changes()]).toEqual(["auto", 0]);
+  expect([store.get().cageSource, store.get().cage]).toEqual(["auto", null]);
 });

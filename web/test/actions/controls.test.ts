@@ -1,102 +1,79 @@
-/** Smooth cages and controls inside: undo, poses, and drawing bones by clicks. */
+/** Smooth cages and controls inside: commands, and bones that clicks draw. */
 
-import { named } from "@cagework/core/session/client";
 import { expect, test } from "vitest";
-import { createCage, type Posed } from "../../src/actions/cage";
+import { createBind } from "../../src/actions/bind";
+import { createCage } from "../../src/actions/cage";
 import { createControls } from "../../src/actions/controls";
 import { createEdit } from "../../src/actions/edit";
-import { cageOf, createFake, type Fake, settled } from "../fake";
+import { cageOf, createFake, PLAIN } from "../fake";
 
-const BEFORE = Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1);
-
-function actions(fake: Fake) {
-  const carried: Posed[] = [];
+/** A page with a cage of four vertices. */
+function page() {
+  const fake = createFake();
+  const edit = createEdit(fake.ctx);
   const cage = createCage(fake.ctx, {
-    refine: () => undefined,
-    carry: () => Promise.resolve(),
-    carryAlong: (before) => Promise.resolve(carried.push(before) > 0),
+    edit,
+    know: fake.mirror.know,
+    bind: createBind(fake.ctx),
+    poses: { carry: async () => true },
   });
-  const edit = createEdit(fake.ctx, cage.adopt);
-  cage.adopt(fake.ctx.session().takeCage({ ...cageOf(4), positions: BEFORE }), cageOf(4).check);
-  fake.store.set({ sampleCage: true, sample: "rat" });
-  return { cage, edit, carried, controls: createControls(fake.ctx, cage, edit) };
+  fake.showCage(cageOf(4));
+  return { ...fake, controls: createControls(fake.ctx, cage.change, edit.setEditingRest) };
 }
 
-test("smoothing keeps the pose, binds again, and can be undone and redone", async () => {
-  const fake = createFake();
-  const { cage, carried } = actions(fake);
-  const pose = BEFORE.map((x) => x + 1);
-  fake.engine.setCagePositions(pose);
-  fake.store.set({ bound: true });
-  const { revision } = fake.engine;
-  expect(cage.setSmooth(2)).toBe(true);
-  expect(fake.engine.revision).toBe(revision + 1);
-  expect(fake.store.get()).toMatchObject({ bound: false, sampleCage: true });
-  expect(fake.store.get().cage?.controls.smooth).toBe(2);
-  expect(fake.engine.cagePositions()).toEqual(pose);
-  expect(carried).toEqual([]);
-  await fake.ctx.history.undo();
-  expect(fake.store.get().cage?.controls.smooth).toBe(0);
-  expect(fake.engine.cagePositions()).toEqual(pose);
-  await fake.ctx.history.redo();
-  expect(fake.store.get().cage?.controls.smooth).toBe(2);
-});
-
-test("a control that does not fit is reported and changes nothing", () => {
-  const fake = createFake();
-  const { controls } = actions(fake);
-  fake.teach({
-    addControl() {
-      throw named("Error", "control 0 is outside the cage: move it in");
+test("a control that does not fit is reported", () => {
+  const { controls, teach, problems } = page();
+  teach({
+    apply() {
+      throw new Error("control 0 is outside the cage: move it in");
     },
   });
-  const { revision } = fake.engine;
   expect(controls.add("point", [[9, 9, 9]])).toBe(false);
-  expect(fake.problems.map(({ message }) => message)).toEqual(["Control 0 is outside the cage: move it in."]);
-  expect([fake.engine.revision, fake.ctx.history.undoLabel]).toEqual([revision, undefined]);
+  expect(problems.map(({ message }) => message)).toEqual(["Control 0 is outside the cage: move it in."]);
 });
 
-test("clicks draw a bone, a double click ends it, and poses are kept", async () => {
-  const fake = createFake();
-  const { controls, carried } = actions(fake);
+test("clicks draw a bone, a double click ends it", () => {
+  const { controls, commands, store } = page();
   controls.arm("line");
-  expect(fake.store.get()).toMatchObject({ placing: "line", editingRest: true });
+  expect(store.get()).toMatchObject({ placing: "line", editingRest: true });
   controls.place(10, 10);
   controls.place(50, 10);
-  expect(fake.store.get().cage?.controls.inner).toBe(0);
+  expect(commands).toEqual([]);
   controls.place(52, 11);
-  expect(fake.store.get().placing).toBe(null);
-  expect(fake.store.get().cage?.controls.elements).toEqual([{ line: [0, 1] }]);
-  expect(fake.engine.restPositions().slice(12)).toEqual(Float32Array.of(10, 10, 0, 50, 10, 0));
-  expect(carried.map(({ positions }) => positions.length)).toEqual([12]);
-  await settled();
-  await fake.ctx.history.undo();
-  expect(fake.engine.restPositions()).toEqual(BEFORE);
+  expect(store.get().placing).toBe(null);
+  const places = [
+    [10, 10, 0],
+    [50, 10, 0],
+  ];
+  expect(commands).toEqual([{ do: "add_control", kind: "line", places }]);
 });
 
 test("one click makes a point but no bone", () => {
-  const fake = createFake();
-  const { controls } = actions(fake);
+  const { controls, commands, store } = page();
   controls.arm("line");
   controls.place(10, 10);
   controls.finish();
-  expect(fake.ctx.history.undoLabel).toBe(undefined);
+  expect(commands).toEqual([]);
   controls.arm("point");
   controls.place(30, 20);
-  expect(fake.store.get().cage?.controls.elements).toEqual([{ point: 0 }]);
-  expect(fake.store.get().placing).toBe(null);
+  expect(commands).toEqual([{ do: "add_control", kind: "point", places: [[30, 20, 0]] }]);
+  expect(store.get().placing).toBe(null);
 });
 
-test("a link contains smoothing and controls inside", () => {
-  const fake = createFake();
-  const { controls } = actions(fake);
+test("a link contains smoothing and controls inside, which are no step where it is opened", () => {
+  const { controls, showCage } = page();
   expect(controls.shared()).toBe(undefined);
-  controls.add("point", [[0.25, 0.5, 0]]);
+  const elements = [{ point: 0 }];
+  const positions = Float32Array.of(...new Float32Array(12), 0.25, 0.5, 0);
+  showCage({ ...cageOf(5), positions, controls: { ...PLAIN, smooth: 1, inner: 1, elements } });
   const shared = controls.shared();
   expect(shared?.inner).toEqual([0.25, 0.5, 0]);
-  const other = createFake();
-  const there = actions(other);
-  if (shared) there.controls.takeShared(shared);
-  expect(other.engine.restPositions()).toEqual(fake.engine.restPositions());
-  expect(other.store.get()).toMatchObject({ sampleCage: true, cage: { controls: { inner: 1 } } });
+  const other = page();
+  if (shared) other.controls.takeShared(shared);
+  expect(other.commands).toEqual([
+    { do: "subdivide", steps: 1 },
+    { do: "set_radius", radius: null },
+    { do: "replace_controls", positions: [[0.25, 0.5, 0]], elements },
+  ]);
+  expect([other.did, other.calls.includes("amend")]).toEqual([[], true]);
 });

@@ -9,62 +9,26 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A page with a cage of two vertices; each gesture moves both by 1. */
+/** A page with a cage of two vertices, one of them selected. */
 function page() {
   const fake = createFake();
-  const changed: number[] = [];
-  const edit = createEdit(fake.ctx, (state) => changed.push(state.info.vertices));
-  const { positions, corners } = cageOf(2);
-  fake.store.set({ cage: fake.engine.setCage(positions, corners) });
-  const height = () => fake.engine.cagePositions()[0] ?? 0;
-  const up = () => fake.engine.setCagePositions(new Float32Array(6).fill(height() + 1));
-  fake.teach({
-    beginTransform: () => true,
-    dragTransform: up,
-    endTransform: (keep: boolean) => keep,
-    nudge: () => {
-      up();
-      return true;
-    },
-  });
-  return { ...fake, edit, changed, height };
+  const edit = createEdit(fake.ctx);
+  fake.showCage(cageOf(2));
+  fake.show({ selected: { count: 1, last: 0, center: [0, 0, 0] } });
+  fake.teach({ beginTransform: () => true, endTransform: (keep: boolean) => keep, nudge: () => true });
+  return { ...fake, edit };
 }
 
-it("reshaping starts at rest; undo restores the pose and its blend", async () => {
-  const { edit, ctx, store, height } = page();
-  store.set({ shares: [1] });
-  expect(edit.begin("grab", 0, 0)).toBe(true);
-  edit.drag(1, 1);
-  edit.end(true);
-  edit.setEditingRest(true);
-  expect([store.get().shares, ctx.history.undoLabel]).toEqual([[0], "Reset the pose"]);
-  await ctx.history.undo();
-  expect([store.get().shares, height(), store.get().editingRest]).toEqual([[1], 1, false]);
-});
-
-it("leaving reshape mode ends face selection", () => {
-  const { edit, store } = page();
-  edit.setEditingRest(true);
-  store.set({ element: "face" });
-  edit.setEditingRest(false);
-  expect(store.get().element).toBe("vertex");
-});
-
-it("a gesture adds one undo step, a cancelled one adds none", async () => {
-  const { edit, ctx, store, height } = page();
+it("a gesture adds one undo step, a cancelled one adds none", () => {
+  const { edit, did, store } = page();
   expect(edit.begin("grab", 0, 0)).toBe(true);
   expect(edit.begin("rotate", 0, 0), "one at a time").toBe(false);
   edit.drag(1, 1);
-  edit.drag(2, 2);
+  expect(store.get().gesture).toBe("Move");
   edit.end(true);
-  expect([height(), ctx.history.undoLabel, store.get().posed]).toEqual([2, "Move 1 vertex", true]);
-  await ctx.history.undo();
-  expect([height(), store.get().posed]).toEqual([0, false]);
-  await ctx.history.redo();
-  expect(height()).toBe(2);
   edit.begin("scale", 0, 0);
   edit.end(false);
-  expect([ctx.history.undoLabel, edit.active(), store.get().gesture]).toEqual(["Move 1 vertex", false, null]);
+  expect([did, edit.active(), store.get().gesture]).toEqual([["Move 1 vertex"], false, null]);
 });
 
 it("typed numbers set the amount of a gesture", () => {
@@ -76,54 +40,47 @@ it("typed numbers set the amount of a gesture", () => {
   expect([amounts.at(-1), store.get().gesture]).toEqual([1.5, "Move  [1.5]"]);
 });
 
-it("consecutive nudges are one undo step", async () => {
-  const { edit, ctx, store, height } = page();
-  store.set({ selected: { count: 2, last: 0, center: null } });
+it("consecutive nudges are one undo step, and come before the next command", () => {
+  const { edit, did } = page();
   edit.nudge(1, 0);
   vi.advanceTimersByTime(300);
   edit.nudge(1, 0);
-  expect(ctx.history.undoLabel).toBeUndefined();
+  vi.advanceTimersByTime(300);
+  expect(did).toEqual([]);
+  vi.advanceTimersByTime(300);
+  edit.nudge(1, 0);
+  edit.restEdit("split_edge");
   vi.advanceTimersByTime(600);
-  expect(ctx.history.undoLabel).toMatch(/^Nudge/);
-  await ctx.history.undo();
-  expect(height()).toBe(0);
+  expect(did).toEqual(["Nudge 1 vertex", "Nudge 1 vertex", "Split edge"]);
 });
 
-it("a reshape replaces the cage; an invalid one is rejected", async () => {
-  const { edit, ctx, teach, changed, problems, engine, height } = page();
+it("a gesture while reshaping moves the rest position; an invalid shape is taken back", () => {
+  const { edit, teach, commands, did, problems, calls } = page();
   edit.setEditingRest(true);
   edit.begin("grab", 0, 0);
-  edit.drag(1, 1);
   edit.end(true);
-  expect([changed, ctx.history.undoLabel, engine.restPositions()[0]]).toEqual([
-    [2],
-    "Move 1 vertex of the cage",
-    1,
-  ]);
-  await ctx.history.undo();
-  expect([changed, engine.restPositions()[0]]).toEqual([[2, 2], 0]);
+  expect([commands, did]).toEqual([[{ do: "move_rest" }], ["Move 1 vertex of the cage"]]);
   teach({
-    commitRest: () => {
+    apply: () => {
       throw new Error("the cage has no inside");
     },
   });
   edit.begin("grab", 0, 0);
-  edit.drag(1, 1);
   edit.end(true);
-  expect([height(), problems[0]?.title, problems[0]?.message]).toEqual([
-    0,
+  expect([calls.includes("revert"), problems[0]?.title, problems[0]?.message]).toEqual([
+    true,
     "The cage cannot have this shape",
     "The cage has no inside.",
   ]);
 });
 
-it("an impossible edit is reported and changes nothing", () => {
-  const { edit, teach, problems, changed } = page();
+it("an impossible edit is reported", () => {
+  const { edit, teach, problems } = page();
   teach({
-    editRest: () => {
+    apply: () => {
       throw new Error("select a face first");
     },
   });
   edit.restEdit("extrude_face");
-  expect([problems[0]?.message, changed]).toEqual(["Select a face first.", []]);
+  expect(problems[0]?.message).toBe("Select a face first.");
 });

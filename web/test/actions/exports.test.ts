@@ -3,9 +3,6 @@ import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
 import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
-/** A project's entry for a model that keeps its shape. */
-const SETTINGS = { first_triangle: 0, options: { shown: true, rigid: ["all"], stays: [] }, painted: [] };
-
 /** Names of downloads. */
 let downloads: string[] = [];
 let copied: string[] = [];
@@ -32,8 +29,8 @@ function page() {
   const fake = createFake();
   const project = createProject(fake.ctx, () => undefined);
   const exports = createExports(fake.ctx, project);
-  const { positions, corners } = cageOf(2);
-  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
+  fake.showModel(MODEL);
+  fake.showCage(cageOf(2));
   return { ...fake, exports, project };
 }
 
@@ -106,49 +103,27 @@ it("a failed export is reported and saves nothing", async () => {
   expect([problems.length, downloads]).toEqual([2, []]);
 });
 
-it("only poses of the current cage are exported", async () => {
-  const { exports, store, teach } = page();
-  const pose = (name: string, n: number) => ({ name, positions: new Float32Array(n) });
-  store.set({ poses: [pose("Fits", 6), pose("Of another cage", 9)] });
-  const names: (readonly string[])[] = [];
-  teach({
-    exportPoses: (_id: number, given: readonly string[]) => {
-      names.push(given);
-      return Uint8Array.of(1);
-    },
-  });
-  await exports.save("poses");
-  expect(names).toEqual([["Fits"]]);
-});
-
 it("a project contains the page's settings", async () => {
   const { project, store, teach } = page();
   const written: string[] = [];
   teach({
-    encodePose: () => Uint8Array.of(0, 1, 2),
-    writeProject: (_names: readonly string[], _poses: readonly Float32Array[], settings: string) => {
+    writeProject: (settings: string) => {
       written.push(settings);
       return Uint8Array.of(1);
     },
   });
-  store.set({ posed: true, sample: "rat", sampleCage: true, symmetry: true });
+  store.set({ symmetry: true });
   project.write();
-  expect(written[0], "one model without choices says nothing").not.toContain("models");
-  teach({ memberSettings: () => [SETTINGS] });
-  project.write();
-  expect(JSON.parse(written[1] ?? "").models).toEqual([SETTINGS]);
   expect(JSON.parse(written[0] ?? "")).toMatchObject({
     bind: { grid: 64 },
     cage: { vertices: 80 },
-    sample: "rat",
     symmetry: true,
-    pose: "AAEC",
   });
   expect(project.fileName()).toBe("cube.cagework.glb");
 });
 
 it("links are for samples in their own cage; otherwise suggests a project", async () => {
-  const { exports, store, said, teach } = page();
+  const { exports, store, said } = page();
   await exports.share();
   expect([copied, said[0]]).toEqual([
     [],
@@ -157,7 +132,10 @@ it("links are for samples in their own cage; otherwise suggests a project", asyn
   store.set({ sample: "rat", sampleCage: true });
   await exports.share();
   expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);
-  teach({ memberSettings: () => [SETTINGS] });
+  const [member = memberOf(0, "cube.obj")] = MODEL.members;
+  store.set({
+    model: { ...MODEL, members: [{ ...member, options: { ...member.options, rigid: ["all"] } }] },
+  });
   await exports.share();
   expect([copied.length, said.length], "what keeps its shape is not in it").toEqual([1, 3]);
 });

@@ -10,39 +10,32 @@ const file = (name: string, content = "v") => ({ name, path: name, file: new Blo
 function page() {
   const fake = createFake();
   const steps: string[] = [];
+  const does = (step: string) => async () => steps.push(step) > 0;
+  const loads = (what: string) => async (list: readonly { name: string }[]) =>
+    steps.push(`${what} ${list[0]?.name}`) > 0;
   const files = createFiles(fake.ctx, {
-    adoptCage: ({ cage, check }) => fake.store.set({ cage, check }),
-    async makeCage() {
-      steps.push("make a cage");
-      const { positions, corners, check } = cageOf(8);
-      fake.store.set({ cage: fake.engine.setCage(positions, corners), check });
-      return true;
+    know: fake.mirror.know,
+    bind: { start: does("bind") },
+    cage: {
+      async make() {
+        fake.showCage(cageOf(8));
+        return steps.push("make a cage") > 0;
+      },
+      load: loads("load"),
     },
-    async loadControls(list) {
-      steps.push(`controls ${list[0]?.name}`);
-      return true;
+    controls: { load: loads("controls") },
+    models: {
+      async join(others) {
+        const added = others.map(({ name }, k) => memberOf(k + 1, name));
+        fake.store.set({ model: modelOf([memberOf(0, "body.glb"), ...added]) });
+        return loads("join")(others);
+      },
     },
-    async loadCage(list) {
-      steps.push(`load ${list[0]?.name}`);
-      return true;
-    },
-    async join(others) {
-      for (const { name } of others) steps.push(`join ${name}`);
-      const added = others.map(({ name }, k) => memberOf(k + 1, name));
-      fake.store.set({ model: modelOf([memberOf(0, "body.glb"), ...added]) });
-    },
-    async bind() {
-      steps.push("bind");
-      return true;
-    },
-    applySettings: ({ bind }) => bind && fake.store.set({ bindOptions: bind }),
-    applyPose: ({ pose }) => steps.push(`pose ${pose}`),
+    project: { write: () => Uint8Array.of(1) },
+    view: { symmetry: (symmetry) => fake.store.set({ symmetry }) },
+    works: { flush: async () => void steps.push("keep"), leave: () => steps.push("leave") },
     settle: () => undefined,
-    writeProject: () => Uint8Array.of(1),
-    async keep() {
-      steps.push("keep");
-    },
-    leave: () => steps.push("leave"),
+    overtaken: () => undefined,
   });
   return { ...fake, files, steps };
 }
@@ -57,7 +50,7 @@ it("a dropped model gets a cage and is bound; the previous work is saved first",
   asked[1]?.resolve(OPENED);
   expect(await opened).toBe(true);
   await settled();
-  expect(steps).toEqual(["keep", "leave", "pose undefined", "make a cage", "bind"]);
+  expect(steps).toEqual(["keep", "leave", "make a cage", "bind"]);
   expect(store.get()).toMatchObject({ model: { name: "cube.obj" }, sample: null, busy: null, step: "pose" });
 });
 
@@ -79,7 +72,7 @@ it("models dropped together are read before the cage is made; unreadable ones ar
   asked[3]?.resolve(OPENED);
   expect(await opened).toBe(true);
   await settled();
-  expect(steps).toEqual(["keep", "leave", "pose undefined", "join shirt.gltf", "load body-cage.obj"]);
+  expect(steps).toEqual(["keep", "leave", "join shirt.gltf", "load body-cage.obj"]);
   expect(problems).toMatchObject([{ title: "bad.glb could not be opened" }]);
   expect(said).toEqual(["2 models share this cage."]);
   expect(store.get().busy).toBeNull();
@@ -146,23 +139,20 @@ it("loads a cage next to the model; reports an empty file and an empty drop", as
   expect(problems.map(({ title }) => title)).toEqual(["This file is empty", "Nothing to open"]);
 });
 
-it("a project restores poses and settings except the memory limit", async () => {
-  const { files, asked, store, steps, ctx } = page();
-  ctx.history.push({ label: "Move", undo: () => undefined, redo: () => undefined });
+it("a project restores settings except the memory limit; what it could not restore is said", async () => {
+  const { files, asked, store, said } = page();
   store.set({ bindOptions: { ...store.get().bindOptions, memory_limit: 7 } });
   const opened = files.openFiles([file("work.cagework.glb")]);
   await settled();
   asked[0]?.resolve({ took: 0 });
   await settled();
-  const poses = [{ name: "Up", positions: new Float32Array(24) }];
-  const settings = JSON.stringify({
-    pose: "AAEC",
-    bind: { ...store.get().bindOptions, grid: 32, memory_limit: 99 },
-  });
-  asked[1]?.resolve({ ...OPENED, project: { poses, settings } });
+  const settings = JSON.stringify({ bind: { ...store.get().bindOptions, grid: 32, memory_limit: 99 } });
+  asked[1]?.resolve({ ...OPENED, settings, notices: ["the pose is damaged"] });
   await opened;
-  expect(store.get()).toMatchObject({ poses, shares: [0], bindOptions: { grid: 32, memory_limit: 7 } });
-  expect([steps.includes("pose AAEC"), ctx.history.undoLabel]).toEqual([true, undefined]);
+  expect([store.get().bindOptions, said]).toMatchObject([
+    { grid: 32, memory_limit: 7 },
+    ["The pose is damaged."],
+  ]);
 });
 
 it("a sample that cannot be built is named", async () => {

@@ -24,16 +24,15 @@ function page() {
       return Promise.resolve(true);
     },
   };
-  const edit = { active: () => state.isActive, sync: () => (count.looks += 1) };
+  const edit = { active: () => state.isActive };
   followCage(fake.ctx, {
     bind,
     edit,
-    view: { refresh: () => undefined },
+    view: { refresh: () => (count.looks += 1) },
     pull: { prepare: () => undefined },
   });
   const change = () => {
-    const { positions, corners } = cageOf(2);
-    fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+    fake.showCage(cageOf(2));
   };
   return { ...fake, count, state, change };
 }

@@ -1,4 +1,5 @@
 import { expect, it } from "vitest";
+import { createEdit } from "../../src/actions/edit";
 import { createPainting } from "../../src/actions/painting";
 import { createFake, memberOf, modelOf } from "../fake";
 
@@ -6,32 +7,30 @@ import { createFake, memberOf, modelOf } from "../fake";
 function page() {
   const fake = createFake();
   let amounts = new Uint8Array();
+  const before = amounts;
   const shown: (number | undefined)[] = [];
   const dabs: number[] = [];
-  const info = () =>
-    modelOf([{ ...memberOf(0, "body.glb"), painted: amounts.some((a) => a > 0) }, memberOf(1, "b")]);
   fake.teach({
     painted: () => amounts.slice(),
-    setPainted(_id: number, next: Uint8Array) {
-      amounts = Uint8Array.from(next);
-      return info();
+    revert() {
+      amounts = before;
     },
     showPainting: (id?: number) => shown.push(id),
     paint(x: number, y: number, radius: number, amount: number) {
       if (y < 100) return false;
-      if (amounts.length === 0) amounts = new Uint8Array(8);
+      amounts = amounts.length === 0 ? new Uint8Array(8) : amounts.slice();
       amounts[Math.floor(x / 10)] = amount;
       dabs.push(radius);
       return true;
     },
   });
-  fake.store.set({ model: info() });
-  const painting = createPainting(fake.ctx, () => fake.calls.push("settle"));
+  fake.showModel(modelOf([memberOf(0, "body.glb"), memberOf(1, "b")]));
+  const painting = createPainting(fake.ctx, createEdit(fake.ctx), () => fake.calls.push("settle"));
   return { ...fake, painting, shown, dabs, amounts: () => [...amounts] };
 }
 
-it("a stroke is one step and has no gaps at high speed", async () => {
-  const { painting, store, amounts, ctx, shown, calls } = page();
+it("a stroke is one step and has no gaps at high speed", () => {
+  const { painting, store, amounts, did, shown, calls } = page();
   painting.on(0);
   expect([store.get().painting, shown, calls]).toEqual([
     { id: 0, radius: 0.05, erase: false },
@@ -43,15 +42,11 @@ it("a stroke is one step and has no gaps at high speed", async () => {
   painting.drag(45, 150);
   painting.end(true);
   expect([painting.active(), amounts()]).toEqual([false, [255, 255, 255, 255, 255, 0, 0, 0]]);
-  expect(store.get().model?.members[0]?.painted).toBe(true);
-  await ctx.history.undo();
-  expect([amounts(), store.get().model?.members[0]?.painted]).toEqual([[], false]);
-  await ctx.history.redo();
-  expect(amounts()).toEqual([255, 255, 255, 255, 255, 0, 0, 0]);
+  expect(did).toEqual(["Paint fixed areas"]);
 });
 
 it("the brush erases too and remembers its size", async () => {
-  const { painting, store, amounts, dabs, ctx } = page();
+  const { painting, store, amounts, dabs, did } = page();
   painting.on(0);
   painting.brush({ radius: 0.2 });
   painting.begin(5, 150);
@@ -61,31 +56,32 @@ it("the brush erases too and remembers its size", async () => {
   painting.begin(15, 150);
   painting.end(true);
   expect([amounts().slice(0, 3), new Set(dabs)]).toEqual([[255, 0, 255], new Set([0.2])]);
-  expect(ctx.history.undoLabel).toBe("Erase fixed areas");
+  expect(did.at(-1)).toBe("Erase fixed areas");
   painting.on(null);
   expect(store.get().painting).toBeNull();
   painting.on(1);
   expect(store.get().painting).toEqual({ id: 1, radius: 0.2, erase: false });
 });
 
-it("a cancelled stroke changes nothing; clearing is an undo step", async () => {
-  const { painting, amounts, ctx } = page();
+it("a cancelled stroke changes nothing; clearing is an undo step", () => {
+  const { painting, amounts, commands, did } = page();
   painting.on(0);
   painting.begin(5, 150);
   painting.end(false);
-  expect([amounts(), ctx.history.undoLabel]).toEqual([[], undefined]);
+  expect([amounts(), did]).toEqual([[], []]);
   painting.clear(0);
-  expect(ctx.history.undoLabel, "there was nothing to clear").toBeUndefined();
+  expect(did, "there was nothing to clear").toEqual([]);
   painting.begin(5, 150);
   painting.end(true);
   painting.clear(0);
-  expect([amounts(), ctx.history.undoLabel]).toEqual([[], "Clear painted areas"]);
-  await ctx.history.undo();
-  expect(amounts()[0]).toBe(255);
+  expect([commands, did.at(-1)]).toEqual([
+    [{ do: "set_painted", id: 0, amounts: [] }],
+    "Clear painted areas",
+  ]);
 });
 
 it("reports models that cannot be painted yet; a busy GPU leaves no gap", () => {
-  const { painting, problems, amounts, teach, engine, store, ctx } = page();
+  const { painting, problems, amounts, teach, engine, show } = page();
   painting.on(0);
   const real = engine.paint;
   const busy = () => {
@@ -93,10 +89,9 @@ it("reports models that cannot be painted yet; a busy GPU leaves no gap", () => 
   };
   teach({ paint: busy });
   expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
-  store.set({ bound: true });
+  show({ bound: true });
   expect([painting.begin(5, 150), problems.length], "busy").toEqual([true, 1]);
   painting.end(true);
-  expect(ctx.history.undoLabel, "nothing was painted").toBeUndefined();
   painting.begin(5, 150);
   painting.drag(25, 150);
   teach({ paint: real });

@@ -23,8 +23,7 @@ function page(canCompare = true) {
     setElement: (element) => elements.push(element),
   });
   const view = createView(fake.ctx, async () => canCompare, dark);
-  const { positions, corners } = cageOf(8);
-  fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+  fake.showCage(cageOf(8));
   return { ...fake, view, scenes, zooms, elements };
 }
 

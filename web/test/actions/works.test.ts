@@ -55,8 +55,8 @@ function page() {
     },
     startFresh: () => opened.push("fresh"),
   });
-  const { positions, corners } = cageOf(8);
-  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
+  fake.showModel(MODEL);
+  fake.showCage(cageOf(8));
   return { ...fake, works, opened };
 }
 

@@ -101,16 +101,16 @@ impl Engine {
         });
     }
 
-    /// Takes back the last step; false if there is none.
+    /// Takes back the last step; false if there is none, or while models are added.
     #[must_use]
     pub fn undo(&self) -> bool {
-        self.change(|state| state.editor.undo())
+        self.change(|state| !state.is_adding && state.editor.undo())
     }
 
-    /// Repeats the step that was taken back last; false if there is none.
+    /// Repeats the step that was taken back last; false if there is none, or while models are added.
     #[must_use]
     pub fn redo(&self) -> bool {
-        self.change(|state| state.editor.redo())
+        self.change(|state| !state.is_adding && state.editor.redo())
     }
 
     /// Drops all steps.

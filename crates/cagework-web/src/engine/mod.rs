@@ -195,6 +195,13 @@ impl Engine {
         Ok(())
     }
 
+    /// Whether there are weights for models and cage as they are, in use or kept from before an undo.
+    #[wasm_bindgen(getter, js_name = hasWeights)]
+    #[must_use]
+    pub fn has_weights(&self) -> bool {
+        self.read(|state| state.bound.is_some() || state.cache.contains(state.editor.key()))
+    }
+
     /// The report of the weights in use; undefined without weights.
     #[wasm_bindgen(js_name = boundReport, unchecked_return_type = "BindReport | undefined")]
     #[must_use]

@@ -44,6 +44,7 @@ impl Engine {
         self.change(|state| {
             let ids = state.editor.add_models(added);
             state.draws.extend(ids.zip(draws));
+            state.is_adding = true;
         });
         let is_too_much = self.read(|state| {
             let size = (state.size * state.scale).as_uvec2().to_array();
@@ -54,18 +55,21 @@ impl Engine {
             Ok(()) => upload(&self.state, gpu).await,
             Err(error) => Err(error.into()),
         };
-        self.change(|state| match (outcome, label) {
-            (Err(fault), _) => {
-                state.editor.revert();
-                Err(fault)
-            }
-            (Ok(()), Some(label)) => {
-                state.editor.commit(label);
-                Ok(())
-            }
-            (Ok(()), None) => {
-                state.editor.amend();
-                Ok(())
+        self.change(|state| {
+            state.is_adding = false;
+            match (outcome, label) {
+                (Err(fault), _) => {
+                    state.editor.revert();
+                    Err(fault)
+                }
+                (Ok(()), Some(label)) => {
+                    state.editor.commit(label);
+                    Ok(())
+                }
+                (Ok(()), None) => {
+                    state.editor.amend();
+                    Ok(())
+                }
             }
         })?;
         Ok(())

@@ -421,11 +421,11 @@ export type Bounds = { min: [number, number, number], max: [number, number, numb
  */
 export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
 /**
- * A kind of control inside.
+ * A kind of interior control.
  */
 export type InnerKind = "point" | "line" | "face";
 /**
- * What is said of a cage besides its positions and faces.
+ * Subdivision and interior controls of a cage.
  */
 export type CageControls = {
 /**
@@ -433,11 +433,11 @@ export type CageControls = {
  */
 smooth: number,
 /**
- * So many of the positions, the last ones, are controls inside.
+ * Number of interior controls: the last of the cage's positions.
  */
 inner: number,
 /**
- * What they are corners of; counted from the first of them.
+ * Points, lines and faces between interior controls, which are counted from the first of them.
  */
 elements: Array<InnerElement>,
 /**
@@ -498,15 +498,19 @@ export type ModelFormat = "obj" | "gltf" | "ply" | "stl" | "off";
  */
 export type UpAxis = "y" | "z";
 /**
- * What of a model is shown, and what the cage does not bend.
+ * Visibility of a model, and which of its parts the cage does not bend.
  */
-export type PartOptions = { shown: boolean,
+export type PartOptions = {
 /**
- * Names of what keeps its shape; "all" for the whole model.
+ * Whether it is drawn and can be picked.
+ */
+shown: boolean,
+/**
+ * Names of parts that keep their shape; "all" for the whole model.
  */
 rigid: Array<string>,
 /**
- * Names of what stays as it is; "all" for the whole model.
+ * Names of parts that stay in place; "all" for the whole model.
  */
 stays: Array<string>, };
 /**
@@ -526,15 +530,15 @@ parts: Array<string>, options: PartOptions,
  */
 painted: boolean, };
 /**
- * What a project says of one of its models besides its file.
+ * What a project stores of a model besides its file.
  */
 export type MemberSettings = {
 /**
- * What its first triangle is counted as.
+ * Number of its first triangle in points of the surface.
  */
 first_triangle: number, options: PartOptions,
 /**
- * How much of each vertex is painted to stay, 0 to 255, and of how many vertices in turn; empty for nothing.
+ * Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
  */
 painted: Array<[number, number]>, };
 /**
@@ -558,33 +562,357 @@ rigged: boolean, bounds: Bounds, notices: Array<string>,
  */
 members: Array<MemberInfo>, };
 /**
- * The page's part of a project, as far as it can be used.
+ * The document's part of a project's settings.
  */
-export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, sample?: string, symmetry?: boolean,
+export type DocumentSettings = {
 /**
- * Read with the cage, whose last positions they are.
+ * Identifier of the built-in sample whose own cage it is.
  */
-controls?: CageControls,
+sample?: string | null,
 /**
- * `Engine.encodePose`, base 64.
+ * Subdivision and interior controls of the cage, whose last positions the controls are.
  */
-pose?: string,
+controls?: CageControls | null,
 /**
- * Points that pulls leave where they are.
+ * The pose in the axes of the model's file: [`cagework_io::encode_pose`] in base 64 for URLs. None at rest.
+ */
+pose?: string | null,
+/**
+ * Points of the model that pulls leave in place.
  */
 pins?: Array<SurfacePoint>,
 /**
- * The same for each pose of the project, in turn.
+ * The same of each saved pose.
  */
 pose_pins?: Array<Array<SurfacePoint>>,
 /**
- * Share of each pose of the project in the blend that `pose` is made of, 0 to 1, in turn.
+ * Share of each saved pose in the pose, 0 to 1.
  */
 pose_shares?: Array<number>,
 /**
- * What of its models the cage does not bend: read with the models.
+ * Visibility, parts and paint of each model.
  */
-models?: Array<MemberSettings>,
+models?: Array<MemberSettings>, };
+/**
+ * A change of the document.
+ */
+export type Command = { "do": "set_pose",
+/**
+ * Where its vertices and interior controls go, object units.
+ */
+positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
+/**
+ * The name.
+ */
+name: string, } | { "do": "apply_pose",
+/**
+ * Which one, from 0.
+ */
+index: number, } | { "do": "rename_pose",
+/**
+ * Which one, from 0.
+ */
+index: number,
+/**
+ * The name.
+ */
+name: string, } | { "do": "remove_pose",
+/**
+ * Which one, from 0.
+ */
+index: number, } | { "do": "blend",
+/**
+ * Which one, from 0.
+ */
+index: number,
+/**
+ * Its share, 0 to 1.
+ */
+share: number, } | { "do": "carry_poses",
+/**
+ * Controls of the other cage.
+ */
+from: number,
+/**
+ * Positions for the controls of this cage.
+ */
+positions: readonly (readonly [number, number, number])[],
+/**
+ * Shares of the saved poses in the pose.
+ */
+shares: Array<number>, } | { "do": "set_pins",
+/**
+ * The points.
+ */
+pins: Array<SurfacePoint>, } | { "do": "replace_cage",
+/**
+ * Positions of its vertices, then of interior controls, and its faces.
+ */
+mesh: unknown,
+/**
+ * Subdivision and interior controls; none to keep those that fit.
+ */
+controls: CageControls | null,
+/**
+ * What the generator reported.
+ */
+notices: Array<string>, } | { "do": "move_rest" } | { "do": "edit_rest",
+/**
+ * The edit.
+ */
+edit: RestEdit, } | { "do": "subdivide",
+/**
+ * Steps, 0 to 3.
+ */
+steps: number, } | { "do": "set_radius",
+/**
+ * Object units; none for a share of the cage.
+ */
+radius: number | null, } | { "do": "add_control",
+/**
+ * A point, a line through places, or a sheet between them.
+ */
+kind: InnerKind,
+/**
+ * Where, object units.
+ */
+places: readonly (readonly [number, number, number])[], } | { "do": "add_sheet",
+/**
+ * Its centre.
+ */
+center: readonly [number, number, number],
+/**
+ * Its half axes at the largest size.
+ */
+axes: readonly (readonly [number, number, number])[], } | { "do": "replace_controls",
+/**
+ * Their positions.
+ */
+positions: readonly (readonly [number, number, number])[],
+/**
+ * Points, lines and faces between them.
+ */
+elements: Array<InnerElement>, } | { "do": "remove_model",
+/**
+ * Its number.
+ */
+id: number, } | { "do": "set_parts",
+/**
+ * Its number.
+ */
+id: number,
+/**
+ * Visibility and parts.
+ */
+options: PartOptions, } | { "do": "set_painted",
+/**
+ * Its number.
+ */
+id: number,
+/**
+ * Amounts, 0 to 255. `[n_vertices]`, or empty for an unpainted model
+ */
+amounts: Array<number>, };
+/**
+ * A saved pose.
+ */
+export type PoseView = {
+/**
+ * Its name.
+ */
+name: string,
+/**
+ * Whether it belongs to the cage; poses of a cage that was replaced do not.
+ */
+fits: boolean, };
+/**
+ * The selection.
+ */
+export type SelectionView = {
+/**
+ * Selected vertices.
+ */
+count: number,
+/**
+ * The vertex that was selected last.
+ */
+last: number | null,
+/**
+ * Centre of the selection, object units; none without a selection and during a gesture.
+ */
+center: [number, number, number] | null, };
+/**
+ * What panels show of a document. Meshes are read separately, when their keys change.
+ */
+export type DocumentView = {
+/**
+ * Changes with the models, their options and painted amounts.
+ */
+models: number,
+/**
+ * Changes with the models' joined mesh.
+ */
+mesh: number,
+/**
+ * Changes with the cage at rest.
+ */
+cage: number,
+/**
+ * Saved poses.
+ */
+poses: Array<PoseView>,
+/**
+ * Share of each saved pose in the pose.
+ */
+shares: Array<number>,
+/**
+ * Points of the model that pulls leave in place.
+ */
+pins: Array<SurfacePoint>,
+/**
+ * Whether the cage is posed.
+ */
+posed: boolean,
+/**
+ * Whether the cage at rest is reshaped.
+ */
+editingRest: boolean,
+/**
+ * Identifier of the built-in sample that is open.
+ */
+sample: string | null,
+/**
+ * Whether the cage is that sample's own.
+ */
+sampleCage: boolean,
+/**
+ * The selection.
+ */
+selected: SelectionView,
+/**
+ * Changes with each step, undo and redo.
+ */
+steps: number,
+/**
+ * Label of the step that undo takes back.
+ */
+undo: string | null,
+/**
+ * Label of the step that redo repeats.
+ */
+redo: string | null,
+/**
+ * Steps that were dropped because the history exceeded its limit.
+ */
+forgotten: number, };
+/**
+ * What panels show.
+ */
+export type View = {
+/**
+ * Whether the models follow the cage: there are weights for both as they are.
+ */
+bound: boolean,
+/**
+ * Changes with the models, their options and painted amounts.
+ */
+models: number,
+/**
+ * Changes with the models' joined mesh.
+ */
+mesh: number,
+/**
+ * Changes with the cage at rest.
+ */
+cage: number,
+/**
+ * Saved poses.
+ */
+poses: Array<PoseView>,
+/**
+ * Share of each saved pose in the pose.
+ */
+shares: Array<number>,
+/**
+ * Points of the model that pulls leave in place.
+ */
+pins: Array<SurfacePoint>,
+/**
+ * Whether the cage is posed.
+ */
+posed: boolean,
+/**
+ * Whether the cage at rest is reshaped.
+ */
+editingRest: boolean,
+/**
+ * Identifier of the built-in sample that is open.
+ */
+sample: string | null,
+/**
+ * Whether the cage is that sample's own.
+ */
+sampleCage: boolean,
+/**
+ * The selection.
+ */
+selected: SelectionView,
+/**
+ * Changes with each step, undo and redo.
+ */
+steps: number,
+/**
+ * Label of the step that undo takes back.
+ */
+undo: string | null,
+/**
+ * Label of the step that redo repeats.
+ */
+redo: string | null,
+/**
+ * Steps that were dropped because the history exceeded its limit.
+ */
+forgotten: number, };
+/**
+ * A cage.
+ */
+export type CageContents = {
+/**
+ * `[n_controls, 3]`
+ */
+positions: Float32Array,
+/**
+ * For each face the number of its corners, then them.
+ */
+corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
+/**
+ * A pose.
+ */
+export type PoseContents = { name: string,
+/**
+ * `[n_controls, 3]`
+ */
+positions: Float32Array, };
+/**
+ * What is opened besides models.
+ */
+export type OpenContents = {
+/**
+ * Identifier of the built-in sample that it is.
+ */
+sample: string | null,
+/**
+ * Settings that a project was saved with.
+ */
+settings: string | null, cage: CageContents | null,
+/**
+ * Poses of a sample; those of a project are in its `Loaded`.
+ */
+poses: Array<PoseContents>, };
+/**
+ * The page's part of a project, as far as it can be used.
+ */
+export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
 /**
  * What was wrong, in whole sentences.
  */
@@ -643,11 +971,15 @@ yaw: number, pitch: number,
  */
 distance: number, parallel: boolean, };
 /**
- * A point of the model's surface.
+ * A point of the models' surface.
  */
-export type SurfacePoint = { triangle: number,
+export type SurfacePoint = {
 /**
- * Barycentric coordinates in it.
+ * Number of its triangle: see [`Models`].
+ */
+triangle: number,
+/**
+ * Barycentric coordinates in the triangle.
  */
 bary: [number, number, number], };
 /**
@@ -748,7 +1080,7 @@ export type Gesture = "grab" | "rotate" | "scale";
  */
 export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | "all";
 /**
- * Edits of the rest cage, on the selection.
+ * An edit of the cage where it is selected.
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};

@@ -40,7 +40,7 @@ export function openView(canvases: Canvases, lost: (error: unknown) => void): Pr
     await artifact.pkg.default({ module_or_path: module });
     const client = createClient(module, artifact.openWorker);
     const frames = createFrames();
-    const engine = await artifact.pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
+    const engine = await artifact.pkg.Engine.create(canvas, frames.ask, () => {}).catch((error: unknown) => {
       client.close();
       throw error;
     });
@@ -86,9 +86,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   async function openModel({ name, file, vertices, grid }: Wanted, hear: Hear): Promise<Ready> {
     hear("Opening", 0);
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
-    const [first, ...further] = await load(pkg, read);
-    let model = await engine.open(first);
-    if (further.length > 0) model = await engine.add(further);
+    await engine.open(await load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
     engine.frameAll();
     let cage = read.cage;
     if (!cage) {
@@ -97,7 +95,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       const input = { positions, triangles, model: engine.modelPositions(), options, smooth: 0 };
       cage = await run(client.run("cage", input, ({ fraction }) => hear("Making a cage", fraction)));
     }
-    engine.setCage(cage.positions, cage.corners, cage.controls);
+    engine.setCage(cage.positions, cage.corners, cage.controls, [], undefined);
     engine.frameAll();
     const report = await run(
       startBind({
@@ -113,7 +111,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
         },
       }),
     );
-    return { model, report };
+    return { model: engine.modelInfo(), report };
   }
 
   return {

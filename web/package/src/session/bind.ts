@@ -60,9 +60,9 @@ export function startBind(start: BindStart): Job<BindReport> {
     const { indptr, indices, data, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     engine.requireCurrent(revision);
-    await engine.adopt(indptr, indices, data, offsets);
-    if (isCancelled) throw named("Cancelled", "cancelled");
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
+    await engine.adopt(indptr, indices, data, offsets, whole, pass === "fine");
+    if (isCancelled) throw named("Cancelled", "cancelled");
     listener({ kind: "adopted", pass, report: whole });
     return whole;
   }

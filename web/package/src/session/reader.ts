@@ -88,7 +88,7 @@ async function pause(): Promise<void> {
   paused = performance.now();
 }
 
-/** Reads, on the page, a file that a worker has read: the first model for `Engine.open`, further ones for `Engine.add`. */
+/** Reads a file again that a worker has read: its model, then further models of a project. */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.packed) loaded.setPacked(read.packed);

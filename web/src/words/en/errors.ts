@@ -36,8 +36,6 @@ export const failed = {
   turn: "The model could not be turned",
   link: "This link is damaged",
   tour: "The tour could not start",
-  undo: "Undo failed",
-  redo: "Redo failed",
 };
 
 export const lost = {

@@ -65,7 +65,6 @@ export const opening = {
       ? `Opens ${what} with ${cage} as ${several ? "their" : "its"} cage.`
       : `Opens ${what} and makes a cage for ${several ? "all of them" : "it"}.`;
   },
-  damagedPose: "The pose in this project is damaged; it opens at rest.",
   dropTo: {
     page: "Drop to open",
     cage: "Drop to use it as the cage",

@@ -68,6 +68,7 @@ export const pull = {
 
 /** Undo steps. */
 export const did = {
+  forgotten: "The oldest steps can no longer be undone: the history is limited to 256 MB.",
   carry: "Carry poses over",
   pull: "Pull",
   pin: "Pin",

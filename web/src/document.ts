@@ -1,0 +1,114 @@
+/** The page's copy of the document: the keys of the state that Rust decides. */
+
+import { attempt, type Context } from "./actions/context";
+import type { Check, View } from "./contract";
+import { SCENE_DEFAULTS } from "./defaults";
+import { follow } from "./queue";
+import type { AppState } from "./state";
+import { T } from "./words";
+
+/** Checks kept for cages that undo brings back. */
+const KEPT_CHECKS = 32;
+
+export interface DocumentMirror {
+  /** Takes what the engine reports after a change. */
+  take(view: View): void;
+  /** Takes the check that came with the cage, in place of a new one. */
+  know(check: Check): void;
+  /** Resolves when the cage was checked as it is now. */
+  checked(): Promise<unknown>;
+}
+
+export function followDocument(ctx: Context): DocumentMirror {
+  const { store } = ctx;
+  const engine = () => ctx.session().engine;
+  /** By the keys of mesh and cage. */
+  const checks = new Map<string, Check>();
+  let shown: View | undefined;
+  let checking: Promise<unknown> = Promise.resolve();
+
+  const know = (check: Check) => {
+    ctx.queue.cancel("check");
+    checks.set(keyOf(shown), check);
+    const [oldest] = checks.keys();
+    if (checks.size > KEPT_CHECKS && oldest !== undefined) checks.delete(oldest);
+    engine().showFaults(check.vertices, check.edges, check.faces, check.points, check.outside);
+    store.set({ check });
+  };
+
+  const startCheck = () =>
+    attempt(ctx, T.failed.check, () =>
+      ctx.queue.replace("check", async (signal) => {
+        // A cage that is opened brings its check, which cancels this one.
+        await new Promise((resolve) => setTimeout(resolve));
+        if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
+      }),
+    );
+
+  const modelPatch = (): Partial<AppState> => {
+    const { model, cageClip } = store.get();
+    const info = engine().modelInfo();
+    // A model that is open alone may be named after its sample or its file.
+    const isAlone = info.members.length === 1 && model?.members.length === 1;
+    const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
+    return {
+      model: { ...info, name: isAlone ? model.name : info.name, notices },
+      cageClip: info.clips.some(({ name }) => name === cageClip) ? cageClip : null,
+    };
+  };
+
+  /** Of another cage, or of the same cage around other models. */
+  const cagePatch = (view: View): Partial<AppState> => ({
+    cage: engine().cageState() ?? null,
+    check: checks.get(keyOf(view)) ?? null,
+    pullReady: false,
+    report: null,
+    earlier: [],
+    scene: { ...store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
+  });
+
+  return {
+    know,
+    checked: () => checking,
+    take(view) {
+      const before = shown;
+      const old = store.get();
+      const isOther = keyOf(view) !== keyOf(before);
+      // Weights in progress are for the previous models or cage.
+      if (isOther) ctx.queue.cancel("bind");
+      shown = view;
+      const isNewlyBound = view.bound && (isOther || !before?.bound);
+      const hasOtherColours =
+        isOther || view.bound !== before?.bound || view.selected.last !== before.selected.last;
+      const { models, mesh: _, cage: __, undo, redo, forgotten, ...same } = view;
+      store.set({
+        ...same,
+        poses: unchanged(old.poses, view.poses),
+        shares: unchanged(old.shares, view.shares),
+        pins: unchanged(old.pins, view.pins),
+        // Edges and faces are selected for reshaping only.
+        ...(old.editingRest && !view.editingRest ? { element: "vertex" } : {}),
+        selected: unchanged(old.selected, view.selected),
+        undoLabel: undo,
+        redoLabel: redo,
+        ...(models === (before?.models ?? 0) ? {} : modelPatch()),
+        ...(isOther ? cagePatch(view) : {}),
+        ...(isNewlyBound ? { report: engine().boundReport() ?? null } : {}),
+        ...(hasOtherColours ? { legend: engine().legend() ?? null } : {}),
+      });
+      if (forgotten > 0 && !before?.forgotten) ctx.tell.say(T.did.forgotten);
+      if (!isOther) return;
+      const { cage, check } = store.get();
+      if (check) know(check);
+      else if (cage) checking = startCheck();
+      else ctx.queue.cancel("check");
+    },
+  };
+}
+
+const keyOf = (view: View | undefined) => `${view?.mesh ?? 0} ${view?.cage ?? 0}`;
+
+/** The old value if the new one is equal, so that panels that show it are not drawn again. */
+function unchanged<T>(old: T, value: T): T {
+  return JSON.stringify(old) === JSON.stringify(value) ? old : value;
+}

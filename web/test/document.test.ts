@@ -1,0 +1,87 @@
+import { expect, it } from "vitest";
+import { cageOf, createFake, MODEL, memberOf, modelOf, reportOf, settled } from "./fake";
+
+const [FIRST, SECOND] = [cageOf(8, 1), cageOf(12, 2)];
+
+it("a cage without a check is checked; undo of another cage shows the known check again", async () => {
+  const { asked, engine, show, store, teach } = createFake();
+  const marked: unknown[] = [];
+  teach({ showFaults: (vertices) => marked.push(vertices) });
+  engine.setCage(FIRST.positions, FIRST.corners, undefined, [], undefined);
+  expect([store.get().cage?.info.vertices, store.get().check]).toEqual([8, null]);
+  await settled();
+  await settled();
+  asked[0]?.resolve(FIRST.check);
+  await settled();
+  engine.setCage(SECOND.positions, SECOND.corners, undefined, [], "Make a cage");
+  expect([store.get().check, store.get().undoLabel]).toEqual([null, "Make a cage"]);
+  show({ cage: 1 });
+  await settled();
+  await settled();
+  expect([store.get().check, asked.length]).toEqual([FIRST.check, 1]);
+  expect(marked).toEqual([FIRST.check?.vertices, FIRST.check?.vertices]);
+});
+
+it("a check that came with a cage replaces a new one", async () => {
+  const { asked, showCage, store } = createFake();
+  showCage(FIRST);
+  await settled();
+  expect([store.get().check, asked.length]).toEqual([FIRST.check, 0]);
+});
+
+it("another cage has no weights: report, comparison and slice end; cached weights bring a report", () => {
+  const { show, showCage, store, teach } = createFake();
+  const report = reportOf();
+  teach({ boundReport: () => report, cageState: () => undefined });
+  store.set({
+    scene: { ...store.get().scene, compare: ["harmonic", "green"], slice: "value" },
+    earlier: [report],
+  });
+  show({ cage: 1, bound: true });
+  expect(store.get()).toMatchObject({ bound: true, report, earlier: [], pullReady: false });
+  expect(store.get().scene).toMatchObject({ compare: ["harmonic"], slice: "off" });
+  showCage(FIRST);
+  expect(store.get()).toMatchObject({ bound: false, report: null });
+  show({ bound: true });
+  expect(store.get().report).toBe(report);
+});
+
+it("weights in progress for the previous cage are cancelled", async () => {
+  const { ctx, showCage } = createFake();
+  const bind = ctx.queue.add(
+    "bind",
+    (signal) =>
+      new Promise<boolean>((done) => {
+        signal.addEventListener("abort", () => done(true));
+      }),
+  );
+  await settled();
+  showCage(FIRST);
+  expect(await bind).toBe(true);
+});
+
+it("a model that is open alone keeps the name that it is shown under; notices are kept once", () => {
+  const { showModel, store } = createFake();
+  showModel({ ...MODEL, notices: ["a"] });
+  store.set({ model: { ...MODEL, name: "Rat", notices: ["a", "b"] }, cageClip: "Walk" });
+  showModel({ ...MODEL, notices: ["a", "c"] });
+  expect(store.get()).toMatchObject({ model: { name: "Rat", notices: ["a", "b", "c"] }, cageClip: null });
+  showModel(modelOf([memberOf(0, "cube.obj"), memberOf(1, "hat.glb")]));
+  expect(store.get().model?.name).toBe("cube.obj and 1 more");
+});
+
+it("equal values keep their identity, so that panels are not drawn again", () => {
+  const { show, store } = createFake();
+  show({ poses: [{ name: "a", fits: true }], shares: [1] });
+  const { poses, shares } = store.get();
+  show({ poses: [{ name: "a", fits: true }], shares: [0.5] });
+  expect([store.get().poses === poses, store.get().shares === shares]).toEqual([true, false]);
+});
+
+it("leaving reshape mode ends face selection", () => {
+  const { show, store } = createFake();
+  show({ editingRest: true });
+  store.set({ element: "face" });
+  show({ editingRest: false });
+  expect(store.get().element).toBe("vertex");
+});
