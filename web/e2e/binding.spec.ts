@@ -112,7 +112,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
       const edited = before.positions.map((x, k) => (k === 1 ? x + 0.01 : x));
       const events: string[] = [];
       const binds = [session.bind(options, ({ kind }) => events.push(kind)), session.bindByFormula("green")];
-      engine.setCage(edited, before.corners);
+      engine.setCage(edited, before.corners, undefined, [], "Edit");
       const names = binds.map(({ done }) =>
         done.then(
           () => "landed",

@@ -106,13 +106,12 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
       width = 0,
       height = 0,
     } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
-    const before = engine?.painted(id) ?? new Uint8Array();
     for (let y = 0.1 * height; y < height; y += 6) {
       for (let x = 0.3 * width; x < 0.7 * width; x += 6) {
         // The brush must also hit the model 14 pixels further.
         const isOn = [0, 14].every((d) => engine?.paint(x + d, y + d, 0.005, 255));
         if (!isOn) continue;
-        engine?.setPainted(id, before);
+        engine?.revert();
         engine?.showPainting(id);
         return { x: left + x, y: top + y };
       }

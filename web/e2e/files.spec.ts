@@ -148,7 +148,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   const files = await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
     const cage = new TextDecoder().decode(engine?.exportCage());
-    return { cage, project: Array.from(engine?.writeProject([], [], "{}") ?? []) };
+    return { cage, project: Array.from(engine?.writeProject("{}") ?? []) };
   });
   const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
   expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);

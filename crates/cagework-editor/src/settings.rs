@@ -136,7 +136,7 @@ impl DocumentSettings {
     /// When it is damaged, or belongs to another cage: the sentence for the user.
     pub fn pose_of(&self, document: &Document) -> Result<Option<Vec<Vec3>>, &'static str> {
         let Some(text) = &self.pose else { return Ok(None) };
-        let damaged = "The pose of this project is damaged: the cage is at rest.";
+        let damaged = "The pose in this project is damaged: the cage is at rest.";
         let bytes = URL_SAFE_NO_PAD.decode(text.trim_end_matches('=')).map_err(|_| damaged)?;
         let up = document.models.up();
         let pose =
