@@ -435,3 +435,112 @@ pub(crate) enum Upload {
     Weights,
     Parts,
 }
+
+#[cfg(test)]
+mod tests {
+    use cagework_core::subdivided_box;
+    use cagework_editor::{Command, Contents};
+
+    use super::*;
+
+    /// A model in a box, of which the GPU holds everything but weights.
+    fn uploaded() -> State {
+        let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+        let model = Model::read("a.obj", text, &mut |_| None).unwrap();
+        let mut state = State::default();
+        state.editor.open([(model, None)], Contents::default());
+        take_box(&mut state, 0.1);
+        state.editor.amend();
+        state.follow_document();
+        upload_all(&mut state);
+        state
+    }
+
+    fn take_box(state: &mut State, margin: f32) {
+        let mesh = subdivided_box(state.editor.bounds().unwrap(), margin, [1; 3]);
+        state.editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    }
+
+    /// What is uploaded, in order.
+    fn upload_all(state: &mut State) -> String {
+        let mut order = String::new();
+        while let Some(next) = state.next_upload() {
+            let (key, models) = (state.editor.key(), state.editor.models_key());
+            match next {
+                Upload::Mesh => state.has_uploaded_mesh(),
+                Upload::Cage => state.on_gpu.cage = Some(key.cage),
+                Upload::Weights => {
+                    let bound = Arc::clone(state.cache.get(key).unwrap());
+                    state.set_bound(bound);
+                }
+                Upload::Parts => state.on_gpu.parts = Some(models),
+            }
+            order.push(match next {
+                Upload::Mesh => 'm',
+                Upload::Cage => 'c',
+                Upload::Weights => 'w',
+                Upload::Parts => 'p',
+            });
+        }
+        order
+    }
+
+    fn bind(state: &mut State) {
+        let bound = Arc::new(BoundModels {
+            weights: Arc::new(Weights::with_room(8, 0, 0)),
+            frames: Arc::default(),
+            rig: None,
+            outside: Vec::new(),
+            joints: None,
+            report: JsValue::UNDEFINED,
+        });
+        state.cache.insert(state.editor.key(), Arc::clone(&bound), 100);
+        state.set_bound(bound);
+    }
+
+    #[test]
+    fn undo_of_a_cage_brings_its_weights_back_without_a_bind() {
+        let mut state = uploaded();
+        bind(&mut state);
+        let revision = state.revision;
+        take_box(&mut state, 0.2);
+        assert!(state.editor.commit("cage"));
+        state.follow_document();
+        assert!(state.bound.is_none() && state.require(revision).is_err());
+        assert_eq!(upload_all(&mut state), "c");
+        assert!(state.bound.is_none(), "there are no weights for the new cage");
+        assert!(state.editor.undo());
+        state.follow_document();
+        assert_eq!(upload_all(&mut state), "cw");
+        assert!(state.bound.is_some());
+    }
+
+    #[test]
+    fn parts_and_poses_keep_weights_and_other_models_do_not() {
+        let mut state = uploaded();
+        bind(&mut state);
+        let revision = state.revision;
+        let options = cagework_editor::PartOptions { stays: vec!["all".to_owned()], ..Default::default() };
+        state.editor.apply(Command::SetParts { id: 0, options }).unwrap();
+        let moved = state.pose().iter().map(|p| *p + Vec3::X).collect();
+        state.editor.set_pose(moved).unwrap();
+        state.follow_document();
+        assert_eq!(
+            (upload_all(&mut state).as_str(), state.bound.is_some(), state.revision),
+            ("p", true, revision)
+        );
+        let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        state.editor.add_models([(Model::read("b.obj", text, &mut |_| None).unwrap(), None)]);
+        state.follow_document();
+        assert_eq!((upload_all(&mut state).as_str(), state.bound.is_some()), ("mp", false));
+    }
+
+    #[test]
+    fn a_lost_device_gets_everything_again() {
+        let mut state = uploaded();
+        bind(&mut state);
+        state.forget_gpu();
+        state.bound = None;
+        assert_eq!(upload_all(&mut state), "mcwp");
+    }
+}
