@@ -65,6 +65,7 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     const pose = engine?.cagePositions() ?? new Float32Array();
     pose[0] = (pose[0] ?? 0) - 8;
     engine?.setCagePositions(pose);
+    engine?.commit("Move a corner");
     engine?.zoomAt(400, 300, 2);
   });
   const plain = await modelPositions(page);

@@ -39,6 +39,7 @@ export async function bend(page: Page): Promise<void> {
     engine?.setCagePositions(
       rest.map((x, k) => (k % 3 === 0 ? (1 + 0.2 * height(k)) * x + 0.15 * height(k) ** 2 : x)),
     );
+    engine?.commit("Bend");
   });
 }
 

@@ -221,7 +221,7 @@ impl Editor {
             }
             Command::Blend { index, share } => self.blend(index, share)?,
             Command::CarryPoses { from, positions, shares } => {
-                self.take_carried(from, &positions, &shares)?
+                self.take_carried(from, &positions, &shares)?;
             }
             Command::SetPins { pins } => self.document_mut().pins = pins.into(),
             Command::ReplaceCage { mesh, controls, notices } => {

@@ -99,7 +99,7 @@ impl DocumentSettings {
 
     /// The cage of a project's mesh, and what was left out. A mesh without faces is no cage yet.
     #[must_use]
-    pub fn cage(&self, mesh: PolygonMesh) -> (Option<RestCage>, Option<&'static str>) {
+    pub fn cage(&self, mesh: &PolygonMesh) -> (Option<RestCage>, Option<&'static str>) {
         if mesh.faces.is_empty() {
             return (None, None);
         }

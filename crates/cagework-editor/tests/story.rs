@@ -22,7 +22,7 @@ fn block(name: &str, min: Vec3, max: Vec3) -> NewModel {
     for f in &mesh.faces {
         text += &format!("f {} {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1, f[3] + 1);
     }
-    (Model::read(name, text.as_bytes(), &mut |_| None).unwrap(), None)
+    (Model::read(name, text.as_bytes(), &mut |_| None).expect("valid input"), None)
 }
 
 fn two_blocks() -> [NewModel; 2] {
@@ -33,9 +33,9 @@ fn two_blocks() -> [NewModel; 2] {
 }
 
 fn bound(document: &Document, grid: u32) -> Weights {
-    let set = document.cage.set.as_ref().unwrap();
+    let set = document.cage.set.as_ref().expect("valid input");
     let options = BindOptions { grid, ..BindOptions::default() };
-    let bound = bind(document.models.positions(), set, &options, &Silent).unwrap();
+    let bound = bind(document.models.positions(), set, &options, &Silent).expect("valid input");
     bound.frames.folded(&bound.weights)
 }
 
@@ -43,15 +43,15 @@ fn bound(document: &Document, grid: u32) -> Weights {
 fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec<Vec3> {
     let models = &document.models;
     let mesh = TriMesh { positions: models.positions().to_vec(), triangles: models.triangles().to_vec() };
-    let cage = document.cage.set.as_ref().unwrap().cage();
-    let probes = Probes::new(&mesh, cage).unwrap();
+    let cage = document.cage.set.as_ref().expect("valid input").cage();
+    let probes = Probes::new(&mesh, cage).expect("valid input");
     let options = BindOptions { grid: 16, ..BindOptions::default() };
-    let of_probes = bind(probes.points(), cage, &options, &Silent).unwrap();
+    let of_probes = bind(probes.points(), cage, &options, &Silent).expect("valid input");
     let of_probes = of_probes.frames.folded(&of_probes.weights);
-    let pull = Pull::new(&mesh, cage, probes, &of_probes).unwrap();
-    let grab = Grip::new(Handle::Vertex(vertex), &pull, &mesh.triangles, weights).unwrap();
+    let pull = Pull::new(&mesh, cage, probes, &of_probes).expect("valid input");
+    let grab = Grip::new(Handle::Vertex(vertex), &pull, &mesh.triangles, weights).expect("valid input");
     let rest: Vec<DVec3> = document.pose.iter().map(|p| p.as_dvec3()).collect();
-    let mut drag = Drag::new(&pull, &rest, &[grab], &[], DragOptions::default()).unwrap();
+    let mut drag = Drag::new(&pull, &rest, &[grab], &[], DragOptions::default()).expect("valid input");
     let to = drag.start()[0] + by;
     drag.settle(&[to]);
     drag.cage().iter().map(|p| p.as_vec3()).collect()
@@ -60,7 +60,7 @@ fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec
 /// Applies a command as one step, and remembers the document after it.
 fn step(editor: &mut Editor, documents: &mut Vec<Document>, command: Command) {
     let label = format!("step {}", documents.len());
-    editor.apply(command).unwrap();
+    editor.apply(command).expect("valid input");
     assert!(editor.commit(label.as_str()), "{label}");
     assert_eq!(editor.view().undo.as_deref(), Some(label.as_str()));
     documents.push(editor.document().clone());
@@ -175,11 +175,11 @@ fn session_can_be_undone_redone_saved_and_reopened() {
 fn saved_and_opened(document: &Document) -> Document {
     let mut editor = Editor::default();
     editor.open([], Contents::default());
-    let bytes = editor_with(document).write_project(r#"{"bind": {"grid": 32}}"#).unwrap();
-    let project = read_project("saved.glb", &bytes, 1 << 28).unwrap().unwrap();
+    let bytes = editor_with(document).write_project(r#"{"bind": {"grid": 32}}"#).expect("valid input");
+    let project = read_project("saved.glb", &bytes, 1 << 28).expect("valid input").expect("valid input");
     assert!(project.settings.contains("\"grid\":32"), "settings of others are kept: {}", project.settings);
     let settings = DocumentSettings::read(&project.settings);
-    let (cage, notice) = settings.cage(project.cage);
+    let (cage, notice) = settings.cage(&project.cage);
     assert_eq!(notice, None);
     let contents = Contents {
         cage,
@@ -191,7 +191,7 @@ fn saved_and_opened(document: &Document) -> Document {
     let mut members = settings.models.iter().cloned();
     let models: Vec<_> = project.models.into_iter().map(|model| (model, members.next())).collect();
     editor.open(models, contents);
-    editor.take_pose(&settings).unwrap();
+    editor.take_pose(&settings).expect("valid input");
     editor.document().clone()
 }
 
@@ -247,9 +247,9 @@ fn gestures_end_in_one_step_or_in_none() {
 fn opened_with_box() -> Editor {
     let mut editor = Editor::default();
     editor.open(two_blocks(), Contents::default());
-    let bounds = editor.bounds().unwrap();
+    let bounds = editor.bounds().expect("valid input");
     let mesh = subdivided_box(bounds, 0.1, [1; 3]);
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).expect("valid input");
     editor.amend();
     editor
 }

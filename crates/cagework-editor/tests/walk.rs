@@ -90,11 +90,11 @@ fn opened() -> Editor {
     for f in &mesh.faces {
         text += &format!("f {} {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1, f[3] + 1);
     }
-    let model = |name: &str| (Model::read(name, text.as_bytes(), &mut |_| None).unwrap(), None);
+    let model = |name: &str| (Model::read(name, text.as_bytes(), &mut |_| None).expect("valid input"), None);
     let mut editor = Editor::default();
     editor.open([model("a.obj"), model("b.obj"), model("c.obj")], Contents::default());
     let mesh = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.1, [1; 3]);
-    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).expect("valid input");
     editor.amend();
     editor
 }

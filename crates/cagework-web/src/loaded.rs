@@ -119,7 +119,7 @@ impl Loaded {
     #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
         self.cage.clone().map(|mesh| {
-            let (cage, _) = self.document_settings().cage(mesh.clone());
+            let (cage, _) = self.document_settings().cage(&mesh);
             Polygons { controls: cage.map(|cage| cage.controls), ..mesh.into() }
         })
     }
@@ -180,7 +180,7 @@ impl Loaded {
             loaded.more = models.collect();
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
-            let notice = loaded.document_settings().cage(loaded.cage.clone().unwrap_or_default()).1;
+            let notice = loaded.document_settings().cage(loaded.cage.as_ref().unwrap_or(&PolygonMesh::default())).1;
             loaded.model.notices.extend(notice.map(str::to_owned));
             return Ok(loaded);
         }
