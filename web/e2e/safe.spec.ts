@@ -35,15 +35,12 @@ test("a damaged link and a project with impossible settings open with defaults a
     pose: "AAEC",
     sample: "nobody",
   };
-  const project = await page.evaluate(
-    (settings) => {
-      const engine = globalThis.cagework?.engine;
-      // At rest the document has no pose of its own in the file.
-      engine?.setCagePositions(engine.restPositions());
-      return Array.from(engine?.writeProject(settings) ?? []);
-    },
-    JSON.stringify(settings),
-  );
+  const project = await page.evaluate((settings) => {
+    const engine = globalThis.cagework?.engine;
+    // At rest the document has no pose of its own in the file.
+    engine?.setCagePositions(engine.restPositions());
+    return Array.from(engine?.writeProject(settings) ?? []);
+  }, JSON.stringify(settings));
   await drop(page, [{ name: "strange.cagework.glb", bytes: Uint8Array.from(project) }]);
   const said = page.locator("#toasts");
   await expect(said).toContainText(

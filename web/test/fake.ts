@@ -234,6 +234,9 @@ export function createFake(): Fake {
     get revision() {
       return revision;
     },
+    get hasWeights() {
+      return view.bound;
+    },
     requireCurrent(asked) {
       if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
     },
@@ -249,13 +252,13 @@ export function createFake(): Fake {
       committed = posed;
       revision += 1;
       show({ cage: view.cage + 1, bound: false });
-      step(label);
+      step(label ?? undefined);
       return stateOf();
     },
     apply(command, label) {
       commands.push(command);
       if (command.do === "set_pins") show({ pins: command.pins });
-      step(label);
+      step(label ?? undefined);
     },
     commit(label) {
       committed = posed;
