@@ -180,7 +180,8 @@ impl Loaded {
             loaded.more = models.collect();
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
-            let notice = loaded.document_settings().cage(loaded.cage.as_ref().unwrap_or(&PolygonMesh::default())).1;
+            let notice =
+                loaded.document_settings().cage(loaded.cage.as_ref().unwrap_or(&PolygonMesh::default())).1;
             loaded.model.notices.extend(notice.map(str::to_owned));
             return Ok(loaded);
         }
