@@ -41,7 +41,7 @@ pub(crate) fn test() -> Result<(), String> {
     package::test()
 }
 
-/// The part of [`test`] that runs beside the Rust tests, once those have been built.
+/// The part of [`test()`] that runs beside the Rust tests, once those have been built.
 pub(crate) fn test_beside() -> Result<(), String> {
     python::test()?;
     site::test_scripts()?;
