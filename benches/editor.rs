@@ -55,14 +55,18 @@ fn main() {
     };
     let positions: Vec<Vec<Vec3>> = (0..RUNS).map(|k| moved(&editor, k)).collect();
     report("apply: pose", |k| {
-        editor.apply(Command::SetPose { positions: positions[k].clone() }).expect("finite")
+        editor.apply(Command::SetPose { positions: positions[k].clone() }).expect("finite");
     });
     report("commit", |k| {
         editor.apply(Command::SetPose { positions: positions[RUNS - 1 - k].clone() }).expect("finite");
         editor.commit("step");
     });
-    report("undo", |_| drop(editor.undo()));
-    report("redo", |_| drop(editor.redo()));
+    report("undo", |_| {
+        editor.undo();
+    });
+    report("redo", |_| {
+        editor.redo();
+    });
     report("apply: save a pose", |k| {
         editor.apply(Command::SavePose { name: format!("pose {k}") }).expect("there is a cage");
     });
@@ -76,10 +80,12 @@ fn main() {
         editor.redo();
     });
     report("apply: another cage", |k| {
-        editor.apply(replace(cage(0.1 + 1e-3 * k as f32))).expect("a box is a cage")
+        editor.apply(replace(cage(0.1 + 1e-3 * k as f32))).expect("a box is a cage");
     });
     editor.selection.change(&[0], SelectMode::Replace);
-    report("nudge the selection", |_| drop(editor.shift(Vec3::splat(1e-4))));
+    report("nudge the selection", |_| {
+        editor.shift(Vec3::splat(1e-4));
+    });
 }
 
 fn report(name: &str, mut run: impl FnMut(usize)) {
