@@ -101,7 +101,7 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     session.pose(&pose);
     let positions = block_on(session.read_positions()).expect("they come back");
     let expected = deform_bound(&cpu.weights, &cpu.frames, &pose);
-    // With equal weights only the rounding of f32 sums differs: dozens of products of size 10.
+    // The weights are equal, so only f32 rounding differs, in sums of dozens of products of magnitude about 10.
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 

@@ -1,9 +1,9 @@
 import { defineConfig, type Plugin, type Rolldown } from "vite";
 
-/** What Vite says of the packages that it bundles; for crates/xtask/src/licences.rs, which takes the files away. */
+/** Files in which Vite lists the licences of bundled packages. crates/xtask/src/licences.rs reads and deletes them. */
 const LICENCES = { page: "licences-npm.json", workers: "licences-npm-workers.json" };
 
-/** Vite's own plugin, which looks at the page only; what a worker bundles is said by the same one. */
+/** Vite's licence plugin. It covers only the page, so `licencesOfWorkers` also calls it for the bundles of workers. */
 let licences: Plugin | undefined;
 const findLicences: Plugin = {
   name: "find-licences",
@@ -22,10 +22,10 @@ const licencesOfWorkers = (): Plugin => ({
   },
 });
 
-/** Relative addresses: the built page works below any path of any server. */
+/** URLs are relative, so the built page works under any path of any server. */
 export default defineConfig({
   root: import.meta.dirname,
-  // The page is a user of its own package, from its sources.
+  // The page imports its own npm package from the sources.
   resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },
   base: "./",
   plugins: [findLicences],

@@ -28,7 +28,7 @@ pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOpt
 
 /// Evenly distributed points in a box, none of them in a plane of symmetry.
 pub(crate) fn scattered(n: usize, low: Vec3, high: Vec3) -> Vec<Vec3> {
-    // Powers of the plastic number (Roberts 2018).
+    // Inverse powers of 1.2207, the root of x^4 = x + 1: the R3 sequence (Roberts 2018).
     const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_4];
     let share = |k: usize, axis: usize| ((k + 1) as f64 * STEPS[axis]).fract() as f32;
     (0..n).map(|k| low + (high - low) * Vec3::new(share(k, 0), share(k, 1), share(k, 2))).collect()

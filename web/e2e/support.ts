@@ -148,7 +148,10 @@ export async function drag(page: Page, dx: number, dy: number): Promise<number> 
   return vertex;
 }
 
-/** The model point nearest to a position in the view, given as shares of its size, that has no handle near it. */
+/**
+ * Finds the point of the model, away from all handles, that is nearest to a given position in the view. `share`: that
+ * position, as fractions of the view's width and height.
+ */
 export async function grip(
   page: Page,
   share: readonly [number, number] = [0.5, 0.5],

@@ -1,4 +1,4 @@
-/** What panels and input may call, put together. */
+/** Creates and connects all actions. Panels and input handlers call them through `App`. */
 
 import { type BindActions, createBind } from "./actions/bind";
 import { type CageActions, createCage } from "./actions/cage";
@@ -32,7 +32,7 @@ import { T } from "./words";
 export interface App {
   readonly ctx: Context;
   readonly store: Store;
-  /** Takes what the engine reports after a change of the document. */
+  /** Updates the state after a change of the document. */
   readonly take: DocumentMirror["take"];
   readonly edit: Edit;
   readonly pull: Pulling;
@@ -49,22 +49,22 @@ export interface App {
   readonly exports: Exports;
   readonly tour: TourActions;
   readonly mac: boolean;
-  /** Runs what a shortcut stands for. */
+  /** Runs the command of a shortcut. */
   run(command: Command): void;
   go(step: StepName): void;
   /** Opens the browser's file dialog. */
   chooseModel(): void;
   chooseFolder(): void;
-  /** Models to add to the cage. */
+  /** Chooses models to add to the cage. */
   chooseMore(): void;
   chooseCage(): void;
-  /** Controls inside, of a file. */
+  /** Chooses an OBJ file of inner controls. */
   chooseControls(): void;
-  /** Begins with the first sample; what is open stays kept. */
+  /** Opens the first sample. The open work stays kept. */
   startFresh(): void;
-  /** Where the pointer was last, CSS pixels in the view. */
+  /** Last position of the pointer, CSS pixels in the view. */
   pointer: () => { x: number; y: number };
-  /** "Ctrl+Z" */
+  /** Shortcut of a command as text, for example "Ctrl+Z". */
   key(command: Command): string;
 }
 
@@ -73,10 +73,10 @@ const MODELS = `${CAGES},.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,mode
 
 export interface Needs {
   store: Store;
-  /** Fails while the page is still starting. */
+  /** Throws until the session is open. */
   session: () => Session;
   tell: Tell;
-  /** The view's place in the window. */
+  /** Rectangle of the view in the window. */
   viewport: () => DOMRect;
 }
 

@@ -1,11 +1,11 @@
-/** What follows from the state of the page. */
+/** Values derived from the state of the page. */
 
 import type { BindOptions, Element as CageElement, PoseView, RigOptions, SceneOptions } from "./contract";
 import type { AppState } from "./state";
 
-/** What becomes of the rig of the model that is open. */
+/** The rig options that apply to the open model. */
 export function rigOf({ model, rigOptions }: AppState): RigOptions {
-  // A project may be of another model by now.
+  // Options of a project may name parts that the open model does not have.
   const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
   return { ...rigOptions, rigid, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
 }
@@ -15,7 +15,7 @@ export function cageBroken(state: AppState): boolean {
   return state.cage !== null && !state.cage.usable;
 }
 
-/** What is drawn: faults are marked where they can be mended, or when they stop the bind. */
+/** Scene options as drawn: faults are marked only in step Cage, or if they prevent a bind. */
 export function drawn(state: AppState): SceneOptions {
   const { scene, step, rigOptions } = state;
   return {
@@ -30,22 +30,25 @@ export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
 
-/** Saved poses of the cage that is open. */
+/** Saved poses that fit the current cage. */
 export function fittingPoses(state: AppState): readonly PoseView[] {
   return state.poses.filter((pose) => pose.fits);
 }
 
-/** What clicks select: pulling takes single vertices, whatever is selected while reshaping. */
+/** The element that clicks select: vertices in pull mode, except while reshaping. */
 export function elementInUse({ element, scene, editingRest }: AppState): CageElement {
   return scene.pull && !editingRest ? "vertex" : element;
 }
 
-/** The options of a bind that follows a changed cage, and of a saved project: chosen ones count once a bind has used them. */
+/**
+ * Options of automatic binds and saved projects: those of the last bind, if there is one. Later choices are not applied
+ * yet.
+ */
 export function optionsInUse({ appliedOptions, bindOptions }: AppState): BindOptions {
   return appliedOptions ?? bindOptions;
 }
 
-/** Whether options were chosen that no bind has used yet. */
+/** Whether the chosen options differ from those of the last bind. False before the first bind. */
 export function hasUnappliedOptions({ appliedOptions: applied, bindOptions: chosen }: AppState): boolean {
   if (applied === null) return false;
   return (Object.keys(chosen) as (keyof BindOptions)[]).some((key) => chosen[key] !== applied[key]);

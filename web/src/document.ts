@@ -1,4 +1,4 @@
-/** The page's copy of the document: the keys of the state that Rust decides. */
+/** Mirrors the document: updates the state keys that Rust determines. */
 
 import { attempt, type Context } from "./actions/context";
 import type { Check, View } from "./contract";
@@ -7,22 +7,22 @@ import { follow } from "./queue";
 import type { AppState } from "./state";
 import { T } from "./words";
 
-/** Checks kept for cages that undo brings back. */
+/** Number of checks kept for cages that undo may restore. */
 const KEPT_CHECKS = 32;
 
 export interface DocumentMirror {
-  /** Takes what the engine reports after a change. */
+  /** Updates the state after a change of the document. */
   take(view: View): void;
-  /** Takes the check that came with the cage, in place of a new one. */
+  /** Uses a check that came with the cage instead of running a new one. */
   know(check: Check): void;
-  /** Resolves when the cage was checked as it is now. */
+  /** Resolves when the current cage has been checked. */
   checked(): Promise<unknown>;
 }
 
 export function followDocument(ctx: Context): DocumentMirror {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** By the keys of mesh and cage. */
+  /** Checks by the keys of mesh and cage. */
   const checks = new Map<string, Check>();
   let shown: View | undefined;
   let checking: Promise<unknown> = Promise.resolve();
@@ -39,7 +39,7 @@ export function followDocument(ctx: Context): DocumentMirror {
   const startCheck = () =>
     attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) => {
-        // A cage that is opened brings its check, which cancels this one.
+        // Wait first: an opened cage may come with its check, which cancels this one.
         await new Promise((resolve) => setTimeout(resolve));
         if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
       }),
@@ -48,7 +48,7 @@ export function followDocument(ctx: Context): DocumentMirror {
   const modelPatch = (): Partial<AppState> => {
     const { model, cageClip } = store.get();
     const info = engine().modelInfo();
-    // A model that is open alone may be named after its sample or its file.
+    // A single model may be named after its sample or file. Keep that name.
     const isAlone = info.members.length === 1 && model?.members.length === 1;
     const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
     return {
@@ -57,7 +57,7 @@ export function followDocument(ctx: Context): DocumentMirror {
     };
   };
 
-  /** Of another cage, or of the same cage around other models. */
+  /** State for another cage, or for the same cage around other models. */
   const cagePatch = (view: View): Partial<AppState> => ({
     cage: engine().cageState() ?? null,
     check: checks.get(keyOf(view)) ?? null,
@@ -108,7 +108,7 @@ export function followDocument(ctx: Context): DocumentMirror {
 
 const keyOf = (view: View | undefined) => `${view?.mesh ?? 0} ${view?.cage ?? 0}`;
 
-/** The old value if the new one is equal, so that panels that show it are not drawn again. */
+/** Returns the old value if the new one is equal, so that its panels are not rendered again. */
 function unchanged<T>(old: T, value: T): T {
   return JSON.stringify(old) === JSON.stringify(value) ? old : value;
 }

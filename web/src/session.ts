@@ -1,4 +1,4 @@
-/** The one way from the page to Rust: the engine on this thread, the binder in a worker, files, frames. */
+/** The page's interface to Rust: the engine on this thread, workers for binds and files, and frames. */
 
 import { startBind } from "@cagework/core/session/bind";
 import { type Client, createClient, named } from "@cagework/core/session/client";
@@ -17,10 +17,10 @@ declare global {
   var cagework: Session | undefined;
 }
 
-/** The stage shows its background for so long at most if nothing is opened, ms. */
+/** Without a model, drawing starts after this time, ms. */
 const LONGEST_EMPTY = 3000;
 
-/** What a file of the page's own has: nothing that anybody would have to look for. */
+/** Fields of a sample file, which has no companion files and no notices. */
 const OWN = {
   siblings: new Map(),
   up: undefined,
@@ -30,13 +30,13 @@ const OWN = {
   vertices: 0,
 };
 
-/** Opens the page: see `openOn`. */
+/** Opens a session, see `openOn`. */
 export function openSession(canvases: Canvases, needs: Needs): Promise<Session> {
   return openOn(canvases, (opened) => start({ ...opened, ...needs }));
 }
 
 interface Needs {
-  /** Whether the first sample is what will be opened first. */
+  /** Whether the first model to be opened is the first sample. */
   readonly fresh: Promise<boolean>;
   /** Called after each change of the document. */
   changed(view: View): void;
@@ -49,7 +49,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   const client = createClient(module, openWorker);
   const buildSample = prepareSample(client, samples(pkg)[0]?.id, fresh);
   const frames = createFrames();
-  /** Rust drops errors of its callbacks. */
+  /** Reports errors of `changed` here, because Rust ignores errors of its callbacks. */
   const report = (view: View) => {
     try {
       changed(view);
@@ -61,9 +61,9 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     client.close();
     throw error;
   });
-  // What cannot be had now is asked for again by the first frame, which says why.
+  // After a failure, the first frame tries again and reports the error.
   engine.warm().catch(() => undefined);
-  /** Begins to draw: with the first model, because a slow GPU's empty frame is what that would wait for. */
+  /** Starts drawing, with the first model: on a slow GPU, an empty frame would delay it. */
   const begin = once(() =>
     frames.start(
       (sharp) => engine.drawFrame(sharp),
@@ -71,14 +71,14 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     ),
   );
   setTimeout(begin, LONGEST_EMPTY);
-  /** Where nothing else can, the processor computes, whatever a project was saved with. */
+  /** Selects the CPU backend where the GPU cannot compute: without WebGPU, and for conjugate gradients. */
   const possible = (options: BindOptions): BindOptions =>
     lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
-  /** WebGL2 tells the canvas, and nobody else, that it was lost. */
+  /** The canvas in use. WebGL2 reports a lost context only by an event of the canvas. */
   let guarded: HTMLCanvasElement;
   const guard = (canvas: HTMLCanvasElement) => {
     guarded = canvas;
-    // One that a failed recovery has left behind says nothing of the device in use.
+    // Ignore canvases of failed recoveries: their events are not about the device in use.
     canvas.addEventListener("webglcontextlost", () => guarded === canvas && engine.lose());
   };
   guard(canvas);
@@ -98,13 +98,13 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   const openApart = () => createClient(module, openWorker);
   const reading = createApart(openApart);
   const checking = createApart(openApart);
-  /** Opened with the first bind: a bind or a long frame must not stop the hand. */
+  /** Worker for pulls, opened when first needed. It is separate so that binds do not delay pulls. */
   let puller: Client | undefined;
   const pulling = () => {
     puller ??= openApart();
     return puller;
   };
-  /** Drops the result if model or cage have changed meanwhile. */
+  /** Discards the result if model or cage have changed since the job started. */
   const ofNow = <T>(job: Job<T>): Job<T> => {
     const { revision } = engine;
     return chain(job, (result) => {
@@ -120,7 +120,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   ): Promise<Opened> {
     const models = await load(pkg, read);
     const settings = models[0].settings ?? null;
-    // A project of a model that has no cage yet has an empty one.
+    // A project saved without a cage contains an empty one.
     const cage = read.cage?.positions.length ? read.cage : undefined;
     const contents: OpenContents = {
       sample,
@@ -150,7 +150,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
           for (const [k, read] of reads.entries()) {
             if (isGivenUp) throw named("Cancelled", "cancelled");
             hear?.(k);
-            // A project brings its models, and leaves its cage.
+            // Of a project, only the models are added, not the cage.
             all.push(...(await load(pkg, read as ReadModel)));
           }
         } catch (error) {

@@ -2,7 +2,7 @@
 
 import type { CageControls, CameraView, SceneOptions } from "./contract";
 
-/** What a link contains besides the pose. */
+/** What a link contains in addition to the pose. */
 export interface Seen {
   readonly camera: CameraView;
   readonly selected: readonly number[];

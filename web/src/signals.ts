@@ -1,16 +1,16 @@
-/** The store of the page's state: a signal a key. */
+/** Store of the page's state, with one signal per key. */
 
 import { batch, signal } from "@preact/signals";
 import type { AppState } from "./state";
 
 export interface Store {
-  /** The state of the moment; a panel or an effect that reads a key hears of its changes. */
+  /** The current state. Panels and effects that read a key are updated when it changes. */
   get(): AppState;
-  /** Changes some keys at once. */
+  /** Changes several keys in one batch. */
   set(patch: Partial<AppState>): void;
 }
 
-/** A store with a signal a key. */
+/** Creates a store with one signal per key. */
 export function createStore(initial: AppState): Store {
   const entries = Object.entries(initial).map(([key, value]) => [key, signal<unknown>(value)] as const);
   const signals = new Map(entries);

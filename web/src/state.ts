@@ -1,4 +1,4 @@
-/** Everything the page shows, in one place, a signal a key: panels derive from it. */
+/** The state of the page: one signal per key, from which panels derive what they show. */
 
 import type {
   BindOptions,
@@ -28,16 +28,16 @@ export type StepName = (typeof STEPS)[number];
 
 export interface BindRun {
   pass: "coarse" | "fine";
-  /** Of the engine: what the bind is for. */
+  /** Engine revision that this bind belongs to. */
   revision: number;
   options: BindOptions;
   stage: Stage;
-  /** Of the pass, 0 to 1. */
+  /** Share of the pass done, 0 to 1. */
   fraction: number;
   etaMs: number | null;
   iteration: number;
   delta: number | null;
-  /** Iteration and delta of this pass, in turn. */
+  /** Deltas of this pass, by ascending iteration. */
   curve: readonly (readonly [iteration: number, delta: number])[];
 }
 
@@ -48,7 +48,7 @@ export interface Slice {
   busy: boolean;
 }
 
-/** Where files are dropped: anywhere, on the panel of the cage, or on the list of the models in it. */
+/** Targets for dropped files: the page, the Cage panel, or the list of models in the cage. */
 export type DropPlace = "page" | "cage" | "list";
 
 export type CageSource = "auto" | "hull" | "box" | "file";
@@ -59,32 +59,32 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
   lack: Lack | null;
   samples: readonly Sample[];
-  /** What keeps the whole page waiting, as a sentence; null when nothing does. */
+  /** Describes the operation that blocks the page; null without one. */
   busy: string | null;
-  /** How far that is, in words. */
+  /** Its progress, in words. */
   busyStep: string;
-  /** Gives it up; null where that is not possible. */
+  /** Cancels it; null if it cannot be cancelled. */
   cancelBusy: (() => void) | null;
-  /** Goes on with it, where the user is asked before; null otherwise. */
+  /** Confirms it while it waits for confirmation; otherwise null. */
   goOn: (() => void) | null;
   model: ModelInfo | null;
   cage: CageState | null;
-  /** What is wrong with it; null while that is not known. */
+  /** Result of the cage's check; null until it is known. */
   check: Check | null;
   cageSource: CageSource;
   cageOptions: CageOptions;
-  /** Name of a clip that generated cages enclose as well. */
+  /** Name of a clip whose frames generated cages also enclose; null for none. */
   cageClip: string | null;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;
-  /** As the panel shows them. */
+  /** As shown in the Bind panel. */
   bindOptions: BindOptions;
-  /** Those of the last bind that ended; null before the first. */
+  /** Options of the last finished bind; null before the first. */
   appliedOptions: BindOptions | null;
   bindRun: BindRun | null;
   report: BindReport | null;
-  /** Reports of earlier binds of this cage, latest first: to compare methods. */
+  /** Reports of earlier binds of this cage, for comparison, latest first. */
   earlier: readonly BindReport[];
   /** Bytes the next bind needs, or why it cannot run. */
   memory: number | string;
@@ -100,46 +100,46 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   proportionalOn: boolean;
   /** Clicks and taps add to the selection. */
   additive: boolean;
-  /** What turns and scales go about. */
+  /** Centre of rotation and scaling. */
   pivot: Pivot;
   boxArmed: boolean;
-  /** What clicks put inside the cage; null for nothing. */
+  /** Kind of inner control that clicks add; null for none. */
   placing: InnerKind | null;
   ortho: boolean;
-  /** What the gesture under way does, null without one. */
+  /** Label of the gesture in progress; null without one. */
   gesture: string | null;
-  /** Vertices of the model that the gesture under way leaves outside of the rest cage: of some that are watched. */
+  /** Number of sampled model vertices outside the cage during a gesture that reshapes it; otherwise 0. */
   strays: number;
-  /** The model can be pulled: what is needed for it belongs to the cage as it is. */
+  /** Whether the worker for pulls is prepared, or being prepared, for the current model and cage. */
   pullReady: boolean;
-  /** Pulls move the whole model. */
+  /** Whether pulls move the whole model. */
   pullWhole: boolean;
   playing: boolean;
-  /** What stays of a model is painted; null when nothing is. */
+  /** The brush that paints which vertices of a model stay; null unless painting. */
   painting: Painting | null;
-  /** The clip that is shown in place of the cage's pose. */
+  /** The clip shown in place of the cage's pose. */
   clip: ClipState;
-  /** The one of several models whose files are exported; null for all. */
+  /** Identifier of the only model to export; null to export all. */
   exportOnly: number | null;
-  /** What becomes of the model's skeleton. */
+  /** How the model's skeleton follows the cage. */
   rigOptions: RigOptions;
-  /** Name of the pose that is played towards, null for the rest pose. */
+  /** Name of the pose that the animation approaches; null for the rest pose. */
   playingPose: string | null;
   undoLabel: string | null;
   redoLabel: string | null;
   theme: Theme;
-  /** When the project was kept in the browser last, ms since 1970. */
+  /** Time of the last save in this browser, ms since 1970; null before the first. */
   savedAt: number | null;
-  /** What this browser keeps, newest first. */
+  /** Work kept in this browser, newest first. */
   works: readonly Work[];
-  /** Whether the list of it is shown. */
+  /** Whether the list of kept work is shown. */
   worksOpen: boolean;
-  /** Where the tour is; null without one. */
+  /** State of the tour; null outside it. */
   tour: TourState | null;
   sheetOpen: boolean;
-  /** Whether the steps to switch WebGPU on are shown. */
+  /** Whether the instructions for enabling WebGPU are shown. */
   waysOpen: boolean;
-  /** Files hover over the window; null when none do. */
+  /** Files dragged over the window; null without any. */
   hovering: { readonly files: number; readonly to: DropPlace } | null;
 }
 
@@ -152,7 +152,7 @@ export const NO_CLIP: ClipState = {
   targets: [],
 };
 
-/** What Rust decides: `document.ts` sets it whenever the document changes. */
+/** Keys that mirror the document in Rust. `document.ts` sets them whenever the document changes. */
 export const DOCUMENT_STATE = {
   model: null,
   sample: null,
@@ -175,7 +175,7 @@ export const DOCUMENT_STATE = {
   redoLabel: null,
 } satisfies Partial<AppState>;
 
-/** What belongs to the model that is open, as it is for the next one: see docs/page.md. */
+/** Initial values of the keys that belong to the open model, see docs/page.md. */
 export const MODEL_STATE = {
   cageSource: "auto",
   cageOptions: CAGE_DEFAULTS,
@@ -207,7 +207,10 @@ export const MODEL_STATE = {
 
 type ModelState = Pick<AppState, keyof typeof MODEL_STATE>;
 
-/** What stays when another model is opened: the person's choices, and what the page itself is doing. */
+/**
+ * Initial values of the keys that stay when another model is opened: the user's choices and the state of the page
+ * itself.
+ */
 export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeof DOCUMENT_STATE> = {
   step: "model",
   adapter: "",
@@ -234,38 +237,38 @@ export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeo
 
 export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
 
-/** The model's part of the state for another model. Where a bind is computed and how much memory it may take is the computer's. */
+/** The model's keys for another model. Backend and memory limit depend on the computer and stay. */
 export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): ModelState {
   return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };
 }
 
-/** A stop of the tour. */
+/** State of the tour. */
 export interface TourState {
-  /** Its number, from 0. */
+  /** Number of the stop, from 0. */
   readonly stop: number;
-  /** Binds of this stop, as they were done. */
+  /** Reports of this stop's binds, in order. */
   readonly reports: readonly BindReport[];
-  /** Which bind of how many it is at; null when it is ready. */
+  /** The bind in progress and the number of binds; null when all are done. */
   readonly doing: readonly [bind: number, all: number] | null;
 }
 
-/** The brush, and the model that it paints. */
+/** The brush and the model that it paints. */
 export interface Painting {
   readonly id: number;
-  /** Over the model's size. */
+  /** Relative to the model's size. */
   readonly radius: number;
-  /** It takes away what was painted. */
+  /** Whether it removes paint. */
   readonly erase: boolean;
 }
 
-/** A clip and the time in it. */
+/** A clip and its playback state. */
 export interface ClipState {
-  /** Its number; null at rest. */
+  /** Index of the clip; null for the rest pose. */
   readonly clip: number | null;
   readonly seconds: number;
   readonly playing: boolean;
   readonly speed: number;
   readonly loop: boolean;
-  /** Weights of the morph targets; none for those of the file. */
+  /** Weights of the morph targets; empty for the file's weights. */
   readonly targets: readonly number[];
 }

@@ -238,7 +238,7 @@ export function createFake(): Fake {
       return view.bound;
     },
     requireCurrent(asked) {
-      if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
+      if (asked !== revision) throw named("Cancelled", "model or cage have changed");
     },
     setCage(positions, corners, controls, notices, label) {
       rest = {

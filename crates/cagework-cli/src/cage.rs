@@ -23,7 +23,7 @@ struct CageSummary {
     divisions: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     margin: Option<f32>,
-    /// Of a generated cage.
+    /// Report of the generator; only for generated cages.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<CageReport>,
 }

@@ -13,7 +13,7 @@ pub struct Counts {
     pub primitives: usize,
     /// Materials.
     pub materials: usize,
-    /// Textures.
+    /// Textures of a glTF; 0 for other formats.
     pub textures: usize,
     /// Skins.
     pub skins: usize,

@@ -1,6 +1,7 @@
-//! The dependency arrows of ARCHITECTURE.md, checked against `cargo tree`, and the modules of each crate against circles.
+//! Checks the dependencies of crates (`cargo tree`) against the arrows of ARCHITECTURE.md, and their modules for
+//! circles.
 //!
-//! A crate is a wall that a dependency must not pass, so each crate has a row here, and a crate without one is an error.
+//! Every crate needs a rule here.
 
 mod modules;
 
@@ -8,12 +9,12 @@ use std::collections::BTreeSet;
 
 use crate::command::output;
 
-/// What one crate of ours may and must not depend on, directly or through others.
+/// Allowed and forbidden dependencies of one of our crates, direct or indirect.
 struct Rule {
     name: &'static str,
-    /// Crates of ours that it may depend on.
+    /// Our crates that it may depend on.
     may_use: &'static [&'static str],
-    /// Crates of others that must not be behind it.
+    /// Third-party crates that it must not depend on.
     must_not_use: &'static [&'static str],
 }
 
@@ -92,7 +93,7 @@ const RULES: &[Rule] = &[
 /// Checks every crate of the workspace with all its features, natively and for the browser.
 ///
 /// # Errors
-/// Names the first arrow that should not be there, or shows the first circle.
+/// Names the first forbidden dependency, or shows the first circle.
 pub(crate) fn check() -> Result<(), String> {
     let members = tree(&["--workspace", "--depth", "0"])?;
     if let Some(stranger) = members.iter().find(|m| RULES.iter().all(|r| r.name != **m)) {
@@ -115,7 +116,7 @@ pub(crate) fn check() -> Result<(), String> {
     modules::check()
 }
 
-/// Names of the packages in a dependency tree; development dependencies do not count.
+/// Names of the packages in a dependency tree, without development dependencies.
 fn tree(args: &[&str]) -> Result<BTreeSet<String>, String> {
     let fixed = ["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let text = output("cargo", &[&fixed[..], args].concat())?;

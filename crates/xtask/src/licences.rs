@@ -18,15 +18,15 @@ const NOTICES: &str = "licences.txt";
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
 /// Files in which Vite lists the npm packages of the page and its workers, below the folder of the page; see vite.config.ts.
 const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
-/// How files begin that hold a licence or what it asks to be kept, in lower case.
+/// Beginnings of the names of files with licences or required notices, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
-/// A package of others.
+/// A third-party package.
 #[derive(Clone, Debug)]
 struct Part {
-    /// With its version.
+    /// Name and version.
     name: String,
-    /// As its manifest says.
+    /// As in its manifest.
     licence: String,
     authors: String,
     texts: Vec<String>,
@@ -40,7 +40,7 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, of_web(folder, &OF_NPM)?)
 }
 
-/// What both wasm files are made of, and what Vite said of npm packages, in files that are taken away.
+/// Packages of both wasm files, and the npm packages that Vite has listed in files, which are deleted.
 fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
@@ -69,7 +69,7 @@ pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-py", &host()?, &[])?)
 }
 
-/// Writes the notices of the npm package into a folder of it. What Vite said of the packages in its decoder lies in `dist`.
+/// Writes the notices of the npm package into a folder of it. Vite's list of the packages in its decoder is in `dist`.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -96,7 +96,7 @@ fn write(folder: &Path, parts: Vec<Part>) -> Result<(), String> {
     save(STANDARD_LIBRARY, &read(&Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html"))?)
 }
 
-/// The packages that are compiled into one of ours, for a target.
+/// Third-party packages that are compiled into one of ours for a target.
 fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>, String> {
     let fixed =
         ["tree", "--locked", "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"];
@@ -109,7 +109,7 @@ fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>
     let mut parts = Vec::new();
     for found in metadata["packages"].as_array().into_iter().flatten() {
         let name = format!("{} v{}", word(found, "name"), word(found, "version"));
-        // Ours have no source; in the tree, a mark may follow that a package was there before.
+        // Our packages have no source. In the tree, ` (*)` marks repeated packages.
         let is_ours = found["source"].is_null();
         if is_ours || !tree.lines().any(|line| line.trim_end_matches(" (*)") == name) {
             continue;
@@ -139,7 +139,7 @@ fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
     paths.iter().map(|path| read(path)).collect()
 }
 
-/// What Vite says of the packages that it bundled.
+/// Packages that Vite lists as bundled.
 fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
     let found: Vec<Value> =
         serde_json::from_str(json).map_err(|e| format!("{} cannot be read: {e}", OF_NPM.join(" or ")))?;
@@ -153,7 +153,7 @@ fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
     Ok(found.iter().map(part).collect())
 }
 
-/// All packages with their licences, then each text once, after the names of those it belongs to.
+/// All packages with their licences, then each text once, below the names of its packages.
 fn notices(parts: Vec<Part>) -> Result<String, String> {
     let mut licences: BTreeMap<String, String> = BTreeMap::new();
     let mut owners: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -180,8 +180,7 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
     Ok(format!("{HEAD}{list}{texts}"))
 }
 
-/// The text of a licence whose package comes without it: that of Apache 2.0 is always the same, in that of MIT the authors
-/// have a line.
+/// Text of a licence whose package does not contain it. Apache 2.0 is always the same; MIT has a line for the authors.
 fn standard_text(part: &Part) -> Result<String, String> {
     let Part { name, licence, authors, .. } = part;
     if licence.contains("Apache-2.0") {
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn every_package_is_named_and_each_text_is_there_once() {
+    fn notices_list_every_package_and_each_text_once() {
         let twice = part("b v1", "ISC", &["keep this\r\nplease\n"]);
         let text =
             notices(vec![part("a v2", "ISC", &["keep this\nplease", "and this"]), twice.clone(), twice]);
@@ -227,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_package_without_a_text_gets_that_of_its_licence_with_its_authors() {
+    fn a_missing_text_is_replaced_by_that_of_the_licence_with_the_authors() {
         let mit = notices(vec![part("a v1", "MIT", &[])]).unwrap();
         assert!(mit.contains("Copyright (c) Ada\n") && mit.contains("Permission is hereby granted"));
         let apache = notices(vec![part("a v1", "MIT OR Apache-2.0", &[])]).unwrap();
@@ -237,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_command_is_made_of_is_named_and_what_only_builds_it_is_not() {
+    fn packages_compiled_into_the_command_are_listed_but_build_tools_are_not() {
         let host = host().unwrap();
         let names: Vec<String> =
             of_crates("cagework-cli", &host, &[]).unwrap().into_iter().map(|part| part.name).collect();

@@ -1,6 +1,6 @@
 //! The repository's own tasks, called through `npm start`, `npm test`, `npm run build` and `npm run check`.
 //!
-//! `cargo xtask TASK` does the same once Rust is there; `crates/xtask/run.sh` sees to that.
+//! `cargo xtask TASK` does the same if Rust is installed; `crates/xtask/run.sh` installs it.
 
 mod arrows;
 mod command;

@@ -2,21 +2,21 @@
 
 use crate::command::{root, run};
 
-/// Installs the dependencies that package-lock.json names, unless that has been done.
+/// Installs the dependencies of package-lock.json, unless they are installed.
 ///
 /// # Errors
 /// When npm fails.
 pub(crate) fn install() -> Result<(), String> {
     let root = root();
     let modified = |path: &str| root.join(path).metadata().and_then(|m| m.modified()).ok();
-    // npm writes this file last; an older one belongs to another lock file.
+    // npm writes this file last. If it is older than the lock file, the installation is outdated.
     let installed = modified("node_modules/.package-lock.json");
     if installed.is_some() && installed >= modified("package-lock.json") {
         return Ok(());
     }
     println!("setup: installing npm dependencies");
-    // Not `npm ci`, which fails where the registry lacks the optional packages of other platforms; --no-save leaves
-    // the lock file alone, and what it names is what is installed.
+    // Not `npm ci`, which fails if the registry lacks the optional packages of other platforms. With --no-save, npm
+    // installs the locked versions and does not change the lock file.
     run("npm", &["install", "--no-save", "--no-audit", "--no-fund"], &[])
 }
 

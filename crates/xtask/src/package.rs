@@ -12,10 +12,10 @@ use crate::wasm::{self, target_folder};
 const PACKAGE: &str = "web/package";
 /// Licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
-/// Tests and pages of the blank project.
+/// Folders with the tests and pages of the blank project.
 const COPIED: [&str; 2] = ["web/package/examples", "web/package/test"];
 
-/// Tests the package, after a build of the page and `cargo test`, which make its wasm and the command for comparisons.
+/// Tests the package. Needs the wasm of a page build, and the command built by `cargo test` for comparisons.
 ///
 /// # Errors
 /// When a step fails.
@@ -30,7 +30,7 @@ pub(crate) fn test() -> Result<(), String> {
         let as_users = ["--module", module, "--moduleResolution", resolution];
         exec(&[&["tsc"], &strict[..], &as_users, &[&format!("{project}/consumer.ts")]].concat())?;
     }
-    // As a user's bundler makes its pages.
+    // Build the pages like a user's bundler.
     let vite = ["vite", "build", "--config", "web/package/test/vite.config.ts", "--logLevel", "error"];
     run("npx", &[&["--no-install"], &vite[..]].concat(), &envs)?;
     let playwright = ["playwright", "test", "--config", "web/package/playwright.config.ts"];

@@ -12,7 +12,7 @@ const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
 /// Python compiles modules when they are first imported. Compiling all of SciPy would double the time of the installation.
 const INSTALL: [&str; 6] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"];
 
-/// Tests the wheel, after `cargo test`, which builds the command for comparisons.
+/// Tests the wheel. Needs the command built by `cargo test` for comparisons.
 ///
 /// # Errors
 /// When a step fails.
@@ -25,7 +25,7 @@ pub(crate) fn test() -> Result<(), String> {
     run(&python, &["-m", "pytest", PACKAGE], &[("CAGEWORK_COMMAND", &command)])
 }
 
-/// Builds the release wheel into `target/wheels`. `args` go to maturin.
+/// Builds the release wheel for distribution, into `target/wheels`. `args` are passed to maturin.
 ///
 /// # Errors
 /// When a step fails.

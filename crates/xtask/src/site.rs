@@ -5,24 +5,24 @@ use crate::licences;
 use crate::npm::{self, exec};
 use crate::wasm;
 
-/// Largest wasm file, gzip-compressed: what a visitor waits for. Two per cent above what it is (PLY and STL took 60 kB, several
-/// models and the npm package 40, OFF, colours in GLBs and models far from the origin 55, commands and undo 57).
+/// Limit on the wasm file that visitors download, gzip-compressed bytes: 2 % above its size. (PLY and STL took 60 kB, several
+/// models and the npm package 40, OFF, colours in GLBs and models far from the origin 55, commands and undo 57.)
 const MAX_WASM_BYTES: usize = 1_262_000;
-/// Largest wasm file of visitors without WebGPU, gzip-compressed: it carries its own translator of shaders.
+/// Limit on the wasm file for browsers without WebGPU, gzip-compressed bytes: it contains a translator of shaders.
 const MAX_WEBGL_BYTES: usize = 1_908_000;
-/// Largest script that a visitor waits for, gzip-compressed.
+/// Limit on the script that visitors download, gzip-compressed bytes.
 const MAX_SCRIPT_BYTES: usize = 92_000;
 
-/// Fewest `f32x4.add` in a wasm file whose loops are vectors: it has 596, and had 261 (of libraries, and written by
-/// hand) when the core's loops were not.
+/// Minimum number of `f32x4.add` in a wasm file: 596 if the core's loops are vectorised, otherwise 261 (in libraries and
+/// hand-written code).
 const MIN_VECTOR_ADDS: usize = 450;
 /// The instruction `f32x4.add`.
 const VECTOR_ADD: [u8; 3] = [0xfd, 0xe4, 0x01];
 
-/// Where the built page goes.
+/// Folder of the built page.
 const FOLDER: &str = "dist";
 
-/// Builds the page into `dist/`: files that work below any path of any web server.
+/// Builds the page into `dist/`: files that work under any path of any web server.
 ///
 /// # Errors
 /// When a step fails or the result is too large to download.
@@ -54,7 +54,7 @@ pub(crate) fn test_scripts() -> Result<(), String> {
     exec(&["vitest", "run", "--root", "web"])
 }
 
-/// Builds the page and tests it in a browser; `args` go to Playwright.
+/// Builds the page and tests it in a browser; `args` are passed to Playwright.
 ///
 /// # Errors
 /// When one fails.
@@ -63,7 +63,7 @@ pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
     test_built_page(args)
 }
 
-/// Tests the page in `dist/`; `args` go to Playwright.
+/// Tests the page in `dist/`; `args` are passed to Playwright.
 ///
 /// # Errors
 /// When a test fails.
@@ -79,7 +79,7 @@ pub(crate) fn test_firefox() -> Result<(), String> {
     run("node", &["web/e2e/firefox.mjs"], &[])
 }
 
-/// Makes the pictures of the samples that the page shows, `web/public/samples`.
+/// Renders the page's pictures of the samples, `web/public/samples`.
 ///
 /// # Errors
 /// When a step fails.
@@ -89,7 +89,7 @@ pub(crate) fn pictures() -> Result<(), String> {
     run("npx", &playwright, &[("PICTURES", "1")])
 }
 
-/// Checks the types of the TypeScript, which the build ignores.
+/// Checks TypeScript types, which the build ignores.
 ///
 /// # Errors
 /// When one is wrong.
@@ -98,7 +98,7 @@ pub(crate) fn check_types() -> Result<(), String> {
     exec(&["tsc", "--project", "web"])
 }
 
-/// Checks the sizes of the files that a visitor waits for, and that the wasm uses vector instructions.
+/// Checks the sizes of the files that visitors download, and that the wasm uses vector instructions.
 fn check_sizes() -> Result<(), String> {
     let folder = root().join(FOLDER).join("assets");
     let entries = std::fs::read_dir(&folder).map_err(|e| format!("cannot read {}: {e}", folder.display()))?;

@@ -19,8 +19,8 @@ pub(crate) fn build() -> Result<(), String> {
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
-/// Packages of all test builds, which then share features and artifacts. Benches have no tests but need criterion, which takes
-/// half a minute; xtask has other features.
+/// Packages of all test builds, the same everywhere so that builds share features and artifacts. Benches have no tests but
+/// need criterion, which takes half a minute to build; xtask has other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
 /// Runs all tests.
@@ -32,7 +32,7 @@ pub(crate) fn test() -> Result<(), String> {
     // Most Rust tests leave one of two cores idle.
     beside("test-beside", || {
         run("cargo", &rust, &[])?;
-        // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
+        // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
         fuzz(&["--minutes", "0.1", "--seed", "1"])?;
         validate_exports()
     })?;
@@ -41,7 +41,7 @@ pub(crate) fn test() -> Result<(), String> {
     package::test()
 }
 
-/// The part of [`test()`] that runs beside the Rust tests, once those have been built.
+/// The part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
 pub(crate) fn test_beside() -> Result<(), String> {
     python::test()?;
     site::test_scripts()?;
@@ -65,7 +65,7 @@ pub(crate) fn check() -> Result<(), String> {
     beside("check-scripts", check_rust)
 }
 
-/// The part of [`check`] that is about TypeScript. It builds the wasm, whose last crates are compiled one at a time.
+/// The TypeScript part of [`check`]. It builds the wasm, whose last crates are compiled one at a time.
 pub(crate) fn check_scripts() -> Result<(), String> {
     site::check_types()?;
     exec(&["biome", "ci", "--error-on-warnings"])
@@ -73,7 +73,7 @@ pub(crate) fn check_scripts() -> Result<(), String> {
 
 fn check_rust() -> Result<(), String> {
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
-    // `--all-targets` omits it, since its manifest sets `test = false`.
+    // `--all-targets` omits this test, since its manifest sets `test = false`.
     let fuzz = ["clippy", "--workspace", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
     run("cargo", &fuzz, &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
@@ -118,10 +118,10 @@ fn validate_exports() -> Result<(), String> {
     run("node", &["crates/cagework-io/tests/three.mjs", folder], &[])
 }
 
-/// Runs a task of this program beside `work`, and shows its output once both have ended.
+/// Runs a task of this program in parallel with `work`, and shows its output when both have ended.
 ///
 /// # Errors
-/// That of `work`, which stops the task, or else when the task fails.
+/// Returns the error of `work`, which also stops the task. Otherwise fails if the task fails.
 fn beside(task: &str, work: impl FnOnce() -> Result<(), String>) -> Result<(), String> {
     let log = wasm::target_folder()?.join(format!("{task}.log"));
     let fault = |e: std::io::Error| format!("cannot run `xtask {task}`: {e}");
@@ -135,7 +135,7 @@ fn beside(task: &str, work: impl FnOnce() -> Result<(), String>) -> Result<(), S
         .map_err(fault)?;
     let outcome = work();
     if outcome.is_err() {
-        // Fails if the task has ended already. What the task has started goes on.
+        // Fails if the task has already ended. Processes that it has started continue.
         child.kill().ok();
     }
     let status = child.wait().map_err(fault)?;

@@ -7,7 +7,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 use crate::command::{output, root, run};
 
-/// Profile of Cargo that the wasm is built with.
+/// Cargo profile of the wasm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Profile {
     /// Quick to build.
@@ -31,12 +31,12 @@ struct Artifact {
     features: &'static [&'static str],
     /// Folder of the JavaScript package, ignored by git.
     package: &'static str,
-    /// Its name.
+    /// Name of its files.
     name: &'static str,
 }
 
-/// Browsers without WebGPU download the first only. Cargo keeps the artifact of the last build, which should be the one that
-/// developers build most often.
+/// Browsers without WebGPU download only the first. Cargo keeps the artifact of the last build, which should be the one
+/// that developers build most often.
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],
@@ -46,8 +46,8 @@ const ARTIFACTS: [Artifact; 2] = [
     Artifact { features: &[], package: "web/package/src/pkg", name: "cagework" },
 ];
 
-/// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 have vectors of 128 bits. The vectorizer must be named: otherwise
-/// all loops of the kernels stay scalar at any optimization level, and a bind takes 1.6 times as long.
+/// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 support 128-bit vectors. The vectorizer must be named:
+/// otherwise all loops of the kernels stay scalar at any optimization level, and a bind takes 1.6 times as long.
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// Sources of the packages.
@@ -67,8 +67,8 @@ const SOURCES: [&str; 10] = [
 /// File in each package that names its profile.
 const PROFILE: &str = "profile.txt";
 
-/// Builds the packages as visitors get them, unless that has been done of the sources as they are now: Cargo keeps one artifact
-/// alone, so that building both again links both again, five minutes of two cores.
+/// Builds the release packages, unless they are newer than all sources. Cargo keeps the artifact of the last build only, so
+/// building both again would link both again, which takes five minutes on two cores.
 ///
 /// # Errors
 /// When a step fails.
@@ -89,7 +89,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
     path.metadata().and_then(|m| m.modified()).ok()
 }
 
-/// When a file, or the newest file in a folder, was written.
+/// Modification time of a file, or of the newest file in a folder.
 fn newest(path: &Path) -> Option<SystemTime> {
     let Ok(entries) = path.read_dir() else { return modified(path) };
     entries.flatten().filter_map(|entry| newest(&entry.path())).max()
@@ -124,7 +124,7 @@ fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), Str
         .web(true)
         .map_err(fault("cannot target the web"))?
         .typescript(true)
-        // Names of functions are for debugging; they are a fifth of the file.
+        // Function names are only for debugging and are a fifth of the file.
         .remove_name_section(profile == Profile::Web)
         .remove_producers_section(profile == Profile::Web)
         .out_name(artifact.name);

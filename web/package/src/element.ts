@@ -180,7 +180,7 @@ export class CageDeformer extends Base {
         this.#resize();
       },
       () => {
-        // Setting src again opens another view.
+        // Forget the failed view, so that setting src again opens a new one.
         if (this.#view === opening) this.#view = undefined;
       },
     );

@@ -1,4 +1,4 @@
-/** Binding: starts, follows and cancels it, and knows what it will need. */
+/** Starts, tracks and cancels binds, and estimates their memory. */
 
 import { effect } from "@preact/signals";
 import type { BindEvent, BindOptions, BindReport, Coordinates } from "../contract";
@@ -11,20 +11,19 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface BindActions {
-  /** True when it ended with weights. Problems on screen stay when nobody asked for this bind: they are about
-   * something else. */
+  /** Binds. Resolves with true if there are weights. `unasked`: started by the page, so errors on screen stay. */
   start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
-  /** Changes options, and binds. */
+  /** Changes options and binds. */
   again(patch: Partial<BindOptions>): Promise<boolean>;
   cancel(): void;
-  /** Whether the cage that is open is bound or about to be. */
+  /** Whether the current cage is bound, has cached weights or is being bound. */
   covers(): boolean;
   setOptions(patch: Partial<BindOptions>): void;
-  /** Coordinates to compare with, each once per cage; true when they are there. */
+  /** Computes coordinates for comparison, once per cage. Resolves with false on failure. */
   prepareCompare(kinds: readonly Coordinates[]): Promise<boolean>;
 }
 
-/** Reports kept to compare methods with. */
+/** Number of earlier reports kept for comparing methods. */
 const EARLIER = 4;
 
 export function createBind(ctx: Context): BindActions {
@@ -40,7 +39,7 @@ export function createBind(ctx: Context): BindActions {
   };
   effect(estimate);
 
-  /** The report of a coarse pass: later binds are not compared with it. */
+  /** Report of the latest coarse pass. Later binds are not compared with it. */
   let coarse: BindReport | undefined;
   const adopted = (report: BindReport, pass: BindRun["pass"]) => {
     const { report: last, earlier } = store.get();
@@ -49,7 +48,7 @@ export function createBind(ctx: Context): BindActions {
     store.set({ report, earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER) });
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
-    // Colours were asked for before there were weights to show.
+    // Apply colours that were chosen before there were weights.
     const { engine } = ctx.session();
     engine.setScene(drawn(store.get()));
     store.set({ legend: engine.legend() ?? null });
@@ -109,7 +108,7 @@ export function createBind(ctx: Context): BindActions {
       const ok = await attempt(ctx, T.failed.bind, () =>
         ctx.queue.replace("bind", (signal) => bind(revision, signal, options)),
       );
-      // One for another cage may wait by now.
+      // A bind of another cage may have been queued since.
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;
     },
@@ -161,7 +160,7 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
   };
 }
 
-/** Whether two binds were done the same way, so that one report takes the other's place. */
+/** Whether two reports are of the same method, solver, grid and backend. The newer one then replaces the older one. */
 export function sameWay(a: BindReport, b: BindReport): boolean {
   return (
     a.method === b.method &&
@@ -172,10 +171,10 @@ export function sameWay(a: BindReport, b: BindReport): boolean {
   );
 }
 
-/** Longest curve kept; beyond it every second point goes, which a plot of 300 pixels does not miss. */
+/** Largest number of points of a curve. Beyond it, every second point is dropped; the plot is only 300 pixels wide. */
 const LONGEST = 600;
 
-/** The curve with a new point, if it is one. */
+/** Appends a point, unless its delta is not positive or its iteration is already there. */
 export function grown(curve: BindRun["curve"], iteration: number, delta: number | null): BindRun["curve"] {
   if (delta === null || !(delta > 0) || curve.at(-1)?.[0] === iteration) return curve;
   const next = [...curve, [iteration, delta] as const];

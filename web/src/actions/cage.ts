@@ -1,4 +1,4 @@
-/** Getting a cage: made for the model, a box, or a file; and repairing it. */
+/** Makes cages: generated, a box, or from a file. Repairs them. */
 
 import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
 import type { DocumentMirror } from "../document";
@@ -11,22 +11,28 @@ import type { Edit } from "./edit";
 import { carriableOf, type PoseActions } from "./poses";
 
 export interface CageActions {
-  /** Subdivides the cage 0 to 3 times for a smooth surface; false when that is not possible. */
+  /** Subdivides the cage 0 to 3 times for a smooth surface. False if that fails. */
   setSmooth(steps: number): boolean;
-  /** Changes what belongs to the cage, as one step; poses come along. False, with an error shown, when it does not fit. */
+  /**
+   * Changes smoothing or inner controls of the cage as one undo step, and carries poses over. Shows an error and
+   * returns false if that fails.
+   */
   change(label: string, change: Command | (() => void), failed?: string): boolean;
-  /** Makes a cage as the Cage panel says. True when there is a new one. `unasked`: leaves problems on screen. */
+  /**
+   * Makes a cage with the settings of the Cage panel. Resolves with false on failure. `unasked`: started by the page,
+   * so errors on screen stay.
+   */
   make(unasked?: boolean): Promise<boolean>;
   cancel(): void;
   load(files: readonly NamedFile[], unasked?: boolean): Promise<boolean>;
   repair(kind: Repair): Promise<boolean>;
-  /** Makes one that follows the model, whatever the panel says. */
+  /** Selects generated cages in the panel and generates one. */
   regenerate(): Promise<boolean>;
-  /** What the button beside a problem does. */
+  /** Runs the fix that the check offers for a problem. */
   mend(fix: Mend): void;
 }
 
-/** A hull needs few vertices: it has no limbs to follow. */
+/** Vertices of a hull: few, because it does not follow limbs. */
 const HULL_VERTICES = 24;
 
 export interface CageNeeds {
@@ -48,7 +54,7 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
     return true;
   };
 
-  /** Takes a new cage as a step; the first cage of a model is none. */
+  /** Sets a new cage as an undo step. The first cage of a model adds no step. */
   const take = (label: string, cage: CheckedCage) => {
     edit.settle();
     const before = carriableOf(ctx);
@@ -56,7 +62,7 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
     const isFirst = !before && ctx.store.get().undoLabel === null;
     ctx.session().takeCage(cage, isFirst ? undefined : label);
     if (cage.check) know(cage.check);
-    // A cage from elsewhere may reach beyond the view.
+    // A first or loaded cage may reach beyond the view.
     if (!before || label === T.did.loadCage) engine().frameAll();
     if (!before || !(posed || saved.length > 0)) return;
     const back = { label: T.pose.backToCage, run: () => void engine().undo() };

@@ -1,4 +1,4 @@
-/** Clips of a rigged model: what plays is the model as it would be exported. */
+/** Plays the clips of a rigged model, as in an exported file. */
 
 import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
@@ -9,21 +9,21 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface ClipActions {
-  /** Shows a clip, by its number; null for the rest pose. */
+  /** Shows a clip by index, and plays it unless reduced motion is preferred; null for the rest pose. */
   choose(clip: number | null): Promise<void>;
   toggle(): Promise<void>;
-  /** Goes to a time, seconds, and stays there. */
+  /** Seeks to a time in seconds and pauses. */
   scrub(seconds: number): Promise<void>;
   speed(factor: number): void;
   loop(on: boolean): void;
-  /** Weight of a morph target that no clip drives. */
+  /** Sets the weight of a morph target that no clip drives. */
   target(index: number, weight: number): Promise<void>;
   rig(patch: Partial<RigOptions>): void;
-  /** The cage poses the model again. */
+  /** Ends the clip and shows the cage's pose. */
   stop(): void;
 }
 
-/** What the cage needs to bend the moving model, if it is to. */
+/** Computes the lattice by which the cage deforms the moving model, if it is needed and missing. */
 export async function loadLattice(ctx: Context): Promise<void> {
   const { engine } = ctx.session();
   if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
@@ -57,7 +57,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
       set({ clip: null, seconds: 0, targets: [] });
   };
 
-  // A step of the history, a gesture, a blend: another pose of the cage has ended a clip that was paused.
+  // Undo steps, gestures and blends pose the cage, which ends a paused clip.
   effect(() => {
     store.get().steps;
     store.get().gesture;
@@ -67,7 +67,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     });
   });
 
-  /** The model as it is posed now, ready to be played; false if it cannot be. */
+  /** Prepares the model in its current pose for playback. False if that fails. */
   const ready = async (): Promise<boolean> => {
     if (engine().showsClip) return true;
     settle();
@@ -84,7 +84,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
   const step = (now: number) => {
     const { clip, seconds, speed, loop } = store.get().clip;
     const length = store.get().model?.clips[clip ?? -1]?.seconds ?? 0;
-    // Another pose of the cage has ended it.
+    // Posing the cage has ended the clip.
     if (!engine().showsClip || length <= 0) {
       stop();
       return;
@@ -110,7 +110,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     const { seconds } = store.get().clip;
     set({ clip, seconds: seconds >= length ? 0 : seconds, playing: true });
     last = performance.now();
-    // One that is asked for twice plays once.
+    // Two calls must not start two animation loops.
     cancelAnimationFrame(frame);
     frame = requestAnimationFrame(step);
   };

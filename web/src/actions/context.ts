@@ -13,11 +13,11 @@ export interface Fix {
 }
 
 export interface Tell {
-  /** A short sentence that goes away by itself. */
+  /** Shows a short message that disappears by itself. */
   say(text: string, ...fixes: Fix[]): void;
-  /** Something that did not work; stays until it is closed or fixed. */
+  /** Shows an error that stays until it is closed or fixed. */
   problem(explained: Explained, fix?: Fix): void;
-  /** Takes back the problems that are shown: a new attempt began. */
+  /** Removes all errors, because a new attempt begins. */
   clear(): void;
 }
 
@@ -26,13 +26,13 @@ export interface Context {
   readonly store: Store;
   readonly queue: Queue;
   readonly tell: Tell;
-  /** The view's place in the window. */
+  /** Rectangle of the view in the window. */
   readonly viewport: () => DOMRect;
-  /** The button for an error's fix, if the page has one. */
+  /** The button for an error's fix. */
   readonly fixFor: (fix: NonNullable<Explained["fix"]>) => Fix;
 }
 
-/** Runs `work`; an error becomes a problem with its fix, a cancellation nothing. Returns whether it went well. */
+/** Runs `work` and shows errors, except cancellations, with their fix. Returns whether it succeeded. */
 export async function attempt(
   ctx: Context,
   title: string,
@@ -47,10 +47,13 @@ export async function attempt(
   }
 }
 
-/** A page that would freeze for longer asks before, ms. */
+/** Ask before blocking the page for longer than this, ms. */
 const LONG_MS = 4000;
 
-/** While a file is read the page waits, says how far it is, and lets the user give it up. */
+/**
+ * Blocks the page until a job is done, and shows its progress with a cancel button. Asks for confirmation if opening
+ * the result would block the page for long.
+ */
 export async function waitFor<T extends object>(
   ctx: Context,
   signal: AbortSignal,
@@ -80,11 +83,11 @@ export async function waitFor<T extends object>(
   }
 }
 
-/** Shows an error, once. `file`: what "choose another file" means where it happened. */
+/** Shows an error, unless it is a cancellation. `file`: whether the fix "choose another file" opens or adds one. */
 export function report(ctx: Context, title: string, error: unknown, file: "file" | "add" = "file"): void {
   if (isCancelled(error)) return;
   if (isFatal(error)) {
-    // More than this action failed: see crash.ts.
+    // The wasm module is unusable, see crash.ts.
     reportError(error);
     return;
   }

@@ -1,4 +1,4 @@
-/** Controls inside the cage: points, bones and sheets, put there by clicks. Each change is one step of the history. */
+/** Inner controls of the cage: points, bones and sheets, added by clicks. Each change is one undo step. */
 
 import type { Command, InnerKind, NamedFile } from "../contract";
 import { triples } from "../points";
@@ -11,31 +11,31 @@ import type { Edit } from "./edit";
 export type Place = readonly [x: number, y: number, z: number];
 
 export interface ControlActions {
-  /** Adds a point, a bone through places, or a sheet between them; false when it does not fit. */
+  /** Adds a point, a bone through several points, or a sheet between them. False if it does not fit. */
   add(kind: InnerKind, places: readonly Place[]): boolean;
-  /** Adds a sheet around a place, as large as fits, turned to the eye. */
+  /** Adds a sheet around a point that faces the camera and is as large as fits. */
   addSheet(center: Place): boolean;
-  /** Reads controls from an OBJ file: points (p), bones (l), sheets (f). They take the place of those there are. */
+  /** Reads controls from an OBJ file: points (p), bones (l), sheets (f). They replace the existing ones. */
   load(files: readonly NamedFile[]): Promise<boolean>;
-  /** Radius of points and bones, object units; null for a share of the cage. */
+  /** Sets the radius of points and bones, object units; null for the default, a share of the cage's size. */
   setRadius(radius: number | null): boolean;
-  /** Takes what is selected of them away. */
+  /** Removes the selected ones. */
   remove(): boolean;
   clear(): boolean;
-  /** What clicks put there; null for nothing. The cage is shown at rest meanwhile. */
+  /** Chooses the kind of control that clicks add, and shows the rest cage. Null ends adding. */
   arm(kind: InnerKind | null): void;
-  /** A click while something is armed. */
+  /** Handles a click while a kind is chosen. */
   place(x: number, y: number): void;
-  /** Shows where a click would put it. */
+  /** Shows where a click would add a control. */
   hover(x: number, y: number): void;
-  /** Ends the bone, and what is armed. */
+  /** Adds the bone that is being drawn, and ends adding. */
   finish(): void;
-  /** For a link. */
+  /** Smoothing and inner controls for a link; undefined without any. */
   shared(): SharedControls | undefined;
   takeShared(shared: SharedControls): void;
 }
 
-/** A second click so near to the last one ends a bone, CSS pixels. */
+/** A click within this distance of the previous one ends the bone, CSS pixels. */
 const SAME_PX = 6;
 
 export function createControls(
@@ -45,7 +45,7 @@ export function createControls(
 ): ControlActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Corners of the bone that is being drawn, and where the last click was. */
+  /** Points of the bone that is being drawn, and the position of the last click. */
   let places: Place[] = [];
   let last: { readonly x: number; readonly y: number } | undefined;
 

@@ -1,4 +1,4 @@
-/** Moving and reshaping the cage. Gestures move it live; each becomes one step of the history when it ends. */
+/** Moves and reshapes the cage. Gestures change it live and become one undo step when they end. */
 
 import { nextAmount } from "../amount";
 import type { Command, Gesture, GizmoHandle, RestEdit } from "../contract";
@@ -6,24 +6,24 @@ import { T } from "../words";
 import { type Context, report } from "./context";
 
 export interface Edit {
-  /** Begins a gesture at a point; false when nothing is selected. */
+  /** Starts a gesture at a point of the view. False if nothing is selected. */
   begin(gesture: Gesture, x: number, y: number): boolean;
   beginGizmo(handle: GizmoHandle, x: number, y: number): boolean;
   drag(x: number, y: number): void;
   constrain(axis: 0 | 1 | 2, plane: boolean): void;
-  /** A key typed as part of an amount; false when it is not one. */
+  /** Handles a key typed as part of an amount. False if it is not part of one. */
   type(key: string): boolean;
   end(keep: boolean): void;
   active(): boolean;
   nudge(right: number, up: number): void;
-  /** Makes a step of nudges, or of a pull that is coming to rest; ends an animation. */
+  /** Completes the step of nudges or of a released pull, and ends an animation. */
   settle(): void;
   /** Adds a function that `settle` calls. */
   alsoSettles(write: () => void): void;
   moveTo(x: number, y: number, z: number): void;
   /** Runs a command as one step. If it throws, the error is shown under the title `failed`. Returns whether it worked. */
   apply(command: Command, label: string, failed?: string): boolean;
-  /** The same for a method of the engine that makes a step by itself. */
+  /** Like `apply`, for a method of the engine that adds an undo step itself. */
   step(work: () => void, failed: string): boolean;
   restEdit(edit: RestEdit): void;
   /** Settles, and starts or ends reshaping. */
@@ -35,12 +35,12 @@ const NUDGE_PAUSE_MS = 600;
 export function createEdit(ctx: Context): Edit {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** What the gesture in progress is called in the history. */
+  /** Name of the gesture in progress, for its undo step. */
   let verb: string | undefined;
   let typed = "";
   let nudging: ReturnType<typeof setTimeout> | undefined;
 
-  /** Makes one step of what was moved live. */
+  /** Adds an undo step for the live change. */
   const keep = (label: string) => {
     if (!store.get().editingRest) {
       engine().commit(label);
@@ -86,7 +86,7 @@ export function createEdit(ctx: Context): Edit {
     return true;
   };
 
-  /** Shows what the gesture does, and whether the reshaped cage still encloses the model. */
+  /** Shows the gesture's label and, while reshaping, how many sampled vertices are outside the cage. */
   const showLabel = () => {
     const label = engine().transformLabel();
     store.set({

@@ -1,4 +1,4 @@
-/** Files out of the page. */
+/** Exports files, pictures and links. */
 
 import type { ModelInfo, NamedFile } from "../contract";
 import { SHAPE_FORMATS } from "../defaults";
@@ -16,15 +16,15 @@ export type ShapeFormatName = (typeof SHAPE_FORMATS)[number];
 
 export interface Exports {
   save(kind: ExportKind): Promise<void>;
-  /** A link to what is open, on the clipboard if it may be. */
+  /** Copies a link to the open work, or offers to save a project if a link cannot contain it. */
   share(): Promise<void>;
-  /** Pixels of the picture for each of the view, and whether it shows the model alone. */
+  /** Sets the picture's pixels per pixel of the view, and whether it shows only the model. */
   pictureOf(scale: number, alone: boolean): void;
-  /** The format of the next shape. */
+  /** Sets the format of exported shapes. */
   shapeIn(format: ShapeFormatName): void;
 }
 
-/** Browsers drop downloads that begin at the same time, ms. */
+/** Pause between downloads, ms: browsers drop simultaneous ones. */
 const BETWEEN_MS = 250;
 
 /** Largest side of a picture, pixels. */
@@ -38,7 +38,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   const engine = () => ctx.session().engine;
   const rig = () => rigOf(ctx.store.get());
 
-  /** Files that each model has of its own. */
+  /** Exports with one file per model. */
   const own = {
     glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
     shape: (id: number) => engine().exportShape(id, format),
@@ -55,7 +55,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   const suffix = (kind: Exclude<ExportKind, "project">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
-  /** A file for each model that is asked for. */
+  /** Saves one file per chosen model. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
     if (kind === "glb") await loadLattice(ctx);
     const { members } = model;
@@ -65,10 +65,10 @@ export function createExports(ctx: Context, project: Project): Exports {
     const files: string[] = [];
     let size = 0;
     for (const { id, name } of chosen.length > 0 ? chosen : members) {
-      // One that is open alone may be called otherwise: a sample by its label, a project by its file.
+      // A single model may be shown under the name of its sample or project.
       const source = members.length === 1 ? model.name : name;
       const full = `${stem(source)}${suffix(kind)}`;
-      // A VRM stays one.
+      // A VRM keeps its extension.
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
       const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
       const blob = new Blob([new Uint8Array(own[kind](id))]);
@@ -92,7 +92,7 @@ export function createExports(ctx: Context, project: Project): Exports {
     async save(kind) {
       const { model } = ctx.store.get();
       await attempt(ctx, T.failed.write, async () => {
-        // The moment after a bind its weights are still on the way to the GPU.
+        // Right after a bind, its weights may still be uploading to the GPU.
         await engine().ready();
         if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(shared[kind]())]);
@@ -124,13 +124,13 @@ export function createExports(ctx: Context, project: Project): Exports {
   return exports;
 }
 
-/** Puts a link in the clipboard. */
+/** Copies a link to the clipboard and shows `done`. */
 export async function copyLink(ctx: Context, link: string, done: string): Promise<void> {
   try {
     await navigator.clipboard.writeText(link);
     ctx.tell.say(done);
   } catch {
-    // No access to the clipboard: the address bar can be copied by hand.
+    // Without clipboard access, show the link in the address bar to be copied by hand.
     window.history.replaceState(null, "", link);
     ctx.tell.say(T.exports.inAddress);
   }
@@ -145,7 +145,7 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   picture: ".png",
 };
 
-/** A name that none of `taken` is: models of one name may come from several folders. */
+/** A name that is not in `taken`: models from different folders may have the same name. */
 function other(name: string, taken: readonly string[]): string {
   const again = (n: number) => name.replace(/(?=\.\w+$)/, `-${n}`);
   let n = 2;
@@ -153,18 +153,18 @@ function other(name: string, taken: readonly string[]): string {
   return taken.includes(name) ? again(n) : name;
 }
 
-/** Hands a file to the browser's downloads. */
+/** Downloads a file. */
 function download(blob: Blob, name: string): void {
   const url = URL.createObjectURL(blob);
   const link = document.createElement("a");
   link.href = url;
   link.download = name;
   link.click();
-  // The download has its own hold on the data once the click has been handled.
+  // The browser keeps the data once the download has started.
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** Files of a file button. */
+/** Files of a file input, with names and paths. */
 export function named(files: Iterable<File>): NamedFile[] {
   return Array.from(files, (file) => ({ name: file.name, path: file.webkitRelativePath || file.name, file }));
 }

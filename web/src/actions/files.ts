@@ -1,4 +1,4 @@
-/** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
+/** Opens samples, files and projects, then makes a cage and binds automatically. */
 
 import type { BindOptions, NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS } from "../defaults";
@@ -19,11 +19,11 @@ import type { View } from "./view";
 import type { WorkActions } from "./works";
 
 export interface Files {
-  /** `bind`: how it is bound, in place of the usual options. */
+  /** `bind`: bind options in place of the defaults. */
   openSample(id: string, bind?: BindOptions): Promise<boolean>;
-  /** Files of a drop or a file button; names and kinds decide. */
+  /** Opens dropped or chosen files, whose names determine their roles. */
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
-  /** The model with another axis up; its cage and poses turn with it. */
+  /** Rotates the model with its cage and poses to another up axis. */
   turn(up: UpAxis): Promise<boolean>;
 }
 
@@ -36,13 +36,13 @@ export interface FileNeeds {
   readonly project: Pick<Project, "write">;
   readonly view: Pick<View, "symmetry">;
   readonly works: Pick<WorkActions, "flush" | "leave">;
-  /** Ends what plays or is in progress, because something else will be open. */
+  /** Ends playback and operations in progress before something else is opened. */
   settle(): void;
   /** Called before a sample, or a file (null), is opened. */
   overtaken(sample: string | null): void;
 }
 
-/** What comes along with a model. */
+/** What is opened together with a model. */
 interface Along {
   readonly others: readonly Named[];
   readonly cageFiles: readonly NamedFile[] | undefined;
@@ -54,7 +54,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   const { store } = ctx;
   const take = async (opened: Opened, sample: string | null, along: Partial<Along> = {}) => {
     const { others = [], cageFiles, signal, bind } = along;
-    // Nobody needs the cage and the weights of what was open.
+    // A cage or weights in progress are for the previous model.
     for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
     const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
     store.set({
@@ -72,7 +72,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     needs.view.symmetry(symmetry ?? false);
     for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
-    // Before there is a cage: it encloses all of them.
+    // Add the other models first, so that the cage encloses all of them.
     if (signal && others.length > 0) await needs.models.join(others, signal);
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
@@ -82,7 +82,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   };
 
   const settingsOf = (opened: Opened): Settings => {
-    // The memory limit is this computer's: no file says how much it has.
+    // The memory limit depends on this computer, not on the file.
     const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
     return opened.settings === null ? { notices: [] } : ctx.session().readSettings(opened.settings, bind);
   };
@@ -91,7 +91,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     if (from.includes(store.get().step)) store.set({ step });
   };
 
-  /** Cage, bind, pose: as far as it goes without the user. */
+  /** Makes the cage and binds, as far as possible without the user. */
   const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     if (cageFiles) {
       if (!(await needs.cage.load(cageFiles, true))) return;
@@ -107,7 +107,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     if ((await needs.bind.start(true)) && !familiar) goTo(["bind"], "pose");
   };
 
-  /** In the order asked for; who asks for another one gives up the one before. */
+  /** Runs `work` while the page is blocked. A new call cancels the previous one. */
   const busy = (what: string, title: string, work: (signal: AbortSignal) => Promise<void>) =>
     attempt(ctx, title, () => {
       ctx.tell.clear();
@@ -117,7 +117,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       });
     });
 
-  /** Opens something else; what is open until then stays kept. */
+  /** Saves the open work, then opens something else. */
   const replace = async (open: () => Promise<Opened>, sample: string | null, along: Partial<Along>) => {
     needs.settle();
     needs.overtaken(sample);
@@ -130,7 +130,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   return {
     openSample(id, bind) {
       const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
-      // Its worker is the one that binds.
+      // Free the worker for the sample: it also generates cages and binds.
       for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
       return busy(T.opening.file(label), T.failed.sample, () =>
         replace(() => ctx.session().openSample(id), id, { bind }),
@@ -147,7 +147,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       const second = plan.second === undefined ? undefined : files[plan.second];
       return busy(T.opening.file(main.name), T.failed.open(main.name), async (signal) => {
         const models = modelsOf(files, plan);
-        // The others open: another file is for their cage.
+        // If one of several models fails, the others open: offer to add a file to their cage.
         const another = models.length > 1 ? "add" : "file";
         const [first, ...others] = await readModels(ctx, signal, models, another);
         const along = { others, cageFiles: second && [second], signal };
@@ -163,10 +163,10 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   };
 }
 
-/** A sample is called by its label, a project by its model. */
+/** Name shown for the model: a sample's label, or the name of a project's model. */
 function shownName(opened: Opened, sample: string | null, samples: readonly Sample[]): string {
   const { name } = opened.model;
   const label = samples.find(({ id }) => id === sample)?.label;
-  // One with several models is called as they are.
+  // Several models keep their common name.
   return label ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
 }

@@ -1,4 +1,4 @@
-/** What follows when the cage at rest has changed: the page looks again, and the model is bound again. */
+/** Updates the view and binds again after the rest cage has changed. */
 
 import { effect, untracked } from "@preact/signals";
 import { optionsInUse } from "../derived";
@@ -8,9 +8,9 @@ import type { Edit } from "./edit";
 import type { Pulling } from "./pull";
 import type { View } from "./view";
 
-/** A hand that has not moved the cage for so long rests, ms. */
+/** Pause after the last change before binding, ms. */
 const PAUSE_MS = 150;
-/** A finer grid waits for the user's word. */
+/** Finest grid that is bound automatically. */
 const FINEST = 128;
 
 export interface Followers {
@@ -27,7 +27,7 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
     soon = setTimeout(() => {
       const { cage } = store.get();
       const options = optionsInUse(store.get());
-      // A gesture may end without a change, and then nobody else would ask for the bind.
+      // Try again later: a gesture that ends without a change does not start a bind.
       if (edit.active()) bindSoon(PAUSE_MS);
       else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
     }, pause);
@@ -45,7 +45,7 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
   });
   effect(() => {
     const { bound, bindRun, cage } = store.get();
-    // After the last pass: the worker that solves pulls would take time from it.
+    // Wait for the last pass, because preparing pulls would slow it down.
     if (cage && bound && bindRun === null) untracked(() => pull.prepare());
   });
   effect(() => {

@@ -1,4 +1,4 @@
-/** The models that share the cage: more of them, fewer, and which parts of them follow it. */
+/** Adds and removes models in the cage, and selects which of their parts follow it. */
 
 import type { MemberInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
@@ -12,13 +12,16 @@ import { modelsOf, type Named, readModels } from "./read";
 export type How = "rigid" | "stays";
 
 export interface Models {
-  /** Adds models of files to the cage that is open. */
+  /** Adds models from files to the open cage. */
   add(files: readonly NamedFile[]): Promise<boolean>;
-  /** Adds models that were read. `label` names the step for a number of models; without it, there is no step. Can be cancelled. */
+  /**
+   * Adds models that were read. `label` returns the name of the undo step for a number of models; without it, no step
+   * is added.
+   */
   join(others: readonly Named[], signal: AbortSignal, label?: (models: number) => string): Promise<boolean>;
   /** Removes a model from the cage. */
   bin(id: number): boolean;
-  /** Shows or hides a model; not a step of the history. */
+  /** Shows or hides a model, without an undo step. */
   show(id: number, shown: boolean): void;
   /** Makes a part keep its shape or stay in place, or follow the cage again. "all" is the whole model. */
   part(id: number, name: string, how: How): void;
@@ -27,10 +30,10 @@ export interface Models {
 export interface ModelNeeds {
   readonly cage: Pick<CageActions, "load" | "regenerate">;
   readonly edit: Pick<Edit, "apply" | "settle">;
-  /** Resolves when the cage was checked as it is now. */
+  /** Resolves when the current cage has been checked. */
   checked(): Promise<unknown>;
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
-  /** Ends what plays or is in progress: another model is another shape. */
+  /** Ends playback and operations in progress before the models change. */
   settle(): void;
 }
 
@@ -39,7 +42,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
   const members = (): readonly MemberInfo[] => store.get().model?.members ?? [];
   const memberOf = (id: number) => members().find((member) => member.id === id);
 
-  /** A cage that was being made was for the previous models. */
+  /** Generates a cage if there is only one in progress, which is for the previous models. */
   const remakeCage = () => {
     if (!store.get().cage) void cage.regenerate();
   };

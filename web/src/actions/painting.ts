@@ -1,4 +1,4 @@
-/** Painting what of a model stays as it is. */
+/** Paints how much each vertex of a model stays in place. */
 
 import { effect, untracked } from "@preact/signals";
 import type { Painting } from "../state";
@@ -7,29 +7,29 @@ import { type Context, report } from "./context";
 import type { Edit } from "./edit";
 
 export interface PaintActions {
-  /** Begins to paint on a model, or ends it (null). */
+  /** Starts painting a model; null ends painting. */
   on(id: number | null): void;
   brush(patch: Partial<Omit<Painting, "id">>): void;
-  /** Takes away what is painted. */
+  /** Removes all paint from a model. */
   clear(id: number): void;
-  /** Begins a stroke; false beside the model. */
+  /** Starts a stroke. False if the point is not on the model. */
   begin(x: number, y: number): boolean;
   drag(x: number, y: number): void;
-  /** Keeps the stroke, or puts back what was there before. */
+  /** Keeps the stroke as an undo step, or reverts it. */
   end(keep: boolean): void;
   active(): boolean;
-  /** Radius of the brush, CSS pixels: null where it would not paint, undefined while the GPU is busy for a moment. */
+  /** Radius of the brush, CSS pixels: null where it would not paint, undefined while the GPU is busy. */
   radiusAt(x: number, y: number): number | null | undefined;
 }
 
-/** Farther apart than this a stroke gets dabs between, CSS pixels. */
+/** Largest distance between the dabs of a stroke, CSS pixels. */
 const DAB_PX = 6;
-/** Of the brush at first, over the model's size. */
+/** Initial radius of the brush, over the model's size. */
 const RADIUS = 0.05;
-/** What a dab leaves: all follows, or all stays. */
+/** Painted amounts: follows the cage completely, or stays completely. */
 const [FOLLOWS, STAYS] = [0, 255];
 
-/** `settle` ends what plays or is in progress. */
+/** `settle` ends playback and operations in progress. */
 export function createPainting(
   ctx: Context,
   edit: Pick<Edit, "apply" | "settle">,
@@ -37,7 +37,7 @@ export function createPainting(
 ): PaintActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Kept from one time to the next. */
+  /** Radius with which painting starts next time. */
   let radius = RADIUS;
   let stroke: { readonly x: number; readonly y: number } | undefined;
 
@@ -75,7 +75,7 @@ export function createPainting(
           report(ctx, T.models.notPainted, error);
           return false;
         }
-        // The GPU is busy with the stroke before for a moment: this one paints from its first movement on.
+        // The GPU is still busy with the previous stroke: this one starts painting with its first movement.
       }
       stroke = { x, y };
       return true;
@@ -88,7 +88,7 @@ export function createPainting(
         for (let k = 0; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
         stroke = { x, y };
       } catch {
-        // The GPU was busy for a moment: the next movement goes on from here.
+        // The GPU is busy: the next movement continues from the last painted point.
       }
     },
     end(keepIt) {
@@ -113,7 +113,7 @@ export function createPainting(
   effect(() => {
     const { editingRest, model, painting } = store.get();
     const isGone = !model?.members.some(({ id }) => id === painting?.id);
-    // A hand that reshapes the cage does not paint.
+    // Reshaping the cage ends painting.
     if (painting && (editingRest || isGone)) untracked(() => actions.on(null));
   });
   return actions;

@@ -1,4 +1,4 @@
-/** Points of the model that pulls leave in place, and the marks of the point that is held. */
+/** Pins, which pulls keep in place, and the mark of the grabbed point. */
 
 import type { SurfacePoint } from "../contract";
 import { T } from "../words";
@@ -6,18 +6,18 @@ import type { Context } from "./context";
 import type { Edit } from "./edit";
 
 export interface Pins {
-  /** Marks the point that is held or would be, and where it is to be. */
+  /** Marks the point that is or would be grabbed, and its target. */
   show(held?: SurfacePoint, target?: Float32Array): void;
-  /** Where a point of the model is in the view; undefined if its model was removed. */
+  /** Position of a model point in the view, CSS pixels; undefined if its model was removed. */
   inView(point: SurfacePoint): { x: number; y: number } | undefined;
-  /** Those that are not at a place of the view. */
+  /** All pins except the one at this position of the view. */
   free(x: number, y: number): readonly SurfacePoint[];
-  /** Removes the pin there, or else pins the point there if `mayPin`; false beside the model. */
+  /** Removes the pin at a position of the view, or pins the model there if `mayPin`. False if neither is possible. */
   toggle(x: number, y: number, mayPin: boolean): boolean;
   removeAll(): void;
 }
 
-/** A grab and a pin that are nearer to each other are the same point, CSS pixels. */
+/** A grab and a pin within this distance are the same point, CSS pixels. */
 const SAME_PX = 14;
 
 export function createPins(ctx: Context, apply: Edit["apply"]): Pins {

@@ -1,4 +1,4 @@
-/** Poses: saved, named, blended and played. */
+/** Saves, renames, blends and plays poses. */
 
 import type { CageArrays, PoseView } from "../contract";
 import { fittingPoses } from "../derived";
@@ -8,22 +8,25 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 
-/** Poses refer to saved poses by their index. */
+/** Indices refer to the list of saved poses. */
 export interface PoseActions {
   save(): void;
   apply(index: number): void;
   rename(index: number, name: string): void;
   remove(index: number): void;
-  /** Sets one pose's share of the blend; `done` when the slider is released, which makes it one step. */
+  /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */
   blend(index: number, share: number, done: boolean): void;
-  /** Carries the poses of the previous cage over to the cage that is open: as a step with a label, or else with the last step. */
+  /**
+   * Converts the poses of the previous cage to the current one: with a label as an undo step, otherwise as part of the
+   * last step.
+   */
   carry(before: Carriable, label?: string): Promise<boolean>;
   reset(): void;
   togglePlay(): void;
   stop(): void;
 }
 
-/** A cage and its poses, before another cage takes its place. */
+/** A cage and its poses, before the cage is replaced. */
 export interface Carriable {
   readonly cage: CageArrays;
   /** The pose, then each saved pose that fits. `[1 + n_poses, n_controls, 3]` */
@@ -31,7 +34,7 @@ export interface Carriable {
   readonly shares: readonly number[];
 }
 
-/** What can be carried over from the cage that is open; undefined without one. */
+/** The current cage and its poses; undefined without a cage. */
 export function carriableOf(ctx: Context): Carriable | undefined {
   const { cage, shares } = ctx.store.get();
   const session = ctx.session();
@@ -50,7 +53,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     engine().revert();
     store.set({ playing: false, playingPose: null });
   };
-  // Steps must not contain a moment of the animation.
+  // Undo steps must not contain an intermediate pose of the animation.
   edit.alsoSettles(stop);
 
   const carry: PoseActions["carry"] = ({ cage, poses, shares }, label) => {
@@ -126,7 +129,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   };
 }
 
-/** "Pose 3", or the next number that is free. */
+/** "Pose 3", or the next unused number. */
 export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));
   let number = poses.length + 1;

@@ -1,4 +1,4 @@
-/** What is open as a project file and as a link. */
+/** Writes the open work as a project file or a link. */
 
 import type { MemberInfo, SceneOptions } from "../contract";
 import { optionsInUse } from "../derived";
@@ -11,7 +11,7 @@ export interface Project {
   /** The project file's bytes. */
   write(): Uint8Array<ArrayBuffer>;
   fileName(): string;
-  /** The link to copy; undefined when what is open cannot be linked to. */
+  /** The link to copy; undefined if a link cannot contain the open work. */
   link(): Promise<string | undefined>;
 }
 
@@ -42,13 +42,13 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
   };
 }
 
-/** What a link keeps of what is shown: nothing that belongs to the visitor or that must be computed first. */
+/** Scene options in a link: not those that are the user's own, and not those that need a computation. */
 export function ofLink(scene: SceneOptions): Partial<SceneOptions> {
   const { model, cage, floor, base_wireframe, colour, weights_to_one, problems } = scene;
   return { model, cage, floor, base_wireframe, colour, weights_to_one, problems };
 }
 
-/** Whether something was chosen for a model that a link cannot say. */
+/** Whether a model has settings that a link cannot contain. */
 function hasChoices({ painted, options: { shown, rigid, stays } }: MemberInfo): boolean {
   return painted || !shown || rigid.length + stays.length > 0;
 }

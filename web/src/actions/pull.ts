@@ -1,4 +1,4 @@
-/** Pulling the model by its own points: the page points, a worker solves, the cage follows. */
+/** Pulls points of the model: a worker computes the pose of the cage that moves them to their targets. */
 
 import type { SurfacePoint } from "../contract";
 import { controlCount } from "../derived";
@@ -9,52 +9,52 @@ import type { Edit } from "./edit";
 import { createPins } from "./pins";
 
 export interface Pulling {
-  /** Makes ready for the model and the cage that are bound. */
+  /** Prepares pulls of the bound model and cage. */
   prepare(): void;
-  /** Shows the point under the pointer that would be grabbed; whether there is one. */
+  /** Marks the point that would be grabbed at this position. Returns whether there is one. */
   hover(x: number, y: number): boolean;
-  /** Takes hold of the model at a place of the view; false beside it. */
+  /** Grabs the model at a position of the view. False if it is not there. */
   begin(x: number, y: number): boolean;
-  /** Takes hold of a vertex of the cage. */
+  /** Grabs a vertex of the cage. */
   beginCage(vertex: number, x: number, y: number): boolean;
   drag(x: number, y: number): void;
-  /** Lets go, or puts back what was there before. */
+  /** Releases the grab, or restores the previous pose. */
   end(keep: boolean): void;
   active(): boolean;
   /** Scales how far the drag reaches along the surface. */
   reach(factor: number): void;
-  /** Moves the point that was held last, or the one in the middle of the view, by CSS pixels. */
+  /** Moves the last grabbed point, or the one in the middle of the view, by CSS pixels. */
   nudge(right: number, up: number): void;
-  /** Pins the point there, or takes the pin there away; false beside the model. */
+  /** Adds or removes a pin at a position of the view. False if neither is possible. */
   pin(x: number, y: number): boolean;
   unpinAll(): void;
   whole(on: boolean): void;
 }
 
-/** Farther than this off its target, over the model's size, a grab cannot follow. */
+/** Error of a grab, over the model's size, above which its target is shown. */
 const OFF = 0.01;
-/** Frames for which a pull goes on after it was let go, at most. */
+/** Maximum number of frames solved after release. */
 const SETTLING = 30;
-/** A wider reach is the whole model. */
+/** Reach above which the whole model moves. */
 const WIDEST = 1.2;
-/** Arrow keys that come one after the other are one pull, ms. */
+/** Arrow keys with shorter pauses are one pull, ms. */
 const NUDGE_PAUSE_MS = 600;
-/** The seed of a grip on a vertex of the cage: Puller's ON_CAGE. */
+/** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
 const ON_CAGE = 0xffffffff;
 
 interface Drag {
   readonly before: Float32Array;
-  /** Of the engine: what is held belongs to it. */
+  /** Engine revision that the grabbed points belong to. */
   readonly revision: number;
   readonly grabs: readonly (SurfacePoint | number)[];
-  /** Where the pointer took hold. */
+  /** Position of the pointer at the grab. */
   readonly from: { readonly x: number; readonly y: number };
-  /** Where the grab was, and where it is to be. */
+  /** Initial position of the first grab, and its target. */
   place: Float32Array;
   to: Float32Array;
-  /** Counts targets: the worker has answered which. */
+  /** Number of targets so far, to recognise answers for an older one. */
   wanted: number;
-  /** Over the model's size; null while the solver chooses it. */
+  /** Over the model's size; null until the solver has chosen it. */
   reach: number | null;
   letGo: boolean;
   by: { right: number; up: number };
@@ -75,7 +75,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     return bound && pullReady && !editingRest && !playing;
   };
 
-  /** Asks the worker to take hold, with the pins that are not grabbed. */
+  /** Sends the grabs, and all pins that are not grabbed, to the worker. */
   const grab = async (drag: Drag) => {
     const { pullWhole, symmetry } = store.get();
     const n = controlCount(store.get());
@@ -115,7 +115,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     drag.wanted += 1;
   };
 
-  /** Frames as long as something moves: the worker solves the next one while this one is drawn. */
+  /** Requests frames from the worker until the pull ends. Pauses while the pose has settled at the current target. */
   const run = async (drag: Drag) => {
     await grab(drag);
     let answered = -1;
@@ -138,7 +138,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     }
   };
 
-  /** Another model or cage came while the hand was at it. */
+  /** Whether model or cage have changed during the drag. */
   const isStale = (drag: Drag) => drag.revision !== engine().revision;
 
   const finish = (drag: Drag) => {
@@ -185,7 +185,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       void attempt(ctx, T.failed.pull, () =>
         ctx.queue.replace("pull", async (signal) => {
           const job = ctx.session().preparePull();
-          // Who takes hold before the worker is ready waits there for it.
+          // Allow pulling right away: a grab waits until the worker is ready.
           store.set({ pullReady: true });
           try {
             await follow(signal, job);

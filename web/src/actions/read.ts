@@ -1,4 +1,4 @@
-/** Reading models that came together: what goes wrong with one of them is said, and the others are read. */
+/** Reads several models. Errors of one are reported, and the others are still read. */
 
 import type { Job, NamedFile, ReadFile, Reading } from "../contract";
 import type { DropPlan } from "../drop";
@@ -14,7 +14,9 @@ export interface Named {
   readonly read: ReadFile;
 }
 
-/** The models of a drop, each with what may belong to it: all that is no model. */
+/**
+ * The models of a drop, each followed by its possible companion files: all that are neither models nor `plan.second`.
+ */
 export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly NamedFile[])[] {
   const models = [plan.main, ...(plan.more ?? [])].flatMap((k) => files[k ?? -1] ?? []);
   const second = files[plan.second ?? -1];
@@ -22,7 +24,10 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
   return models.map((model) => [model, ...companions]);
 }
 
-/** Reads them in turn, and can be cancelled. Ends as if it were when there is nothing left to open. `another`: what helps. */
+/**
+ * Reads models in sequence. If none can be read, their errors have been shown and the function throws a cancellation.
+ * `another`: whether fixes offer to open or to add another file.
+ */
 export async function readModels(
   ctx: Context,
   signal: AbortSignal,

@@ -1,15 +1,15 @@
-/** The way to the tour, which is downloaded when somebody takes it. */
+/** Starts the tour, whose code is downloaded at the first start. */
 
 import type { Guide, GuideNeeds, Loaded } from "../tour";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface TourActions {
-  /** Begins at a stop, counted from 0, or where it was left. */
+  /** Starts at a stop, counted from 0, by default where the tour was left. */
   start(stop?: number): Promise<void>;
-  /** Drives it, and what shows it; nothing before it has begun. */
+  /** The downloaded tour; undefined before the first start. */
   loaded(): Loaded | undefined;
-  /** Where it is on. */
+  /** The guide of the tour in progress; undefined otherwise. */
   guide(): Guide | undefined;
 }
 
@@ -27,7 +27,7 @@ export function createTour(ctx: Context, needs: GuideNeeds): TourActions {
   };
 }
 
-/** The stop that a link leads to, from 0. */
+/** The stop in a link's fragment, counted from 0; undefined without one. */
 export function stopOf(fragment: string): number | undefined {
   const said = new URLSearchParams(fragment.slice(1)).get("tour");
   return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);

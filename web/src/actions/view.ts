@@ -1,4 +1,4 @@
-/** What is drawn and from where. */
+/** Scene options and camera. */
 
 import { effect } from "@preact/signals";
 import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
@@ -15,11 +15,11 @@ import { ofLink } from "./project";
 
 export interface View {
   scene(patch: Partial<SceneOptions>): void;
-  /** What a link shows. */
+  /** Applies scene options, camera and selection of a link. */
   show(seen: Seen): void;
   theme(theme: Theme): void;
   slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): void;
-  /** Shows these side by side; one alone ends the comparison. */
+  /** Compares coordinates side by side. A single kind ends the comparison. */
   compare(kinds: readonly Coordinates[]): Promise<void>;
   frameAll(): void;
   frameSelection(): void;
@@ -30,25 +30,27 @@ export interface View {
   element(element: CageElement): void;
   pivot(pivot: Pivot): void;
   gizmo(gizmo: SceneOptions["gizmo"]): void;
-  /** Space is held, or let go. */
+  /** Shows the model at rest while Space is held. */
   original(on: boolean): void;
-  /** The cage changed: what is shown of it follows. */
+  /** Updates the scene after the cage has changed. */
   refresh(): void;
-  /** Tells the session the view's size; set once it is known. */
+  /** Passes the view's size to the session. Set at startup. */
   resized: () => void;
 }
 
 /** Pause before a moved slice is computed, ms: a slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
-/** What there is to compare, in the order in which it is shown. */
+/** Coordinates that can be compared, in display order. */
 export const COORDINATES = ["harmonic", "mean_value", "green"] as const satisfies Coordinates[];
 
-/** Harmonic coordinates alone are what is shown anyway; others alone would not be what the hand takes hold of. */
+/**
+ * Whether these are compared: at least two. Others are never shown alone, because gestures act on the harmonic shape.
+ */
 export function isComparison(kinds: readonly Coordinates[]): boolean {
   return kinds.length > 1;
 }
 
-/** A part of the width holds the model when it is so much smaller. */
+/** Zoom at which the model fits into one of several views side by side. */
 const partZoom = (parts: number) => (parts > 2 ? 0.45 : parts > 1 ? 0.6 : 1);
 
 export function createView(
@@ -143,7 +145,7 @@ export function createView(
     },
     element(element) {
       store.set({ element });
-      // Who wants edges or faces in a pose does not pull.
+      // Choosing edges or faces outside reshaping ends pulling.
       if (elementInUse(store.get()) !== element) scene({ pull: false });
     },
     pivot(pivot) {

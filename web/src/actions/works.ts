@@ -1,4 +1,4 @@
-/** Keeping work: each piece has an entry of its own in this browser, and one tab at a time has it open. */
+/** Keeps work in the browser: one entry per work, open in at most one tab. */
 
 import type { NamedFile } from "../contract";
 import { isFatal } from "../crash";
@@ -10,29 +10,29 @@ import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
 import { attempt, type Context } from "./context";
 
 export interface WorkActions {
-  /** Keeps what is open a little later; many calls make one. */
+  /** Saves the open work after a pause; repeated calls are merged. */
   touch(): void;
-  /** Keeps at once what would be kept later, and a model that was not yet: something else will be opened. */
+  /** Saves pending changes, and a model that was never saved, before something else is opened. */
   flush(): Promise<void>;
-  /** Something else is open: what was before stays kept. */
+  /** Releases the previous work after something else was opened, and offers to return to it. */
   leave(): void;
-  /** Reads anew what is kept, for `AppState.works`. */
+  /** Reads the list of kept work into `AppState.works`. */
   refresh(): Promise<void>;
-  /** Opens what is kept; a copy of what another tab has open. */
+  /** Opens kept work, as a copy if another tab has it open. */
   open(work: Work): Promise<boolean>;
   remove(id: string): Promise<void>;
-  /** Opens what a visit opens by itself; false when there is nothing, or more to choose from. */
+  /** Opens the work that `toOpen` chooses. False without one, or if it cannot be opened. */
   restore(): Promise<boolean>;
-  /** What this tab had open is not opened by itself any more: the page stops with it. */
+  /** Excludes the work of this tab from automatic opening, because the page crashed with it. */
   distrust(): Promise<void>;
 }
 
 const PAUSE_MS = 1500;
-/** Larger projects are not kept by themselves, bytes: writing them would be felt with each change. */
+/** Larger projects are not saved automatically, bytes: each save would cause a noticeable pause. */
 const LARGEST = 200 * 1024 ** 2;
 
 export interface WorkNeeds {
-  /** The project file of what is open. */
+  /** The project file of the open work. */
   write(): Uint8Array;
   /** Opens files, as a drop does. */
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
@@ -43,11 +43,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const { store } = ctx;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let saving: Promise<void> | undefined;
-  /** What is open could not be kept; that was said. */
+  /** Whether saving the open work has failed, which was reported. */
   let hasFailed = false;
-  /** What is open was deleted from what is kept, and has not changed since. */
+  /** Whether the entry of the open work was deleted, and the work has not changed since. */
   let isUnwanted = false;
-  /** What is open, and how other tabs may have it. */
+  /** Entry of the open work. `release` lets other tabs open it. */
   let current: { readonly id: string; readonly name: string; readonly release: () => void } | undefined;
 
   const hasWork = () => store.get().cage?.usable === true && store.get().model !== null && !hasFailed;
@@ -59,7 +59,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     }
     hasFailed = true;
     const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
-    // Private windows refuse as well: once is enough to say so.
+    // Private windows refuse storage as well. Report it once.
     const text = isFull ? T.works.full(name) : T.works.forbidden;
     ctx.tell.say(text, ...(isFull ? [showList] : []));
   };
@@ -146,7 +146,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const open = async (work: Work, isFirst = false): Promise<boolean> => {
     const isCopy = work.where === "elsewhere" && !isFirst;
     const release = isCopy ? undefined : await hold(work.id);
-    // Should the page stop with it, the next one must know.
+    // If the page crashes while opening it, the next start must know the work.
     if (isFirst) rememberOwn(release ? work.id : null);
     if (!isCopy && !release) {
       await refresh();

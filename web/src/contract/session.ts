@@ -1,4 +1,4 @@
-/** What `session.ts` offers: files, jobs in the worker, frames. */
+/** Interface of `session.ts`: files, jobs in workers, frames. */
 
 import type {
   BindEvent,
@@ -25,7 +25,7 @@ import type {
 } from "@cagework/core/contract";
 
 export interface Session {
-  /** Synchronous side: state, picking, gestures, exports. Never keep anything else of the wasm module. */
+  /** Synchronous part: state, picking, gestures, exports. Do not store other objects of the wasm module. */
   readonly engine: Engine;
   /** Name of the GPU, as the report card shows it. */
   readonly adapter: string;
@@ -35,18 +35,18 @@ export interface Session {
   readonly samples: readonly Sample[];
 
   /**
-   * Reads what was dropped or chosen, in a worker of its own: one .glb/.gltf/.obj (with siblings of a .gltf; paths of a
-   * folder drop through `path`), or a project GLB. Draco and meshopt are decoded (their decoders load only then), textures
-   * decoded. Whatever the file does, what is open stays open.
+   * Reads one model with its companion files, or a project GLB, in its own worker. Files of a folder are found by `path`.
+   * Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If reading fails or crashes, the
+   * open model is not affected.
    */
   readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
-  /** Opens what was read, once; a project's cage and poses are open afterwards too. */
+  /** Opens what was read, including cage and poses of a project. Call it once per read. */
   open(read: ReadFile): Promise<Opened>;
-  /** Until what it returns is called, files are read by one worker as long as it does not break. */
+  /** Until the returned function is called, one worker reads all files. It is replaced only after a failure. */
   shareReader(): () => void;
   /**
-   * Adds models to the cage that is open; cage and pose stay. `label` names the step of the history for a number of models;
-   * without it, there is no step. `hear` is called with the index of each file. Resolves with notices.
+   * Adds models to the open cage; cage and pose stay. `label` returns the name of the undo step for a number of models;
+   * without it, no step is added. `hear` is called with the index of each file. Resolves with notices.
    */
   add(
     reads: readonly ReadFile[],
@@ -54,61 +54,79 @@ export interface Session {
     hear?: (next: number) => void,
   ): Job<readonly string[]>;
   openSample(id: string): Promise<Opened>;
-  /** Opens a project again with another axis up: model, cage and poses are turned. */
+  /** Opens a project again with another up axis: rotates model, cage and poses. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
   /** Checks the page's part of a project's settings: defaults (`bind` for a bind) replace bad values, and `notices` name them. */
   readSettings(text: string, bind: BindOptions): Settings;
-  /** Reads a cage from a file as a model is read, and checks it. */
+  /** Reads a cage from a file like a model, and checks it. */
   readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
   /** A box around the model, its longest side cut into `divisions`. */
   boxCage(divisions: number): CageArrays;
-  /** Makes a cage for the model, in the worker. `clip` names a clip whose frames it encloses as well. */
+  /** Generates a cage for the model, in the worker. `clip`: name of a clip whose frames it also encloses. */
   generateCage(options: CageOptions, onProgress: (fraction: number) => void, clip?: string): Job<CheckedCage>;
-  /** Checks the cage at rest as it is, in a worker of its own. */
+  /** Checks the rest cage, in its own worker. */
   checkCage(): Job<Check>;
-  /** The cage at rest, repaired, in that worker too. */
+  /** Repairs the rest cage, in the worker of `checkCage`. */
   repair(kind: Repair): Job<CheckedCage>;
-  /** The cage at rest. */
+  /** The rest cage. */
   cageArrays(): CageArrays;
-  /** Poses of another cage of the model, one after the other, for the cage that is open; in the worker. */
+  /**
+   * Converts poses of another cage of the model to the open cage, in the worker.
+   * `poses`: `[n_poses, n_old_controls, 3]`.
+   */
   carryPoses(old: CageArrays, poses: Float32Array): Job<Float32Array>;
-  /** Takes a cage, as a step if there is a label. A mesh that is no cage yet is kept as a draft: `usable` is false. */
+  /** Sets the cage, as an undo step if there is a label. An invalid cage is kept as a draft, with `usable` false. */
   takeCage(cage: CheckedCage, label?: string): CageState;
 
   /**
-   * Binds in the worker: coarse (g = 32) first if that is less than asked, then as asked; each result is adopted as
-   * soon as it is there, the pose stays.
-   * `done` rejects with name "Cancelled" after `cancel()`, what was adopted before stays.
+   * Binds in the worker: first on a coarse grid (g = 32) if the requested grid is finer, then on the requested grid. Each
+   * result is adopted as soon as it is ready; the pose stays. After `cancel()`, `done` rejects with name "Cancelled" and
+   * adopted results stay.
    */
   bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;
-  /** Bytes that this bind would need, or the Error that it would end in. Cheap: call on every change. */
+  /**
+   * Bytes that a bind with these options needs. Throws the error that the bind would end with. Cheap enough to call on
+   * every change.
+   */
   estimateMemory(options: BindOptions): number;
-  /** Coordinates by formula to compare with; needed once per cage before `scene.compare` shows them. Runs in the worker. */
+  /**
+   * Computes coordinates by a formula for comparison, in the worker. Needed once per cage before `scene.compare` shows
+   * them.
+   */
   bindByFormula(kind: Coordinates): Job<void>;
-  /** Cells and coordinates of one plane of the grid, in the worker; shown with `scene.slice` afterwards. */
+  /** Computes cells and coordinates of one plane of the grid, in the worker. `scene.slice` then shows them. */
   loadSlice(axis: 0 | 1 | 2, position: number, grid: number): Job<void>;
-  /** What the cage needs to bend a moving model (`RigOptions.dynamic`), in the worker; once per cage. */
+  /**
+   * Computes the lattice by which the cage deforms a moving model (`RigOptions.dynamic`), in the worker. Needed once
+   * per cage.
+   */
   loadLattice(grid: number): Job<void>;
 
-  /** Makes ready to pull the model that is open, in a worker of its own. */
+  /** Prepares pulls of the open model, in their own worker. */
   preparePull(): Job<null>;
-  /** Takes hold there. */
+  /** Starts a pull with grabs and pins, in that worker. */
   pullGrab(grab: GrabInput): Job<Grabbed>;
-  /** One frame towards targets, `[n_grabs, 3]`. */
+  /** Solves one frame of the pull. `to`: targets of the grabs, `[n_grabs, 3]`. */
   pullFrame(to: Float32Array): Job<PullFrame>;
 
-  /** Asks for a frame; many calls make one. Every change through `engine` asks by itself. */
+  /** Requests a frame; repeated calls are merged. Changes through `engine` request a frame themselves. */
   draw(): void;
-  /** Called after each drawn frame with the milliseconds the main thread spent on it. Returns "stop listening". */
+  /**
+   * Called after each drawn frame with the milliseconds the main thread spent on it. Returns a function that removes
+   * the listener.
+   */
   onFrame(listener: (ms: number) => void): () => void;
-  /** PNG of the scene (without canvas borders), any size up to 8192; `alone`: of the model, transparent around it. */
+  /** PNG of the scene, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
   picture(width: number, height: number, alone?: boolean): Promise<Blob>;
-  /** Posed positions as they are drawn, harmonic unless told (tests, numbers panel). */
+  /** Posed positions as drawn, by default with harmonic coordinates. For tests. */
   readPositions(kind?: Coordinates): Promise<Float32Array>;
 
-  /** The device was lost (or `loseDevice()` was called): the page says so and calls `recover()`. */
+  /**
+   * Calls `listener` when the GPU device is lost, after which the page calls `recover()`. Returns a function that
+   * removes the listener.
+   */
   onLost(listener: (reason: string) => void): () => void;
-  /** Everything again on a new device and canvas (a lost context's canvas cannot be used again: give a fresh one). */
+  /** Restores everything on a new device. `canvas` must be new: one with a lost context cannot be used again. */
   recover(canvas: HTMLCanvasElement): Promise<void>;
   /** For tests: destroys the device, as a driver reset would. */
   loseDevice(): void;
@@ -120,23 +138,23 @@ export interface Session {
 export interface Sample {
   readonly id: string;
   readonly label: string;
-  /** What there is to see. */
+  /** Describes the sample. */
   readonly sentence?: string;
 }
 
-/** A file that a worker has read without harm. */
+/** A file that a worker has read successfully. */
 export interface ReadFile {
-  /** How long the page freezes while it is opened, about, ms. */
+  /** Approximate time for which opening it blocks the page, ms. */
   readonly took: number;
   readonly vertices: number;
 }
 
 export interface Opened {
   readonly model: ModelInfo;
-  /** What is wrong with the cage that came along; null without one. */
+  /** Check of the cage in the file; null without a cage. */
   readonly check: Check | null;
-  /** The text that a project was saved with; null without a project. */
+  /** Settings text of a project; null for other files. */
   readonly settings: string | null;
-  /** What could not be restored, in sentences. */
+  /** Sentences about what could not be restored. */
   readonly notices: readonly string[];
 }

@@ -1,10 +1,10 @@
-/** The first moments: which samples there are, and the first of them built before it is asked for. */
+/** Startup: the list of samples, and the first sample built in advance. */
 
 import type { Package } from "@cagework/core/session/artifact";
 import type { Client } from "@cagework/core/session/client";
 import type { Sample } from "../contract";
 
-/** Does it the first time only. */
+/** Runs `work` on the first call only. */
 export function once(work: () => void): () => void {
   let done = false;
   return () => {
@@ -13,21 +13,23 @@ export function once(work: () => void): () => void {
   };
 }
 
-/** Builds samples; the one that a first visit opens while the GPU is still being opened. */
+/**
+ * Returns a function that builds samples. For a first visit, the first sample is built while the GPU is being opened.
+ */
 export function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
   const build = (id: string) => client.run("sample", { id }).done;
   let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
-  // Who opens it hears of the error.
+  // The error is reported when the sample is opened.
   early.catch(() => undefined);
   return async (id: string) => {
-    // Its arrays are given away: a second time it is built anew.
+    // The caller takes over the arrays, so the next call builds the sample again.
     const waiting = early;
     early = Promise.resolve(undefined);
     return (id === first ? await waiting : undefined) ?? build(id);
   };
 }
 
-/** The samples there are, the one to begin with first. */
+/** All built-in samples. The first one is opened at startup. */
 export function samples(pkg: Package): readonly Sample[] {
   const words = pkg.Binder.samples();
   return Array.from({ length: words.length / 3 }, (_, k) => {

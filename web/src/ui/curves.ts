@@ -6,7 +6,10 @@ import { T } from "../words";
 import { type Curve, historyPoints, KINDS } from "./plot";
 import { solverName } from "./report";
 
-/** The current curve comes first, then the latest of each other solver. */
+/**
+ * While a bind runs, only its curve. Otherwise the current curve, then the latest of each other solver, up to
+ * `KINDS.length` curves.
+ */
 export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];
   const now = bindRun

@@ -57,8 +57,8 @@ export function newestFirst<T extends Entry>(entries: readonly T[]): T[] {
 }
 
 /**
- * The work to open at the start: what this tab had open before a reload (whose lock the old page may still hold), or the only
- * work that no other tab has open. Never work with which the page has crashed twice.
+ * Chooses the work to open at startup: the one that this tab had open before a reload, even if the old page still holds its
+ * lock, or else the only work that no other tab has open. Returns undefined if the page has crashed twice with that work.
  */
 export function toOpen(works: readonly Work[], own: string | null): Work | undefined {
   const free = works.filter(({ where }) => where !== "elsewhere");

@@ -60,7 +60,7 @@ test("one click makes a point but no bone", () => {
   expect(store.get().placing).toBe(null);
 });
 
-test("a link contains smoothing and controls inside, which are no step where it is opened", () => {
+test("a link contains smoothing and inner controls; opening it adds no undo step", () => {
   const { controls, showCage } = page();
   expect(controls.shared()).toBe(undefined);
   const elements = [{ point: 0 }];

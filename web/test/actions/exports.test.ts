@@ -48,10 +48,10 @@ it("files are named after the model and their size is shown", async () => {
   expect(said.slice(0, 2)).toEqual(["cube-posed.glb is in your downloads (2 kB).", "3 of 4 joints moved."]);
   store.set({ model: { ...MODEL, name: "someone.vrm" } });
   await exports.save("glb");
-  expect(downloads.at(-1), "a VRM stays one").toBe("someone-posed.vrm");
+  expect(downloads.at(-1), "a VRM keeps its extension").toBe("someone-posed.vrm");
   exports.shapeIn("stl");
   await exports.save("shape");
-  expect(downloads.at(-1), "its shape is another file").toBe("someone-posed.stl");
+  expect(downloads.at(-1), "a shape has its own format").toBe("someone-posed.stl");
   expect(said.at(-2)).toContain("(3 byte)");
 });
 
@@ -81,7 +81,7 @@ it("several models are exported to one file each, or one alone", async () => {
   store.set({ exportOnly: 5 });
   await exports.save("weights");
   await exports.save("cage");
-  expect(downloads.slice(3), "the cage is all of theirs").toEqual(["shirt-weights.npz", "body-cage.obj"]);
+  expect(downloads.slice(3), "all models share the cage").toEqual(["shirt-weights.npz", "body-cage.obj"]);
   store.set({ exportOnly: 6 });
   await exports.save("weights");
   expect(downloads.length, "a removed model cannot be chosen").toBe(8);
@@ -137,5 +137,5 @@ it("links are for samples in their own cage; otherwise suggests a project", asyn
     model: { ...MODEL, members: [{ ...member, options: { ...member.options, rigid: ["all"] } }] },
   });
   await exports.share();
-  expect([copied.length, said.length], "what keeps its shape is not in it").toEqual([1, 3]);
+  expect([copied.length, said.length], "a link cannot contain rigid parts").toEqual([1, 3]);
 });

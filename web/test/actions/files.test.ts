@@ -139,7 +139,7 @@ it("loads a cage next to the model; reports an empty file and an empty drop", as
   expect(problems.map(({ title }) => title)).toEqual(["This file is empty", "Nothing to open"]);
 });
 
-it("a project restores settings except the memory limit; what it could not restore is said", async () => {
+it("a project restores settings except the memory limit, and reports what it cannot restore", async () => {
   const { files, asked, store, said } = page();
   store.set({ bindOptions: { ...store.get().bindOptions, memory_limit: 7 } });
   const opened = files.openFiles([file("work.cagework.glb")]);

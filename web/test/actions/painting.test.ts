@@ -103,7 +103,7 @@ it("reports models that cannot be painted yet; a busy GPU leaves no gap", () => 
 it("the brush outline shows where it would paint", () => {
   const { painting, store, teach } = page();
   teach({ brushRadius: (_x: number, y: number, radius: number) => (y < 100 ? undefined : 100 * radius) });
-  expect(painting.radiusAt(5, 150), "nobody paints").toBeNull();
+  expect(painting.radiusAt(5, 150), "not painting").toBeNull();
   painting.on(0);
   expect([painting.radiusAt(5, 150), painting.radiusAt(5, 50)]).toEqual([5, null]);
   teach({

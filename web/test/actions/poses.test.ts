@@ -56,7 +56,7 @@ it("poses of a previous cage are carried over as one step", async () => {
   expect([did.at(-1), ctx.store.get().editingRest]).toEqual(["Carry poses over", false]);
 });
 
-it("poses that come along with a new control are no step, and a pose at rest stays at rest", async () => {
+it("carrying poses over to a new control adds no undo step, and a pose at rest stays at rest", async () => {
   const { poses, engine, ctx, showCage, asked, commands, did, calls } = page();
   showCage(cageOf(2));
   const before = carriableOf(ctx);

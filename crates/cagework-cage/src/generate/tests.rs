@@ -192,8 +192,9 @@ fn a_gap_that_no_lattice_resolves_is_reported() {
     assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
 }
 
-/// A clearance closes narrow gaps on any lattice. Thin voxels for them took 17 GB: hundreds of layers for the clearance, each as
-/// many times too thick along the other axes as voxels are thinner across the gap.
+/// A clearance closes narrow gaps on any lattice, so the lattice must not be refined for them. Voxels thin enough for the gap
+/// needed hundreds of layers for the clearance. A layer is one voxel, which is several times longer along the other axes, so
+/// the hull grew that many times too far along these and took 17 GB.
 #[test]
 fn clearance_that_closes_a_gap_asks_for_no_finer_lattice() {
     let (positions, triangles) = mannequin(0.03, 0.07);

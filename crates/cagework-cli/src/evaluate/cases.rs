@@ -133,7 +133,7 @@ impl Run {
     }
 }
 
-/// A reconstruction of the rest pose: figures 2 to 5.
+/// One of the rest-pose reconstructions shown in figures 2 to 5 of the report.
 #[derive(Clone, Debug)]
 pub(super) struct Reconstruction {
     /// File name without extension.

@@ -125,8 +125,8 @@ impl EdgeLists {
             let Some(across) = edge.across[axis] else { continue };
             let [a, b] = edge.ends;
             let along = 3 - axis - across;
-            // Past its end an edge stops a decreasing share of the ray: edges of spikes end in a tip, those of sheets
-            // in a corner.
+            // Beyond an end of the edge, the nearest point is that end, so the share fades with the distance from it. Values
+            // then stay continuous at the tips of spikes and the corners of sheets, where edges end.
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };

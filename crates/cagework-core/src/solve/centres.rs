@@ -104,7 +104,7 @@ mod tests {
     use crate::levels::plain::{hierarchy, some_field};
     use crate::solve::rows::residual_plane;
 
-    /// f32 rounding of residuals: diagonals up to some thousands times values in [0, 1).
+    /// Tolerance for f32 rounding of residuals, in which diagonals of up to a few thousand multiply values in [0, 1).
     const RESIDUAL_ROUNDING: f32 = 1e-3;
 
     #[test]

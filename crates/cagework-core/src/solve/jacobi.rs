@@ -139,7 +139,8 @@ fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MA
     sums.map(|sum| sum / level.n_unknowns().max(1) as f64)
 }
 
-/// Sum of the roots of the changes of some cells.
+/// Sum over a range of cells of the square root of each cell's change in one sweep. A cell's change is added over all
+/// threads.
 #[inline(always)]
 fn sum_of_roots(shares: &[ThreadBatches], sweep: usize, cells: std::ops::Range<usize>) -> f64 {
     let mut sums = ZERO;

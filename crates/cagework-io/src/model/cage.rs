@@ -54,7 +54,8 @@ impl Model {
 
     /// Positions of `pose` for each vertex of this model's [`Self::cage_mesh`].
     ///
-    /// A glTF cage is welded at rest. Its pose has the vertex count of the cage before or after welding.
+    /// The vertices of a glTF cage are welded by their rest positions, so its pose may have the vertex count from
+    /// before or after welding.
     ///
     /// # Errors
     /// [`PoseError`] if vertex counts differ, or the pose's faces show that its vertices are in another order.

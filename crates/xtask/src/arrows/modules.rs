@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use crate::command::root;
 use read::Crate;
 
-/// Which module uses which, and the first line that does (`file:line`).
+/// Uses of a module by another one, `(from, to)`, and the first line of each (`file:line`).
 type Edges = BTreeMap<(String, String), String>;
 
 /// Checks every crate, the tests and the benches.
@@ -33,8 +33,8 @@ pub(super) fn check() -> Result<(), String> {
     Ok(())
 }
 
-/// Root files of all crates, and whether their tests count: `lib.rs` and `main.rs` of `crates/*/src` without, every target
-/// of the packages of tests and benches with.
+/// Root files of all crates, and whether their test code counts. It does not for `lib.rs` and `main.rs` of `crates/*/src`;
+/// it does for every target of the packages of tests and benches.
 fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     let mut roots = Vec::new();
     for folder in files_in(&root().join("crates"))? {
@@ -50,7 +50,7 @@ fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     Ok(roots)
 }
 
-/// What a folder holds, in the order of names.
+/// Entries of a folder, sorted by name.
 fn files_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let cannot = |e| format!("cannot read {}: {e}", folder.display());
     let entries = std::fs::read_dir(folder).map_err(cannot)?;
@@ -59,7 +59,7 @@ fn files_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(paths)
 }
 
-/// Edges between the top-level modules of a crate; its root is one of them where it defines what others use.
+/// Edges between the top-level modules of a crate, including its root if modules use items defined there.
 fn edges(source: &Crate) -> Edges {
     let mut edges = Edges::new();
     for path in &source.paths {
@@ -71,7 +71,7 @@ fn edges(source: &Crate) -> Edges {
     edges
 }
 
-/// The circle with the fewest modules, its first module again at its end.
+/// The circle with the fewest modules. Its first module is repeated at the end.
 fn shortest_circle(edges: &Edges) -> Option<Vec<String>> {
     let circles = edges.keys().filter_map(|(from, to)| {
         let mut way = way(edges, to, from)?;
@@ -81,7 +81,7 @@ fn shortest_circle(edges: &Edges) -> Option<Vec<String>> {
     circles.min_by_key(Vec::len)
 }
 
-/// Shortest way along edges, both ends included: breadth first.
+/// Shortest path along edges, both ends included, by breadth-first search.
 fn way(edges: &Edges, from: &str, to: &str) -> Option<Vec<String>> {
     let mut before = BTreeMap::from([(from, None)]);
     let mut queue = VecDeque::from([from]);

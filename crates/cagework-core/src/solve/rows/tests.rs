@@ -10,7 +10,7 @@ use crate::solve::operator;
 /// f32 rounding of reordered sums of six values in [0, 1), over a diagonal of at least 3.
 const ROUNDING: f32 = 1e-6;
 
-/// f32 rounding of residuals: diagonals up to some thousands times values in [0, 1).
+/// Tolerance for f32 rounding of residuals, in which diagonals of up to a few thousand multiply values in [0, 1).
 const RESIDUAL_ROUNDING: f32 = 1e-3;
 
 /// The same right-hand side in both forms: per cut cell, and per cell.

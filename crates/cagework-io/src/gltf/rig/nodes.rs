@@ -56,8 +56,9 @@ pub(super) struct NodeUpdate {
     /// World transforms with local transforms rounded to f32, as written.
     pub(super) world: Vec<DMat4>,
     pub(super) n_moved: usize,
-    /// Joints outside the cage: those with vertices, and those without, which follow their parent.
+    /// Joints outside the cage that have vertices.
     pub(super) n_outside: usize,
+    /// Joints outside the cage that have no vertices; they follow their parent.
     pub(super) n_loose: usize,
 }
 

@@ -43,9 +43,9 @@ pub struct ReshapeReport {
     pub joints: usize,
     /// Nodes among `joints` with a changed transform.
     pub joints_moved: usize,
-    /// Joints with vertices outside the cage. They move as points outside the cage.
+    /// Joints outside the cage that have vertices; they move as points outside the cage.
     pub joints_outside: usize,
-    /// Joints without vertices outside the cage. They follow their parent.
+    /// Joints outside the cage that have no vertices; they follow their parent.
     pub joints_loose: usize,
     /// Ends of morph targets: vertices with one target at weight 0 or 1.
     pub morph_ends: usize,

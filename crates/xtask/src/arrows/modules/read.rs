@@ -7,36 +7,36 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 use crate::command::root;
 
-/// The name of the crate's root among its modules.
+/// Name that stands for the crate's root among its modules.
 pub(super) const ROOT: &str = "crate";
 
 /// A path that a module mentions.
 pub(super) struct Mention {
     /// Top-level module, or [`ROOT`].
     pub(super) from: String,
-    /// From the crate's root on: modules, then an item, or `*`.
+    /// Segments from the crate's root: modules, then an item or `*`.
     pub(super) segments: Vec<String>,
     /// `file:line`
     pub(super) place: String,
 }
 
-/// What circles are looked for in.
+/// Modules of a crate and the paths in them.
 #[derive(Default)]
 pub(super) struct Crate {
     /// Whether code under `#[cfg(test)]` is read.
     with_tests: bool,
     /// Modules that the root declares.
     modules: BTreeSet<String>,
-    /// Names that the root imports, and from where.
+    /// Names that the root imports, with their paths.
     imported: BTreeMap<String, Vec<String>>,
     /// Every path that may be an edge.
     pub(super) paths: Vec<Mention>,
 }
 
-/// Where tokens are read.
+/// The module whose tokens are being read.
 struct Place<'a> {
     file: &'a Path,
-    /// Module path, from the crate's root on.
+    /// Module path from the crate's root.
     module: Vec<String>,
     /// Folder of the files of this module's children.
     children: PathBuf,
@@ -46,7 +46,7 @@ impl Crate {
     /// Reads a root file and all files that its modules are in.
     ///
     /// # Errors
-    /// Names a file that is missing or that is not Rust.
+    /// Names a file that is missing or not Rust.
     pub(super) fn read(path: &Path, with_tests: bool) -> Result<Self, String> {
         let mut source = Self { with_tests, ..Self::default() };
         let folder = path.parent().ok_or("a root file lies in a folder")?;
@@ -54,7 +54,7 @@ impl Crate {
         Ok(source)
     }
 
-    /// A crate in one text, as tests write them; its file is called `lib.rs`.
+    /// Reads a crate from a string, for tests. Its file is called `lib.rs`.
     #[cfg(test)]
     pub(super) fn of_text(text: &str, with_tests: bool) -> Result<Self, String> {
         let mut source = Self { with_tests, ..Self::default() };
@@ -63,7 +63,7 @@ impl Crate {
         Ok(source)
     }
 
-    /// The top-level module that a path leads to; [`ROOT`] if to the root's own items, nothing if out of the crate.
+    /// Top-level module of a path's target: [`ROOT`] for the root's own items, `None` outside the crate.
     pub(super) fn module_of(&self, segments: &[String]) -> Option<String> {
         let first = segments.first()?;
         if self.modules.contains(first) {
@@ -112,7 +112,7 @@ impl Crate {
                 }
                 _ => {}
             }
-            // The braces of a module are read with it.
+            // `read_module` has read the braces of an inline module.
             at += if is_inline_module(rest) { 3 } else { 1 };
         }
         Ok(())
@@ -139,8 +139,8 @@ impl Crate {
         }
     }
 
-    /// An import of the root makes names that modules reach through `crate::`; one that is not public is a use, too.
-    /// Returns how many tokens it has.
+    /// Records an import of the root, whose names modules reach through `crate::`. A private import is also a use.
+    /// Returns its number of tokens.
     fn read_root_import(&mut self, tokens: &[TokenTree], before: Option<&TokenTree>, place: &Place) -> usize {
         let (paths, length) = paths(tokens);
         // `pub use` and `pub(crate) use`.
@@ -159,7 +159,7 @@ impl Crate {
         length
     }
 
-    /// Notes a path that begins at the crate's root or relative to a module; in the root, modules need no prefix.
+    /// Records a path that begins at the crate's root or is relative to a module.
     fn mention(&mut self, path: &Found, place: &Place) {
         let Some(first) = path.segments.first() else { return };
         let ups = path.segments.iter().take_while(|s| *s == "super").count();
@@ -182,12 +182,12 @@ impl Crate {
 /// A path as it is written.
 struct Found {
     segments: Vec<String>,
-    /// What it is called where it is imported.
+    /// Name under which it is imported.
     name: String,
     line: usize,
 }
 
-/// The paths that begin at the first token (several with braces), and how many tokens they have.
+/// Paths that begin at the first token (several if they have braces), and their number of tokens.
 fn paths(tokens: &[TokenTree]) -> (Vec<Found>, usize) {
     let mut found = Vec::new();
     let length = add_paths(tokens, &[], &mut found);
@@ -262,7 +262,7 @@ fn is_for_tests(tokens: &[TokenTree]) -> bool {
         if p.as_char() == '#' && g.stream().to_string().replace(' ', "") == "cfg(test)")
 }
 
-/// Tokens of an item, to its semicolon or its braces.
+/// Number of tokens of an item, up to its semicolon or braces.
 fn item_length(tokens: &[TokenTree]) -> usize {
     let is_end = |token: &TokenTree| match token {
         TokenTree::Punct(p) => p.as_char() == ';',
