@@ -1,13 +1,14 @@
-//! Results kept for documents that undo and redo come back to.
+//! Cache of results for documents in the history.
 
 use std::collections::VecDeque;
 
 use crate::document::Key;
 
-/// Results by what they were computed from. The ones used least recently go when all exceed a number of bytes.
+/// Results by the [`Key`] of the document they were computed from. Evicts the least recently used results above a limit in
+/// bytes.
 #[derive(Debug)]
 pub struct Cache<T> {
-    /// The one used last at the end.
+    /// Entries, most recently used last.
     entries: VecDeque<Entry<T>>,
     limit: usize,
 }
@@ -20,13 +21,13 @@ struct Entry<T> {
 }
 
 impl<T> Cache<T> {
-    /// An empty cache that keeps at most so many bytes.
+    /// Creates an empty cache with a limit in bytes.
     #[must_use]
     pub fn new(limit: usize) -> Self {
         Self { entries: VecDeque::new(), limit }
     }
 
-    /// Keeps a result in place of an earlier one of the same key. One that is larger than the limit is not kept.
+    /// Inserts a result, replacing an earlier one of the same key. Ignores results larger than the limit.
     pub fn insert(&mut self, key: Key, result: T, bytes: usize) {
         self.entries.retain(|entry| entry.key != key);
         self.entries.push_back(Entry { key, bytes, result });
@@ -35,7 +36,7 @@ impl<T> Cache<T> {
         }
     }
 
-    /// The result of a key.
+    /// Returns the result of a key, and marks it as most recently used.
     pub fn get(&mut self, key: Key) -> Option<&T> {
         let place = self.entries.iter().position(|entry| entry.key == key)?;
         let entry = self.entries.remove(place)?;
@@ -49,7 +50,7 @@ impl<T> Cache<T> {
         self.entries.iter().any(|entry| entry.key == key)
     }
 
-    /// Drops everything.
+    /// Removes all results.
     pub fn clear(&mut self) {
         self.entries.clear();
     }
@@ -64,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn least_recently_used_results_are_dropped_at_the_limit() {
+    fn least_recently_used_results_are_evicted() {
         let mut cache = Cache::new(100);
         cache.insert(key(1), "one", 40);
         cache.insert(key(2), "two", 40);

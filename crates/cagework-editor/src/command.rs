@@ -1,4 +1,4 @@
-//! Commands: what changes a document. They are data, so that a panel, a script and a test drive the editor alike.
+//! Commands that change a document. They are data, so panels, scripts and tests use the same interface.
 
 use std::sync::Arc;
 
@@ -15,25 +15,25 @@ use crate::models::PartOptions;
 use crate::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_face, split_edge};
 use crate::surface::SurfacePoint;
 
-/// How far a face is extruded, in diagonals of model and cage.
+/// Distance of an extrusion, over the diagonal of model and cage.
 const EXTRUSION: f32 = 0.08;
-/// Sizes that are tried for a sheet, each four fifths of the previous one.
+/// Number of sizes that are tried for a sheet, each 4/5 of the previous one.
 const SHEET_SIZES: i32 = 16;
 
-/// An edit of the cage where it is selected.
+/// An edit of the selected elements of the cage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum RestEdit {
-    /// Puts a vertex in the middle of each selected edge.
+    /// Inserts a vertex at the middle of each selected edge.
     SplitEdge,
     /// Merges the two ends of a selected edge.
     CollapseEdge,
-    /// Pulls selected faces outwards.
+    /// Extrudes selected faces outwards.
     ExtrudeFace,
-    /// Removes selected vertices, and closes the holes; selected interior controls are removed instead if there are any.
+    /// Removes selected vertices and closes the holes. If interior controls are selected, removes only those.
     DeleteVertex,
-    /// Removes selected faces, and closes the holes.
+    /// Removes selected faces and closes the holes.
     DeleteFace,
 }
 
@@ -44,7 +44,7 @@ pub enum RestEdit {
 pub enum Command {
     /// Moves the cage. `[n_controls]`, finite
     SetPose {
-        /// Where its vertices and interior controls go, object units.
+        /// Positions of cage vertices and interior controls, object units.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
     },
@@ -57,34 +57,34 @@ pub enum Command {
     },
     /// Moves the cage to a saved pose, with its pins.
     ApplyPose {
-        /// Which one, from 0.
+        /// Index of the pose.
         index: usize,
     },
     /// Gives a saved pose another name.
     RenamePose {
-        /// Which one, from 0.
+        /// Index of the pose.
         index: usize,
         /// The name.
         name: String,
     },
     /// Deletes a saved pose.
     RemovePose {
-        /// Which one, from 0.
+        /// Index of the pose.
         index: usize,
     },
-    /// Changes the share of a saved pose in the blend. What was moved by hand since the last step stays.
+    /// Changes the share of a saved pose in the blend. Other edits since the last step are kept.
     Blend {
-        /// Which one, from 0.
+        /// Index of the pose.
         index: usize,
-        /// Its share, 0 to 1.
+        /// Share, 0 to 1.
         share: f32,
     },
-    /// Takes poses that were carried over from another cage of the models: positions of the pose, then of each saved pose with
-    /// `from` controls, one after the other.
+    /// Sets poses that were transferred from another cage of the same models: the current pose, then each saved pose with
+    /// `from` controls.
     CarryPoses {
-        /// Controls of the other cage.
+        /// Number of controls of the other cage.
         from: usize,
-        /// Positions for the controls of this cage.
+        /// Positions of the controls of this cage, concatenated over the poses. `[n_poses, n_controls]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
         /// Shares of the saved poses in the pose.
@@ -95,19 +95,19 @@ pub enum Command {
         /// The points.
         pins: Vec<SurfacePoint>,
     },
-    /// Takes another cage, or a draft of one. The pose is its rest position.
+    /// Replaces the cage by another cage or a draft, at rest.
     ReplaceCage {
         /// Positions of its vertices, then of interior controls, and its faces.
         #[cfg_attr(feature = "typescript", ts(type = "unknown"))]
         mesh: PolygonMesh,
-        /// Subdivision and interior controls; none to keep those that fit.
+        /// Subdivision and interior controls; null keeps the current ones that fit.
         controls: Option<CageControls>,
-        /// What the generator reported.
+        /// Notices of the generator.
         notices: Vec<String>,
     },
-    /// Takes the positions of the moved cage as its rest position.
+    /// Makes the current positions of the cage its rest position.
     MoveRest,
-    /// Edits the cage where it is selected, and selects the result.
+    /// Edits the selected elements of the cage, and selects the result.
     EditRest {
         /// The edit.
         edit: RestEdit,
@@ -119,14 +119,14 @@ pub enum Command {
     },
     /// Sets the radius of interior points and lines.
     SetRadius {
-        /// Object units; none for a share of the cage.
+        /// Object units; null for a share of the cage's size.
         radius: Option<f32>,
     },
     /// Adds an interior control, and selects it.
     AddControl {
-        /// A point, a line through places, or a sheet between them.
+        /// A point, a polyline through `places`, or a sheet with corners at `places`.
         kind: InnerKind,
-        /// Where, object units.
+        /// Positions, object units.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         places: Vec<Vec3>,
     },
@@ -135,44 +135,44 @@ pub enum Command {
         /// Its centre.
         #[cfg_attr(feature = "typescript", ts(type = "readonly [number, number, number]"))]
         center: Vec3,
-        /// Its half axes at the largest size.
+        /// Half axes of the largest size that is tried.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         axes: [Vec3; 2],
     },
-    /// Takes other interior controls in place of the present ones.
+    /// Replaces the interior controls.
     ReplaceControls {
         /// Their positions.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
-        /// Points, lines and faces between them.
+        /// Points, lines and faces; indices are relative to `positions`.
         elements: Vec<InnerElement>,
     },
     /// Removes a model from the cage.
     RemoveModel {
-        /// Its number.
+        /// Id of the model.
         id: u32,
     },
     /// Sets visibility and parts of a model.
     SetParts {
-        /// Its number.
+        /// Id of the model.
         id: u32,
         /// Visibility and parts.
         options: PartOptions,
     },
     /// Sets how much of each vertex of a model stays in place.
     SetPainted {
-        /// Its number.
+        /// Id of the model.
         id: u32,
-        /// Amounts, 0 to 255. `[n_vertices]`, or empty for an unpainted model
+        /// Amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted model
         amounts: Vec<u8>,
     },
 }
 
 impl Editor {
-    /// Changes the document; [`Editor::commit`] makes a step of it.
+    /// Changes the document; [`Editor::commit`] adds the change to the history.
     ///
     /// # Errors
-    /// When the command cannot be applied; nothing changes then.
+    /// If the command cannot be applied. Nothing changes then.
     pub fn apply(&mut self, command: Command) -> Result<(), EditError> {
         let before = self.document().clone();
         let result = self.run(command);
@@ -190,7 +190,7 @@ impl Editor {
                 let pose = self.document().pose.clone();
                 let pins = Some(self.document().pins.clone());
                 let document = self.document_mut();
-                // The pose is all of the new one.
+                // The pose is the new saved pose with share 1.
                 document.shares = std::iter::repeat_n(0.0, document.poses.len()).chain([1.0]).collect();
                 Arc::make_mut(&mut document.poses).push(NamedPose {
                     name: name.into(),
@@ -300,7 +300,8 @@ impl Editor {
         if self.document().cage.set.is_ok() { Ok(()) } else { Err(EditError::NoCage) }
     }
 
-    /// From the pose and the shares of the last step: a slider sends many shares, and each replaces the one before.
+    /// Computes the pose from the pose and shares of the last step, because a slider sends many shares and each replaces the
+    /// previous one.
     fn blend(&mut self, index: usize, share: f32) -> Result<(), EditError> {
         self.pose(index)?;
         if !share.is_finite() {
@@ -342,7 +343,7 @@ impl Editor {
         Ok(())
     }
 
-    /// The same cage with other controls; the pose stays.
+    /// Replaces the controls of the cage; keeps the pose.
     fn change_controls(
         &mut self,
         change: impl FnOnce(CageControls) -> CageControls,
@@ -356,7 +357,7 @@ impl Editor {
         Ok(())
     }
 
-    /// The same cage with one more interior control, which is selected.
+    /// Sets a cage with one more interior control, and selects the control.
     fn add_control(&mut self, cage: RestCage) {
         let first = cage.n_cage() as u32;
         let corners = cage.controls.elements.last().map(|element| element.corners().to_vec());
@@ -393,7 +394,7 @@ impl Editor {
             RestEdit::SplitEdge => {
                 each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?.ok_or(edge)?
             }
-            // Merging moves vertices together: one edge at a time.
+            // A collapse moves vertices of adjacent edges, so only the first edge is collapsed.
             RestEdit::CollapseEdge => collapse_edge(&mesh, *edges.first().ok_or(edge)?, 0.5)?,
             RestEdit::ExtrudeFace => {
                 let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
@@ -414,7 +415,7 @@ impl Editor {
     }
 }
 
-/// Applies an edit to each item in turn; none for no items. An edit keeps the numbers of the items that follow.
+/// Applies an edit to each item; `None` if there are no items. An edit must keep the indices of later items.
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],

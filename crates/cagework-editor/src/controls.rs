@@ -14,13 +14,13 @@ use crate::error::EditError;
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageControls {
-    /// Steps of subdivision.
+    /// Number of subdivision steps.
     pub smooth: u32,
     /// Number of interior controls: the last of the cage's positions.
     pub inner: usize,
-    /// Points, lines and faces between interior controls, which are counted from the first of them.
+    /// Points, lines and faces; indices are relative to the first interior control.
     pub elements: Vec<InnerElement>,
-    /// Radius of points and lines, object units; null for a share of the cage.
+    /// Radius of points and lines, object units; null for a share of the cage's size.
     pub radius: Option<f32>,
 }
 
@@ -33,7 +33,7 @@ pub enum InnerKind {
     Point,
     /// A tube around a polyline.
     Line,
-    /// A sheet.
+    /// A polygonal sheet.
     Face,
 }
 
@@ -47,20 +47,20 @@ impl InnerKind {
     }
 }
 
-/// A cage at rest, or a draft that is no cage yet, with its interior controls.
+/// A cage at rest with its interior controls, or a draft that is not a valid cage yet.
 #[derive(Clone, Debug)]
 pub struct RestCage {
     /// Positions of the cage's vertices, then of interior controls; faces of the cage.
     pub mesh: PolygonMesh,
     /// Subdivision and interior controls.
     pub controls: CageControls,
-    /// The controls of a bind, or why the mesh is no cage yet.
+    /// The controls of a bind, or why the mesh is not a valid cage.
     pub set: Result<ControlSet, CageError>,
-    /// Interior controls that were dropped because they do not fit, and what the generator reported.
+    /// Notices about interior controls that were dropped because they do not fit, and notices of the generator.
     pub notices: Vec<String>,
 }
 
-/// Equal meshes and controls make equal cages.
+/// Compares mesh and controls.
 impl PartialEq for RestCage {
     fn eq(&self, other: &Self) -> bool {
         self.mesh == other.mesh && self.controls == other.controls
@@ -75,15 +75,15 @@ impl Default for RestCage {
 }
 
 impl RestCage {
-    /// A cage whose last positions are those of controls inside.
+    /// Creates a cage from a mesh whose last positions are the interior controls.
     ///
     /// # Errors
-    /// When the controls do not fit into it.
+    /// If the controls do not fit into it.
     pub fn new(mut mesh: PolygonMesh, controls: CageControls) -> Result<Self, EditError> {
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
-            // Only a radius, for controls to come.
+            // Only a radius, for future controls.
             InnerControls::default()
         } else {
             InnerControls {
@@ -97,14 +97,14 @@ impl RestCage {
             Err(fault) => Err(fault),
         };
         if let Ok(set) = &set {
-            // Turned outward, seams closed.
+            // `Cage::new` orients the faces outward and closes seams.
             mesh = set.cage().to_polygon_mesh();
         }
         mesh.positions.extend(positions);
         Ok(Self { mesh, controls, set, notices: Vec::new() })
     }
 
-    /// Another cage in its place: controls stay as far as they fit into it.
+    /// Another cage with those of the current controls that fit into it.
     pub fn replaced(&self, cage: &PolygonMesh) -> Self {
         let with = |inner: &[Vec3], controls: CageControls| {
             let mut mesh = cage.clone();
@@ -126,21 +126,21 @@ impl RestCage {
         made.map_or_else(|_| Self::default(), |made| Self { notices, ..made })
     }
 
-    /// Positions of controls inside.
+    /// Positions of interior controls.
     pub fn inner_positions(&self) -> &[Vec3] {
         &self.mesh.positions[self.n_cage()..]
     }
 
-    /// Vertices of the cage alone.
+    /// Number of vertices of the cage, without interior controls.
     pub fn n_cage(&self) -> usize {
         self.mesh.positions.len().saturating_sub(self.controls.inner)
     }
 
-    /// The same with another element between these places. Corners of lines and faces that are within the radius of a control
-    /// are that control: so bones hang together.
+    /// Adds an element with corners at `places`. Corners of lines and faces within the radius of a control reuse that
+    /// control, so that bones share joints.
     ///
     /// # Errors
-    /// When it does not fit.
+    /// If the element does not fit into the cage.
     pub fn with(&self, kind: InnerKind, places: &[Vec3]) -> Result<Self, EditError> {
         let (mut mesh, mut controls) = (self.mesh.clone(), self.controls.clone());
         let (first, radius) = (self.n_cage(), self.radius());
@@ -160,10 +160,10 @@ impl RestCage {
         Self::new(mesh, controls)
     }
 
-    /// The same without some controls inside, and without elements that need them: polylines keep what is left of them.
+    /// Removes interior controls and the elements that use them; polylines keep their other points.
     ///
     /// # Errors
-    /// Never; what fits with more fits with less.
+    /// Never: a subset of controls that fit also fits.
     pub fn without(&self, vertices: &[u32]) -> Result<Self, EditError> {
         let (mut mesh, mut controls) = (self.mesh.clone(), self.controls.clone());
         let first = self.n_cage();
@@ -182,7 +182,7 @@ impl RestCage {
                 }
             })
             .collect();
-        // What belongs to nothing any more goes as well.
+        // Drop positions without an element.
         let mut numbers = vec![None; controls.inner];
         let mut kept = Vec::new();
         for (i, number) in numbers.iter_mut().enumerate() {
@@ -213,7 +213,7 @@ impl RestCage {
         inner.radius_in(self.set.as_ref().map_or(0.0, longest))
     }
 
-    /// Lines between controls, and around faces inside, as pairs of positions.
+    /// Edges of lines and of interior faces, as pairs of position indices.
     pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let first = self.n_cage() as u32;
         let mut edges = Vec::new();
@@ -260,14 +260,14 @@ mod tests {
     }
 
     #[test]
-    fn what_belongs_to_nothing_any_more_goes_with_what_is_deleted() {
+    fn deleting_controls_drops_unused_positions() {
         let made = made().with(InnerKind::Line, &[at(-0.5), at(0.0), at(0.5)]).unwrap();
         let made = made.with(InnerKind::Point, &[Vec3::new(0.0, 0.5, 0.0)]).unwrap();
-        // The middle of the line: it goes on without it.
+        // The middle of the line: the ends stay connected.
         let shorter = made.without(&[9]).unwrap();
         assert_eq!(shorter.controls.elements, [InnerElement::Line(vec![0, 1]), InnerElement::Point(2)]);
         assert_eq!(shorter.inner_positions(), [at(-0.5), at(0.5), Vec3::new(0.0, 0.5, 0.0)]);
-        // One of two ends: the other is no line.
+        // One of two ends: a single point is not a line.
         let point = shorter.without(&[8]).unwrap();
         assert_eq!(
             (point.controls.elements.as_slice(), point.controls.inner),
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_draft_keeps_controls_for_the_cage_to_come() {
+    fn a_draft_keeps_its_controls() {
         let made = made().with(InnerKind::Point, &[at(0.5)]).unwrap();
         let mut open = made.set.as_ref().unwrap().cage().to_polygon_mesh();
         open.faces.pop();

@@ -1,4 +1,4 @@
-//! The document: everything that a person changes, undoes and saves.
+//! The document: all data that can be edited, undone and saved.
 
 use std::sync::Arc;
 
@@ -13,41 +13,40 @@ use crate::surface::SurfacePoint;
 pub struct NamedPose {
     /// Its name.
     pub name: Arc<str>,
-    /// Positions of the cage and its interior controls. `[n_controls]` of the cage that it was saved for
+    /// Positions of cage vertices and interior controls. `[n_controls]` of the cage it was saved for
     pub positions: Arc<[Vec3]>,
-    /// Points of the model that pulls left in place; none if unknown.
+    /// Surface points that pulls keep in place; `None` if unknown.
     pub pins: Option<Arc<[SurfacePoint]>>,
 }
 
-/// Everything that can be changed, undone and saved. Clones share their contents.
+/// All data that can be edited, undone and saved. Clones share their contents.
 #[derive(Clone, Debug, Default)]
 pub struct Document {
     /// The models in the cage.
     pub models: Models,
     /// The cage at rest.
     pub cage: Arc<RestCage>,
-    /// Positions of the cage and its interior controls as posed; while the cage is reshaped, as they will be at rest.
-    /// `[n_controls]`
+    /// Posed positions of cage vertices and interior controls; during reshaping, the new rest positions. `[n_controls]`
     pub pose: Arc<[Vec3]>,
     /// Saved poses.
     pub poses: Arc<Vec<NamedPose>>,
     /// Share of each saved pose in `pose`. `[n_poses]`
     pub shares: Arc<[f32]>,
-    /// Points of the model that pulls leave in place.
+    /// Surface points that pulls keep in place.
     pub pins: Arc<[SurfacePoint]>,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<Arc<str>>,
-    /// Whether the cage is that sample's own.
+    /// Whether the cage is the one of the sample.
     pub has_sample_cage: bool,
     /// Identifies the joined mesh of the models: documents with equal keys have equal meshes.
     pub(crate) mesh_key: u64,
-    /// Identifies the cage at rest in the same way.
+    /// Identifies the cage at rest: documents with equal keys have equal cages.
     pub(crate) cage_key: u64,
     /// Identifies the models with their options and painted amounts.
     pub(crate) models_key: u64,
 }
 
-/// Equal contents, whatever their keys.
+/// Compares contents, not keys.
 impl PartialEq for Document {
     fn eq(&self, other: &Self) -> bool {
         self.models == other.models
@@ -62,7 +61,7 @@ impl PartialEq for Document {
 }
 
 impl Document {
-    /// Identifies what weights are computed from: the joined mesh of the models and the cage at rest.
+    /// Identifies the inputs of a bind: the joined mesh of the models and the cage at rest.
     #[must_use]
     pub fn key(&self) -> Key {
         Key { mesh: self.mesh_key, cage: self.cage_key }
@@ -85,7 +84,7 @@ impl Document {
         self.poses.iter().filter(|pose| self.fits(pose))
     }
 
-    /// Whether nothing was changed between two clones. Meshes are compared by their keys.
+    /// Whether two clones are equal. Compares meshes by their keys.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.pose == other.pose
@@ -98,12 +97,12 @@ impl Document {
             && self.has_sample_cage == other.has_sample_cage
     }
 
-    /// Bytes of what another document does not share, about.
+    /// Approximate size of the data that another document does not share, bytes.
     pub(crate) fn bytes_beyond(&self, other: &Self) -> usize {
         let points = |own: &Arc<[Vec3]>, other: &Arc<[Vec3]>| {
             if Arc::ptr_eq(own, other) { 0 } else { size_of_val(&**own) }
         };
-        // Mesh, controls, triangles and the surface that a bind subdivides.
+        // Mesh, controls, triangles and subdivided surface.
         let cage =
             if Arc::ptr_eq(&self.cage, &other.cage) { 0 } else { 256 * self.cage.mesh.positions.len() };
         let shares = |pose: &NamedPose| {
@@ -126,7 +125,7 @@ impl Document {
     }
 }
 
-/// Identifies what weights and checks are computed from.
+/// Identifies the inputs of binds and checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Key {
     /// The joined mesh of the models.

@@ -1,4 +1,4 @@
-//! The editor: a document, its history, and what is selected in it.
+//! The editor: a document, its history and its selection.
 
 use std::sync::Arc;
 
@@ -20,18 +20,18 @@ use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
 
-/// A document, its history, and the selection in it.
+/// A document, its history and its selection.
 ///
-/// Methods that change the document do so at once; [`Self::commit`] makes one step of everything since the last step.
+/// Methods change the document immediately. [`Self::commit`] adds one step with all changes since the last step.
 #[derive(Debug, Default)]
 pub struct Editor {
     document: Document,
     /// The document at the last step.
     committed: Document,
     history: History,
-    /// Counts steps, undos and redos.
+    /// Number of steps, undos and redos so far.
     steps: u64,
-    /// The last key that was given out.
+    /// The last key that was assigned.
     keys: u64,
     topology: Topology,
     symmetry: Symmetry,
@@ -43,39 +43,39 @@ pub struct Editor {
     pub selection: Selection,
     /// Vertices of the element under the pointer.
     pub hovered: Vec<u32>,
-    /// What a click selects.
+    /// Element type that a click selects.
     pub element: Element,
-    /// Centre of turns and scales.
+    /// Centre of rotation and scaling.
     pub pivot: Pivot,
-    /// Whether mirror images move along.
+    /// Whether mirror images of the selection move with it.
     pub is_mirrored: bool,
-    /// Radius of proportional editing, diagonals of the cage; 0 for none.
+    /// Radius of proportional editing, in diagonals of the cage; 0 turns it off.
     pub radius: f32,
 }
 
-/// What is opened besides models.
+/// Contents that are opened together with models.
 #[derive(Clone, Debug, Default)]
 pub struct Contents {
-    /// The cage; none if it is still to be made.
+    /// The cage, if there is one.
     pub cage: Option<RestCage>,
     /// Saved poses.
     pub poses: Vec<NamedPose>,
-    /// Share of each saved pose in the pose. `[n_poses]`, or fewer: the others have none
+    /// Share of each saved pose in the pose. `[n_poses]`, or shorter: missing shares are 0
     pub shares: Vec<f32>,
-    /// Points of the model that pulls leave in place.
+    /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
-    /// Identifier of the built-in sample that it is.
+    /// Identifier of the built-in sample, if it is one.
     pub sample: Option<String>,
 }
 
 impl Editor {
-    /// An editor whose history takes at most so many bytes.
+    /// Creates an editor with a history limit in bytes.
     #[must_use]
     pub fn with_history_limit(bytes: usize) -> Self {
         Self { history: History::with_limit(bytes), ..Self::default() }
     }
 
-    /// The document as it is now.
+    /// The current document.
     #[must_use]
     pub fn document(&self) -> &Document {
         &self.document
@@ -90,7 +90,7 @@ impl Editor {
         &mut self.document
     }
 
-    /// Opens other models; the history starts anew.
+    /// Replaces models and contents, and clears the history.
     pub fn open(&mut self, models: impl IntoIterator<Item = NewModel>, contents: Contents) {
         let Contents { cage, poses, mut shares, pins, sample } = contents;
         let (pivot, radius, keys, steps) = (self.pivot, self.radius, self.keys, self.steps + 1);
@@ -116,10 +116,10 @@ impl Editor {
         self.amend();
     }
 
-    /// Takes the pose of a project without a step of the history. Without a pose nothing is blended.
+    /// Sets the pose of a project without adding a step to the history. Without a pose, all shares are 0.
     ///
     /// # Errors
-    /// When it is damaged, or belongs to another cage: the cage is at rest then.
+    /// If the pose is damaged or belongs to another cage. The cage is at rest then.
     pub fn take_pose(&mut self, settings: &DocumentSettings) -> Result<(), &'static str> {
         let pose = settings.pose_of(&self.document);
         match &pose {
@@ -130,10 +130,10 @@ impl Editor {
         pose.map(|_| ())
     }
 
-    /// Adds models; cage and pose stay. Returns their numbers.
+    /// Adds models; keeps cage and pose. Returns the ids of the models.
     pub fn add_models(&mut self, models: impl IntoIterator<Item = NewModel>) -> std::ops::Range<u32> {
         let first = self.document.models.next_id();
-        // Adding does not fail.
+        // Adding never fails.
         let _ = self.change_models(|all| {
             all.add(models);
             Ok(())
@@ -141,8 +141,8 @@ impl Editor {
         first..self.document.models.next_id()
     }
 
-    /// Paints a model: changes how much of each vertex stays in place, 0 to 255. The key of the models follows with the next step, so that
-    /// a stroke derives nothing from each of its dabs.
+    /// Changes the painted amounts of a model, 0 to 255. The key of the models changes only at the next step, so that the
+    /// dabs of a stroke do not trigger updates of derived data.
     pub fn paint(&mut self, id: u32, change: impl FnOnce(&mut Vec<u8>)) {
         if let Some(painted) = self.document.models.painted_mut(id) {
             change(painted);
@@ -150,7 +150,7 @@ impl Editor {
         }
     }
 
-    /// Makes one step of all changes since the last step; false if there were none.
+    /// Adds a step with all changes since the last step; false if nothing has changed.
     pub fn commit(&mut self, label: impl Into<String>) -> bool {
         if std::mem::take(&mut self.is_painting) && self.document.models != self.committed.models {
             self.document.models_key = self.next_key();
@@ -164,23 +164,23 @@ impl Editor {
         true
     }
 
-    /// Keeps all changes since the last step without making a step of them.
+    /// Adds all changes since the last step to that step.
     pub fn amend(&mut self) {
         self.committed = self.document.clone();
     }
 
-    /// Takes back all changes since the last step.
+    /// Reverts all changes since the last step.
     pub fn revert(&mut self) {
         self.is_painting = false;
         self.set_document(self.committed.clone());
     }
 
-    /// Takes back the last step; false if there is none. Which models are shown stays as it is.
+    /// Undoes the last step; false if the history is empty. Keeps the visibility of models.
     pub fn undo(&mut self) -> bool {
         self.go(History::undo)
     }
 
-    /// Repeats the step that was taken back last; false if there is none.
+    /// Redoes the step that was undone last; false if nothing was undone.
     pub fn redo(&mut self) -> bool {
         self.go(History::redo)
     }
@@ -202,17 +202,17 @@ impl Editor {
         went
     }
 
-    /// Drops all steps.
+    /// Clears the history.
     pub fn clear_history(&mut self) {
         self.history = History::with_limit(self.history.limit());
     }
 
-    /// Shows a document in place of the present one; [`Self::commit`] makes a step of it.
+    /// Replaces the document; [`Self::commit`] adds the change to the history.
     pub fn show(&mut self, document: Document) {
         self.set_document(document);
     }
 
-    /// Takes another document, and drops a selection in another cage.
+    /// Replaces the document. Clears the selection if the cage differs.
     pub(crate) fn set_document(&mut self, document: Document) {
         let has_other_cage = document.cage_key != self.document.cage_key;
         self.document = document;
@@ -222,7 +222,7 @@ impl Editor {
         }
     }
 
-    /// Takes another cage at rest; shares of saved poses in the pose are 0.
+    /// Replaces the cage at rest; sets the shares of all saved poses to 0.
     pub(crate) fn set_cage(&mut self, cage: RestCage) {
         self.document.cage_key = self.next_key();
         self.document.pose = cage.mesh.positions.as_slice().into();
@@ -231,7 +231,7 @@ impl Editor {
         self.follow_cage();
     }
 
-    /// Derives from the cage what picking and symmetry need.
+    /// Updates topology and symmetry for the current cage.
     fn follow_cage(&mut self) {
         let cage = &self.document.cage;
         self.topology = Topology::new(&cage.mesh.faces);
@@ -271,7 +271,7 @@ impl Editor {
         self.selection.linked(&self.topology);
     }
 
-    /// Identifies what weights are computed from.
+    /// Identifies the inputs of a bind.
     #[must_use]
     pub fn key(&self) -> Key {
         self.document.key()
@@ -295,7 +295,7 @@ impl Editor {
         &self.symmetry
     }
 
-    /// Bounds of models and cage at rest; none without either.
+    /// Bounds of models and cage at rest; `None` if there is neither.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let (models, cage) = (self.document.models.positions(), &self.document.cage.mesh.positions);
@@ -305,7 +305,7 @@ impl Editor {
         }
     }
 
-    /// The cage as it is reshaped, or at rest, without interior controls.
+    /// The cage without interior controls, at rest or as reshaped so far.
     #[must_use]
     pub fn cage_as_shown(&self) -> PolygonMesh {
         let cage = &self.document.cage;
@@ -313,13 +313,13 @@ impl Editor {
         PolygonMesh { positions: positions[..cage.n_cage()].to_vec(), faces: cage.mesh.faces.clone() }
     }
 
-    /// Whether the cage at rest is reshaped rather than posed.
+    /// Whether the cage is being reshaped rather than posed.
     #[must_use]
     pub fn is_editing_rest(&self) -> bool {
         self.editing_rest
     }
 
-    /// Starts or ends reshaping. The pose is the rest position afterwards.
+    /// Starts or ends reshaping. Resets the pose to the rest position.
     pub fn set_editing_rest(&mut self, editing: bool) {
         if self.editing_rest != editing {
             self.editing_rest = editing;
@@ -343,7 +343,7 @@ impl Editor {
     /// Moves the cage. `[n_controls]`
     ///
     /// # Errors
-    /// When there are more or fewer positions, or one is not finite.
+    /// If the number of positions is wrong, or one is not finite.
     pub fn set_pose(&mut self, positions: Vec<Vec3>) -> Result<(), EditError> {
         let (given, expected) = (positions.len(), self.document.pose.len());
         if given != expected {
@@ -358,17 +358,17 @@ impl Editor {
         Ok(())
     }
 
-    /// Moves the cage to a moment of the animation through all saved poses, a second each.
+    /// Moves the cage to a time of the animation through all saved poses, one second each.
     pub fn play_at(&mut self, seconds: f32) {
         let poses: Vec<Vec<Vec3>> =
             self.document.fitting_poses().map(|pose| pose.positions.to_vec()).collect();
         if let Ok(positions) = moment(&self.document.cage.mesh.positions, &poses, seconds) {
-            // As many as the cage has.
+            // The number of positions matches, so this cannot fail.
             let _ = self.set_pose(positions);
         }
     }
 
-    /// How a gesture moves the cage from `positions`.
+    /// Shares of the vertices in a gesture that starts at `positions`.
     #[must_use]
     pub fn pull(&self, positions: &[Vec3]) -> Pull {
         let rest = &self.document.cage.mesh.positions;
@@ -377,7 +377,7 @@ impl Editor {
         Pull::new(&self.selection, positions, rest, SharedPull { radius: self.radius * diagonal, symmetry })
     }
 
-    /// Starts a gesture; false when nothing is selected or another one is in progress.
+    /// Starts a gesture; false if nothing is selected or another gesture is in progress.
     pub fn begin(&mut self, kind: GestureKind, pointer: Vec2, constraint: Constraint) -> bool {
         let pose = self.document.pose.to_vec();
         let Some(pivot) = self.selection.pivot(&pose, &self.topology, self.pivot) else { return false };
@@ -397,18 +397,18 @@ impl Editor {
         self.gesture.as_ref()
     }
 
-    /// Changes the gesture in progress, and moves the cage as it says.
+    /// Changes the gesture in progress and moves the cage accordingly.
     pub fn drag(&mut self, view: &dyn View, change: impl FnOnce(&mut Gesture)) {
         if let Some(mut gesture) = self.gesture.take() {
             change(&mut gesture);
             let positions = gesture.positions(view);
             self.gesture = Some(gesture);
-            // Not finite where the pointer is on the horizon: the cage stays.
+            // Positions are not finite if the pointer is on the horizon; the cage keeps its pose then.
             let _ = self.set_pose(positions);
         }
     }
 
-    /// Sets the radius of proportional editing, also of the gesture in progress.
+    /// Sets the radius of proportional editing, and updates the gesture in progress.
     pub fn set_radius(&mut self, radius: f32, view: &dyn View) {
         self.radius = radius.max(0.0);
         if let Some(gesture) = &self.gesture {
@@ -417,7 +417,7 @@ impl Editor {
         }
     }
 
-    /// Ends the gesture: keeps what it moved, or moves the cage back. True when something was moved and is kept.
+    /// Ends the gesture and keeps or reverts its movement. True if a movement was kept.
     pub fn end(&mut self, keep: bool) -> bool {
         let Some(gesture) = self.gesture.take() else { return false };
         let moved = gesture.start() != &*self.document.pose;
@@ -427,7 +427,7 @@ impl Editor {
         keep && moved
     }
 
-    /// Moves the selection; false when nothing is selected.
+    /// Moves the selection; false if nothing is selected.
     pub fn shift(&mut self, by: Vec3) -> bool {
         if self.selection.is_empty() || !by.is_finite() {
             return false;
@@ -437,10 +437,10 @@ impl Editor {
         self.set_pose(moved).is_ok()
     }
 
-    /// The document and other settings, a JSON object, as a project.
+    /// Writes a project file of the document and other settings, a JSON object.
     ///
     /// # Errors
-    /// When no model is open or the file would be too large.
+    /// If no model is open, or the file would be too large.
     pub fn write_project(&self, settings: &str) -> Result<Vec<u8>, EditError> {
         let Document { models, cage, poses, .. } = &self.document;
         let models: Vec<&Model> = models.iter().map(|member| &*member.model).collect();
@@ -450,7 +450,7 @@ impl Editor {
         Ok(write_project(&models, &cage.mesh, &poses, &settings)?)
     }
 
-    /// What panels show.
+    /// The view that panels show.
     #[must_use]
     pub fn view(&self) -> DocumentView {
         let Document { poses, shares, pins, sample, has_sample_cage, models_key, cage_key, mesh_key, .. } =

@@ -1,4 +1,4 @@
-//! Why a command was refused. The document is unchanged then.
+//! Errors of commands. The document is unchanged after an error.
 
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, WriteError};
@@ -7,10 +7,10 @@ use thiserror::Error;
 use crate::edit::PoseError;
 use crate::rest_edit::RestEditError;
 
-/// Why a command was refused.
+/// Why a command cannot be applied.
 #[derive(Debug, Error)]
 pub enum EditError {
-    /// No model is open, or none has this number.
+    /// No model is open, or none has this id.
     #[error("there is no such model yet: open one first")]
     NoModel,
     /// The only model cannot be removed.
@@ -28,41 +28,41 @@ pub enum EditError {
     /// A saved pose that does not exist.
     #[error("there is no pose number {number}: {count} are saved")]
     NoSuchPose {
-        /// Counted from 1.
+        /// Number of the pose, from 1.
         number: usize,
-        /// How many there are.
+        /// Number of saved poses.
         count: usize,
     },
-    /// Painted amounts for another number of vertices.
+    /// The number of painted amounts differs from the number of vertices.
     #[error("{given} amounts for {expected} vertices")]
     Amounts {
-        /// Amounts given.
+        /// Number of amounts.
         given: usize,
-        /// Vertices of the model.
+        /// Number of vertices of the model.
         expected: usize,
     },
     /// A number that is not finite.
     #[error("{what} must be finite numbers")]
     NotFinite {
-        /// What the numbers are.
+        /// The quantity.
         what: &'static str,
     },
-    /// Positions that are no cage.
+    /// The mesh is not a valid cage.
     #[error(transparent)]
     Cage(#[from] CageError),
-    /// Controls that do not fit into the cage.
+    /// The controls do not fit into the cage.
     #[error(transparent)]
     Control(#[from] ControlError),
-    /// An edit of the rest cage.
+    /// An edit of the rest cage is not possible.
     #[error(transparent)]
     Rest(#[from] RestEditError),
-    /// A pose of another cage.
+    /// The pose belongs to another cage.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// A name that is that of no part of the model.
+    /// A name selects no part of the model.
     #[error(transparent)]
     Part(#[from] SelectError),
-    /// A rig that cannot be read.
+    /// The rig cannot be read.
     #[error(transparent)]
     Rig(#[from] WriteError),
 }

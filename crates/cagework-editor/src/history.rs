@@ -1,18 +1,18 @@
-//! Undo as a list of documents.
+//! Undo history, stored as a list of documents.
 
 use std::collections::VecDeque;
 
 use crate::document::Document;
 
-/// Bytes of documents kept unless told otherwise.
+/// Default limit of the history, bytes.
 pub const HISTORY_BYTES: usize = 256 << 20;
 
-/// A step and the document before it, or after it once it was undone.
+/// A step, with the document before it, or after an undo the document after it.
 #[derive(Clone, Debug)]
 struct Step {
     label: String,
     document: Document,
-    /// Bytes of it that the neighbouring document does not share.
+    /// Size of the data that the neighbouring document does not share, bytes.
     bytes: usize,
 }
 
@@ -36,8 +36,8 @@ impl History {
         Self { limit, ..Self::default() }
     }
 
-    /// Records a step that led from `before` to `after`, and forgets undone ones. The oldest steps go when the bytes of all exceed
-    /// the limit; the latest stays.
+    /// Records a step from `before` to `after`, and drops undone steps. Above the limit, drops the oldest steps, but never the
+    /// latest.
     pub(crate) fn push(&mut self, label: String, before: Document, after: &Document) {
         let bytes = before.bytes_beyond(after);
         self.undone.clear();
@@ -77,7 +77,7 @@ impl History {
         self.limit
     }
 
-    /// Steps that were dropped because of the limit.
+    /// Number of steps that were dropped because of the limit.
     pub(crate) fn forgotten(&self) -> usize {
         self.forgotten
     }

@@ -1,7 +1,6 @@
-//! What a person edits, and how: models, cage, pose and saved poses as one [`Document`], changed by [`Command`]s and taken back
-//! by undo.
+//! Editing of models, cage, pose and saved poses: one [`Document`], changed by [`Command`]s, with undo.
 //!
-//! No GPU, no browser. Weights, checks and pictures are derived from a document and not part of it.
+//! Independent of GPU and browser. Weights, checks and pictures are derived from a document and not part of it.
 
 pub mod cache;
 mod command;

@@ -1,7 +1,7 @@
-//! The models in one cage, joined to one mesh: vertices and triangles of the first model, then those of the next.
+//! The models in one cage, joined to one mesh: vertices and triangles are concatenated in the order of the models.
 //!
-//! A point of the surface is stored as a triangle's number and barycentric coordinates. Triangles are numbered through all models
-//! that a document has held, so that a point stays on its triangle when other models are added or removed.
+//! A surface point is stored as a triangle number and barycentric coordinates. Triangle numbers are unique among all models
+//! that a document has ever contained, so that a point keeps its triangle when other models are added or removed.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EditError;
 
-/// Largest number of a first triangle that a project may ask for; it leaves room for the triangles of later models.
+/// Largest number of a first triangle that is accepted from a project; leaves room for later models.
 const MAX_FIRST: u32 = u32::MAX / 2;
 /// The name that stands for all of a model.
 const WHOLE: &str = "all";
@@ -38,37 +38,37 @@ impl Default for PartOptions {
     }
 }
 
-/// What a project stores of a model besides its file.
+/// Settings of a model in a project.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemberSettings {
-    /// Number of its first triangle in points of the surface.
+    /// Number of the first triangle in surface points.
     first_triangle: u32,
     options: PartOptions,
     /// Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
     painted: Vec<(u8, u32)>,
 }
 
-/// One of the models.
+/// A model in the cage.
 #[derive(Clone, Debug)]
 pub struct Member {
-    /// Its number, which no other model of the document has.
+    /// Identifier, unique in the document.
     pub id: u32,
     /// The file.
     pub model: Arc<Model>,
     /// Visibility and parts.
     pub options: PartOptions,
-    /// How much of each vertex is painted to stay in place, 0 to 255; empty for an unpainted model. `[n_vertices]`
+    /// Painted amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted model
     pub painted: Arc<Vec<u8>>,
     first_triangle: u32,
-    /// Its vertices in the joined mesh.
+    /// Range of vertices in the joined mesh.
     pub vertices: Range<usize>,
-    /// Its triangles in the joined mesh.
+    /// Range of triangles in the joined mesh.
     pub triangles: Range<usize>,
 }
 
-/// Members are equal when they are the same file with the same options.
+/// Compares file, options and painted amounts.
 impl PartialEq for Member {
     fn eq(&self, other: &Self) -> bool {
         let is_same_file = Arc::ptr_eq(&self.model, &other.model)
@@ -82,7 +82,7 @@ impl PartialEq for Member {
     }
 }
 
-/// A model to add, and what a project stores of it.
+/// A model to add, and its settings in a project.
 pub type NewModel = (Model, Option<MemberSettings>);
 
 /// The models in one cage. Clones share files and the joined mesh.
@@ -92,11 +92,11 @@ pub struct Models {
     mesh: Arc<TriMesh>,
     next_id: u32,
     next_triangle: u32,
-    /// That of the first model that was opened; it stays when that model is removed.
+    /// Origin of the first model that was opened; kept when that model is removed.
     origin: DVec3,
 }
 
-/// Equal members make equal models.
+/// Compares the members.
 impl PartialEq for Models {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.members, &other.members) || self.members == other.members
@@ -116,9 +116,9 @@ impl Models {
         if self.next_id == 0 {
             self.origin = model.origin();
         }
-        // Each triangle has one number.
-        let asked = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST);
-        let first_triangle = asked.max(self.next_triangle);
+        // Triangle numbers are unique, also if the project's settings collide.
+        let stored = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST);
+        let first_triangle = stored.max(self.next_triangle);
         self.next_triangle = first_triangle + model.triangles.len() as u32;
         let mut member = Member {
             id: self.next_id,
@@ -149,7 +149,7 @@ impl Models {
     /// Removes a model.
     ///
     /// # Errors
-    /// When there is no such model, or it is the only one; nothing changes then.
+    /// If there is no such model, or it is the only one. Nothing changes then.
     pub fn remove(&mut self, id: u32) -> Result<(), EditError> {
         self.get(id)?;
         if self.members.len() == 1 {
@@ -178,7 +178,7 @@ impl Models {
         self.members.iter()
     }
 
-    /// How many there are.
+    /// Number of models.
     #[must_use]
     pub fn len(&self) -> usize {
         self.members.len()
@@ -202,16 +202,16 @@ impl Models {
         &self.mesh.triangles
     }
 
-    /// Whether the joined meshes are one: the same models in the same order.
+    /// Whether the joined meshes are the same: the same models in the same order.
     #[must_use]
     pub fn has_mesh_of(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.mesh, &other.mesh)
     }
 
-    /// A model by its number.
+    /// Finds a model by its id.
     ///
     /// # Errors
-    /// When there is no such model.
+    /// If there is no such model.
     pub fn get(&self, id: u32) -> Result<&Member, EditError> {
         self.iter().find(|member| member.id == id).ok_or(EditError::NoModel)
     }
@@ -219,7 +219,7 @@ impl Models {
     /// The first model.
     ///
     /// # Errors
-    /// When no model is open.
+    /// If no model is open.
     pub fn first(&self) -> Result<&Member, EditError> {
         self.iter().next().ok_or(EditError::NoModel)
     }
@@ -233,7 +233,7 @@ impl Models {
     /// Sets visibility and parts of a model.
     ///
     /// # Errors
-    /// When there is no such model, or a name is that of no part; nothing changes then.
+    /// If there is no such model, or a name selects no part. Nothing changes then.
     pub fn set_options(&mut self, id: u32, options: PartOptions) -> Result<(), EditError> {
         let model = &self.get(id)?.model;
         for name in options.rigid.iter().chain(&options.stays).filter(|name| *name != WHOLE) {
@@ -243,7 +243,7 @@ impl Models {
         Ok(())
     }
 
-    /// Shows and hides models as in another document; false if that changes nothing.
+    /// Copies the visibility of models from another document; false if nothing changes.
     pub(crate) fn show_as(&mut self, other: &Self) -> bool {
         let shown = |id: u32| other.get(id).ok().map(|member| member.options.shown);
         let differs = |member: &Member| shown(member.id).is_some_and(|shown| shown != member.options.shown);
@@ -256,10 +256,10 @@ impl Models {
         is_other
     }
 
-    /// Sets how much of each vertex of a model stays in place, 0 to 255. `[n_vertices]`, or empty for an unpainted model.
+    /// Sets the painted amounts of a model, 0 to 255. `[n_vertices]`, or empty for an unpainted model.
     ///
     /// # Errors
-    /// When there is no such model, or it has another number of vertices; nothing changes then.
+    /// If there is no such model, or it has another number of vertices. Nothing changes then.
     pub fn set_painted(&mut self, id: u32, amounts: Vec<u8>) -> Result<(), EditError> {
         let expected = self.get(id)?.model.positions.len();
         if !amounts.is_empty() && amounts.len() != expected {
@@ -285,7 +285,7 @@ impl Models {
         self.origin
     }
 
-    /// Says where the origin is, if it is not the world's.
+    /// Notice about the origin, if it is not the world origin.
     #[must_use]
     pub fn origin_notice(&self) -> Option<String> {
         let [x, y, z] = self.up().vector_turned(self.origin).to_array();
@@ -303,7 +303,7 @@ impl Models {
         self.iter().next().map_or_else(UpAxis::default, |member| member.model.up())
     }
 
-    /// Triangles of models that are not shown.
+    /// Triangles of hidden models.
     #[must_use]
     pub fn hidden(&self) -> Vec<Range<u32>> {
         let hidden = self.iter().filter(|member| !member.options.shown);
@@ -319,7 +319,7 @@ impl Models {
         })
     }
 
-    /// Corners of a numbered triangle in the joined mesh; none if its model was removed.
+    /// Corners of a triangle by its number; `None` if its model was removed.
     #[must_use]
     pub fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
         let place = |member: &Member| {
@@ -337,10 +337,10 @@ impl Models {
         self.iter().find(of).map_or(triangle, number)
     }
 
-    /// Points of rigs, which are bound after the vertices: those of the first model, then those of the next. `[n_points]`
+    /// Points of rigs, which are bound after the vertices, concatenated over the models. `[n_points]`
     ///
     /// # Errors
-    /// When a rig cannot be read.
+    /// If a rig cannot be read.
     pub fn extra_points(&self) -> Result<Vec<Vec3>, EditError> {
         let mut points = Vec::new();
         for member in self.iter() {
@@ -349,10 +349,10 @@ impl Models {
         Ok(points)
     }
 
-    /// Which of [`Self::extra_points`] belong to a model.
+    /// Range of a model's points in [`Self::extra_points`].
     ///
     /// # Errors
-    /// When there is no such model, or a rig cannot be read.
+    /// If there is no such model, or a rig cannot be read.
     pub fn extra_of(&self, id: u32) -> Result<Range<usize>, EditError> {
         let mut first = 0;
         for member in self.iter() {
@@ -365,12 +365,12 @@ impl Models {
         Err(EditError::NoModel)
     }
 
-    /// Parts of all models that the cage does not bend.
+    /// Held and rigid parts of all models.
     #[must_use]
     pub fn parts(&self) -> Parts {
         let mut all = Parts::default();
         for member in self.iter() {
-            // `set_options` has refused names that select nothing.
+            // `set_options` rejects names that select nothing.
             let own = member.parts().unwrap_or_default();
             if !own.stays.is_empty() {
                 all.stays.resize(self.mesh.positions.len(), 0.0);
@@ -383,7 +383,7 @@ impl Models {
         all
     }
 
-    /// What a project stores of the models besides their files; empty for one model with default options.
+    /// Settings of the models in a project; empty for one model with default options.
     #[must_use]
     pub fn settings(&self) -> Vec<MemberSettings> {
         let of = |member: &Member| MemberSettings {
@@ -395,7 +395,7 @@ impl Models {
         if all == [MemberSettings::default()] { Vec::new() } else { all }
     }
 
-    /// Bytes of what another document does not share, about.
+    /// Approximate size of the data that other models do not share, bytes.
     pub(crate) fn bytes_beyond(&self, other: &Self) -> usize {
         if Arc::ptr_eq(&self.members, &other.members) {
             return 0;
@@ -420,10 +420,10 @@ impl Member {
         name == WHOLE || self.model.select(name).is_ok()
     }
 
-    /// Its parts that the cage does not bend. Vertices are its own.
+    /// Held and rigid parts. Vertex indices are relative to the model.
     ///
     /// # Errors
-    /// When a name is that of no part.
+    /// If a name selects no part.
     pub fn parts(&self) -> Result<Parts, EditError> {
         let of_parts = |names: &[String]| -> Vec<String> {
             names.iter().filter(|name| *name != WHOLE).cloned().collect()
@@ -434,7 +434,7 @@ impl Member {
         let mut parts = self.model.parts(&named, &of_parts(rigid))?;
         let n = self.model.positions.len();
         if is_whole(rigid) {
-            // One rigid piece, even where the mesh has several components: a suit of armour moves as one.
+            // One rigid piece, also if the mesh has several components, such as a suit of armour.
             parts.rigid = vec![(0..n as u32).collect()];
         }
         if is_whole(stays) {
@@ -448,7 +448,7 @@ impl Member {
         Ok(parts)
     }
 
-    /// Its part of a list over all vertices.
+    /// The model's slice of a list over all vertices.
     #[must_use]
     pub fn share<'a, T>(&self, of_all: &'a [T]) -> &'a [T] {
         &of_all[self.vertices.clone()]

@@ -1,4 +1,4 @@
-//! The document's part of a project's settings. The project file itself holds models, cage and saved poses.
+//! Settings of a document in a project. The project file itself stores models, cage and saved poses.
 
 use std::sync::Arc;
 
@@ -16,35 +16,35 @@ use crate::document::{Document, NamedPose};
 use crate::models::MemberSettings;
 use crate::surface::SurfacePoint;
 
-/// The document's part of a project's settings.
+/// Settings of a document in a project.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct DocumentSettings {
-    /// Identifier of the built-in sample whose own cage it is.
+    /// Identifier of the built-in sample that the cage belongs to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
-    /// Subdivision and interior controls of the cage, whose last positions the controls are.
+    /// Subdivision and interior controls; the controls are the last positions of the cage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controls: Option<CageControls>,
-    /// The pose in the axes of the model's file: [`cagework_io::encode_pose`] in base 64 for URLs. None at rest.
+    /// The pose in the axes of the model's file: [`cagework_io::encode_pose`] in URL-safe base 64. Null at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
-    /// Points of the model that pulls leave in place.
+    /// Surface points that pulls keep in place.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
-    /// The same of each saved pose.
+    /// Surface points that pulls keep in place, of each saved pose.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pose_pins: Vec<Vec<SurfacePoint>>,
     /// Share of each saved pose in the pose, 0 to 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pose_shares: Vec<f32>,
-    /// Visibility, parts and paint of each model.
+    /// Visibility, parts and painted amounts of each model.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<MemberSettings>,
 }
 
 impl DocumentSettings {
-    /// Those of a document.
+    /// Settings of a document.
     #[must_use]
     pub fn of(document: &Document) -> Self {
         let Document { cage, poses, shares, pins, sample, has_sample_cage, models, .. } = document;
@@ -67,7 +67,7 @@ impl DocumentSettings {
         }
     }
 
-    /// Those of a project; what cannot be read is left out.
+    /// Reads the settings of a project; skips fields that cannot be read.
     #[must_use]
     pub fn read(text: &str) -> Self {
         let given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
@@ -86,18 +86,18 @@ impl DocumentSettings {
         }
     }
 
-    /// These settings and others, a JSON object, as one. Those here replace others of the same name.
+    /// Merges these settings into `others`, a JSON object, and replaces fields of the same name.
     #[must_use]
     pub fn beside(&self, others: &str) -> String {
         let mut all: Map<String, Value> = serde_json::from_str(others).unwrap_or_default();
-        // A structure of numbers and text is always written.
+        // Serialization of numbers and text never fails.
         if let Ok(Value::Object(own)) = serde_json::to_value(self) {
             all.extend(own);
         }
         Value::Object(all).to_string()
     }
 
-    /// The cage of a project's mesh, and what was left out. A mesh without faces is no cage yet.
+    /// The cage of a project's mesh, and a notice about dropped controls. `None` if the mesh has no faces.
     #[must_use]
     pub fn cage(&self, mesh: &PolygonMesh) -> (Option<RestCage>, Option<&'static str>) {
         if mesh.faces.is_empty() {
@@ -130,10 +130,10 @@ impl DocumentSettings {
         poses.into_iter().enumerate().map(named).collect()
     }
 
-    /// The pose; none at rest. `[n_controls]`
+    /// The pose; `None` at rest. `[n_controls]`
     ///
     /// # Errors
-    /// When it is damaged, or belongs to another cage: the sentence for the user.
+    /// A message for the user if the pose is damaged or belongs to another cage.
     pub fn pose_of(&self, document: &Document) -> Result<Option<Vec<Vec3>>, &'static str> {
         let Some(text) = &self.pose else { return Ok(None) };
         let damaged = "The pose in this project is damaged: the cage is at rest.";
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_that_cannot_be_read_are_left_out() {
+    fn unreadable_fields_are_skipped() {
         let read = |given: Value| DocumentSettings::read(&given.to_string());
         assert_eq!(read(json!({ "pose_shares": [0.25, -3, 1e300] })).pose_shares, [0.25, 0.0, 1.0]);
         assert_eq!(
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_poses_are_refused_with_a_sentence() {
+    fn damaged_poses_give_a_message() {
         let document = Document::default();
         for pose in ["!", "AAEC", ""] {
             let settings = DocumentSettings { pose: Some(pose.to_owned()), ..DocumentSettings::default() };

@@ -1,22 +1,22 @@
-//! Points of the models' surface.
+//! Points on the surface of the models.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::models::Models;
 
-/// A point of the models' surface.
+/// A point on the surface of the models.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SurfacePoint {
-    /// Number of its triangle: see [`Models`].
+    /// Number of the triangle; see [`Models`].
     pub triangle: u32,
     /// Barycentric coordinates in the triangle.
     pub bary: [f32; 3],
 }
 
 impl SurfacePoint {
-    /// Where it is for positions of all vertices; none if its model was removed. `[n_vertices]`
+    /// Position for `positions` of all vertices, `[n_vertices]`; `None` if the model was removed.
     #[must_use]
     pub fn at(&self, models: &Models, positions: &[Vec3]) -> Option<Vec3> {
         let corners = models.corners(self.triangle)?;

@@ -1,10 +1,10 @@
-//! What panels show of a document.
+//! The part of a document that panels show.
 
 use serde::Serialize;
 
 use crate::surface::SurfacePoint;
 
-/// What panels show of a document. Meshes are read separately, when their keys change.
+/// The part of a document that panels show. Meshes are read separately when their keys change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -19,25 +19,25 @@ pub struct DocumentView {
     pub poses: Vec<PoseView>,
     /// Share of each saved pose in the pose.
     pub shares: Vec<f32>,
-    /// Points of the model that pulls leave in place.
+    /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
     /// Whether the cage is posed.
     pub posed: bool,
-    /// Whether the cage at rest is reshaped.
+    /// Whether the cage is being reshaped.
     pub editing_rest: bool,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<String>,
-    /// Whether the cage is that sample's own.
+    /// Whether the cage is the one of the sample.
     pub sample_cage: bool,
     /// The selection.
     pub selected: SelectionView,
     /// Changes with each step, undo and redo.
     pub steps: u64,
-    /// Label of the step that undo takes back.
+    /// Label of the step that undo reverts.
     pub undo: Option<String>,
     /// Label of the step that redo repeats.
     pub redo: Option<String>,
-    /// Steps that were dropped because the history exceeded its limit.
+    /// Number of steps that were dropped because the history exceeded its limit.
     pub forgotten: usize,
 }
 
@@ -47,7 +47,7 @@ pub struct DocumentView {
 pub struct PoseView {
     /// Its name.
     pub name: String,
-    /// Whether it belongs to the cage; poses of a cage that was replaced do not.
+    /// Whether the pose belongs to the current cage rather than a replaced one.
     pub fits: bool,
 }
 
@@ -55,10 +55,10 @@ pub struct PoseView {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SelectionView {
-    /// Selected vertices.
+    /// Number of selected vertices.
     pub count: usize,
     /// The vertex that was selected last.
     pub last: Option<u32>,
-    /// Centre of the selection, object units; none without a selection and during a gesture.
+    /// Centre of the selection, object units; null without a selection and during a gesture.
     pub center: Option<[f32; 3]>,
 }

@@ -39,7 +39,7 @@ fn bound(document: &Document, grid: u32) -> Weights {
     bound.frames.folded(&bound.weights)
 }
 
-/// Where the cage goes when a vertex of the models is pulled.
+/// Pose of the cage after a pull of a model vertex.
 fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec<Vec3> {
     let models = &document.models;
     let mesh = TriMesh { positions: models.positions().to_vec(), triangles: models.triangles().to_vec() };
@@ -57,7 +57,7 @@ fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec
     drag.cage().iter().map(|p| p.as_vec3()).collect()
 }
 
-/// Applies a command as one step, and remembers the document after it.
+/// Applies a command as one step, and appends the new document to `documents`.
 fn step(editor: &mut Editor, documents: &mut Vec<Document>, command: Command) {
     let label = format!("step {}", documents.len());
     editor.apply(command).expect("valid input");
@@ -96,7 +96,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     step(&mut editor, &mut documents, Command::SetPose { positions });
     step(&mut editor, &mut documents, Command::SavePose { name: "up".to_owned() });
     assert_eq!(*editor.document().shares, [0.0, 1.0]);
-    // A slider sends many shares; all of them are one step, from the pose at its beginning.
+    // A slider sends many shares. They form one step, relative to the pose before it.
     for share in [0.9, 0.4, 0.25] {
         editor.apply(Command::Blend { index: 1, share }).unwrap();
     }
@@ -104,7 +104,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let rest = &editor.document().cage.mesh.positions;
     let [left, up] = [0, 1].map(|k| editor.document().poses[k].positions.clone());
     for (k, p) in editor.document().pose.iter().enumerate() {
-        // The formula of a blend: rest + sum of share times offset.
+        // Formula of a blend: rest + sum of share × offset.
         let expected = rest[k] + 0.5 * (left[k] - rest[k]) + 0.25 * (up[k] - rest[k]);
         assert!(p.distance(expected) < 1e-5, "{p} {expected}");
     }
@@ -124,13 +124,13 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let edge = editor.topology().edges[0];
     editor.selection.change(&edge, SelectMode::Replace);
     step(&mut editor, &mut documents, Command::EditRest { edit: RestEdit::SplitEdge });
-    assert!(editor.document().fitting_poses().next().is_none(), "the cage has another vertex");
+    assert!(editor.document().fitting_poses().next().is_none(), "the cage has one more vertex");
     let place = editor.bounds().unwrap().center();
     step(&mut editor, &mut documents, Command::AddControl { kind: InnerKind::Point, places: vec![place] });
     editor.set_editing_rest(false);
     step(&mut editor, &mut documents, Command::RemoveModel { id: hat });
 
-    // To the start and back, with the same document at every step.
+    // Undo all steps, then redo them: every document must be equal.
     for k in (0..documents.len() - 1).rev() {
         assert!(editor.undo());
         assert_eq!(*editor.document(), documents[k], "undo to {k}");
@@ -144,7 +144,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     }
     assert!(!editor.redo());
 
-    // Every document can be saved and opened again.
+    // Every document survives saving and opening.
     for (k, document) in documents.iter().enumerate() {
         let reopened = saved_and_opened(document);
         assert_eq!(reopened.models.settings(), document.models.settings(), "{k}");
@@ -171,13 +171,13 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     }
 }
 
-/// A document through a project file.
+/// Saves a document as a project file and opens it.
 fn saved_and_opened(document: &Document) -> Document {
     let mut editor = Editor::default();
     editor.open([], Contents::default());
     let bytes = editor_with(document).write_project(r#"{"bind": {"grid": 32}}"#).expect("valid input");
     let project = read_project("saved.glb", &bytes, 1 << 28).expect("valid input").expect("valid input");
-    assert!(project.settings.contains("\"grid\":32"), "settings of others are kept: {}", project.settings);
+    assert!(project.settings.contains("\"grid\":32"), "other settings are kept: {}", project.settings);
     let settings = DocumentSettings::read(&project.settings);
     let (cage, notice) = settings.cage(&project.cage);
     assert_eq!(notice, None);
@@ -255,7 +255,7 @@ fn opened_with_box() -> Editor {
 }
 
 #[test]
-fn refused_commands_change_nothing_and_say_why() {
+fn invalid_commands_change_nothing_and_return_errors() {
     let mut editor = opened_with_box();
     let before = editor.document().clone();
     let nan = vec![Vec3::NAN; 8];
@@ -289,7 +289,7 @@ fn refused_commands_change_nothing_and_say_why() {
 }
 
 #[test]
-fn history_is_bounded_by_bytes_and_says_what_it_forgot() {
+fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
     let mut editor = Editor::with_history_limit(100_000);
     editor.open(two_blocks(), Contents::default());
     let bounds = editor.bounds().unwrap();
@@ -315,7 +315,7 @@ fn history_is_bounded_by_bytes_and_says_what_it_forgot() {
 }
 
 #[test]
-fn keys_tell_what_weights_depend_on() {
+fn keys_change_with_the_inputs_of_a_bind() {
     let mut editor = opened_with_box();
     let key = editor.key();
     editor.apply(Command::ResetPose).unwrap();

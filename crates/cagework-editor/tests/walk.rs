@@ -1,4 +1,4 @@
-//! Random commands, undo and redo: documents come back as they were, and nothing panics.
+//! Random commands, undo and redo: documents are restored exactly, and nothing panics.
 
 use cagework_core::{Bounds, subdivided_box};
 use cagework_editor::edit::SelectMode;
@@ -8,7 +8,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 
-/// One thing that a person does.
+/// A user action.
 #[derive(Clone, Debug)]
 enum Act {
     Do(Command),
@@ -99,7 +99,7 @@ fn opened() -> Editor {
     editor
 }
 
-/// Undoes everything, then redoes it: the same documents the other way round.
+/// Undoes all steps, then redoes them; the documents must be the same in reverse order.
 fn undo_and_redo_are_inverse(editor: &mut Editor) {
     editor.revert();
     while editor.redo() {}
@@ -117,7 +117,7 @@ fn undo_and_redo_are_inverse(editor: &mut Editor) {
 
 #[test]
 fn two_thousand_random_acts_can_be_undone_and_redone() {
-    // The same acts in every run. 40 sessions of 50 acts.
+    // Deterministic: 40 sessions of 50 acts.
     let config =
         Config { cases: 40, rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..Config::default() };
     let steps = std::cell::Cell::new(0);
@@ -145,7 +145,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
                     Act::Commit => {
                         let was_committed = editor.commit("step");
                         steps.set(steps.get() + usize::from(was_committed));
-                        // A document that was committed comes back from undo, equal.
+                        // Undo restores a committed document exactly.
                         if was_committed {
                             let now = editor.document().clone();
                             prop_assert!(editor.undo() && editor.redo());
@@ -167,6 +167,6 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
             Ok(())
         })
         .unwrap();
-    // Most commands are not refused, or the walk would test nothing.
+    // Enough commands must succeed, or the walk tests nothing.
     assert!(done.get() > 300 && steps.get() > 100, "{} commands, {} steps", done.get(), steps.get());
 }

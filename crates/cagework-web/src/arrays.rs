@@ -1,24 +1,24 @@
-//! Flat arrays of JavaScript to points and faces, and back.
+//! Conversion between JavaScript's flat arrays and points and faces.
 
 use cagework_core::PolygonMesh;
 use glam::Vec3;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// `[n, 3]` flattened to points.
+/// Points of a flat `[n, 3]` array.
 pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
     flat.chunks_exact(3).map(Vec3::from_slice).collect()
 }
 
-/// Points to `[n, 3]` flattened.
+/// Flat `[n, 3]` array of points.
 pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(Vec3::to_array).collect()
 }
 
-/// A polygon mesh from positions and, for each face, the number of its corners and then them.
+/// Polygon mesh of positions `[n_vertices, 3]` and `corners`: for each face its corner count, then its corners.
 ///
 /// # Errors
-/// When the last face is cut off.
+/// If `corners` ends within a face.
 pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<PolygonMesh> {
     let mut faces = Vec::new();
     let mut rest = corners;
@@ -32,7 +32,7 @@ pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<Polygon
     Ok(PolygonMesh { positions: points(positions), faces })
 }
 
-/// For each face the number of its corners, then them.
+/// For each face its corner count, then its corners.
 pub(crate) fn corners(faces: &[Vec<u32>]) -> Vec<u32> {
     faces.iter().flat_map(|f| std::iter::once(f.len() as u32).chain(f.iter().copied())).collect()
 }
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn faces_come_back_and_cut_off_ones_are_refused() {
+    fn faces_round_trip_and_truncated_faces_are_errors() {
         let faces = vec![vec![0, 1, 2], vec![0, 2, 3, 1]];
         let flat = corners(&faces);
         assert_eq!(flat, [3, 0, 1, 2, 4, 0, 2, 3, 1]);

@@ -1,6 +1,6 @@
-//! The worker's half: what takes longer than a frame.
+//! The worker's entry points: computations that take longer than a frame.
 //!
-//! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
+//! The worker has its own GPU device. Arguments and results are arrays, which the page passes to `Engine`.
 
 mod results;
 
@@ -26,17 +26,17 @@ use cagework_editor::CageControls;
 
 use crate::controls::{control_set, from_js};
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{BindAsked, CageAsked, Coordinates, READ_LIMIT, taken};
+use crate::options::{Coordinates, JsBindOptions, JsCageOptions, READ_LIMIT, decode};
 use crate::problems::{self, Check};
 use crate::views::object;
 
 pub(crate) use results::Offsets;
 pub use results::{Bound, BuiltSample, Polygons};
 
-/// Vertices of the model that are bound along with a cage, so that some lie inside.
-const INSIDE: usize = 256;
+/// Number of model vertices bound along with the new cage's vertices, because a bind needs at least one point inside.
+const MODEL_SAMPLES: usize = 256;
 
-/// Binds, makes cages, cuts slices and builds samples.
+/// Binds models and slices, makes, checks and repairs cages, and builds samples.
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
@@ -44,15 +44,15 @@ pub struct Binder {
 
 #[wasm_bindgen]
 impl Binder {
-    /// Without a GPU yet.
+    /// A binder without a GPU; see `openGpu`.
     #[wasm_bindgen(constructor)]
     #[must_use]
-    #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
+    #[allow(clippy::new_without_default, reason = "constructed by JavaScript only")]
     pub fn new() -> Self {
         Self { gpu: None }
     }
 
-    /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
+    /// Opens a GPU for later binds. Does nothing if one is open, or in builds without WebGPU.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`.
@@ -64,12 +64,14 @@ impl Binder {
         Ok(())
     }
 
-    /// Harmonic coordinates. `positions` `[n_points, 3]`, of which the last `extra_points` are no vertices, `cage` `[n_controls, 3]`; `corners`: for each face their number,
-    /// then them; `controls` as `Engine.setCage` takes them. `progress` is called with every step and stops the bind by returning false.
+    /// Harmonic coordinates of `positions`, `[n_points, 3]`; the last `extra_points` of them are not vertices.
+    ///
+    /// `cage`: `[n_controls, 3]`. `corners`: for each face its corner count, then its corners. `controls`: as for
+    /// `Engine.setCage`. `progress` is called at every step; if it returns false, the bind is cancelled.
     ///
     /// # Errors
-    /// Those of a bind; when the arrays are no cage; `Missing` when the GPU is asked for and not open.
-    #[allow(clippy::too_many_arguments, reason = "arrays cross the border one by one")]
+    /// Those of a bind. If the arrays are not a valid cage. `Missing` if the options select the GPU and it is not open.
+    #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn bind(
         &self,
         positions: Vec<f32>,
@@ -80,12 +82,12 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
-        let mut asked: BindAsked = taken(options)?;
-        asked.options.extra_points = extra_points;
+        let mut request: JsBindOptions = decode(options)?;
+        request.options.extra_points = extra_points;
         let set = control_set(&cage, &corners, controls)?;
         let at = points(&positions);
         drop(positions);
-        let binding = self.run(&at, &set, asked, progress).await?;
+        let binding = self.run(&at, &set, request, progress).await?;
         let report = object(&binding.report)?;
         Ok(Bound {
             weights: binding.weights,
@@ -94,10 +96,10 @@ impl Binder {
         })
     }
 
-    /// Coordinates by formula, mean value or Green, of the cage alone; the arrays are those of `bind`.
+    /// Mean value or Green coordinates in the cage without interior controls. Arrays as for `bind`.
     ///
     /// # Errors
-    /// When they are not defined somewhere, or the arrays are no cage.
+    /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
     #[wasm_bindgen(js_name = bindByFormula)]
     pub fn bind_by_formula(
         &self,
@@ -108,25 +110,27 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
     ) -> Result<Bound, JsValue> {
         let set = control_set(cage, corners, controls)?;
-        let by_formula = match taken(kind)? {
+        let by_formula = match decode(kind)? {
             Coordinates::MeanValue => mean_value_weights,
             Coordinates::Green => green_weights,
             Coordinates::Harmonic => {
-                return Err(
-                    Fault::new(ErrorName::Error, "there is no formula for harmonic coordinates").into()
-                );
+                return Err(Fault::new(
+                    ErrorName::Error,
+                    "harmonic coordinates have no closed form: use bind instead",
+                )
+                .into());
             }
         };
         let weights = by_formula(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
         Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 
-    /// Coordinates at the centres of a slice's cells: rows for `Engine.takeSlice`. Takes the cage's arrays, the axis,
-    /// where along it (0 to 1), and the options of a bind.
+    /// Coordinates at the cell centres of a slice, for `Engine.takeSlice`. `axis`: 0 to 2; `fraction`: position along
+    /// the axis, 0 to 1; other arguments as for `bind`.
     ///
     /// # Errors
     /// Those of a bind.
-    #[allow(clippy::too_many_arguments, reason = "arrays cross the border one by one")]
+    #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     #[wasm_bindgen(js_name = bindSlice)]
     pub async fn bind_slice(
         &self,
@@ -138,14 +142,14 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Option<Bound>, JsValue> {
-        let asked: BindAsked = taken(options)?;
+        let request: JsBindOptions = decode(options)?;
         let set = control_set(&cage, &corners, controls)?;
-        let centers = Slice::new(&set, &asked.into(), axis.min(2), fraction).centers();
+        let centers = Slice::new(&set, &request.into(), axis.min(2), fraction).centers();
         if centers.is_empty() {
             return Ok(None);
         }
-        let binding = match self.run(&centers, &set, asked, progress).await {
-            // Rounding may put all of a layer that only grazes the cage outside.
+        let binding = match self.run(&centers, &set, request, progress).await {
+            // If the slice only touches the cage, rounding can put all of its cell centres outside.
             Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
             ran => ran?,
         };
@@ -154,7 +158,7 @@ impl Binder {
         Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
-    /// Coordinates of a lattice around a cage, for `Engine.takeLattice`; arguments as for `bind`.
+    /// Coordinates at the points of a lattice around a cage, for `Engine.takeLattice`. Arguments as for `bind`.
     ///
     /// # Errors
     /// Those of a bind.
@@ -167,20 +171,19 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
-        let mut asked: BindAsked = taken(options)?;
-        asked.options.outside = OutsidePolicy::Extend;
+        let mut request: JsBindOptions = decode(options)?;
+        request.options.outside = OutsidePolicy::Extend;
         let set = control_set(&cage, &corners, controls)?;
         let lattice = Lattice::new(Controls::from(&set).surface());
-        let binding = self.run(&lattice.points(), &set, asked, progress).await?;
+        let binding = self.run(&lattice.points(), &set, request, progress).await?;
         let offsets = Offsets { frames: binding.frames, outside: Vec::new() };
         Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })
     }
 
-    /// A cage for a model: `CageOptions` of contract.ts, and after how many steps of subdivision it encloses the model. `progress`
-    /// as for `bind`.
+    /// Generates a cage that encloses a model after `smooth` steps of subdivision. `progress` as for `bind`.
     ///
     /// # Errors
-    /// When there is nothing to enclose or an option is out of range.
+    /// If the model has no triangles or an option is out of range.
     #[wasm_bindgen(js_name = generateCage)]
     pub fn generate_cage(
         &self,
@@ -190,8 +193,8 @@ impl Binder {
         smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Polygons, JsValue> {
-        let asked: CageAsked = taken(options)?;
-        let options = CageOptions { smooth, ..asked.into() };
+        let request: JsCageOptions = decode(options)?;
+        let options = CageOptions { smooth, ..request.into() };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &options, &listener);
@@ -200,13 +203,14 @@ impl Binder {
         Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged, notices: report.notices, controls: None })
     }
 
-    /// Poses of a cage for another one around the same model: where harmonic coordinates in the old cage bring the new one's
-    /// vertices. (The new one's coordinates at the old vertices would be equations to solve, and bend the new cage where
-    /// the old one reaches beyond it.) Controls inside are carried as vertices are. `poses` and what is returned: one pose after
-    /// the other, `[n_controls, 3]` each.
+    /// Transfers poses from an old cage to a new one around the same model: binds the new controls to the old cage and
+    /// deforms them by each pose. `poses`: `[n_poses, n_old, 3]`; returns `[n_poses, n_new, 3]`.
+    ///
+    /// The reverse, binding the old vertices to the new cage, would need a linear solve, and would bend the new cage where
+    /// the old one extends beyond it.
     ///
     /// # Errors
-    /// When the arrays are no cages; those of a bind.
+    /// If the arrays are not a valid cage. Those of a bind.
     #[wasm_bindgen(js_name = carryPoses)]
     pub fn carry_poses(
         model: &[f32],
@@ -218,8 +222,8 @@ impl Binder {
     ) -> Result<Vec<f32>, JsValue> {
         let (mut at, set) = (points(new), control_set(old, old_corners, old_controls)?);
         let (n_new, n_old) = (at.len(), Controls::from(&set).n_controls());
-        // A cage that lies around the old one has no vertex inside of it: some of the model's are.
-        at.extend(points(model).into_iter().take(INSIDE));
+        // A new cage around the old one has no vertices inside it; the model has.
+        at.extend(points(model).into_iter().take(MODEL_SAMPLES));
         let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
         let poses = points(poses);
         let carried = poses.chunks_exact(n_old).flat_map(|pose| {
@@ -229,10 +233,10 @@ impl Binder {
         Ok(carried.collect())
     }
 
-    /// What is wrong with a cage for a model, `[n_vertices, 3]`; a cage's arrays are those of `bind`.
+    /// Finds the faults of a cage for a model, `[n_vertices, 3]`. Cage arrays as for `bind`.
     ///
     /// # Errors
-    /// When the arrays are no mesh.
+    /// If the arrays are not a polygon mesh.
     #[wasm_bindgen(js_name = checkCage)]
     pub fn check_cage(
         model: &[f32],
@@ -244,10 +248,10 @@ impl Binder {
         Ok(Check { check: problems::find(&mesh, &points(model), smooth) })
     }
 
-    /// A repaired cage, from the arrays of `checkCage`; without controls inside.
+    /// Repairs a cage. Arrays as for `checkCage`; the result has no interior controls.
     ///
     /// # Errors
-    /// When growing did not help.
+    /// If the cage still does not enclose the model.
     #[wasm_bindgen(js_name = repairCage)]
     pub fn repair_cage(
         #[wasm_bindgen(unchecked_param_type = "Repair")] kind: JsValue,
@@ -256,13 +260,13 @@ impl Binder {
         corners: &[u32],
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
     ) -> Result<Polygons, JsValue> {
-        let asked = taken(kind)?;
+        let repair = decode(kind)?;
         let (mesh, smooth) = cage_alone(positions, corners, controls)?;
-        let repaired = repair_smooth(&mesh, &[asked], Some(&points(model)), smooth).map_err(Fault::from)?;
+        let repaired = repair_smooth(&mesh, &[repair], Some(&points(model)), smooth).map_err(Fault::from)?;
         Ok(repaired.mesh.into())
     }
 
-    /// Identifier, label and what there is to see of each sample, in turn.
+    /// Identifier, label and description of each sample, concatenated. `[n_samples, 3]`
     #[must_use]
     pub fn samples() -> Vec<String> {
         samples::all().iter().flat_map(|s| [s.id, s.label, s.sentence]).map(str::to_owned).collect()
@@ -271,7 +275,7 @@ impl Binder {
     /// Builds a sample.
     ///
     /// # Errors
-    /// When there is none of that name.
+    /// If the identifier is unknown.
     #[wasm_bindgen(js_name = buildSample)]
     pub fn build_sample(id: &str) -> Result<BuiltSample, JsValue> {
         let unknown = || Fault::new(ErrorName::Error, format!("there is no sample called {id:?}"));
@@ -284,7 +288,7 @@ impl Binder {
     }
 }
 
-/// A cage's mesh without the controls inside it, and its steps of subdivision.
+/// Cage mesh without interior controls, and number of subdivision steps.
 fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(PolygonMesh, u32)> {
     let mut mesh = polygon_mesh(positions, corners)?;
     let CageControls { smooth, inner, .. } = from_js(controls)?.unwrap_or_default();
@@ -301,12 +305,12 @@ impl Binder {
         &self,
         positions: &[Vec3],
         set: &ControlSet,
-        asked: BindAsked,
+        request: JsBindOptions,
         progress: Function,
     ) -> Answer<Binding> {
-        let options = BindOptions::from(asked);
+        let options = BindOptions::from(request);
         let listener = Listener::new(progress);
-        if asked.is_on_cpu() {
+        if request.is_on_cpu() {
             return Ok(cagework_core::bind(positions, set, &options, &listener)?);
         }
         Ok(bind_on(positions, set, &options, &listener, self.open()?).await?)

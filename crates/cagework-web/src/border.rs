@@ -1,5 +1,5 @@
-//! TypeScript's types of what page and Rust say to each other, written from the serde types that are sent, and the page's
-//! defaults and ranges.
+//! Writes TypeScript declarations of the serde types that cross the border between Rust and the page, and the page's
+//! default values and ranges.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -30,8 +30,8 @@ use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::opening::{CageContents, OpenContents, PoseContents};
 use crate::options::{
-    BindAsked, CageAsked, Colour, Coordinates, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RigAsked,
-    SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
+    Colour, Coordinates, GizmoHandle, JsBindOptions, JsCageOptions, JsGizmo, JsJoints, JsPullOptions,
+    JsRigOptions, JsSceneOptions, JsSymmetry, JsTheme, SliceShown,
 };
 use crate::settings::Settings;
 use crate::views::{
@@ -41,26 +41,26 @@ use crate::views::{
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
-/// Bytes that a bind in a page may take unless asked: half of what a tab has.
+/// Default memory limit of a bind in the page, bytes: half of the 4 GiB of a tab.
 const PAGE_MEMORY: u64 = 2 << 30;
 
-/// Declarations of types, with their comments.
+/// Doc comment and TypeScript declaration of each type.
 macro_rules! declarations {
     ($($type:ty),* $(,)?) => {{
-        // Numbers of 64 bits are sent as JavaScript's.
+        // 64-bit integers are sent as JavaScript numbers.
         let config = Config::default().with_large_int("number");
         [$((<$type>::docs().unwrap_or_default(), <$type>::decl(&config)),)*]
     }};
 }
 
-/// A constant of a type. (Its own writer and not `json!`, which would make 64 bits of 32.)
+/// A TypeScript constant. `serde_json::to_string` keeps `f32` decimals; `json!` would widen them to `f64`.
 fn constant(name: &str, r#type: &str, value: &impl Serialize) -> String {
     let json = serde_json::to_string(value).unwrap().replace("\"threads\":0,", "");
     format!("export const {name}: {type} = {json};\n")
 }
 
 #[test]
-fn the_page_has_the_types_of_rust() {
+fn generated_types_are_up_to_date() {
     let mut text =
         "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n"
             .to_owned();
@@ -73,7 +73,7 @@ fn the_page_has_the_types_of_rust() {
         CellShape,
         DeltaNorm,
         OutsidePolicy,
-        BindAsked,
+        JsBindOptions,
         Stage,
         Event,
         Frames,
@@ -88,8 +88,8 @@ fn the_page_has_the_types_of_rust() {
         MeanMax,
         WeightStats,
         Shape,
-        SymmetryAsked,
-        CageAsked,
+        JsSymmetry,
+        JsCageOptions,
         BoundsView,
         InnerElement,
         InnerKind,
@@ -118,18 +118,18 @@ fn the_page_has_the_types_of_rust() {
         PoseContents,
         OpenContents,
         Settings,
-        ThemeAsked,
+        JsTheme,
         Colour,
         Coordinates,
         SliceShown,
-        GizmoAsked,
-        SceneAsked,
+        JsGizmo,
+        JsSceneOptions,
         CameraView,
         SurfacePoint,
         Grip,
-        PullAsked,
-        JointsAsked,
-        RigAsked,
+        JsPullOptions,
+        JsJoints,
+        JsRigOptions,
         ClipView,
         TargetView,
         ColorMap,
@@ -146,21 +146,21 @@ fn the_page_has_the_types_of_rust() {
         text = text.replace(" \n", "\n");
     }
     let options = BindOptions { memory_limit: PAGE_MEMORY, ..BindOptions::default() };
-    text += &constant("BIND_DEFAULTS", "BindOptions", &BindAsked { backend: Backend::Gpu, options });
-    text += &constant("CAGE_DEFAULTS", "CageOptions", &CageAsked::from(CageOptions::default()));
-    text += &constant("RIG_DEFAULTS", "RigOptions", &RigAsked::default());
-    text += &constant("SCENE_DEFAULTS", "SceneOptions", &SceneAsked::default());
+    text += &constant("BIND_DEFAULTS", "BindOptions", &JsBindOptions { backend: Backend::Gpu, options });
+    text += &constant("CAGE_DEFAULTS", "CageOptions", &JsCageOptions::from(CageOptions::default()));
+    text += &constant("RIG_DEFAULTS", "RigOptions", &JsRigOptions::default());
+    text += &constant("SCENE_DEFAULTS", "SceneOptions", &JsSceneOptions::default());
     let formats = ModelFormat::ALL.into_iter();
     let endings: Vec<&str> = formats.clone().flat_map(ModelFormat::endings).copied().collect();
     writeln!(
         text,
-        "/** Endings of files of models, best first. */\nexport const MODEL_ENDINGS = {endings:?} as const;"
+        "/** File extensions of models, preferred first. */\nexport const MODEL_ENDINGS = {endings:?} as const;"
     )
     .unwrap();
     let shapes: Vec<&str> = formats.filter(|format| !format.holds_poses()).map(ModelFormat::name).collect();
     writeln!(
         text,
-        "/** Formats of a shape without anything else. */\nexport const SHAPE_FORMATS = {shapes:?} as const;"
+        "/** Formats that store only a shape. */\nexport const SHAPE_FORMATS = {shapes:?} as const;"
     )
     .unwrap();
     writeln!(
@@ -174,7 +174,7 @@ fn the_page_has_the_types_of_rust() {
     if fs::read_to_string(FILE).unwrap_or_default() != text {
         fs::write(FILE, text).unwrap();
         panic!(
-            "web/package/src/contract/generated.ts was old; it is written again: look at it and commit it"
+            "web/package/src/contract/generated.ts was out of date and has been rewritten: review and commit it"
         );
     }
 }

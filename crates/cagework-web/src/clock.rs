@@ -1,4 +1,4 @@
-//! The browser's clock, and progress on its way to JavaScript.
+//! The browser's clock, and progress reports to JavaScript.
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -13,18 +13,18 @@ use crate::views::object;
 
 #[wasm_bindgen]
 extern "C" {
-    /// Milliseconds since the page or worker began.
+    /// Milliseconds since the page or worker started.
     #[wasm_bindgen(js_namespace = performance, js_name = now)]
     pub(crate) fn now_ms() -> f64;
 }
 
 thread_local! {
-    /// Who listens. A [`Progress`] may be shared between threads, which functions of JavaScript cannot; here is one
-    /// thread, and one job at a time.
+    /// The JavaScript callback. [`Progress`] must be `Sync`, which `Function` is not; a thread-local is enough because each
+    /// worker runs one job at a time on one thread.
     static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
 }
 
-/// Reports to the function it was given; stops the work when that returns false.
+/// Reports progress to a JavaScript function; cancels the job when the function returns false.
 pub(crate) struct Listener(());
 
 impl Listener {
@@ -59,7 +59,7 @@ impl Progress for Listener {
         match listener.call1(&JsValue::NULL, &event) {
             Ok(answer) if answer == JsValue::FALSE => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),
-            // Nobody can hear any more: no reason to go on.
+            // The callback threw: cancel the job.
             Err(_) => ControlFlow::Break(()),
         }
     }

@@ -1,4 +1,4 @@
-//! Cages with interior controls from JavaScript's arrays.
+//! Reads cages with interior controls from JavaScript arrays.
 
 use cagework_core::ControlSet;
 use cagework_editor::{CageControls, RestCage};
@@ -6,18 +6,18 @@ use wasm_bindgen::JsValue;
 
 use crate::arrays::polygon_mesh;
 use crate::error::Answer;
-use crate::options::taken;
+use crate::options::decode;
 
-/// A cage from arrays: see [`CageControls`]. Undefined controls are none.
+/// Cage with interior controls from arrays; see [`CageControls`]. `controls` may be undefined.
 ///
 /// # Errors
-/// When the arrays are no cage, or the controls do not fit into it.
+/// If the arrays are not a valid cage, or the controls do not fit into it.
 pub(crate) fn control_set(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<ControlSet> {
     let mesh = polygon_mesh(positions, corners)?;
     Ok(RestCage::new(mesh, from_js(controls)?.unwrap_or_default())?.set?)
 }
 
-/// Controls from JavaScript; none for undefined.
+/// Controls from JavaScript; `None` if undefined.
 pub(crate) fn from_js(controls: JsValue) -> Answer<Option<CageControls>> {
-    if controls.is_undefined() { Ok(None) } else { taken(controls).map(Some) }
+    if controls.is_undefined() { Ok(None) } else { decode(controls).map(Some) }
 }

@@ -1,4 +1,4 @@
-//! Errors as JavaScript has them: what the page decides by is their name, the sentence is for people.
+//! Errors passed to JavaScript. The page branches on the name; the message is for the user.
 
 use std::fmt::Display;
 
@@ -15,57 +15,57 @@ use cagework_pose::pull::PullError;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
-/// What kinds of errors the page tells apart.
+/// Kinds of errors that the page handles differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) enum ErrorName {
-    /// Somebody gave it up, or something else overtook it.
+    /// The job was cancelled, or its result is out of date.
     Cancelled,
-    /// A file's geometry is compressed, and JavaScript has what decompresses it.
+    /// The geometry of a file is compressed; JavaScript has the decoder.
     Compressed,
     /// A file cannot be read.
     Format,
-    /// A bind needs more memory than it may take.
+    /// A bind needs more memory than its limit.
     Memory,
-    /// The same, and most of it for the weights.
+    /// A bind needs more memory than its limit, mostly for weights.
     WeightsMemory,
-    /// Vertices of the model are outside the cage.
+    /// Some vertices of the model are outside the cage.
     Outside,
-    /// All of them are.
+    /// All vertices of the model are outside the cage.
     NoneInside,
     /// There is no GPU.
     NoAdapter,
-    /// It gives no device.
+    /// The GPU adapter provides no device.
     NoDevice,
-    /// The device is gone.
+    /// The GPU device is lost.
     DeviceLost,
-    /// The GPU cannot do it; the processor may.
+    /// The GPU does not support the computation; the CPU may.
     Gpu,
-    /// The canvas cannot be drawn into.
+    /// The canvas does not support drawing by this GPU.
     Canvas,
-    /// Something has to come first.
+    /// A precondition is missing, such as a model or weights.
     Missing,
-    /// Anything else.
+    /// All other errors.
     Error,
 }
 
-/// An error on its way to JavaScript.
+/// An error that JavaScript receives.
 #[derive(Debug)]
 pub(crate) struct Fault {
     name: ErrorName,
     message: String,
 }
 
-/// What functions that JavaScript calls return.
+/// Result of functions that JavaScript calls.
 pub(crate) type Answer<T> = Result<T, Fault>;
 
 impl Fault {
-    /// An error of this crate's own.
+    /// An error of this crate.
     pub(crate) fn new(name: ErrorName, message: impl Display) -> Self {
         Self { name, message: message.to_string() }
     }
 
-    /// Whether this is the error of that name.
+    /// Whether the error has this name.
     pub(crate) fn is(&self, name: ErrorName) -> bool {
         self.name == name
     }
@@ -75,7 +75,7 @@ impl Fault {
         &self.message
     }
 
-    /// There is none of what is needed.
+    /// A [`ErrorName::Missing`] error: `what` is missing, `how` says what to do first.
     pub(crate) fn missing(what: &str, how: &str) -> Self {
         Self::new(ErrorName::Missing, format!("there is no {what} yet: {how}"))
     }
@@ -90,7 +90,7 @@ impl From<Fault> for JsValue {
     }
 }
 
-/// Errors of which the page tells no more than their sentence.
+/// Converts error types that the page shows only as a message.
 macro_rules! plain {
     ($($error:ty),*) => {$(
         impl From<$error> for Fault {

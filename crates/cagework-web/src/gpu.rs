@@ -1,6 +1,6 @@
-//! Sessions on the GPU, and the upload that brings them to the document.
+//! GPU sessions, and the upload of the document.
 //!
-//! A frame is skipped while the lock is held; an allocation holds the lock until the GPU has answered.
+//! An upload holds the lock until the GPU has finished the allocation; frames are skipped until then.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,25 +11,25 @@ use cagework_gpu::Session;
 
 use crate::error::Answer;
 use crate::options::Coordinates;
-use crate::state::{OnGpu, State, Upload};
+use crate::state::{GpuKeys, State, Upload};
 use crate::surface::Surface;
 
-/// Sessions and the canvas they are drawn into.
+/// Sessions and the canvas that they draw into.
 pub(crate) struct Gpu {
-    /// Harmonic coordinates.
+    /// Session of harmonic coordinates.
     pub(crate) main: Session,
-    /// Others beside them, each once at most.
+    /// Sessions of other kinds of coordinates, at most one per kind.
     pub(crate) others: Vec<(Coordinates, Session)>,
     pub(crate) surface: Surface,
 }
 
 impl Gpu {
-    /// Takes what has changed.
+    /// Writes the changed parts of the state to all sessions.
     pub(crate) fn take(&mut self, state: &mut State) {
         state.write(&mut self.main, self.others.iter_mut().map(|(_, session)| session));
     }
 
-    /// The canvas, and sessions by kinds of coordinates, in that order, as far as there are such.
+    /// The canvas, and the available sessions of `kinds`, in this order.
     pub(crate) fn shown(&mut self, kinds: &[Coordinates]) -> (&mut Surface, Vec<&mut Session>) {
         let Self { main, others, surface } = self;
         let others = others.iter_mut().map(|(kind, session)| (*kind, session));
@@ -42,14 +42,14 @@ impl Gpu {
     }
 }
 
-/// Empty only while it is rebuilt after a loss, and after that failed.
+/// `None` while the device is recreated after a loss, and after this has failed.
 pub(crate) type SharedGpu = Rc<Mutex<Option<Gpu>>>;
 
-/// Brings the GPU to what the document refers to: mesh, cage, weights that were computed before, and parts that the cage does not
-/// bend. Looks again after each upload, because the document may have changed while the GPU answered.
+/// Uploads mesh, cage, cached weights, and held and rigid parts of the document. Compares again after each upload, because
+/// the document may have changed while the GPU was busy.
 ///
 /// # Errors
-/// When the GPU has no room. What was not uploaded is tried again after the next change.
+/// If the GPU runs out of memory. The next change retries.
 pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
     loop {
         let Some(next) = state.borrow().next_upload() else { return Ok(()) };
@@ -63,7 +63,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 gpu.others.clear();
                 {
                     let on_gpu = &mut state.borrow_mut().on_gpu;
-                    *on_gpu = OnGpu { cage: on_gpu.cage, ..OnGpu::default() };
+                    *on_gpu = GpuKeys { cage: on_gpu.cage, ..GpuKeys::default() };
                 }
                 gpu.main.set_shared_model(draw).await?;
                 state.borrow_mut().on_gpu.mesh = Some(key.mesh);

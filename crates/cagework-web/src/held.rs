@@ -1,4 +1,4 @@
-//! Grabbed points of the models, and positions of the models for picking.
+//! Grabs and pins on the models, and posed models for picking.
 
 use cagework_core::{Frames, Weights};
 use cagework_editor::SurfacePoint;
@@ -10,11 +10,11 @@ use glam::{Vec2, Vec3};
 use crate::state::State;
 use crate::views::Grip;
 
-/// A mirror image may be off by this share of the model's diagonal.
-const MIRROR_OFF: f32 = 0.02;
+/// Maximum distance of a surface point from the exact mirror image, over the diagonal of model and cage.
+const MIRROR_TOLERANCE: f32 = 0.02;
 
 impl State {
-    /// Brings the models in memory to where the cage is.
+    /// Updates the posed models for the current pose of the cage.
     pub(crate) fn pose_models(&mut self, session: &Session) {
         if self.held.posed_for != self.pose() {
             self.held.posed = session.deformed(self.pose()).unwrap_or_default();
@@ -22,7 +22,7 @@ impl State {
         }
     }
 
-    /// The point of the posed model under the pointer.
+    /// Surface point of the posed models under the pointer.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
         if self.held.posed.len() != self.models().positions().len() {
             return None;
@@ -32,12 +32,12 @@ impl State {
         Some(SurfacePoint { triangle: self.models().number_of(triangle), bary })
     }
 
-    /// Where a point of the model is; none if there is no such point.
+    /// Position of a surface point on the posed models; `None` if the point does not exist.
     pub(crate) fn place_of(&self, point: SurfacePoint) -> Option<Vec3> {
         point.at(self.models(), &self.held.posed)
     }
 
-    /// How a point of the model follows the cage.
+    /// Weights and nearest vertex of a surface point.
     pub(crate) fn grip_of(
         &self,
         point: SurfacePoint,
@@ -57,11 +57,11 @@ impl State {
         Some(Grip { row, seed: corners[most] })
     }
 
-    /// The point of the model that is a point's mirror image at rest, if there is one, and it is another.
+    /// Mirror image of a surface point at rest; `None` if the surface is not symmetric there, or the point lies on the mirror plane.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
         let models = self.models();
         let at = point.at(models, models.positions())?;
-        let limit = MIRROR_OFF * self.editor.bounds()?.diagonal();
+        let limit = MIRROR_TOLERANCE * self.editor.bounds()?.diagonal();
         let image = Vec3::new(2.0 * self.editor.symmetry().plane() - at.x, at.y, at.z);
         let near = |v: u32| models.positions()[v as usize].distance(image);
         let (t, k) = (0u32..)
@@ -75,7 +75,7 @@ impl State {
         Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
-    /// What is held, as it is drawn, where the cage is now; nothing before there are weights.
+    /// Marks of grabs and pins in the current pose; empty without weights.
     pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
         let place = |point: &SurfacePoint| {
             let corners = self.models().corners(point.triangle)?;

@@ -1,4 +1,4 @@
-//! What the worker has bound, taken over by the page's module a little at a time: a page answers meanwhile.
+//! Copies weights of the worker into the page's module in chunks, so that the page stays responsive.
 
 use cagework_core::Weights;
 use js_sys::{Float32Array, Promise, Uint32Array};
@@ -8,8 +8,8 @@ use wasm_bindgen_futures::JsFuture;
 
 use crate::error::Answer;
 
-/// Weights that are copied and looked at between two turns of the page: a few milliseconds of its main thread.
-const PART: u32 = 1 << 18;
+/// Number of weights that are copied and checked per turn of the event loop: a few milliseconds.
+const CHUNK: u32 = 1 << 18;
 
 #[wasm_bindgen]
 extern "C" {
@@ -17,14 +17,14 @@ extern "C" {
     fn set_timeout(then: &js_sys::Function, ms: u32);
 }
 
-/// Lets the page have its turn: events and frames that wait.
+/// Yields to the event loop, which handles pending events and frames.
 pub(crate) async fn page_turn() {
     let promise = Promise::new(&mut |resolve, _| set_timeout(&resolve, 0));
-    // A timer does not fail.
+    // A timer never rejects.
     let _: Result<JsValue, JsValue> = JsFuture::from(promise).await;
 }
 
-/// Weights from arrays of a `Bound`.
+/// Weights from the arrays of a `Bound`.
 pub(crate) async fn weights(
     n_columns: u32,
     indptr: &[u32],
@@ -37,7 +37,7 @@ pub(crate) async fn weights(
     while let [start, rest @ ..] = rows
         && !rest.is_empty()
     {
-        let count = rest.partition_point(|&end| end <= start.saturating_add(PART)).max(1);
+        let count = rest.partition_point(|&end| end <= start.saturating_add(CHUNK)).max(1);
         let (ends, end) = (&rest[..count], rest[count - 1]);
         let pointers = std::iter::once(0).chain(ends.iter().map(|&e| e.wrapping_sub(*start))).collect();
         let (indices, data) = (indices.subarray(*start, end).to_vec(), data.subarray(*start, end).to_vec());

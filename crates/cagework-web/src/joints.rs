@@ -1,4 +1,4 @@
-//! Joints of bound models, where they would be in an export.
+//! Joints of bound models at the positions of an export.
 
 use cagework_core::Frames;
 use cagework_core::Weights;
@@ -12,22 +12,22 @@ use cagework_editor::Models;
 /// The joints of bound models.
 pub(crate) struct JointDots {
     pub(crate) joints: Vec<JointPoint>,
-    /// The number of each joint's model.
+    /// Number of each joint's model. `[n_joints]`
     pub(crate) models: Vec<u32>,
-    /// At rest. `[n_joints]`
+    /// Positions at rest. `[n_joints]`
     pub(crate) at: Vec<Vec3>,
-    /// How they follow the cage; a row each.
+    /// Weights, one row per joint.
     weights: Weights,
     frames: Frames,
-    /// Those outside the cage, ascending.
+    /// Indices of joints outside the cage, ascending.
     outside: Vec<usize>,
 }
 
 impl JointDots {
-    /// `weights`, `frames`: of all points of the rigs; `outside`: those outside the cage, ascending.
+    /// `weights`, `frames`: of all points of the rigs. `outside`: indices of points outside the cage, ascending.
     ///
     /// # Errors
-    /// When the rig cannot be read.
+    /// If a rig cannot be read.
     pub(crate) fn new(models: &Models, weights: &Weights, frames: Frames, outside: &[u32]) -> Answer<Self> {
         let (mut joints, mut of_joints, mut points) = (Vec::new(), Vec::new(), Vec::new());
         for member in models.iter() {
@@ -52,12 +52,12 @@ impl JointDots {
         })
     }
 
-    /// Whether one is outside the cage.
+    /// Whether a joint is outside the cage.
     pub(crate) fn is_outside(&self, joint: usize) -> bool {
         self.outside.contains(&joint)
     }
 
-    /// Where they are in a pose of the cage.
+    /// Positions in a pose of the cage. `[n_joints]`
     pub(crate) fn posed(&self, rest: &[Vec3], posed: &[Vec3]) -> Vec<Vec3> {
         let mut by = displacements(&self.weights, &self.frames, rest, posed);
         for (k, joint) in self.joints.iter().enumerate() {

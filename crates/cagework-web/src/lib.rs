@@ -1,13 +1,13 @@
-//! The page's half of Cagework: JavaScript classes over core, io and gpu. No mathematics.
+//! JavaScript classes over core, io, editor and gpu for the page and the npm package. No algorithms of its own.
 //!
 //! One wasm module, two instances: on the main thread `engine::Engine` draws, picks and deforms; in a worker
-//! `binder::Binder` binds. Arrays go across as typed arrays, everything else as plain objects. What fails throws an
-//! `Error` whose name is the variant and whose message is the sentence.
+//! `binder::Binder` binds. Arrays are passed as typed arrays, everything else as plain objects. A failing method throws an
+//! `Error` whose name is the variant of `error::ErrorName` and whose message is a sentence.
 
-// Canvases are the browser's. What does without compiles everywhere, so that tests and lints see it.
+// Only browsers have canvases. Everything else also compiles natively, for tests and lints.
 #![cfg_attr(
     not(target_family = "wasm"),
-    allow(dead_code, unused_imports, reason = "used by what only the browser has")
+    allow(dead_code, unused_imports, reason = "used only by code for the browser")
 )]
 
 mod arrays;
@@ -40,7 +40,7 @@ mod views;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// The types of `unchecked_*_type` below: serde's, as `border.rs` writes them for TypeScript.
+/// The types of `unchecked_*_type`; `border.rs` writes their declarations.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, Element, Gesture,
@@ -54,8 +54,8 @@ extern "C" {
     fn report_error(error: &js_sys::Error);
 }
 
-/// Called once by the glue: a panic becomes an error called `Panic` that nobody can catch by accident, in the console with
-/// its place and message, and for the page's `crash.ts` or the worker's page to hear. What follows is a trap.
+/// Called once by the JavaScript glue. Installs a panic hook that reports an error named `Panic` with location and message
+/// as an uncaught error, which the page's `crash.ts` handles. The module then traps.
 #[wasm_bindgen(start)]
 pub fn start() {
     std::panic::set_hook(Box::new(|panic| {

@@ -1,4 +1,4 @@
-//! A file that was read, before it is shown: its textures are decoded by the browser in between.
+//! A file between reading and display; the browser decodes its textures in this state.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use crate::arrays::flat;
 use crate::binder::Polygons;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{READ_LIMIT, taken};
+use crate::options::{READ_LIMIT, decode};
 
-/// A model with its looks, and what else was in its file.
+/// A model with its materials, and the other contents of its file.
 #[wasm_bindgen]
 pub struct Loaded {
     pub(crate) model: Model,
@@ -26,24 +26,24 @@ pub struct Loaded {
     textures: Vec<DrawTexture>,
     poses: Vec<(String, Vec<Vec3>)>,
     settings: Option<String>,
-    /// Which model of a project it is.
+    /// Index of the model in its project.
     number: usize,
-    /// Further models of a project.
+    /// The remaining models of a project.
     more: VecDeque<Self>,
 }
 
 #[wasm_bindgen]
 impl Loaded {
-    /// Reads a model of any format, or a project; [`Self::prepare`] comes next. `sibling` is called with the path of each file that it refers to and
-    /// returns a Uint8Array or undefined.
+    /// Reads a model of any format, or a project. Call [`Self::prepare`] next. `sibling` is called with the path of each file
+    /// that the model refers to, and returns a Uint8Array or undefined.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// If the file cannot be read.
     pub fn read(name: &str, bytes: &[u8], sibling: &Function) -> Result<Loaded, JsValue> {
         Ok(Self::from_bytes(name, bytes, sibling)?)
     }
 
-    /// Finds out how the model looks. A step of its own, so that a page answers between the two.
+    /// Reads materials and textures. Separate from [`Self::read`], so that the page can handle events in between.
     pub fn prepare(&mut self) {
         self.look = self.model.look();
         self.textures = vec![DrawTexture::default(); self.look.images.len()];
@@ -59,30 +59,30 @@ impl Loaded {
         }
     }
 
-    /// Says what points up in the file, y or z: model, cage and poses are turned.
+    /// Sets the up axis of the file, y or z, and rotates model, cage and poses accordingly.
     ///
     /// # Errors
-    /// When it is another word.
+    /// If the axis is neither.
     #[wasm_bindgen(js_name = setUp)]
     pub fn set_up(
         &mut self,
         #[wasm_bindgen(unchecked_param_type = "UpAxis")] up: JsValue,
     ) -> Result<(), JsValue> {
-        self.turn_to(taken(up)?);
+        self.turn_to(decode(up)?);
         Ok(())
     }
 
-    /// What model, cage and poses are seen from, in the file's axes: zero unless they are far away. `[3]`
+    /// Origin of model, cage and poses, in the file's axes: zero unless the model is far from the world origin. `[3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.model.origin().to_array().to_vec()
     }
 
-    /// Sees a model or a cage from the origin of what it goes with. `[3]`
+    /// Moves a model or a cage to the origin of another file. `[3]`
     ///
     /// # Errors
-    /// When it is not three numbers, or the file is too far from it.
+    /// If `origin` is not three numbers, or is too far from the model.
     #[wasm_bindgen(js_name = seeFrom)]
     pub fn see_from(&mut self, origin: &[f64]) -> Result<(), JsValue> {
         let origin: [f64; 3] =
@@ -94,13 +94,13 @@ impl Loaded {
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
     }
 
-    /// Takes the compressed file that the model was decoded from: the export of a model that nothing has moved.
+    /// Keeps the compressed file that the model was decoded from, for the export of an undeformed model.
     #[wasm_bindgen(js_name = setPacked)]
     pub fn set_packed(&mut self, file: Vec<u8>) {
         self.model.set_packed(file);
     }
 
-    /// The next of a project's further models, which share its cage; undefined when there is no more.
+    /// Removes and returns the next remaining model of a project; undefined after the last one.
     #[wasm_bindgen(js_name = takeNext)]
     #[must_use]
     pub fn take_next(&mut self) -> Option<Loaded> {
@@ -114,7 +114,7 @@ impl Loaded {
         flat(&self.model.positions)
     }
 
-    /// The cage of a project; undefined in any other file.
+    /// The cage of a project; undefined for other files.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
@@ -131,28 +131,28 @@ impl Loaded {
         self.model.cage_mesh().into()
     }
 
-    /// Textures to decode.
+    /// Number of textures to decode.
     #[wasm_bindgen(getter, js_name = textureCount)]
     #[must_use]
     pub fn texture_count(&self) -> usize {
         self.look.images.len()
     }
 
-    /// File of one texture.
+    /// Encoded file of a texture.
     #[wasm_bindgen(js_name = textureBytes)]
     #[must_use]
     pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
         self.look.images.get(index).map(|t| t.bytes.clone()).unwrap_or_default()
     }
 
-    /// Its media type, empty if unknown.
+    /// Media type of a texture; empty if unknown.
     #[wasm_bindgen(js_name = textureType)]
     #[must_use]
     pub fn texture_type(&self, index: usize) -> String {
         self.look.images.get(index).map(|t| t.mime.clone()).unwrap_or_default()
     }
 
-    /// Takes a decoded texture: red, green, blue, alpha; rows from the top.
+    /// Sets a decoded texture: RGBA, rows from the top. `[height, width, 4]`
     #[wasm_bindgen(js_name = setTexture)]
     pub fn set_texture(&mut self, index: usize, width: u32, height: u32, rgba: Vec<u8>) {
         let fits = rgba.len() as u64 == 4 * u64::from(width) * u64::from(height);
@@ -161,7 +161,7 @@ impl Loaded {
         }
     }
 
-    /// What the page remembered in a project; undefined in any other file.
+    /// JSON of the page's settings in a project; undefined for other files.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn settings(&self) -> Option<String> {
@@ -209,7 +209,7 @@ impl Loaded {
         self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default()
     }
 
-    /// Turns everything in it to what points up.
+    /// Rotates model, cage and poses to an up axis.
     pub(crate) fn turn_to(&mut self, up: UpAxis) {
         let before = self.model.up();
         let turn = |positions: &mut Vec<Vec3>| {
@@ -221,12 +221,12 @@ impl Loaded {
         self.more.iter_mut().for_each(|next| next.turn_to(up));
     }
 
-    /// What a project says of this model besides its file.
+    /// Settings of this model in its project.
     pub(crate) fn member_settings(&self) -> Option<MemberSettings> {
         self.document_settings().models.into_iter().nth(self.number)
     }
 
-    /// What the renderer takes; a texture that was not decoded is left out.
+    /// The model for the renderer, without textures that were not decoded.
     pub(crate) fn draw_model(&mut self) -> DrawModel {
         let look = std::mem::take(&mut self.look);
         let textures = std::mem::take(&mut self.textures);

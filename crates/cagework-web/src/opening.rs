@@ -1,4 +1,4 @@
-//! What is opened besides models: a cage, poses, and what a project stores.
+//! Contents that are opened together with models: cage, poses, and settings of a project.
 
 use cagework_cage::samples;
 use cagework_editor::{CageControls, Contents, DocumentSettings, RestCage};
@@ -9,13 +9,13 @@ use crate::arrays::{points, polygon_mesh};
 use crate::error::Answer;
 use crate::loaded::Loaded;
 
-/// What is opened besides models.
+/// Contents that are opened together with models.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct OpenContents {
-    /// Identifier of the built-in sample that it is.
+    /// Identifier of the built-in sample, if it is one.
     sample: Option<String>,
-    /// Settings that a project was saved with.
+    /// JSON of the page's settings in a project.
     settings: Option<String>,
     cage: Option<CageContents>,
     /// Poses of a sample; those of a project are in its `Loaded`.
@@ -29,7 +29,7 @@ pub(crate) struct CageContents {
     /// `[n_controls, 3]`
     #[cfg_attr(test, ts(type = "Float32Array"))]
     positions: Vec<f32>,
-    /// For each face the number of its corners, then them.
+    /// For each face its corner count, then its corners.
     #[cfg_attr(test, ts(type = "Uint32Array"))]
     corners: Vec<u32>,
     #[cfg_attr(test, ts(optional = nullable))]
@@ -48,7 +48,7 @@ pub(crate) struct PoseContents {
 }
 
 impl OpenContents {
-    /// Contents for the editor, the project's settings, and what was left out. `first`: the first model that is opened with them.
+    /// Contents for the editor, the project's settings, and notices about omitted parts. `first`: the first model.
     pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings, Vec<String>)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
         let of_project = self.poses.is_empty();

@@ -1,4 +1,4 @@
-//! What JavaScript asks for: the option types of contract.ts.
+//! Option types as JavaScript passes them; contract.ts has their declarations.
 
 use cagework_cage::generate::{CageOptions, Shape, Symmetry};
 use cagework_core::BindOptions;
@@ -11,27 +11,27 @@ use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Bytes that reading a file, or coordinates by formula, may take: a tab has 4 GiB, of which drawing and binding take their part.
+/// Memory limit for reading a file, and for closed-form coordinates, bytes. A tab has 4 GiB, also for drawing and binding.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
-/// `BindOptions`: those of the core, and where to compute.
+/// Options of a bind, and where it runs.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "BindOptions"))]
-pub(crate) struct BindAsked {
+pub(crate) struct JsBindOptions {
     pub(crate) backend: Backend,
     #[serde(flatten)]
     pub(crate) options: BindOptions,
 }
 
-impl From<BindAsked> for BindOptions {
-    fn from(asked: BindAsked) -> Self {
-        asked.options
+impl From<JsBindOptions> for BindOptions {
+    fn from(request: JsBindOptions) -> Self {
+        request.options
     }
 }
 
-impl BindAsked {
-    /// Whether the processor computes: it was asked to, there is no WebGPU, or the solver runs nowhere else.
+impl JsBindOptions {
+    /// Whether the bind runs on the CPU: as set, without WebGPU, or because the solver has no GPU version.
     pub(crate) fn is_on_cpu(&self) -> bool {
         self.backend == Backend::Cpu
             || self.options.solver == Solver::ConjugateGradient
@@ -39,16 +39,16 @@ impl BindAsked {
     }
 }
 
-/// `CageOptions`.
+/// Options of a generated cage.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "CageOptions"))]
-pub(crate) struct CageAsked {
+pub(crate) struct JsCageOptions {
     vertices: u32,
     detail: f32,
     quads: bool,
     margin: f32,
-    symmetry: SymmetryAsked,
+    symmetry: JsSymmetry,
     voxels: u32,
     #[serde(default)]
     shape: Shape,
@@ -60,14 +60,14 @@ pub(crate) struct CageAsked {
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "CageSymmetry"))]
-pub(crate) enum SymmetryAsked {
+pub(crate) enum JsSymmetry {
     Auto,
     On,
     Off,
 }
 
 #[cfg(test)]
-impl From<CageOptions> for CageAsked {
+impl From<CageOptions> for JsCageOptions {
     fn from(options: CageOptions) -> Self {
         let CageOptions {
             target: vertices,
@@ -81,63 +81,63 @@ impl From<CageOptions> for CageAsked {
             smooth: _,
         } = options;
         let symmetry = match symmetry {
-            Symmetry::Auto => SymmetryAsked::Auto,
-            Symmetry::None => SymmetryAsked::Off,
-            _ => SymmetryAsked::On,
+            Symmetry::Auto => JsSymmetry::Auto,
+            Symmetry::None => JsSymmetry::Off,
+            _ => JsSymmetry::On,
         };
         Self { vertices, detail, quads, margin, symmetry, voxels, shape, per_component }
     }
 }
 
-impl From<CageAsked> for CageOptions {
-    fn from(asked: CageAsked) -> Self {
+impl From<JsCageOptions> for CageOptions {
+    fn from(request: JsCageOptions) -> Self {
         Self {
-            target: asked.vertices,
-            detail: asked.detail,
-            quads: asked.quads,
-            clearance: asked.margin,
-            symmetry: match asked.symmetry {
-                SymmetryAsked::Auto => Symmetry::Auto,
-                SymmetryAsked::On => Symmetry::X,
-                SymmetryAsked::Off => Symmetry::None,
+            target: request.vertices,
+            detail: request.detail,
+            quads: request.quads,
+            clearance: request.margin,
+            symmetry: match request.symmetry {
+                JsSymmetry::Auto => Symmetry::Auto,
+                JsSymmetry::On => Symmetry::X,
+                JsSymmetry::Off => Symmetry::None,
             },
-            shape: asked.shape,
-            per_component: asked.per_component,
-            voxels: asked.voxels,
+            shape: request.shape,
+            per_component: request.per_component,
+            voxels: request.voxels,
             smooth: 0,
         }
     }
 }
 
-/// `SceneOptions`.
+/// Options of the scene.
 #[derive(Clone, Deserialize, PartialEq, Eq)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
-pub(crate) struct SceneAsked {
-    theme: ThemeAsked,
+pub(crate) struct JsSceneOptions {
+    theme: JsTheme,
     pub(crate) model: bool,
     pub(crate) base_wireframe: bool,
     pub(crate) cage: bool,
     pub(crate) floor: bool,
     pub(crate) original: bool,
     pub(crate) colour: Colour,
-    /// Colours of weights span 0 to 1, not 0 to the largest.
+    /// Whether the colours of weights span 0 to 1 rather than 0 to the largest weight.
     pub(crate) weights_to_one: bool,
     pub(crate) slice: SliceShown,
-    pub(crate) gizmo: GizmoAsked,
-    /// The cage steps back: the model itself is pulled.
+    pub(crate) gizmo: JsGizmo,
+    /// Whether dragging pulls the model; the cage is drawn faintly then.
     pub(crate) pull: bool,
-    /// Side by side, from the left. Those by formula only once they are there; harmonic ones alone are no comparison.
+    /// Kinds shown side by side, from the left. Kinds that are not computed yet are skipped.
     pub(crate) compare: Vec<Coordinates>,
     pub(crate) problems: bool,
-    /// Joints are shown as they will be exported; null for none.
-    pub(crate) joints: Option<JointsAsked>,
+    /// How joints are shown: as they will be exported. Null hides them.
+    pub(crate) joints: Option<JsJoints>,
 }
 
-impl Default for SceneAsked {
+impl Default for JsSceneOptions {
     fn default() -> Self {
         Self {
-            theme: ThemeAsked::Dark,
+            theme: JsTheme::Dark,
             model: true,
             base_wireframe: false,
             cage: true,
@@ -146,7 +146,7 @@ impl Default for SceneAsked {
             colour: Colour::Material,
             weights_to_one: false,
             slice: SliceShown::Off,
-            gizmo: GizmoAsked::None,
+            gizmo: JsGizmo::None,
             pull: true,
             compare: vec![Coordinates::Harmonic],
             problems: true,
@@ -155,11 +155,11 @@ impl Default for SceneAsked {
     }
 }
 
-impl SceneAsked {
+impl JsSceneOptions {
     pub(crate) fn theme(&self) -> Theme {
         match self.theme {
-            ThemeAsked::Light => Theme::Light,
-            ThemeAsked::Dark => Theme::Dark,
+            JsTheme::Light => Theme::Light,
+            JsTheme::Dark => Theme::Dark,
         }
     }
 }
@@ -168,12 +168,12 @@ impl SceneAsked {
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "Theme"))]
-pub(crate) enum ThemeAsked {
+pub(crate) enum JsTheme {
     Light,
     Dark,
 }
 
-/// What colours of the mesh mean.
+/// Quantity that the colours of the mesh show.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
@@ -184,7 +184,7 @@ pub(crate) enum Colour {
     Error,
 }
 
-/// How the model follows the cage.
+/// Kind of coordinates.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
@@ -194,7 +194,7 @@ pub(crate) enum Coordinates {
     Green,
 }
 
-/// What the slice shows.
+/// Quantity that the slice shows.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
@@ -204,19 +204,19 @@ pub(crate) enum SliceShown {
     Value,
 }
 
-/// The gizmo.
+/// Mode of the gizmo.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "Gizmo"))]
-pub(crate) enum GizmoAsked {
+pub(crate) enum JsGizmo {
     None,
     Move,
     Rotate,
     Scale,
 }
 
-/// A part of the gizmo: an axis, the plane normal to it, or the whole.
+/// Handle of the gizmo: an axis, the plane normal to an axis, or all axes.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -230,33 +230,33 @@ pub(crate) enum GizmoHandle {
     All,
 }
 
-/// How the model is pulled.
+/// Options of pulling the model.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "PullOptions"))]
-pub(crate) struct PullAsked {
-    /// How far along the surface, over the model's size; null for automatic.
+pub(crate) struct JsPullOptions {
+    /// Reach along the surface, over the model's size; null for automatic.
     pub(crate) reach: Option<f64>,
-    /// The whole model follows.
+    /// Whether the whole model follows.
     pub(crate) whole: bool,
-    /// Mirror images stay mirror images.
+    /// Whether the pull is symmetric.
     pub(crate) mirrored: bool,
 }
 
-/// What becomes of a rig.
+/// Options of exporting a rig.
 #[derive(Clone, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "RigOptions"))]
-pub(crate) struct RigAsked {
-    joints: JointsAsked,
-    /// Clips travel as far as they did.
+pub(crate) struct JsRigOptions {
+    joints: JsJoints,
+    /// Whether translations of clips keep their length; otherwise they scale with the height of the hips.
     keep_travel: bool,
-    /// Names of what hangs on the skeleton and keeps its shape.
+    /// Names of parts that keep their shape.
     #[serde(default)]
     rigid: Vec<String>,
-    /// The shape alone.
+    /// Whether to export the shape without the rig.
     pub(crate) plain: bool,
-    /// The cage bends the model while a clip moves it.
+    /// Whether the cage deforms the model after a clip moves it.
     pub(crate) dynamic: bool,
 }
 
@@ -264,18 +264,18 @@ pub(crate) struct RigAsked {
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "Joints"))]
-pub(crate) enum JointsAsked {
+pub(crate) enum JsJoints {
     Follow,
     Stay,
     Turn,
 }
 
-impl RigAsked {
+impl JsRigOptions {
     pub(crate) fn options(&self) -> ReshapeOptions {
         let joints = match self.joints {
-            JointsAsked::Follow => Joints::Follow,
-            JointsAsked::Stay => Joints::Stay,
-            JointsAsked::Turn => Joints::Turn,
+            JsJoints::Follow => Joints::Follow,
+            JsJoints::Stay => Joints::Stay,
+            JsJoints::Turn => Joints::Turn,
         };
         let (keep_travel, rigid) = (self.keep_travel, self.rigid.clone());
         ReshapeOptions { joints, keep_travel, rigid, ..ReshapeOptions::default() }
@@ -283,23 +283,17 @@ impl RigAsked {
 }
 
 #[cfg(test)]
-impl Default for RigAsked {
+impl Default for JsRigOptions {
     fn default() -> Self {
-        Self {
-            joints: JointsAsked::Follow,
-            keep_travel: false,
-            rigid: Vec::new(),
-            plain: false,
-            dynamic: false,
-        }
+        Self { joints: JsJoints::Follow, keep_travel: false, rigid: Vec::new(), plain: false, dynamic: false }
     }
 }
 
-/// A word or an object that JavaScript says, typed there as what it becomes here.
+/// Decodes a JavaScript value into a Rust type.
 ///
 /// # Errors
-/// `Argument` when it is something else: the page and the wasm file are of different versions.
-pub(crate) fn taken<T: DeserializeOwned>(said: JsValue) -> Answer<T> {
-    serde_wasm_bindgen::from_value(said)
+/// If the value has another type, for instance because page and wasm file are of different versions.
+pub(crate) fn decode<T: DeserializeOwned>(value: JsValue) -> Answer<T> {
+    serde_wasm_bindgen::from_value(value)
         .map_err(|error| Fault::new(ErrorName::Error, value_fault(&error.to_string())))
 }

@@ -1,4 +1,4 @@
-//! Models that play a clip, as one.
+//! Playback of a clip on all models.
 
 use std::ops::Range;
 
@@ -9,24 +9,24 @@ use glam::{Mat4, Vec3};
 
 use cagework_editor::Models;
 
-/// A clip, of all models that have one of this name.
+/// The clips of one name, of all models that have it.
 pub(crate) struct SharedClip {
-    /// Or its number, if it has none.
+    /// The name, or the clip's number if it has none.
     pub(crate) name: String,
-    /// Of the longest.
+    /// Duration of the longest clip.
     pub(crate) seconds: f32,
-    /// Numbers of the models, and of their clips.
+    /// `(model id, clip index)` pairs.
     of: Vec<(u32, usize)>,
 }
 
 impl SharedClip {
-    /// All clips there are, in order of the models.
+    /// All clips, in order of the models.
     pub(crate) fn all(models: &Models) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for member in models.iter() {
             for (number, clip) in member.model.clips().iter().enumerate() {
                 let name = clip.label(number);
-                // One file may have several of a name.
+                // A file may have several clips of one name.
                 let is_same = |other: &&mut Self| other.name == name && other.of(member.id).is_none();
                 match all.iter_mut().find(is_same) {
                     Some(other) => {
@@ -40,50 +40,50 @@ impl SharedClip {
         all
     }
 
-    /// The number of a model's own clip, if it has one.
+    /// Index of this clip in a model, if the model has it.
     pub(crate) fn of(&self, id: u32) -> Option<usize> {
         self.of.iter().find(|(member, _)| *member == id).map(|(_, clip)| *clip)
     }
 }
 
-/// What one model is played by.
-pub(crate) enum Part {
-    /// Its skeleton, morph targets and clips.
+/// How one model moves during playback.
+pub(crate) enum ModelMotion {
+    /// By skeleton, morph targets and clips.
     Player(Box<Player>),
-    /// Nothing: it stays where it is, in the axes of the file.
+    /// Constant positions, in the axes of the file. `[n_vertices]`
     Still(Vec<Vec3>),
 }
 
-/// One model of those that play.
-struct Played {
+/// One model of a playback.
+struct PlayedModel {
     id: u32,
-    part: Part,
-    /// Its weights among those of all morph targets.
+    part: ModelMotion,
+    /// Range of its weights among those of all morph targets.
     targets: Range<usize>,
 }
 
-/// Models that play.
-pub(crate) struct Playing {
-    played: Vec<Played>,
+/// Playback of all models.
+pub(crate) struct Playback {
+    played: Vec<PlayedModel>,
     clips: Vec<SharedClip>,
-    /// Vertices of all.
+    /// Skin of all vertices.
     pub(crate) skin: Skin,
-    /// From the file's axes to those that are drawn.
+    /// Rotation from the axes of the files to those of the scene.
     up: Mat4,
-    /// Each model where it is now.
+    /// Current joints and targets of each model.
     posed: Vec<Posed>,
     /// Weights of all morph targets. `[n_targets]`
     targets: Vec<f32>,
-    /// What bends them.
+    /// Field of the cage that deforms the models, if `dynamic`.
     pub(crate) field: Option<DisplacementField>,
-    /// Whether the GPU does not have it yet.
+    /// Whether the current time is not on the GPU yet.
     pub(crate) is_new: bool,
 }
 
-impl Playing {
-    /// At rest. `parts`: of each model, with its number.
+impl Playback {
+    /// Playback at rest. `parts`: id and motion of each model.
     pub(crate) fn new(
-        parts: Vec<(u32, Part)>,
+        parts: Vec<(u32, ModelMotion)>,
         clips: Vec<SharedClip>,
         up: Mat4,
         field: Option<DisplacementField>,
@@ -92,12 +92,12 @@ impl Playing {
         let (mut played, mut n_palette, mut n_targets) = (Vec::new(), 0, 0);
         for (id, part) in parts {
             let own = match &part {
-                Part::Player(player) => player.targets().1.len(),
-                Part::Still(_) => 0,
+                ModelMotion::Player(player) => player.targets().1.len(),
+                ModelMotion::Still(_) => 0,
             };
             append(&mut skin, &part, n_palette as u32, n_targets as u32);
             n_palette += posed(&part, None, 0.0, &[]).palette.len();
-            played.push(Played { id, part, targets: n_targets..n_targets + own });
+            played.push(PlayedModel { id, part, targets: n_targets..n_targets + own });
             n_targets += own;
         }
         let mut playing =
@@ -106,11 +106,11 @@ impl Playing {
         playing
     }
 
-    /// Goes to a time of a clip, seconds; at rest without one. `targets`: weights of the morph targets that the clip does not drive;
-    /// nothing for those of the files.
+    /// Sets the time of a clip, seconds; without a clip, the rest pose. `targets`: weights of the morph targets that the clip
+    /// does not drive; empty for those of the files.
     pub(crate) fn show(&mut self, clip: Option<usize>, seconds: f32, targets: &[f32]) {
         let clip = clip.and_then(|clip| self.clips.get(clip));
-        let at = |one: &Played| {
+        let at = |one: &PlayedModel| {
             let own = targets.get(one.targets.clone()).unwrap_or_default();
             posed(&one.part, clip.and_then(|clip| clip.of(one.id)), seconds, own)
         };
@@ -119,7 +119,7 @@ impl Playing {
         self.is_new = true;
     }
 
-    /// Matrices of the joints, in the axes that are drawn.
+    /// Matrices of the joints, in the axes of the scene.
     pub(crate) fn palette(&self) -> Vec<Mat4> {
         self.posed.iter().flat_map(|posed| &posed.palette).map(|&m| self.up * m).collect()
     }
@@ -129,13 +129,13 @@ impl Playing {
         &self.targets
     }
 
-    /// Where a node of a model is, in the axes that are drawn; none if there is no such node.
+    /// Position of a model's node, in the axes of the scene; `None` if the node does not exist.
     pub(crate) fn origin(&self, id: u32, node: u32) -> Option<Vec3> {
         let place = self.played.iter().position(|one| one.id == id)?;
         self.posed[place].origins.get(node as usize).map(|&p| self.up.transform_point3(p))
     }
 
-    /// Where the vertices are, by the processor. `[n_vertices]`
+    /// Vertices computed on the CPU. `[n_vertices]`
     pub(crate) fn positions(&self) -> Vec<Vec3> {
         let mut positions = skin_vertices(&self.skin, &self.palette(), &self.targets);
         if let Some(field) = &self.field {
@@ -145,20 +145,22 @@ impl Playing {
     }
 }
 
-/// One model at a time of a clip of its own.
-fn posed(part: &Part, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
+/// One model at a time of one of its clips.
+fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
     match part {
-        Part::Player(player) => player.at(clip, seconds, targets),
-        Part::Still(_) => Posed { palette: vec![Mat4::IDENTITY], targets: Vec::new(), origins: Vec::new() },
+        ModelMotion::Player(player) => player.at(clip, seconds, targets),
+        ModelMotion::Still(_) => {
+            Posed { palette: vec![Mat4::IDENTITY], targets: Vec::new(), origins: Vec::new() }
+        }
     }
 }
 
-/// Adds the vertices of one more model.
-fn append(skin: &mut Skin, part: &Part, first_joint: u32, first_target: u32) {
+/// Appends the vertices of a model.
+fn append(skin: &mut Skin, part: &ModelMotion, first_joint: u32, first_target: u32) {
     let still;
     let own = match part {
-        Part::Player(player) => &player.skin,
-        Part::Still(positions) => {
+        ModelMotion::Player(player) => &player.skin,
+        ModelMotion::Still(positions) => {
             let n = positions.len() as u32;
             still = Skin {
                 positions: positions.clone(),

@@ -1,4 +1,4 @@
-//! What is wrong with a cage, as the page lists it and draws it.
+//! Faults of a cage: messages, fixes and marks for the page.
 
 use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
 use cagework_core::PolygonMesh;
@@ -9,15 +9,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::views::{self, Mend};
 
-/// Cells along the longest side that parts of a cage should be thicker than: the default of a bind.
-const USUAL_GRID: u32 = 64;
+/// Grid resolution that a cage is checked for, cells along the longest side: the default of a bind.
+const DEFAULT_GRID: u32 = 64;
 
-/// Everything that is wrong with a cage for a model, subdivided so often.
+/// Finds the faults of a cage for a model, after `smooth` steps of subdivision.
 pub(crate) fn find(mesh: &PolygonMesh, model: &[Vec3], smooth: u32) -> CageCheck {
-    check_smooth(mesh, Some(model), Some(USUAL_GRID), smooth)
+    check_smooth(mesh, Some(model), Some(DEFAULT_GRID), smooth)
 }
 
-/// A problem as the page says it.
+/// Message and fix of a problem.
 fn view(problem: &Problem) -> views::Problem {
     let n = problem.count;
     let label = |repair| match repair {
@@ -29,7 +29,7 @@ fn view(problem: &Problem) -> views::Problem {
         Repair::Flip => "Turn them outward".to_owned(),
         Repair::Grow => "Grow the cage".to_owned(),
     };
-    // The best one stands first.
+    // Fixes are sorted, best first.
     let fix = problem.fixes.first().map(|fix| match *fix {
         Fix::Repair { repair } => views::Fix { label: label(repair), mend: Mend::Repair { repair } },
         Fix::Grid { cells } => {
@@ -47,7 +47,7 @@ fn view(problem: &Problem) -> views::Problem {
     }
 }
 
-/// What a worker found wrong with a cage, on its way to the page: sentences, and the places for `Engine.showFaults`.
+/// Faults of a cage: messages, and the arrays for `Engine.showFaults`.
 #[wasm_bindgen]
 pub struct Check {
     pub(crate) check: CageCheck,
@@ -55,7 +55,7 @@ pub struct Check {
 
 #[wasm_bindgen]
 impl Check {
-    /// What is said.
+    /// Messages and fixes.
     ///
     /// # Errors
     /// Never.
@@ -65,35 +65,35 @@ impl Check {
         Ok(views::object(&shown)?)
     }
 
-    /// Vertices of the cage.
+    /// Faulty vertices of the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn vertices(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.vertices.iter().copied()).collect()
     }
 
-    /// Edges of the cage. `[n, 2]`
+    /// Faulty edges of the cage. `[n, 2]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn edges(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.edges.iter().flatten().copied()).collect()
     }
 
-    /// Faces of the cage.
+    /// Faulty faces of the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn faces(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.faces.iter().copied()).collect()
     }
 
-    /// Points in space. `[n, 3]`
+    /// Positions of other faults. `[n, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn points(&self) -> Vec<f32> {
         self.places(false).flat_map(|p| p.points.iter().flatten().copied()).collect()
     }
 
-    /// Vertices of the model that are outside.
+    /// Vertices of the model outside the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn outside(&self) -> Vec<u32> {
@@ -102,7 +102,7 @@ impl Check {
 }
 
 impl Check {
-    /// Places in the cage, or those of the model's vertices outside. Notes are not marked: they need no attention.
+    /// Places in the cage, or of the model's vertices outside it. Notes are not marked.
     fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
         let shown =
             move |p: &&Problem| p.severity != Severity::Note && (p.code == Code::ModelOutside) == are_outside;
@@ -110,30 +110,30 @@ impl Check {
     }
 }
 
-/// Places of a [`Check`], as the page keeps them.
+/// Places of the faults that a [`Check`] found.
 #[derive(Default)]
 pub(crate) struct Faults {
     pub(crate) in_cage: Places,
-    /// Vertices of the model.
+    /// Vertices of the model outside the cage.
     pub(crate) outside: Vec<u32>,
 }
 
 impl Faults {
-    /// What is drawn for them; a draft is drawn as a whole.
+    /// Marks of the faults. Of a draft, all faces are marked.
     pub(crate) fn marks(&self, mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
         let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
         let Places { vertices, edges, faces, points } = &self.in_cage;
         let mut marks = Marks { mesh_vertices: self.outside.clone(), ..Marks::default() };
         marks.segments.extend(edges.iter().map(|e| e.map(at)));
         let faces = faces.iter().filter_map(|&f| mesh.faces.get(f as usize));
-        // Nothing else draws a mesh that is no cage.
+        // Drafts are drawn only as marks.
         let all = is_draft.then_some(&mesh.faces).into_iter().flatten();
         for face in faces.chain(all) {
             marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
         }
         marks.points.extend(vertices.iter().map(|&v| at(v)));
         if positions == mesh.positions {
-            // Nothing says where they would be in a pose.
+            // Points are known only at rest.
             marks.points.extend(points.iter().copied().map(Vec3::from_array));
         }
         marks

@@ -1,4 +1,4 @@
-//! The puller's half, in a worker of its own: a bind or a long frame of the page does not stop the hand.
+//! Pulling the model, in a separate worker: binds and long frames of the page do not block it.
 
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
@@ -11,12 +11,12 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use crate::arrays::{flat, points};
 use crate::controls::control_set;
 use crate::error::Answer;
-use crate::options::{PullAsked, taken};
+use crate::options::{JsPullOptions, decode};
 
-/// The seed of a grip on a vertex of the cage.
+/// Seed that marks a grip on a cage vertex.
 const ON_CAGE: u32 = u32::MAX;
 
-/// A model and its cage, ready to be pulled, and the drag under way.
+/// Prepared model and cage, and the drag in progress.
 #[wasm_bindgen]
 pub struct Puller {
     pull: Pull,
@@ -26,10 +26,10 @@ pub struct Puller {
 
 #[wasm_bindgen]
 impl Puller {
-    /// Of a model, `[n_vertices, 3]` and `[n_triangles, 3]`, and its cage at rest, as `Binder.bind` takes it.
+    /// Prepares a model, `[n_vertices, 3]` and `[n_triangles, 3]`, and its cage at rest; cage arrays as for `Binder.bind`.
     ///
     /// # Errors
-    /// When the arrays are no cage, or there is nothing to pull.
+    /// If the arrays are not a valid cage, or the model has no triangles.
     #[wasm_bindgen(constructor)]
     pub fn new(
         positions: &[f32],
@@ -43,9 +43,9 @@ impl Puller {
         Ok(Self::of(&mesh, &set)?)
     }
 
-    /// Takes hold of grabs and pins in the pose `start`, `[n_cage, 3]`. `rows`: their weights, one after the other,
-    /// `[n_grips, n_cage]`; `seeds`: the nearest vertex of the model, or 2^32 - 1 for a vertex of the cage. Returns where the
-    /// grabs are, `[n_grabs, 3]`.
+    /// Starts a drag of grabs, then pins, in the pose `start`, `[n_cage, 3]`. `rows`: weights of the grips,
+    /// `[n_grips, n_cage]`; `seeds`: nearest model vertex of each grip, or 2^32 - 1 for a cage vertex. Returns the positions
+    /// of the grabs, `[n_grabs, 3]`.
     ///
     /// # Errors
     /// Those of a drag.
@@ -57,15 +57,15 @@ impl Puller {
         n_grabs: usize,
         #[wasm_bindgen(unchecked_param_type = "PullOptions")] options: JsValue,
     ) -> Result<Vec<f32>, JsValue> {
-        let asked = taken(options)?;
+        let request = decode(options)?;
         self.drag = None;
-        let drag = self.begin(start, rows, seeds, n_grabs, asked)?;
+        let drag = self.begin(start, rows, seeds, n_grabs, request)?;
         let at: Vec<Vec3> = drag.start().iter().map(|p| p.as_vec3()).collect();
         self.drag = Some(drag);
         Ok(flat(&at))
     }
 
-    /// Of each vertex of the model how much it stays where it is, 0 to 1; empty without a drag. `[n_vertices]`
+    /// How much each vertex of the model stays in place during the drag, 0 to 1; empty without a drag. `[n_vertices]`
     #[must_use]
     pub fn stays(&self) -> Vec<f32> {
         self.drag.as_ref().map_or_else(Vec::new, |drag| {
@@ -73,34 +73,35 @@ impl Puller {
         })
     }
 
-    /// One frame towards targets, `[n_grabs, 3]`; of a grab and its mirror image the first is enough. The cage, `[n_cage, 3]`; empty without a drag.
+    /// Advances the solve by one frame towards `to`, `[n_grabs, 3]`; the target of a mirror image may be omitted. Returns the
+    /// cage, `[n_cage, 3]`, or an empty array without a drag.
     #[must_use]
     pub fn frame(&mut self, to: &[f32]) -> Vec<f32> {
         let Some(drag) = &mut self.drag else { return Vec::new() };
         let mut to: Vec<DVec3> = points(to).into_iter().map(Vec3::as_dvec3).collect();
         if let (&[to_first], &[first, image]) = (&*to, drag.start()) {
-            // A grab and its mirror image: what the one does, the other does mirrored.
+            // The mirror image moves by the mirrored displacement of the grab.
             to.push(image + (to_first - first) * DVec3::new(-1.0, 1.0, 1.0));
         }
         drag.frame(&to);
         flat(&drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>())
     }
 
-    /// Whether the last frame was as good as the next one.
+    /// Whether the solve has converged: more frames would not change the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn settled(&self) -> bool {
         self.drag.as_ref().is_none_or(Drag::is_settled)
     }
 
-    /// How far the drag reaches, over the model's size; infinite for the whole model.
+    /// Reach of the drag, over the model's size; infinite for the whole model.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.drag.as_ref().map_or(0.0, Drag::reach)
     }
 
-    /// How far grabs and pins are from where they should be, over the model's size.
+    /// Distance of grabs and pins from their targets, over the model's size.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn error(&self) -> f64 {
@@ -122,7 +123,7 @@ impl Puller {
         rows: &[f64],
         seeds: &[u32],
         n_grabs: usize,
-        asked: PullAsked,
+        request: JsPullOptions,
     ) -> Answer<Drag> {
         let rows = rows.chunks_exact(self.pull.n_cage().max(1));
         let grip = |(row, &seed): (&[f64], &u32)| {
@@ -136,12 +137,12 @@ impl Puller {
         let (grabs, pins) = grips.split_at(n_grabs.min(grips.len()));
         let start: Vec<DVec3> = points(start).into_iter().map(Vec3::as_dvec3).collect();
         let options = DragOptions {
-            reach: match asked.reach {
-                _ if asked.whole => Reach::Whole,
+            reach: match request.reach {
+                _ if request.whole => Reach::Whole,
                 Some(reach) => Reach::Of(reach),
                 None => Reach::Automatic,
             },
-            symmetry: asked.mirrored.then_some(&self.symmetry),
+            symmetry: request.mirrored.then_some(&self.symmetry),
             ..DragOptions::default()
         };
         Ok(Drag::new(&self.pull, &start, grabs, pins, options)?)
@@ -163,9 +164,9 @@ mod tests {
         let n = cage.n_vertices();
         let mut row = vec![0.0; n];
         row[3] = 1.0;
-        let asked = PullAsked { reach: None, whole: false, mirrored: false };
+        let request = JsPullOptions { reach: None, whole: false, mirrored: false };
         let start = flat(cage.positions());
-        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, asked).unwrap());
+        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, request).unwrap());
         let to = cage.positions()[3] + 0.1 * Vec3::Y;
         let mut moved = Vec::new();
         for _ in 0..20 {
@@ -173,7 +174,7 @@ mod tests {
         }
         assert!(moved[3].distance(to) < 1e-2, "{} {to}", moved[3]);
         assert_eq!(puller.stays().len(), sample.mesh.positions.len());
-        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, asked).err();
+        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, request).err();
         assert!(none.is_some(), "no vertex of the cage");
     }
 }

@@ -1,4 +1,4 @@
-//! For the npm package: models in, models out, and weights without a picture.
+//! Methods for the npm package: deform model files, and apply weights without a GPU.
 
 use cagework_core::deform::{deform_bound, displacements};
 use cagework_core::{Controls, Frames, Weights};
@@ -14,7 +14,7 @@ use crate::binder::{Binder, Offsets};
 use crate::controls::control_set;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::loaded::Loaded;
-use crate::options::{BindAsked, RigAsked, taken};
+use crate::options::{JsBindOptions, JsRigOptions, decode};
 
 #[wasm_bindgen]
 impl Loaded {
@@ -25,13 +25,13 @@ impl Loaded {
         self.model.triangles.as_flattened().to_vec()
     }
 
-    /// What a cage should enclose: the vertices, where morph targets take them, and frames of a clip if one is named; triangles as in
-    /// `Engine.modelStates`. `[n, 3]` each
+    /// Geometry that a cage should enclose: positions and triangles at rest, with each morph target, and in the frames of
+    /// `clip`, if given. `[n, 3]` each
     ///
     /// # Errors
-    /// When there is no such clip.
+    /// If the model has no such clip.
     #[wasm_bindgen(unchecked_return_type = "[Float32Array, Uint32Array]")]
-    #[allow(clippy::needless_pass_by_value, reason = "how an optional string crosses the border")]
+    #[allow(clippy::needless_pass_by_value, reason = "wasm-bindgen passes optional strings by value")]
     pub fn states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
         let states = self.model.states(clip.as_deref());
         let (positions, triangles) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
@@ -43,12 +43,12 @@ impl Loaded {
 
 #[wasm_bindgen]
 impl Binder {
-    /// The file of a model that follows a posed cage, `[n_controls, 3]`: what `cagework bind` and `cagework deform` make of it. A
-    /// glTF keeps its rig as `rig` says (`RigOptions`, where `dynamic` counts for nothing). The other arguments are those of `bind`.
+    /// Binds the model and deforms its file by a posed cage, `[n_controls, 3]`, like `cagework bind` and `cagework deform`.
+    /// A glTF keeps its rig according to `rig` (`RigOptions`; `dynamic` is ignored). Other arguments as for `bind`.
     ///
     /// # Errors
-    /// Those of a bind; when the pose has another number of points; when the file cannot be written.
-    #[allow(clippy::too_many_arguments, reason = "arrays cross the border one by one")]
+    /// Those of a bind. If the pose has another number of points, or the file cannot be written.
+    #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn reshape(
         &self,
         loaded: &Loaded,
@@ -60,7 +60,7 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] rig: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Vec<u8>, JsValue> {
-        let (model, rig): (&Model, RigAsked) = (&loaded.model, taken(rig)?);
+        let (model, rig): (&Model, JsRigOptions) = (&loaded.model, decode(rig)?);
         let set = control_set(&cage, &corners, controls)?;
         let rest = Controls::from(&set).rest().to_vec();
         let posed = pose("posed", &posed, rest.len())?;
@@ -68,11 +68,11 @@ impl Binder {
         let of_rig = of_model(model, &rig)?;
         let extra = if keeps_rig { model.extra_points().map_err(Fault::from)? } else { Vec::new() };
         let at = [model.positions.as_slice(), &extra].concat();
-        let mut asked: BindAsked = taken(options)?;
-        asked.options.extra_points = extra.len();
-        // What writing takes counts from the start, so that it does not end what took long.
-        asked.options.held = model.bytes() + model.bytes_to_write(model.format());
-        let bound = self.run(&at, &set, asked, progress).await?;
+        let mut request: JsBindOptions = decode(options)?;
+        request.options.extra_points = extra.len();
+        // Reserve the memory for writing before the bind, so that a long bind does not fail afterwards.
+        request.options.held = model.bytes() + model.bytes_to_write(model.format());
+        let bound = self.run(&at, &set, request, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
             let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
@@ -84,20 +84,23 @@ impl Binder {
     }
 }
 
-/// Names of parts that keep their shape: those that hang on the skeleton, and others.
-fn of_model(model: &Model, rig: &RigAsked) -> Answer<ReshapeOptions> {
-    let asked = rig.options();
+/// Options of a model: splits the names of rigid parts into attachments of the skeleton and other parts.
+fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
+    let options = rig.options();
     let props = if rig.plain { Vec::new() } else { model.props()? };
-    let (rigid, others): (Vec<_>, Vec<_>) = asked.rigid.into_iter().partition(|name| props.contains(name));
+    let (rigid, others): (Vec<_>, Vec<_>) = options.rigid.into_iter().partition(|name| props.contains(name));
     let parts = if others.is_empty() {
         Parts::default()
     } else {
         model.parts(&[], &others).map_err(|e| Fault::new(ErrorName::Error, e))?
     };
-    Ok(ReshapeOptions { rigid, parts, ..asked })
+    Ok(ReshapeOptions { rigid, parts, ..options })
 }
 
-/// `[n, 3]` as points, if there are so many.
+/// Points of a flat `[n, 3]` array.
+///
+/// # Errors
+/// If its length is not `3 n`.
 fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
     if flat.len() == 3 * n {
         return Ok(points(flat));
@@ -107,7 +110,7 @@ fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
     Err(Fault::new(ErrorName::Error, message))
 }
 
-/// Weights at hand, for pose after pose.
+/// Weights that are applied to many poses.
 #[wasm_bindgen]
 pub struct Deformer {
     n_controls: usize,
@@ -117,10 +120,10 @@ pub struct Deformer {
 
 #[wasm_bindgen]
 impl Deformer {
-    /// Of the arrays of a `Bound`, of `n_controls` controls.
+    /// Deformer of the arrays of a `Bound` with `n_controls` controls.
     ///
     /// # Errors
-    /// When they do not belong together.
+    /// If the arrays do not match.
     #[wasm_bindgen(constructor)]
     pub fn new(
         n_controls: u32,
@@ -129,14 +132,14 @@ impl Deformer {
         data: Vec<f32>,
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<Self, JsValue> {
-        let Offsets { frames, .. } = taken(offsets)?;
+        let Offsets { frames, .. } = decode(offsets)?;
         Ok(Self::of(n_controls, indptr, indices, data, frames)?)
     }
 
-    /// Where the points are in a pose, `[n_controls, 3]`. `[n_points, 3]`
+    /// Points in a pose, `[n_controls, 3]`. `[n_points, 3]`
     ///
     /// # Errors
-    /// When the pose has another number of points.
+    /// If the pose has another number of points.
     pub fn deform(&self, posed: &[f32]) -> Result<Vec<f32>, JsValue> {
         let posed = pose("posed", posed, self.n_controls)?;
         Ok(flat(&deform_bound(&self.weights, &self.frames, &posed)))
@@ -179,7 +182,7 @@ mod tests {
             let frames = Frames { joints, plain, whole: vec![[0.0; 3]; 3], ..Frames::default() };
             Deformer::of(3, vec![0, 1], vec![column], vec![1.0], frames).map(drop)
         };
-        // Three controls, three axes, three columns of the whole cage and three of the one joint.
+        // 3 controls, 3 axes, 3 columns of the whole cage and 3 of the joint.
         assert!(of(vec![2], 11).is_ok());
         assert!(of(vec![2], 12).is_err(), "a column");
         assert!(of(vec![3], 2).is_err(), "a joint");

@@ -1,4 +1,4 @@
-//! The state as the renderer draws it.
+//! Converts the state to the renderer's options.
 
 use std::sync::Arc;
 
@@ -8,11 +8,11 @@ use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
 use glam::{Quat, Vec3};
 
-use crate::options::{Colour, GizmoAsked, JointsAsked, SliceShown};
+use crate::options::{Colour, JsGizmo, JsJoints, SliceShown};
 use crate::state::State;
 
 impl State {
-    /// How the mesh is drawn: colours need weights, and a heat map a vertex.
+    /// Style of the mesh. Weights and errors need a bind; weights also need a selected vertex.
     pub(crate) fn mesh_style(&self) -> MeshStyle {
         match self.view.colour {
             _ if !self.view.model => MeshStyle::Hidden,
@@ -27,7 +27,7 @@ impl State {
         }
     }
 
-    /// What the renderer draws; `weights` are those it has.
+    /// The scene of the view. `weights`: those on the GPU.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view();
         SceneOptions {
@@ -56,24 +56,24 @@ impl State {
         }
     }
 
-    /// Whether the cage is where the model is shown: it fits the shape at rest, or bends the clip that plays.
+    /// Whether the cage matches the visible model: no clip plays, or the cage deforms it.
     pub(crate) fn has_cage_in_view(&self) -> bool {
         self.playing.as_ref().is_none_or(|playing| playing.field.is_some())
     }
 
-    /// Whether the model itself can be pulled: then what it hides is not taken in its place.
+    /// Whether dragging pulls the model. Cage vertices behind the model are not picked then.
     pub(crate) fn pulls(&self) -> bool {
         self.view.pull && self.bound.is_some() && !self.editor.is_editing_rest()
     }
 
-    /// Whether no part of the cage is chosen or pointed at.
+    /// Whether no cage element is selected or hovered.
     fn is_nothing_chosen(&self) -> bool {
         self.editor.hovered.is_empty()
             && self.editor.selection.vertices().is_empty()
             && self.editor.gesture().is_none()
     }
 
-    /// The same for a picture: `alone` without anything but the model, transparent around it.
+    /// The scene of a picture. `alone`: only the model, on a transparent background.
     pub(crate) fn picture_scene(&self, alone: bool, weights: Option<&Weights>) -> SceneOptions {
         if !alone {
             return self.scene(weights);
@@ -114,13 +114,13 @@ impl State {
         shown
     }
 
-    /// The gizmo, where its turns and scales go about.
+    /// The gizmo, at the centre of rotation and scaling.
     pub(crate) fn gizmo(&self) -> Option<Gizmo> {
         let mode = match self.view.gizmo {
-            GizmoAsked::None => return None,
-            GizmoAsked::Move => GizmoMode::Move,
-            GizmoAsked::Rotate => GizmoMode::Rotate,
-            GizmoAsked::Scale => GizmoMode::Scale,
+            JsGizmo::None => return None,
+            JsGizmo::Move => GizmoMode::Move,
+            JsGizmo::Rotate => GizmoMode::Rotate,
+            JsGizmo::Scale => GizmoMode::Scale,
         };
         let center = self.editor.selection.pivot(self.pose(), self.editor.topology(), self.editor.pivot)?;
         Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
@@ -132,7 +132,7 @@ impl State {
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
-    /// Places with a problem; all of a draft is one.
+    /// Marks of faults.
     fn marks(&self) -> Marks {
         if !self.view.problems {
             return Marks::default();
@@ -140,10 +140,10 @@ impl State {
         self.faults.marks(self.rest(), self.pose(), self.set().is_none())
     }
 
-    /// The joints as they are drawn: dots, and rings outside the cage; nothing before the model is bound.
+    /// Marks of joints: dots inside the cage, rings outside; empty before a bind.
     fn joint_marks(&self) -> Marks {
         let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
-        let (Some(asked), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };
+        let (Some(mode), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };
         let at = match &self.playing {
             Some(playing) => {
                 let joints = dots.joints.iter().zip(&dots.models);
@@ -154,7 +154,7 @@ impl State {
                 }
                 at
             }
-            None if asked == JointsAsked::Stay || self.view.original || self.editor.is_editing_rest() => {
+            None if mode == JsJoints::Stay || self.view.original || self.editor.is_editing_rest() => {
                 dots.at.clone()
             }
             None => dots.posed(&self.rest().positions, self.pose()),

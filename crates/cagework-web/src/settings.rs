@@ -1,4 +1,4 @@
-//! The page's settings in a project: files come from anywhere, so each part is looked at before it is taken.
+//! The page's settings in a project. Project files are untrusted, so each value is checked.
 
 use std::mem::discriminant;
 
@@ -12,13 +12,13 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::error::{ErrorName, Fault};
-use crate::options::{BindAsked, CageAsked, RigAsked};
+use crate::options::{JsBindOptions, JsCageOptions, JsRigOptions};
 use crate::views::object;
 
-/// Longest value that is repeated in a notice, characters.
-const SHOWN: usize = 40;
+/// Maximum length of a value in a notice, characters.
+const MAX_VALUE_CHARS: usize = 40;
 
-/// Numbers of the page's settings, by their names there.
+/// Ranges of numeric options, by their names in the page.
 const NUMBERS: [(&str, Number); 8] = [
     ("grid", GRID),
     ("tau", TAU),
@@ -30,32 +30,32 @@ const NUMBERS: [(&str, Number); 8] = [
     ("voxels", VOXELS),
 ];
 
-/// The page's part of a project, as far as it can be used.
+/// Valid settings of a project.
 #[derive(Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional, as = "Option<BindAsked>"))]
+    #[cfg_attr(test, ts(optional, as = "Option<JsBindOptions>"))]
     bind: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional, as = "Option<CageAsked>"))]
+    #[cfg_attr(test, ts(optional, as = "Option<JsCageOptions>"))]
     cage: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional, as = "Option<RigAsked>"))]
+    #[cfg_attr(test, ts(optional, as = "Option<JsRigOptions>"))]
     rig: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     symmetry: Option<bool>,
-    /// What was wrong, in whole sentences.
+    /// Values that were replaced, a sentence each.
     notices: Vec<String>,
 }
 
-/// Settings of a project as far as they can be used, and what was wrong with the rest. `text` is their JSON; `defaults`
-/// the JSON of an object with `bind`, `cage` and `rig`, for what is missing or wrong. The memory limit is always that of
-/// `defaults`: it belongs to the computer, not to the project.
+/// Reads the settings of a project, and replaces missing and invalid values by defaults. `text`: JSON of the settings.
+/// `defaults`: JSON object with `bind`, `cage` and `rig`. The memory limit is always that of `defaults`, because it depends
+/// on the computer.
 ///
 /// # Errors
-/// When `defaults` is something else.
+/// If `defaults` is not a JSON object.
 #[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
 pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
     let defaults: Map<String, Value> =
@@ -71,18 +71,18 @@ impl Settings {
             settings.notices.push("The settings of this project cannot be read.".to_owned());
             return settings;
         };
-        settings.bind = settings.group("bind", &mut given, defaults, |asked: BindAsked| {
-            BindOptions::from(asked).check().map_err(|wrong| wrong.allowed)
+        settings.bind = settings.group("bind", &mut given, defaults, |request: JsBindOptions| {
+            BindOptions::from(request).check().map_err(|wrong| wrong.allowed)
         });
-        settings.cage = settings.group("cage", &mut given, defaults, |asked: CageAsked| {
-            CageOptions::from(asked).check().map_err(|wrong| wrong.allowed)
+        settings.cage = settings.group("cage", &mut given, defaults, |request: JsCageOptions| {
+            CageOptions::from(request).check().map_err(|wrong| wrong.allowed)
         });
-        settings.rig = settings.group("rig", &mut given, defaults, |_: RigAsked| Ok(()));
+        settings.rig = settings.group("rig", &mut given, defaults, |_: JsRigOptions| Ok(()));
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
         settings
     }
 
-    /// The options of one group, one after the other put in the place of the default; none when the group is not there.
+    /// Options of a group: valid values replace defaults one by one. `None` if the group is missing.
     fn group<T: serde::de::DeserializeOwned>(
         &mut self,
         name: &str,
@@ -98,11 +98,11 @@ impl Settings {
             taken.insert(key.clone(), value.clone());
             let wrong = match is_in_range(key, value) {
                 Err(allowed) => Some(format!("; it must be {allowed}")),
-                // A word's name as the key of an object would pass for the word.
+                // serde also accepts an object with the variant's name as its key: compare the JSON types.
                 Ok(()) if discriminant(value) != discriminant(default) => Some(String::new()),
                 Ok(()) => match serde_json::from_value(Value::Object(taken.clone())) {
                     Err(error) => Some(format!(" ({})", value_fault(&error.to_string()))),
-                    Ok(asked) => check(asked).err().map(|allowed| format!("; it must be {allowed}")),
+                    Ok(request) => check(request).err().map(|allowed| format!("; it must be {allowed}")),
                 },
             };
             if let Some(wrong) = wrong {
@@ -116,14 +116,14 @@ impl Settings {
     }
 }
 
-/// Whether a number is one that the option can have; its range if not. Options that are no numbers are not looked at.
+/// Checks a numeric option; other options pass. The error is the allowed range.
 fn is_in_range(key: &str, value: &Value) -> Result<(), &'static str> {
     let Some((_, number)) = NUMBERS.iter().find(|(name, _)| *name == key) else { return Ok(()) };
     number.check(value.as_f64().unwrap_or(f64::NAN)).map_err(|wrong| wrong.allowed)
 }
 
 fn shown(value: &Value) -> String {
-    value.to_string().chars().take(SHOWN).collect()
+    value.to_string().chars().take(MAX_VALUE_CHARS).collect()
 }
 
 #[cfg(test)]
@@ -134,7 +134,7 @@ mod tests {
 
     const GIB: u64 = 1 << 30;
 
-    /// What the page takes where a project says nothing.
+    /// The page's defaults.
     fn defaults() -> Map<String, Value> {
         let all = json!({
             "bind": {
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_come_back_as_they_were() {
+    fn settings_round_trip() {
         let mut saved = defaults();
         saved["bind"]["grid"] = json!(128);
         saved["bind"]["tau"] = json!(0.001);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_older_projects_do_not_say_is_the_default() {
+    fn missing_options_get_defaults() {
         let settings = read(&json!({ "bind": { "grid": 32 }, "cage": { "vertices": 120 } }));
         assert_eq!(settings.rig, None);
         let bind = settings.bind.unwrap();
@@ -186,14 +186,14 @@ mod tests {
         assert_eq!(Settings::read("", &defaults()), Settings::default());
     }
 
-    /// A project said so once, and no bind and no estimate worked any more until the page was loaded anew.
+    /// Accepted, such values make every bind and memory estimate fail until the page is reloaded.
     #[test]
-    fn values_that_no_bind_and_no_cage_can_have_are_not_taken() {
+    fn invalid_values_are_replaced_by_defaults() {
         for (group, key, value, allowed) in [
             ("bind", "grid", json!(64.5), "a whole number from 8 to 512"),
             ("bind", "grid", json!(100_000), "a whole number from 8 to 512"),
             ("bind", "tau", json!(0), "a number above 0"),
-            // Above 0 in 64 bits; in the 32 of the solver it is not.
+            // Positive as f64, but 0 as f32, the solver's type.
             ("bind", "tau", json!(1e-60), "a number above 0"),
             ("bind", "max_iterations", json!(1e300), "has the wrong type"),
             ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),
@@ -212,7 +212,7 @@ mod tests {
             assert_eq!(settings[group][key], defaults()[group][key], "{key} {value}");
             let notices = settings["notices"].as_array().unwrap();
             assert!(notices.len() == 1 && notices[0].as_str().unwrap().contains(allowed), "{notices:?}");
-            // Nothing else is lost with it.
+            // Valid values of the same group are kept.
             if key != "grid" {
                 assert_eq!(settings["bind"]["grid"], 32);
             }
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_no_settings_changes_nothing_and_says_so() {
+    fn malformed_settings_give_defaults_and_a_notice() {
         for text in ["not json", "[1]", "7"] {
             let settings = Settings::read(text, &defaults());
             assert_eq!(settings.notices, ["The settings of this project cannot be read."]);

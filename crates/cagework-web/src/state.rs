@@ -1,4 +1,5 @@
-//! The page's state on the CPU: the editor, what is derived from its document, and the view. The GPU follows with the next frame.
+//! The page's state on the CPU: the editor, state derived from its document, and the view. The next frame writes it to the
+//! GPU.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,57 +18,57 @@ use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 use crate::joints::JointDots;
-use crate::options::{Coordinates, SceneAsked};
-use crate::playing::Playing;
+use crate::options::{Coordinates, JsSceneOptions};
+use crate::playing::Playback;
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState, View};
 
-/// Bytes of weights that are kept for documents that undo and redo come back to.
+/// Size limit of the cache of weights for undo and redo, bytes.
 const CACHE_BYTES: usize = 256 << 20;
 
-/// Document, camera, and what is derived from them.
+/// Document, camera, and derived state.
 pub(crate) struct State {
     pub(crate) editor: Editor,
-    /// How each model is drawn, by its number.
+    /// Draw data of each model, by id.
     pub(crate) draws: BTreeMap<u32, Arc<DrawModel>>,
-    /// Number of points of the models' rigs, once they were counted.
+    /// Number of points of the models' rigs; computed on first use.
     pub(crate) n_rig: Option<usize>,
-    /// The model that is painted, and how much of each vertex of all models stays in place. `[n_vertices]`
+    /// The model in paint mode, and how much each vertex of all models stays in place, 0 to 1. `[n_vertices]`
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
-    /// Faults of the cage, once it was checked.
+    /// Faults of the cage that the last check found.
     pub(crate) faults: Faults,
-    /// Some vertices of the model to count outside the cage while it is reshaped; made when first needed.
+    /// Subset of the vertices that is counted outside the cage during reshaping; computed on first use.
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
-    /// The weights in use; none before the models are bound to the cage as it is.
+    /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
-    /// Weights of documents that undo and redo come back to.
+    /// Weights of documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,
-    /// What the last export did not keep.
+    /// Notices of the last export.
     pub(crate) rig_notices: Vec<String>,
-    /// The clip that is shown in place of the pose.
-    pub(crate) playing: Option<Playing>,
-    /// Lattice by which the cage bends a moving model, the weights of its points, and their offsets.
+    /// Playback of a clip, shown instead of the pose.
+    pub(crate) playing: Option<Playback>,
+    /// Lattice for deforming a model that a clip moves, with weights and frames of its points.
     pub(crate) lattice: Option<(Lattice, Weights, Frames)>,
-    /// Kinds of coordinates to compare with.
+    /// Kinds of coordinates available for comparison.
     pub(crate) others: Vec<Coordinates>,
     pub(crate) active_part: Option<GizmoPart>,
     pub(crate) slice: Option<Arc<Slice>>,
-    pub(crate) held: Held,
-    pub(crate) view: SceneAsked,
+    pub(crate) held: GrabState,
+    pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
     /// The viewport, CSS pixels.
     pub(crate) size: Vec2,
-    /// Device pixels of a CSS pixel.
+    /// Device pixels per CSS pixel.
     pub(crate) scale: f32,
-    /// Counts changes of mesh and cage: the result of a job is for one of them.
+    /// Number of changes of mesh and cage. The result of a job is valid for one revision.
     pub(crate) revision: u32,
-    /// The document that everything derived here belongs to.
-    derived: Derived,
-    /// What the GPU holds.
-    pub(crate) on_gpu: OnGpu,
-    /// Whether an upload is in progress; it looks again when it is done.
+    /// Keys of the document that the derived state belongs to.
+    derived: DerivedKeys,
+    /// Keys of the data on the GPU.
+    pub(crate) on_gpu: GpuKeys,
+    /// Whether an upload is in progress. It compares again when it finishes.
     pub(crate) is_uploading: bool,
-    /// Whether models of the document are being added, and may still be refused.
+    /// Whether models are being added; the upload may still fail.
     pub(crate) is_adding: bool,
     pub(crate) is_moved: bool,
     pub(crate) is_changed: bool,
@@ -81,25 +82,25 @@ pub(crate) struct BoundModels {
     pub(crate) frames: Arc<Frames>,
     /// Weights of the points of the models' rigs.
     pub(crate) rig: Option<Weights>,
-    /// Vertices outside the cage, then points of rigs outside, counted after all vertices.
+    /// Vertices outside the cage, then points of rigs outside it; their indices follow those of all vertices.
     pub(crate) outside: Vec<OutsideVertex>,
-    /// The joints among them.
+    /// Joints among the points of the rigs.
     pub(crate) joints: Option<JointDots>,
-    /// The report of the bind, as the page shows it.
+    /// Bind report.
     pub(crate) report: JsValue,
 }
 
-/// Keys of the document that derived state belongs to, and its pose.
+/// Keys and pose of the document that the derived state belongs to.
 #[derive(Default)]
-struct Derived {
+struct DerivedKeys {
     key: Key,
     models: u64,
     pose: Arc<[Vec3]>,
 }
 
-/// Keys of what the GPU holds; none for what it does not hold.
+/// Keys of the data on the GPU; `None` for data that is not uploaded.
 #[derive(Clone, Copy, Default, PartialEq)]
-pub(crate) struct OnGpu {
+pub(crate) struct GpuKeys {
     pub(crate) mesh: Option<u64>,
     pub(crate) parts: Option<u64>,
     pub(crate) cage: Option<u64>,
@@ -107,18 +108,18 @@ pub(crate) struct OnGpu {
     pub(crate) bound: Option<Key>,
 }
 
-/// Grabs, and positions of the models for picking.
+/// Grabs and pins, and the posed models for picking.
 #[derive(Default)]
-pub(crate) struct Held {
-    /// Points that are grabbed or pointed at.
+pub(crate) struct GrabState {
+    /// Surface points that are grabbed, pinned or hovered.
     pub(crate) points: Vec<SurfacePoint>,
-    /// Where the grab should be, if the cage cannot bring it there.
+    /// Position of the pointer, if the grab cannot reach it.
     pub(crate) target: Option<Vec3>,
-    /// How much of each vertex of the model stays in place during the drag.
+    /// How much each vertex of the model stays in place during the drag, 0 to 1. `[n_vertices]`
     pub(crate) stays: Option<Arc<Vec<f32>>>,
-    /// Places of an interior control that is being added.
+    /// Points of an interior control that is being added.
     pub(crate) placed: Vec<Vec3>,
-    /// The models as posed, and the pose that it was computed for.
+    /// Vertices of the posed models, and the pose they were computed for. `[n_vertices]`
     pub(crate) posed: Vec<Vec3>,
     pub(crate) posed_for: Vec<Vec3>,
 }
@@ -140,14 +141,14 @@ impl Default for State {
             others: Vec::new(),
             active_part: None,
             slice: None,
-            held: Held::default(),
-            view: SceneAsked::default(),
+            held: GrabState::default(),
+            view: JsSceneOptions::default(),
             camera: Camera::default(),
             size: Vec2::default(),
             scale: 0.0,
             revision: 0,
-            derived: Derived::default(),
-            on_gpu: OnGpu::default(),
+            derived: DerivedKeys::default(),
+            on_gpu: GpuKeys::default(),
             is_uploading: false,
             is_adding: false,
             is_moved: false,
@@ -172,7 +173,7 @@ impl State {
         &self.editor.document().pose
     }
 
-    /// The controls of a bind; none while there is only a draft of a cage.
+    /// The controls of a bind; `None` if the cage is a draft.
     pub(crate) fn set(&self) -> Option<&ControlSet> {
         self.cage().set.as_ref().ok()
     }
@@ -180,28 +181,28 @@ impl State {
     /// The controls of a bind.
     ///
     /// # Errors
-    /// When there is no cage.
-    pub(crate) fn the_set(&self) -> Answer<&ControlSet> {
+    /// Without a cage, or if it is a draft.
+    pub(crate) fn require_set(&self) -> Answer<&ControlSet> {
         self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
     }
 
-    /// Positions of cage and interior controls at rest, and the cage's faces; or the draft's.
+    /// Positions of cage and interior controls at rest, and faces of the cage or draft.
     pub(crate) fn rest(&self) -> &PolygonMesh {
         &self.cage().mesh
     }
 
-    /// Drops what was derived from another document. Called after each change.
+    /// Drops derived state of an earlier document. Called after each change.
     pub(crate) fn follow_document(&mut self) {
         let document = self.editor.document();
         let (key, models, pose) = (document.key(), self.editor.models_key(), Arc::clone(&document.pose));
-        let Derived { key: before, models: models_before, pose: pose_before } =
-            std::mem::replace(&mut self.derived, Derived { key, models, pose: Arc::clone(&pose) });
+        let DerivedKeys { key: before, models: models_before, pose: pose_before } =
+            std::mem::replace(&mut self.derived, DerivedKeys { key, models, pose: Arc::clone(&pose) });
         if key != before {
             self.revision += 1;
             self.watched = None;
             self.active_part = None;
             (self.slice, self.lattice, self.playing) = (None, None, None);
-            self.held = Held::default();
+            self.held = GrabState::default();
             self.others.clear();
             self.faults = Faults::default();
             self.bound = None;
@@ -220,15 +221,15 @@ impl State {
             self.playing = None;
         }
         if key != before || !Arc::ptr_eq(&pose, &pose_before) {
-            // The gizmo is drawn in the middle of the selection.
+            // The gizmo follows the selection.
             (self.is_moved, self.is_changed) = (true, true);
         }
     }
 
-    /// Whether the result of a job that was started at a revision is still wanted.
+    /// Checks that the result of a job that was started at `revision` is still valid.
     ///
     /// # Errors
-    /// `Cancelled` when mesh or cage have changed since.
+    /// `Cancelled` if mesh or cage have changed since.
     pub(crate) fn require(&self, revision: u32) -> Answer<()> {
         let is_current = self.revision == revision;
         is_current
@@ -241,7 +242,7 @@ impl State {
         self.models().up()
     }
 
-    /// Tells the camera where everything is.
+    /// Sets the bounds that the camera fits.
     pub(crate) fn fit_camera(&mut self) {
         self.place_viewport();
         if let Some(bounds) = self.editor.bounds() {
@@ -249,7 +250,7 @@ impl State {
         }
     }
 
-    /// Tells the camera the size of one picture: a part of the view when several are compared.
+    /// Sets the camera's viewport: the whole view, or one of several pictures side by side.
     pub(crate) fn place_viewport(&mut self) {
         self.camera.set_viewport(Vec2::new(self.part_width(), self.size.y));
     }
@@ -265,17 +266,17 @@ impl State {
         self.size.x / self.shown().len() as f32
     }
 
-    /// A pointer's place in the picture it is over.
+    /// Pointer position relative to the picture under it, CSS pixels.
     pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
         self.pointers().at(x, y)
     }
 
-    /// How pointers of the view become those of one picture.
+    /// Mapping of pointer positions to pictures.
     pub(crate) fn pointers(&self) -> Pointers {
         Pointers { width: self.part_width(), last: self.shown().len() as f32 - 1.0 }
     }
 
-    /// The camera that a model is first seen from, and the size of its picture, pixels.
+    /// Initial camera of a model, and the picture's size, pixels.
     pub(crate) fn view_of(&self, model: &Model) -> (Camera, [u32; 2]) {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
@@ -293,7 +294,7 @@ impl State {
         }
     }
 
-    /// Greys what stays of the model that is painted.
+    /// Updates the grey of the model in paint mode.
     pub(crate) fn show_painting(&mut self) {
         let Some((id, _)) = self.painting else { return };
         let mut stays = vec![0.0; self.models().positions().len()];
@@ -305,7 +306,7 @@ impl State {
         self.is_changed = true;
     }
 
-    /// The cage as panels show it; none without a cage.
+    /// Properties of the cage, for panels; `None` without a cage.
     pub(crate) fn cage_state(&self) -> Option<CageState> {
         (!self.rest().faces.is_empty()).then(|| CageState {
             usable: self.set().is_some(),
@@ -315,12 +316,12 @@ impl State {
         })
     }
 
-    /// What panels show.
+    /// The view that panels show.
     pub(crate) fn document_view(&self) -> View {
         View { document: self.editor.view(), bound: self.bound.is_some() }
     }
 
-    /// Takes weights of the present document.
+    /// Sets the weights of the current document.
     pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
         self.bound = Some(bound);
         self.on_gpu.bound = Some(self.editor.key());
@@ -328,7 +329,7 @@ impl State {
         (self.is_moved, self.is_changed) = (true, true);
     }
 
-    /// The models as they are drawn, as one.
+    /// Draw data of all models, joined.
     pub(crate) fn draw_model(&self) -> Arc<DrawModel> {
         joined(&self.models().iter().filter_map(|member| self.draws.get(&member.id)).collect::<Vec<_>>())
     }
@@ -344,7 +345,7 @@ impl State {
         self.next_upload().is_some()
     }
 
-    /// What is to be uploaded next. Each upload may drop what is uploaded after it.
+    /// The next upload. An upload may invalidate those after it in this order.
     pub(crate) fn next_upload(&self) -> Option<Upload> {
         if self.models().is_empty() {
             return None;
@@ -363,18 +364,18 @@ impl State {
         }
     }
 
-    /// The device holds nothing.
+    /// Marks all data as not uploaded.
     pub(crate) fn forget_gpu(&mut self) {
-        self.on_gpu = OnGpu::default();
+        self.on_gpu = GpuKeys::default();
     }
 
-    /// The GPU holds the mesh of the document, and nothing else.
+    /// Marks only the mesh of the document as uploaded.
     pub(crate) fn has_uploaded_mesh(&mut self) {
         let cage = self.on_gpu.cage;
-        self.on_gpu = OnGpu { mesh: Some(self.editor.key().mesh), cage, ..OnGpu::default() };
+        self.on_gpu = GpuKeys { mesh: Some(self.editor.key().mesh), cage, ..GpuKeys::default() };
     }
 
-    /// Brings moved cage, camera and scene to the GPU.
+    /// Writes cage, camera and scene to the GPU sessions if they have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
@@ -390,7 +391,7 @@ impl State {
             if self.is_moved && self.is_on_gpu() {
                 let editing = self.editor.is_editing_rest();
                 let at_rest = self.view.original || editing;
-                // Closed forms know the plain cage alone.
+                // Closed-form coordinates have no interior controls.
                 let n = session.cage_positions().len();
                 session.pose(if at_rest { &self.rest().positions[..n] } else { &self.pose()[..n] });
                 if editing && !self.view.original {
@@ -406,20 +407,20 @@ impl State {
     }
 }
 
-/// Pictures side by side: their width, CSS pixels, and the index of the last.
+/// Pictures side by side: width of one, CSS pixels, and index of the last.
 pub(crate) struct Pointers {
     width: f32,
     last: f32,
 }
 
 impl Pointers {
-    /// A pointer's place in the picture it is over.
+    /// Pointer position relative to the picture under it, CSS pixels.
     pub(crate) fn at(&self, x: f32, y: f32) -> Vec2 {
         Vec2::new(x - self.width * (x / self.width).floor().clamp(0.0, self.last), y)
     }
 }
 
-/// Models as they are drawn, as one.
+/// Joins the draw data of several models.
 pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
     match draws {
         [only] => Arc::clone(only),
@@ -427,7 +428,7 @@ pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
     }
 }
 
-/// What is uploaded at once.
+/// A unit of upload.
 #[derive(Clone, Copy)]
 pub(crate) enum Upload {
     Mesh,
@@ -443,7 +444,7 @@ mod tests {
 
     use super::*;
 
-    /// A model in a box, of which the GPU holds everything but weights.
+    /// A model in a box; mesh and cage are marked as uploaded, weights are not.
     fn uploaded() -> State {
         let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
         let model = Model::read("a.obj", text, &mut |_| None).unwrap();
@@ -461,7 +462,7 @@ mod tests {
         state.editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
     }
 
-    /// What is uploaded, in order.
+    /// The sequence of uploads.
     fn upload_all(state: &mut State) -> String {
         let mut order = String::new();
         while let Some(next) = state.next_upload() {
@@ -499,7 +500,7 @@ mod tests {
     }
 
     #[test]
-    fn undo_of_a_cage_brings_its_weights_back_without_a_bind() {
+    fn undo_of_a_cage_restores_its_weights_from_the_cache() {
         let mut state = uploaded();
         bind(&mut state);
         let revision = state.revision;
@@ -508,7 +509,7 @@ mod tests {
         state.follow_document();
         assert!(state.bound.is_none() && state.require(revision).is_err());
         assert_eq!(upload_all(&mut state), "c");
-        assert!(state.bound.is_none(), "there are no weights for the new cage");
+        assert!(state.bound.is_none(), "the new cage has no weights");
         assert!(state.editor.undo());
         state.follow_document();
         assert_eq!(upload_all(&mut state), "cw");
@@ -516,7 +517,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_and_poses_keep_weights_and_other_models_do_not() {
+    fn parts_and_poses_keep_weights_but_new_models_drop_them() {
         let mut state = uploaded();
         bind(&mut state);
         let revision = state.revision;
@@ -536,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_device_gets_everything_again() {
+    fn recovery_uploads_everything() {
         let mut state = uploaded();
         bind(&mut state);
         state.forget_gpu();

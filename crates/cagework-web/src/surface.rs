@@ -1,4 +1,4 @@
-//! The canvas as wgpu sees it.
+//! The canvas as a wgpu surface.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -10,59 +10,59 @@ use web_sys::HtmlCanvasElement;
 use crate::clock::now_ms;
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Frames that the GPU may be behind: with one it would wait for us, with more a slow one shows what was long ago.
-const MOST_IN_FLIGHT: u32 = 2;
+/// Maximum number of unfinished frames. With 1, the GPU idles between frames; with more than 2, a slow GPU lags.
+const MAX_IN_FLIGHT: u32 = 2;
 
-/// A frame that takes longer comes from a slow GPU, ms: there a second one behind it only keeps everything else waiting
-/// that is asked of the GPU, the weights of a bind first of all.
+/// Frame time above which a GPU counts as slow, ms. A slow GPU gets one frame at a time, because queued frames delay other
+/// work such as binds.
 const SLOW_MS: f64 = 50.0;
 
-/// Sides of a rough picture are so many times shorter: a quarter of the pixels.
-const ROUGH: u32 = 2;
+/// A rough frame has the canvas's width and height divided by this: a quarter of the pixels.
+const ROUGH_DIVISOR: u32 = 2;
 
-/// How much longer a sharp picture may take than a rough one, at least: what is slow stays so until a rough one is this much
-/// faster than [`SLOW_MS`], or a sharp one is fast.
-const SHARP_COSTS: f64 = 2.0;
+/// Assumed lower bound of the time ratio of sharp to rough frames. A slow GPU stays slow until a rough frame takes less
+/// than [`SLOW_MS`] over this ratio, or a sharp frame takes less than [`SLOW_MS`].
+const SHARP_COST_RATIO: f64 = 2.0;
 
-/// Side of a target that nobody sees, pixels.
-pub(crate) const SMALL: u32 = 16;
+/// Side of the offscreen target for warming up, pixels.
+pub(crate) const SMALL_SIDE: u32 = 16;
 
-/// A canvas that is drawn into.
+/// A canvas, and the textures that are drawn before they are copied to it.
 pub(crate) struct Surface {
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
-    /// Format that is drawn in: the canvas's, with sRGB encoding.
+    /// Render format: that of the canvas, with sRGB encoding.
     format: wgpu::TextureFormat,
-    /// What is drawn into and then copied to the canvas: the whole picture, or parts side by side.
+    /// Render targets that are copied to the canvas: the whole picture, or parts side by side.
     ///
-    /// Not the canvas itself seen as sRGB: SwiftShader forgets to encode where multisampling resolves into such a view
-    /// (a clear of 0.2 arrives as 51, not 124).
+    /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves into
+    /// such a view: a clear of 0.2 gives 51 instead of 124.
     parts: Vec<wgpu::Texture>,
-    /// Draws the parts where they cannot be copied.
+    /// Draws the parts if the canvas does not support copies.
     painter: Option<PartPainter>,
-    /// Frames that were handed to the GPU and are not finished.
+    /// Number of submitted frames that are not finished.
     in_flight: Arc<AtomicU32>,
-    /// Whether a sharp one takes longer than [`SLOW_MS`].
+    /// Whether a sharp frame takes longer than [`SLOW_MS`].
     is_slow: Arc<AtomicBool>,
 }
 
-/// How a picture is asked for.
+/// Resolution of a requested frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
-    /// Soon: a slow GPU draws fewer pixels, which the browser enlarges.
+pub(crate) enum FrameQuality {
+    /// Reduced on a slow GPU; the browser scales the canvas up.
     Soon,
-    /// With all pixels, however long it takes.
+    /// Full, also on a slow GPU.
     Sharp,
 }
 
-/// What became of it.
+/// Result of drawing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Drawn {
-    /// The canvas could not be drawn into now.
+pub(crate) enum FrameOutcome {
+    /// Skipped: the canvas is unavailable, or too many frames are unfinished.
     NotNow,
-    /// With fewer pixels than the canvas has.
+    /// Drawn at reduced resolution.
     Roughly,
-    /// As it should be.
+    /// Drawn at full resolution.
     Sharply,
 }
 
@@ -70,7 +70,7 @@ impl Surface {
     /// Opens a GPU that can draw into the canvas.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`, or that the canvas belongs to something else.
+    /// `NoAdapter`, `NoDevice`; `Canvas` if the GPU cannot draw into the canvas.
     pub(crate) async fn open(canvas: HtmlCanvasElement) -> Answer<(Self, GpuContext)> {
         let size = [canvas.width().max(1), canvas.height().max(1)];
         let instance = device::instance();
@@ -92,7 +92,7 @@ impl Surface {
             .ok_or_else(|| Fault::new(ErrorName::Canvas, "this GPU cannot draw into a canvas"))?;
         let format = config.format.add_srgb_suffix();
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
-        // WebGL2's canvas takes no copies, but encodes as it should.
+        // A WebGL2 canvas does not support copies, but encodes sRGB correctly.
         let painter = context.draws_only().then(|| PartPainter::new(&context, format));
         if painter.is_some() {
             config.format = format;
@@ -105,7 +105,7 @@ impl Surface {
         Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
     }
 
-    /// Gives the canvas another size, pixels.
+    /// Resizes the canvas, pixels.
     fn resize(&mut self, context: &GpuContext, [width, height]: [u32; 2]) {
         let most = context.device.limits().max_texture_dimension_2d;
         let size = [width.clamp(1, most), height.clamp(1, most)];
@@ -117,28 +117,32 @@ impl Surface {
         self.surface.configure(&context.device, &self.config);
     }
 
-    /// Draws sessions side by side, at least one, into `size` pixels, `scale` for each of CSS, or fewer, and shows the picture.
+    /// Draws sessions side by side and presents the frame. `size`: pixels; `scale`: pixels per CSS pixel. A slow GPU may use
+    /// fewer pixels.
     ///
     /// # Errors
-    /// The GPU was lost or refused something.
+    /// If the GPU device is lost or returned an error.
     pub(crate) fn draw(
         &mut self,
         mut sessions: Vec<&mut Session>,
         size: [u32; 2],
         scale: f32,
-        wanted: Wanted,
-    ) -> Answer<Drawn> {
+        wanted: FrameQuality,
+    ) -> Answer<FrameOutcome> {
         let Some(context) = sessions.first().map(|session| session.context().clone()) else {
-            return Ok(Drawn::NotNow);
+            return Ok(FrameOutcome::NotNow);
         };
         context.check()?;
         let is_slow = self.is_slow.load(Ordering::Relaxed);
-        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MOST_IN_FLIGHT } {
-            return Ok(Drawn::NotNow);
+        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MAX_IN_FLIGHT } {
+            return Ok(FrameOutcome::NotNow);
         }
-        let is_rough = is_slow && wanted == Wanted::Soon;
-        let (size, scale) =
-            if is_rough { (size.map(|n| n.div_ceil(ROUGH)), scale / ROUGH as f32) } else { (size, scale) };
+        let is_rough = is_slow && wanted == FrameQuality::Soon;
+        let (size, scale) = if is_rough {
+            (size.map(|n| n.div_ceil(ROUGH_DIVISOR)), scale / ROUGH_DIVISOR as f32)
+        } else {
+            (size, scale)
+        };
         self.resize(&context, size);
         let frame = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(frame) | wgpu::CurrentSurfaceTexture::Suboptimal(frame) => {
@@ -146,11 +150,11 @@ impl Surface {
             }
             wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
                 self.surface.configure(&context.device, &self.config);
-                return Ok(Drawn::NotNow);
+                return Ok(FrameOutcome::NotNow);
             }
             wgpu::CurrentSurfaceTexture::Timeout
             | wgpu::CurrentSurfaceTexture::Occluded
-            | wgpu::CurrentSurfaceTexture::Validation => return Ok(Drawn::NotNow),
+            | wgpu::CurrentSurfaceTexture::Validation => return Ok(FrameOutcome::NotNow),
         };
         let [width, height] = [self.config.width, self.config.height];
         sessions.truncate(width as usize);
@@ -170,20 +174,20 @@ impl Surface {
         let began = now_ms();
         context.queue.on_submitted_work_done(move || {
             in_flight.fetch_sub(1, Ordering::Relaxed);
-            let sharp_ms = (now_ms() - began) * if is_rough { SHARP_COSTS } else { 1.0 };
+            let sharp_ms = (now_ms() - began) * if is_rough { SHARP_COST_RATIO } else { 1.0 };
             is_slow.store(sharp_ms > SLOW_MS, Ordering::Relaxed);
         });
         context.queue.present(frame);
-        Ok(if is_rough { Drawn::Roughly } else { Drawn::Sharply })
+        Ok(if is_rough { FrameOutcome::Roughly } else { FrameOutcome::Sharply })
     }
 
-    /// Brings the parts to the canvas. Columns between them that no part has stay clear: the dividers.
+    /// Copies the parts to the canvas. Columns between them stay transparent, as dividers.
     fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
         let between = (self.parts.len() as u32 - 1).max(1);
         let left = |k: u32, part: &wgpu::Texture| k * (self.config.width - part.width()) / between;
         let parts: Vec<_> = (0u32..).zip(&self.parts).map(|(k, part)| (left(k, part), part)).collect();
         let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        // Asked of the device as well, which a compiler knows the answer of: the other artifact has no use for this.
+        // `draws_only` is constant per build, so that the WebGPU build does not contain the painter.
         if let Some(painter) = self.painter.as_ref().filter(|_| context.draws_only()) {
             let view = canvas.create_view(&wgpu::TextureViewDescriptor::default());
             painter.paint(context, &mut encoder, &view, &parts);
@@ -197,16 +201,16 @@ impl Surface {
         context.queue.submit([encoder.finish()]);
     }
 
-    /// Gives the parts' memory back now, not when JavaScript collects garbage: sizes change with every pause.
+    /// Frees the textures immediately instead of at the next garbage collection, because sizes change often.
     fn drop_parts(&mut self) {
         for part in self.parts.drain(..) {
             part.destroy();
         }
     }
 
-    /// A target like those that are drawn into, of few pixels, and its format.
+    /// A small render target, and its format.
     pub(crate) fn small_target(&self, context: &GpuContext) -> (wgpu::Texture, wgpu::TextureFormat) {
-        (self.make_part(context, [SMALL; 2]), self.format)
+        (self.make_part(context, [SMALL_SIDE; 2]), self.format)
     }
 
     fn make_part(&self, context: &GpuContext, [width, height]: [u32; 2]) -> wgpu::Texture {

@@ -1,4 +1,4 @@
-//! What JavaScript is told about things, as plain objects: the types of contract.ts.
+//! Plain objects passed to JavaScript: the types of contract.ts.
 
 use cagework_cage::check::{Code, Repair, Severity};
 use cagework_core::cage::CageNotice;
@@ -22,7 +22,7 @@ pub(crate) struct BoundsView {
 }
 
 impl BoundsView {
-    /// Of points that may be none.
+    /// Converts bounds; `None` becomes zero.
     pub(crate) fn of(bounds: Option<Bounds>) -> Self {
         let zero = [0.0; 3];
         bounds
@@ -30,41 +30,41 @@ impl BoundsView {
     }
 }
 
-/// Where the camera is.
+/// Position and direction of the camera.
 #[derive(Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CameraView {
-    /// What it turns around, object units.
+    /// Centre of orbiting, object units.
     pub(crate) target: [f32; 3],
-    /// Turn around y and height above the horizon, radians.
+    /// Rotation about y, and elevation above the horizon, radians.
     pub(crate) yaw: f32,
     pub(crate) pitch: f32,
-    /// From the eye to the target, object units.
+    /// Distance from the eye to the target, object units.
     pub(crate) distance: f32,
     pub(crate) parallel: bool,
 }
 
-/// How a point of the model follows the cage.
+/// Weights and nearest vertex of a surface point.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Grip {
-    /// Its weights. `[n_cage]`
+    /// Weights of the point. `[n_cage]`
     pub(crate) row: Vec<f64>,
     /// The nearest vertex of the model.
     pub(crate) seed: u32,
 }
 
-/// What panels show.
+/// Document and bind state that panels show.
 #[derive(Default, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct View {
     #[serde(flatten)]
     pub(crate) document: DocumentView,
-    /// Whether the models follow the cage: there are weights for both as they are.
+    /// Whether the models are bound to the current cage.
     pub(crate) bound: bool,
 }
 
-/// `ModelInfo`.
+/// Properties of the models in the cage.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -80,21 +80,21 @@ pub(crate) struct ModelInfo {
     skins: usize,
     joints: usize,
     clips: Vec<ClipView>,
-    /// Morph targets of all that is shown, and their weights at rest.
+    /// Morph targets of all models, and their weights at rest.
     targets: Vec<TargetView>,
-    /// Names of what hangs on the skeleton without a skin: it can be kept rigid.
+    /// Names of unskinned parts attached to joints or animated nodes; they can be kept rigid.
     props: Vec<String>,
-    /// Whether exports keep more than the shape.
+    /// Whether exports keep a rig.
     rigged: bool,
     bounds: BoundsView,
     notices: Vec<String>,
-    /// Each of the models in the cage; all else is of all of them.
+    /// Properties of each model.
     members: Vec<MemberInfo>,
 }
 
 impl ModelInfo {
     /// # Errors
-    /// When there is no model.
+    /// If no model is open.
     pub(crate) fn of(models: &Models) -> Answer<Self> {
         let first = &*models.first()?.model;
         let all = || models.iter().map(|member| &*member.model);
@@ -113,7 +113,7 @@ impl ModelInfo {
             joints: sum(|model| model.counts.joints),
             clips: SharedClip::all(models).into_iter().map(ClipView::of).collect(),
             targets: TargetView::all(models),
-            // What is wrong with a rig is said where it is used.
+            // Errors of a rig are reported when it is used.
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
             bounds: BoundsView::of(Bounds::of(models.positions())),
@@ -127,17 +127,17 @@ impl ModelInfo {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct MemberInfo {
-    /// Its number, which stays.
+    /// Identifier; never changes.
     id: u32,
     name: String,
     format: ModelFormat,
     vertices: usize,
     triangles: usize,
     rigged: bool,
-    /// Names of its parts, each with its kind: "material:Cloth".
+    /// Names of the parts with their kinds, such as `material:Cloth`.
     parts: Vec<String>,
     options: PartOptions,
-    /// Whether some of it is painted to stay.
+    /// Whether a part of the model is painted to stay in place.
     painted: bool,
 }
 
@@ -162,7 +162,7 @@ impl MemberInfo {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ClipView {
-    /// Its name, or its number if it has none.
+    /// The name, or the number if it has none.
     name: String,
     seconds: f32,
 }
@@ -202,14 +202,14 @@ impl TargetView {
     }
 }
 
-/// `CageInfo`.
+/// Size of the cage.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageInfo {
     vertices: usize,
     edges: usize,
     faces: usize,
-    /// Quads among the faces.
+    /// Number of quads among the faces.
     quads: usize,
     triangles: usize,
     bounds: BoundsView,
@@ -233,30 +233,30 @@ impl CageInfo {
     }
 }
 
-/// `CageState`.
+/// The cage, its controls and notices.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageState {
     pub(crate) usable: bool,
     pub(crate) info: CageInfo,
     pub(crate) controls: CageControls,
-    /// Radius of points and lines inside, object units.
+    /// Radius of interior points and lines, object units.
     pub(crate) radius: f32,
 }
 
-/// A kind of fault, as the page says it.
+/// A kind of fault of a cage.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Problem {
     pub(crate) code: Code,
     pub(crate) severity: Severity,
-    /// A whole sentence with numbers.
+    /// A complete sentence.
     pub(crate) message: String,
     pub(crate) count: usize,
     pub(crate) fix: Option<Fix>,
 }
 
-/// What helps, and what its button says.
+/// A fix, and the label of its button.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Fix {
@@ -265,20 +265,20 @@ pub(crate) struct Fix {
     pub(crate) mend: Mend,
 }
 
-/// What a button beside a problem does.
+/// Action of a fix.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) enum Mend {
     /// Repairs the cage.
     Repair { repair: Repair },
-    /// Binds with so many cells.
+    /// Binds with a grid of `cells` along the longest side.
     Grid { cells: u32 },
     /// Makes another cage.
     Regenerate,
 }
 
-/// `Legend`.
+/// Legend of the colours of model or slice.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Legend {
@@ -286,11 +286,11 @@ pub(crate) struct Legend {
     pub(crate) high: f32,
     pub(crate) logarithmic: bool,
     pub(crate) map: ColorMap,
-    /// Of the weights that the model's colours show; none for other colours.
+    /// Largest of the displayed weights; `None` for other quantities.
     pub(crate) largest: Option<Largest>,
 }
 
-/// The largest value that colours show, and the vertex of the model that has it.
+/// The largest displayed value, and the model vertex that has it.
 #[derive(Clone, Copy, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Largest {
@@ -298,7 +298,7 @@ pub(crate) struct Largest {
     pub(crate) vertex: u32,
 }
 
-/// How colours of a legend follow each other.
+/// Colour map of a legend.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -308,7 +308,7 @@ pub(crate) enum ColorMap {
     Kinds,
 }
 
-/// A plain object of JavaScript; what is not there is null.
+/// Converts a value to a plain JavaScript object; `None` becomes null.
 pub(crate) fn object(value: &impl Serialize) -> Answer<JsValue> {
     let serializer = serde_wasm_bindgen::Serializer::json_compatible();
     Ok(value.serialize(&serializer)?)

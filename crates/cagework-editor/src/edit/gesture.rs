@@ -6,7 +6,7 @@ use cagework_core::view::View;
 
 use super::pull::Pull;
 
-/// Sine of the angle between view and plane below which the view plane is used instead: a pixel would move too far.
+/// Sine of the angle between view and plane below which the view plane is used instead: near edge-on, a pixel would move too far.
 const MIN_PLANE_SINE: f32 = 0.05;
 
 /// Minimum start distance of a scale gesture from the centre, pixels: below, a pixel would change the factor too much.
@@ -196,7 +196,7 @@ impl Gesture {
         if from == Vec2::ZERO || to == Vec2::ZERO {
             return (axis, 0.0);
         }
-        // Pixels run down, so a counter-clockwise turn has a negative angle.
+        // The pixel y axis points down, so a counter-clockwise turn has a negative angle.
         let seen = -from.angle_to(to);
         // About an axis that points away from the eye, the turn appears reversed.
         (axis, if axis.dot(backward) < 0.0 { -seen } else { seen })

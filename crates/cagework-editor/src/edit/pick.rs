@@ -85,7 +85,7 @@ fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View
     topology.faces.iter().filter(|face| face.contains(&vertex)).any(|face| {
         let pixels: Option<Vec<Vec2>> =
             face.iter().map(|&i| view.project(positions[i as usize]).map(|(pixel, _)| pixel)).collect();
-        // Pixels run down, so a counter-clockwise outline has a negative area.
+        // The pixel y axis points down, so a counter-clockwise outline has a negative area.
         pixels.is_none_or(|pixels| {
             let next = pixels.iter().cycle().skip(1);
             pixels.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() < 0.0

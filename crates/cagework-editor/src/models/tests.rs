@@ -1,8 +1,8 @@
-//! Models that come and go.
+//! Adding and removing models.
 
 use super::*;
 
-/// A tetrahedron `at` a place, of a material each for its first two triangles and the rest.
+/// A tetrahedron translated by `at` along x, with one material on two triangles and another on the rest.
 fn model(name: &str, at: f32) -> Model {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut text = String::new();
@@ -23,7 +23,7 @@ fn three() -> Models {
     models
 }
 
-/// A model as a project that kept it brings it.
+/// A model with its settings, as read from a project.
 fn again((member, settings): (&Member, &MemberSettings)) -> NewModel {
     ((*member.model).clone(), Some(settings.clone()))
 }
@@ -33,7 +33,7 @@ fn names(models: &Models) -> Vec<&str> {
 }
 
 #[test]
-fn points_of_the_surface_mean_the_same_triangle_whatever_comes_and_goes() {
+fn surface_points_keep_their_triangle_when_models_change() {
     let mut models = three();
     let of_hat = 7;
     let at = |models: &Models| models.corners(of_hat).map(|c| c.map(|v| models.positions()[v as usize]));
@@ -43,7 +43,7 @@ fn points_of_the_surface_mean_the_same_triangle_whatever_comes_and_goes() {
     assert_eq!(at(&models).unwrap(), before);
     assert_eq!(models.number_of(4), of_hat, "the hat's second triangle is the fifth of the mesh now");
     assert_eq!(models.corners(4), None, "the shirt is not in the cage");
-    // A project has only what is in the cage; its points are counted as they were.
+    // A project stores only the models in the cage, with their triangle numbers.
     models.remove(0).unwrap();
     let saved = models.settings();
     let mut opened = Models::default();
@@ -52,7 +52,7 @@ fn points_of_the_surface_mean_the_same_triangle_whatever_comes_and_goes() {
 }
 
 #[test]
-fn the_last_model_stays() {
+fn the_last_model_cannot_be_removed() {
     let mut models = three();
     models.remove(0).unwrap();
     models.remove(2).unwrap();
@@ -79,7 +79,7 @@ fn models_in_one_cage_have_the_origin_of_the_first() {
     let origin = models.origin();
     assert_eq!(models.positions()[3].as_dvec3().x + origin.x, 4.6e6 + 0.25);
     models.remove(0).unwrap();
-    assert_eq!(models.origin(), origin, "the cage stays where it is");
+    assert_eq!(models.origin(), origin, "the cage keeps its place");
     assert!(models.origin_notice().unwrap().contains("seen from 4500000.5, 0, 0"));
 }
 
@@ -95,27 +95,27 @@ fn parts_are_named_painted_and_kept_in_settings() {
     models.set_options(0, options(&[], &["material:skin"])).unwrap();
     models.set_options(1, options(&["all"], &[])).unwrap();
     let error = models.set_options(2, options(&["material:gold"], &[])).unwrap_err();
-    assert!(error.to_string().contains("material:skin"), "it names what there is: {error}");
+    assert!(error.to_string().contains("material:skin"), "the error lists the parts: {error}");
     assert_eq!(models.get(2).unwrap().options, PartOptions::default());
     models.set_painted(2, vec![0, 255, 255, 51]).unwrap();
     assert!(models.set_painted(2, vec![1; 3]).is_err());
     let expected = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.2];
     let parts = models.parts();
     assert_eq!((parts.stays.as_slice(), &parts.rigid), (&expected[..], &vec![vec![4, 5, 6, 7]]));
-    // Through JSON, as a project keeps them.
+    // Through JSON, as in a project.
     let text = serde_json::to_string(&models.settings()).unwrap();
     let saved: Vec<MemberSettings> = serde_json::from_str(&text).unwrap();
     let mut opened = Models::default();
     opened.add(models.iter().zip(&saved).map(again));
     assert_eq!(opened.parts(), parts);
     assert_eq!(opened.settings(), saved);
-    // What another program wrote is left out as far as it does not fit.
+    // Settings that do not fit the model are ignored.
     let odd =
         r#"{"first_triangle": 4294967295, "options": {"rigid": ["nobody"]}, "painted": [[255, 4000000000]]}"#;
     let mut other = Models::default();
     let odd: MemberSettings = serde_json::from_str(odd).unwrap();
     other.add([(model("a.obj", 0.0), Some(odd.clone()))]);
-    // A second one once ended in a panic: it is counted on from the first.
+    // A second model with the same settings must not overflow the triangle numbers.
     other.add([(model("b.obj", 0.0), Some(odd.clone()))]);
     assert!(other.parts().is_empty());
     assert_eq!(other.settings().len(), 2);
@@ -123,7 +123,7 @@ fn parts_are_named_painted_and_kept_in_settings() {
 }
 
 #[test]
-fn one_model_has_nothing_to_keep() {
+fn a_single_default_model_stores_no_settings() {
     let mut models = Models::default();
     models.add([(model("a.obj", 0.0), None)]);
     assert_eq!(models.settings(), Vec::new());

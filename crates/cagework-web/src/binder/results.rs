@@ -1,4 +1,4 @@
-//! What the worker sends to the page, an array each.
+//! Results of the worker, read by JavaScript one array at a time.
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::{Frames, PolygonMesh, Weights};
@@ -11,17 +11,17 @@ use crate::arrays::{corners, flat};
 use crate::views::object;
 use cagework_editor::CageControls;
 
-/// Offsets of a bind: what weights of controls alone miss.
+/// Offsets of a bind: the frames, whose columns follow those of the controls, and the points outside the cage.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Offsets {
-    /// The columns of the weights after those of the controls.
+    /// Frames; their columns follow those of the controls.
     pub(crate) frames: Frames,
     /// Points outside the cage.
     pub(crate) outside: Vec<OutsideVertex>,
 }
 
-/// Weights on their way to the page: compressed sparse rows, and the columns of offsets.
+/// Weights as compressed sparse rows, with the frames of the columns after the controls.
 #[wasm_bindgen]
 pub struct Bound {
     pub(super) weights: Weights,
@@ -29,15 +29,15 @@ pub struct Bound {
     pub(super) report: JsValue,
 }
 
-/// A mesh of polygons on its way to the page.
+/// A polygon mesh; for generated cages with the generator's report.
 #[wasm_bindgen]
 pub struct Polygons {
     pub(crate) mesh: PolygonMesh,
-    /// Separate parts of the model that one made cage joins; 0 if there is one, or no cage was made.
+    /// Number of separate parts of the model that a generated cage joins; 0 if it joins none.
     pub(crate) bridged: u32,
-    /// Gaps of the model that a made cage closes, and what would keep each open.
+    /// Notices of the generator: gaps of the model that the cage closes, and how to keep each open.
     pub(crate) notices: Vec<String>,
-    /// A project's.
+    /// Subdivision and interior controls of a project's cage.
     pub(crate) controls: Option<CageControls>,
 }
 
@@ -47,7 +47,7 @@ impl From<PolygonMesh> for Polygons {
     }
 }
 
-/// A built sample.
+/// A built-in sample: model, cage and poses.
 #[wasm_bindgen]
 pub struct BuiltSample {
     pub(super) glb: Vec<u8>,
@@ -79,7 +79,7 @@ impl Bound {
         self.weights.data().to_vec()
     }
 
-    /// The frames after the controls, and the points outside the cage.
+    /// The frames, whose columns follow those of the controls, and the points outside the cage.
     ///
     /// # Errors
     /// Never.
@@ -112,7 +112,8 @@ impl Polygons {
         corners(&self.mesh.faces)
     }
 
-    /// A project's controls, whose positions stand at the end; undefined for others.
+    /// Subdivision and interior controls of a project's cage, whose positions follow the vertices; undefined for other
+    /// meshes.
     ///
     /// # Errors
     /// Never.
@@ -121,14 +122,14 @@ impl Polygons {
         Ok(self.controls.as_ref().map_or(Ok(JsValue::UNDEFINED), object)?)
     }
 
-    /// Separate parts of the model that a made cage joins; 0 if none are joined.
+    /// Number of separate parts of the model that a generated cage joins; 0 if it joins none.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn bridged(&self) -> u32 {
         self.bridged
     }
 
-    /// Gaps of the model that a made cage closes, and what would keep each open: a sentence each.
+    /// Notices of the generator, a sentence each: gaps of the model that the cage closes, and how to keep each open.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
@@ -152,7 +153,7 @@ impl BuiltSample {
         flat(&self.positions)
     }
 
-    /// Its cage.
+    /// The cage of the sample.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Polygons {
@@ -166,7 +167,7 @@ impl BuiltSample {
         self.poses.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// Cage positions of one of them. `[n_cage, 3]`
+    /// Cage positions of the pose at `index`. `[n_cage, 3]`
     #[wasm_bindgen(js_name = posePositions)]
     #[must_use]
     pub fn pose_positions(&self, index: usize) -> Vec<f32> {

@@ -1,4 +1,4 @@
-//! The cage: made, read, edited at rest, posed.
+//! Methods for the cage: create, read, edit at rest, pose.
 
 use cagework_core::bind::estimate_memory;
 use cagework_core::subdivided_box;
@@ -12,18 +12,18 @@ use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::binder::Polygons;
 use crate::controls;
 use crate::error::{Answer, Fault};
-use crate::options::{BindAsked, taken};
+use crate::options::{JsBindOptions, decode};
 use crate::views::object;
 
-/// Room between the model and a box around it, in diagonals of the model.
+/// Distance between the model and a box cage, over the model's diagonal.
 const BOX_MARGIN: f32 = 0.04;
 
 #[wasm_bindgen]
 impl Engine {
-    /// A box around the model, its longest side cut into `divisions`, the others to match.
+    /// A box around the model. Its longest side has `divisions` segments, the others proportionally many.
     ///
     /// # Errors
-    /// When no model is open.
+    /// If no model is open.
     #[wasm_bindgen(js_name = boxCage)]
     pub fn box_cage(&self, divisions: u32) -> Result<Polygons, JsValue> {
         let mesh = self.read(|state| {
@@ -36,12 +36,12 @@ impl Engine {
         Ok(mesh.into())
     }
 
-    /// Takes a cage given as arrays; `corners`: for each face their number, then them. A mesh that is no cage yet becomes a draft, whose
-    /// faults `Binder.checkCage` finds. Without `controls` the present ones stay as far as they fit. One step of the history, or none
-    /// without a label.
+    /// Replaces the cage. `corners`: for each face its corner count, then its corners. A mesh that is not a valid cage is
+    /// kept as a draft; `Binder.checkCage` finds its faults. Without `controls`, the current ones that fit are kept. With a
+    /// label, adds a step to the history.
     ///
     /// # Errors
-    /// When the arrays are no mesh, or the controls do not fit; nothing changes then.
+    /// If the arrays are not a polygon mesh, or the controls do not fit. Nothing changes then.
     #[wasm_bindgen(js_name = setCage, unchecked_return_type = "CageState")]
     pub fn set_cage(
         &self,
@@ -60,7 +60,7 @@ impl Engine {
         self.cage_state()
     }
 
-    /// The cage; undefined without one.
+    /// The cage as panels show it; undefined without a cage.
     ///
     /// # Errors
     /// Never.
@@ -69,30 +69,30 @@ impl Engine {
         Ok(self.read(|state| state.cage_state().map_or(Ok(JsValue::UNDEFINED), |shown| object(&shown)))?)
     }
 
-    /// Changes the document as a command says: one step of the history, or with the next step without a label.
+    /// Applies a command to the document. With a label, adds a step to the history; otherwise the next step includes it.
     ///
     /// # Errors
-    /// When the command cannot be applied; nothing changes then.
+    /// If the command cannot be applied. Nothing changes then.
     pub fn apply(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Command")] command: JsValue,
         label: Option<String>,
     ) -> Result<(), JsValue> {
-        Ok(self.step(taken(command)?, label)?)
+        Ok(self.step(decode(command)?, label)?)
     }
 
-    /// Makes one step of the history of everything since the last step; false if nothing has changed.
+    /// Adds a step to the history with all changes since the last step; false if nothing has changed.
     #[must_use]
     pub fn commit(&self, label: &str) -> bool {
         self.change(|state| state.editor.commit(label))
     }
 
-    /// Keeps everything since the last step without making a step of it.
+    /// Adds all changes since the last step to that step.
     pub fn amend(&self) {
         self.change(|state| state.editor.amend());
     }
 
-    /// Takes back everything since the last step.
+    /// Reverts all changes since the last step.
     pub fn revert(&self) {
         self.change(|state| {
             state.editor.revert();
@@ -101,53 +101,53 @@ impl Engine {
         });
     }
 
-    /// Takes back the last step; false if there is none, or while models are added.
+    /// Undoes the last step; false if the history is empty, or while models are being added.
     #[must_use]
     pub fn undo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.undo())
     }
 
-    /// Repeats the step that was taken back last; false if there is none, or while models are added.
+    /// Redoes the step that was undone last; false if nothing was undone, or while models are being added.
     #[must_use]
     pub fn redo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.redo())
     }
 
-    /// Drops all steps.
+    /// Clears the history.
     #[wasm_bindgen(js_name = clearHistory)]
     pub fn clear_history(&self) {
         self.change(|state| state.editor.clear_history());
     }
 
-    /// For each face of the cage the number of its corners, then them.
+    /// For each face of the cage its corner count, then its corners.
     #[wasm_bindgen(js_name = cageCorners)]
     #[must_use]
     pub fn cage_corners(&self) -> Vec<u32> {
         self.read(|state| corners(&state.rest().faces))
     }
 
-    /// Cage vertices and controls inside at rest. `[n_controls, 3]`
+    /// Cage vertices and interior controls at rest. `[n_controls, 3]`
     #[wasm_bindgen(js_name = restPositions)]
     #[must_use]
     pub fn rest_positions(&self) -> Vec<f32> {
         self.read(|state| flat(&state.rest().positions))
     }
 
-    /// Cage vertices and controls inside of the moment. `[n_controls, 3]`
+    /// Current positions of cage vertices and interior controls. `[n_controls, 3]`
     #[wasm_bindgen(js_name = cagePositions)]
     #[must_use]
     pub fn cage_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.pose()))
     }
 
-    /// Moves the cage; the model follows. Positions of another cage change nothing.
+    /// Sets the pose. Positions of another cage are ignored.
     #[wasm_bindgen(js_name = setCagePositions)]
     pub fn set_cage_positions(&self, positions: &[f32]) {
-        // A job of another cage may end late.
+        // A job that was started for an earlier cage may finish after a change.
         let _ = self.change(|state| state.editor.set_pose(points(positions)));
     }
 
-    /// The pose, then each saved pose that belongs to the cage: what is carried over to another cage. `[n_poses, n_controls, 3]`
+    /// The current pose and each saved pose of this cage, for `Binder.carryPoses`. `[n_poses, n_controls, 3]`
     #[must_use]
     pub fn carriable(&self) -> Vec<f32> {
         self.read(|state| {
@@ -157,7 +157,7 @@ impl Engine {
         })
     }
 
-    /// Starts or ends reshaping the cage. A pose that this takes back is one step of the history.
+    /// Starts or ends reshaping the cage. If this resets a pose, it adds a step to the history.
     #[wasm_bindgen(js_name = setEditingRest)]
     pub fn set_editing_rest(&self, editing: bool, label: &str) {
         self.change(|state| {
@@ -169,29 +169,29 @@ impl Engine {
         });
     }
 
-    /// Bytes that a bind would need.
+    /// Estimated memory of a bind, bytes.
     ///
     /// # Errors
-    /// When there is no cage or an option is out of range.
+    /// Without a cage, or if an option is out of range.
     #[wasm_bindgen(js_name = estimateMemory)]
     pub fn estimate_memory(
         &self,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
     ) -> Result<f64, JsValue> {
-        let asked: BindAsked = taken(options)?;
+        let request: JsBindOptions = decode(options)?;
         if self.read(|state| state.n_rig.is_none()) {
             let n = self.read(|state| Answer::Ok(state.models().extra_points()?.len()))?;
             self.state.borrow_mut().n_rig = Some(n);
         }
         let bytes = self.read(|state| {
-            let set = state.the_set()?;
+            let set = state.require_set()?;
             let n = state.models().positions().len() + state.n_rig.unwrap_or(0);
-            Answer::Ok(estimate_memory(set, n, &asked.into())?)
+            Answer::Ok(estimate_memory(set, n, &request.into())?)
         })?;
         Ok(bytes as f64)
     }
 
-    /// The pose of the moment in few bytes, in the axes of the model's file.
+    /// Compact encoding of the current pose, in the axes of the model's file.
     #[wasm_bindgen(js_name = encodePose)]
     #[must_use]
     pub fn encode_pose(&self) -> Vec<u8> {
@@ -201,10 +201,10 @@ impl Engine {
         })
     }
 
-    /// Takes a pose from `encodePose`.
+    /// Sets the pose from the bytes of `encodePose`.
     ///
     /// # Errors
-    /// When it is damaged or belongs to another cage.
+    /// If the bytes are damaged or belong to another cage.
     #[wasm_bindgen(js_name = decodePose)]
     pub fn decode_pose(&self, bytes: &[u8]) -> Result<(), JsValue> {
         let pose = self.read(|state| decode_pose(&state.up().turned_back(&state.rest().positions), bytes));
@@ -215,7 +215,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// Applies a command; one step of the history with a label.
+    /// Applies a command; with a label, adds a step to the history.
     pub(super) fn step(&self, command: Command, label: Option<String>) -> Answer<()> {
         self.change(|state| {
             state.editor.apply(command)?;

@@ -1,4 +1,4 @@
-//! Looking around.
+//! Methods for the camera.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -10,15 +10,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::{ErrorName, Fault};
-use crate::options::taken;
+use crate::options::decode;
 use crate::views::{CameraView, object};
 
-/// Pixels of a whole turn: half a turn across half a screen.
+/// Drag distance of a whole turn, CSS pixels: half the width of a typical screen is half a turn.
 const PIXELS_PER_TURN: f32 = 900.0;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Where the camera is.
+    /// The camera's position and direction.
     ///
     /// # Errors
     /// Never.
@@ -34,21 +34,21 @@ impl Engine {
         })?)
     }
 
-    /// Puts the camera there.
+    /// Sets the camera.
     ///
     /// # Errors
-    /// When it is no such place.
+    /// If a number is not finite or out of range.
     #[wasm_bindgen(js_name = setCamera)]
     pub fn set_camera(
         &self,
         #[wasm_bindgen(unchecked_param_type = "CameraView")] view: JsValue,
     ) -> Result<(), JsValue> {
-        let view: CameraView = taken(view)?;
+        let view: CameraView = decode(view)?;
         let is_finite =
             Vec3::from(view.target).is_finite() && view.yaw.is_finite() && view.distance.is_finite();
         let is_view = is_finite && view.pitch.abs() <= FRAC_PI_2 && view.distance > 0.0;
         if !is_view {
-            return Err(Fault::new(ErrorName::Error, "the view of the link is no place to look from").into());
+            return Err(Fault::new(ErrorName::Error, "the camera of this link is invalid").into());
         }
         self.change(|state| {
             let camera = &mut state.camera;
@@ -60,17 +60,17 @@ impl Engine {
         Ok(())
     }
 
-    /// Turns the camera, CSS pixels.
+    /// Orbits the camera by a pointer movement, CSS pixels.
     pub fn orbit(&self, dx: f32, dy: f32) {
         self.change(|state| state.camera.orbit(Vec2::new(dx, dy) * (TAU / PIXELS_PER_TURN)));
     }
 
-    /// Moves the camera, CSS pixels.
+    /// Pans the camera by a pointer movement, CSS pixels.
     pub fn pan(&self, dx: f32, dy: f32) {
         self.change(|state| state.camera.pan(Vec2::new(dx, dy)));
     }
 
-    /// Magnifies by `factor` around a point.
+    /// Zooms by `factor` about a point of the view, CSS pixels.
     #[wasm_bindgen(js_name = zoomAt)]
     pub fn zoom_at(&self, x: f32, y: f32, factor: f32) {
         if factor.is_finite() && factor > 0.0 {
@@ -81,13 +81,13 @@ impl Engine {
         }
     }
 
-    /// Shows model and cage as large as fits.
+    /// Fits model and cage into the view.
     #[wasm_bindgen(js_name = frameAll)]
     pub fn frame_all(&self) {
         self.change(super::super::state::State::frame_all);
     }
 
-    /// Shows the selection as large as fits; everything if nothing is selected.
+    /// Fits the selection into the view; model and cage if nothing is selected.
     #[wasm_bindgen(js_name = frameSelection)]
     pub fn frame_selection(&self) {
         self.change(|state| {
@@ -126,7 +126,7 @@ impl Engine {
         })
     }
 
-    /// Where a point is in the picture: x, y in CSS pixels, and 1, or 0 if it lies behind the camera.
+    /// Projects a point: x and y in CSS pixels, then 1, or 0 if it is behind the camera. `[3]`
     #[must_use]
     pub fn project(&self, x: f32, y: f32, z: f32) -> Vec<f32> {
         let projected = self.read(|state| state.camera.project(Vec3::new(x, y, z)));

@@ -1,4 +1,4 @@
-//! Interior controls.
+//! Methods for interior controls.
 
 use cagework_core::{ControlError, InnerControls};
 use cagework_editor::Command;
@@ -16,7 +16,7 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Smooth surface and controls inside, as `setCage` takes them.
+    /// Subdivision and interior controls, as for `setCage`.
     ///
     /// # Errors
     /// Never.
@@ -25,10 +25,10 @@ impl Engine {
         Ok(self.read(|state| object(&state.cage().controls))?)
     }
 
-    /// Takes interior controls of an OBJ file in place of the present ones; one step of the history.
+    /// Replaces the interior controls by those of an OBJ file; adds a step to the history.
     ///
     /// # Errors
-    /// When the file cannot be read, or a control does not fit; nothing changes then.
+    /// If the file cannot be read, or a control does not fit. Nothing changes then.
     #[wasm_bindgen(js_name = readControls)]
     pub fn read_controls(&self, bytes: &[u8], label: String) -> Result<(), JsValue> {
         let origin = self.read(|state| state.models().origin());
@@ -41,7 +41,7 @@ impl Engine {
         Ok(self.step(Command::ReplaceControls { positions, elements }, Some(label))?)
     }
 
-    /// The middle of the model under the pointer, at rest: where a control would be put. `[3]`
+    /// The point inside the model under the pointer, at rest, where a new control is placed. `[3]`
     #[wasm_bindgen(js_name = middleAt)]
     #[must_use]
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {
@@ -58,10 +58,10 @@ impl Engine {
         middle.to_array().to_vec()
     }
 
-    /// Adds a sheet around a place, in the plane that faces the eye, as large as fits; one step of the history.
+    /// Adds the largest sheet that fits around `center`, parallel to the view plane; adds a step to the history.
     ///
     /// # Errors
-    /// When the smallest does not fit either.
+    /// If the smallest sheet does not fit.
     #[wasm_bindgen(js_name = addSheet)]
     pub fn add_sheet(&self, center: &[f32], label: String) -> Result<(), JsValue> {
         let axes = self.read(|state| {
@@ -73,7 +73,7 @@ impl Engine {
         Ok(self.step(Command::AddSheet { center, axes }, Some(label))?)
     }
 
-    /// Shows places of a control that is being put in.
+    /// Shows the points of a control that is being added. `[n, 3]`
     #[wasm_bindgen(js_name = showPlaced)]
     pub fn show_placed(&self, places: &[f32]) {
         self.change(|state| {

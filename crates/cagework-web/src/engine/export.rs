@@ -1,4 +1,4 @@
-//! Files.
+//! Methods that write files and return the arrays of the models.
 
 use std::ops::Range;
 
@@ -17,18 +17,18 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{RigAsked, taken};
+use crate::options::{JsRigOptions, decode};
 use crate::playing::SharedClip;
 use crate::state::State;
 use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// A model as GLB, as posed; a rigged one with its skeleton, morph targets and clips. Where the cage bends the moving model,
-    /// frames of `clip` instead, if it has this clip.
+    /// The posed model as GLB; a rigged model with skeleton, morph targets and clips. With `options.dynamic`, the frames of
+    /// `clip` as morph targets instead, if the model has this clip.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If the file cannot be written.
     #[wasm_bindgen(js_name = exportGlb)]
     pub fn export_glb(
         &self,
@@ -36,27 +36,27 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
         clip: u32,
     ) -> Result<Vec<u8>, JsValue> {
-        let asked: RigAsked = taken(options)?;
+        let request: JsRigOptions = decode(options)?;
         let clips = self.read(|state| SharedClip::all(state.models()));
         let (bytes, notices) = match clips.get(clip as usize).and_then(|clip| clip.of(id)) {
-            Some(clip) if asked.dynamic => self.baked(id, clip)?,
-            _ => self.posed_glb(id, &asked)?,
+            Some(clip) if request.dynamic => self.baked(id, clip)?,
+            _ => self.posed_glb(id, &request)?,
         };
         self.state.borrow_mut().rig_notices = notices;
         Ok(bytes)
     }
 
-    /// A model's shape as posed, in a format of shapes alone.
+    /// The posed model in a format that stores only a shape.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If the file cannot be written.
     #[wasm_bindgen(js_name = exportShape)]
     pub fn export_shape(
         &self,
         id: u32,
         #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
-        let format: ModelFormat = taken(format)?;
+        let format: ModelFormat = decode(format)?;
         let pose = self.read(|state| state.pose().to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         let (bytes, lost) = self.read(|state| {
@@ -67,7 +67,7 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// What the last export did to the rig or did not keep, each a sentence; they are told once.
+    /// Notices of the last export about the rig, a sentence each. Returns each notice once.
     #[wasm_bindgen(js_name = rigNotices)]
     #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {
@@ -77,7 +77,7 @@ impl Engine {
     /// A model as GLB with a morph target for each saved pose of the cage and an animation through all of them.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If the file cannot be written.
     #[wasm_bindgen(js_name = exportPoses)]
     pub fn export_poses(
         &self,
@@ -89,7 +89,7 @@ impl Engine {
             let named = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec()));
             (state.rest().positions.clone(), named.collect())
         });
-        if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &taken(options)?)? {
+        if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &decode(options)?)? {
             return Ok(bytes);
         }
         let (names, poses): (Vec<String>, Vec<Vec<Vec3>>) = named.into_iter().unzip();
@@ -102,10 +102,10 @@ impl Engine {
         })?)
     }
 
-    /// Cage as OBJ, in the pose of the moment.
+    /// The posed cage as OBJ.
     ///
     /// # Errors
-    /// When there is no cage.
+    /// Without a cage.
     #[wasm_bindgen(js_name = exportCage)]
     pub fn export_cage(&self) -> Result<Vec<u8>, JsValue> {
         let mesh = self.read(|state| PolygonMesh {
@@ -119,15 +119,15 @@ impl Engine {
         Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
-    /// Controls inside as OBJ, in the pose of the moment.
+    /// The posed interior controls as OBJ.
     ///
     /// # Errors
-    /// When there are none.
+    /// If the cage has no interior controls.
     #[wasm_bindgen(js_name = exportControls)]
     pub fn export_controls(&self) -> Result<Vec<u8>, JsValue> {
         Ok(self.read(|state| {
             if state.cage().controls.inner == 0 {
-                return Err(Fault::missing("control inside", "put one there first"));
+                return Err(Fault::missing("interior control", "add one first"));
             }
             let positions = state.up().turned_back(&state.pose()[state.cage().n_cage()..]).into_owned();
             let elements = state.cage().controls.elements.clone();
@@ -136,15 +136,16 @@ impl Engine {
         })?)
     }
 
-    /// A model's weights as NPZ, which SciPy loads.
+    /// A model's weights as NPZ, as loaded by `scipy.sparse.load_npz`.
     ///
     /// # Errors
-    /// When the models are not bound.
+    /// If the models are not bound.
     #[wasm_bindgen(js_name = exportWeights)]
     pub fn export_weights(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         Ok(self.with_session(|session| {
             self.read(|state| {
-                let Some(Own { mut weights, frames, outside, rig }) = state.own_rows(id, session)? else {
+                let Some(ModelRows { mut weights, frames, outside, rig }) = state.own_rows(id, session)?
+                else {
                     return Err(Fault::missing("weights", "bind the model first"));
                 };
                 let inner = state.cage().inner_positions();
@@ -155,16 +156,16 @@ impl Engine {
         })?)
     }
 
-    /// The document and the page's settings, a JSON object, as one file.
+    /// Project file with the document and the page's settings, a JSON object.
     ///
     /// # Errors
-    /// When there is no model or the file would be too large.
+    /// If no model is open, or the file would be too large.
     #[wasm_bindgen(js_name = writeProject)]
     pub fn write_project(&self, settings: &str) -> Result<Vec<u8>, JsValue> {
         Ok(self.read(|state| state.editor.write_project(settings)).map_err(Fault::from)?)
     }
 
-    /// What points up in the models' files.
+    /// Up axis of the models' files.
     ///
     /// # Errors
     /// Never.
@@ -173,23 +174,23 @@ impl Engine {
         Ok(self.read(|state| object(&state.up()))?)
     }
 
-    /// What all positions are seen from, in the axes of the models' files: zero unless they are far away. `[3]`
+    /// Origin of all positions, in the axes of the models' files: zero unless the models are far from the world origin. `[3]`
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.read(|state| state.models().origin().to_array().to_vec())
     }
 
-    /// The models' vertices at rest, one model after the other. `[n_vertices, 3]`
+    /// Vertices at rest, concatenated over the models. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
     #[must_use]
     pub fn model_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.models().positions()))
     }
 
-    /// All that is bound: the models' vertices, then the points of their rigs. `[n_points, 3]`
+    /// Points to bind: vertices of all models, then the points of their rigs. `[n_points, 3]`
     ///
     /// # Errors
-    /// When the rig cannot be read.
+    /// If the rig cannot be read.
     #[wasm_bindgen(js_name = boundPoints)]
     pub fn bound_points(&self) -> Result<Vec<f32>, JsValue> {
         Ok(self.read(|state| {
@@ -199,18 +200,18 @@ impl Engine {
         })?)
     }
 
-    /// What a cage should enclose: positions and triangles of the models at rest, of their morph targets, and of a clip if one is
-    /// named. `[n, 3]` each
+    /// Geometry that a cage should enclose: positions and triangles of the models at rest, with each morph target, and in
+    /// the frames of `clip`, if given. `[n, 3]` each
     ///
     /// # Errors
-    /// When there is no such clip.
+    /// If no model has this clip.
     #[wasm_bindgen(js_name = modelStates, unchecked_return_type = "[Float32Array, Uint32Array]")]
     pub fn model_states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         self.read(|state| {
             let is_alone = state.models().iter().nth(1).is_none();
             for member in state.models().iter() {
-                // One that lacks the clip stays where it is, as it does when the others play.
+                // Models without the clip stay at rest, as in playback.
                 let has = |name: &&str| is_alone || Clip::named(&member.model.clips(), name).is_ok();
                 let states = member.model.states(clip.as_deref().filter(has));
                 let (own, corners) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
@@ -234,10 +235,10 @@ impl Engine {
 }
 
 impl Engine {
-    /// A model as posed, and what became of its rig.
-    pub(super) fn posed_glb(&self, id: u32, asked: &RigAsked) -> Answer<(Vec<u8>, Vec<String>)> {
+    /// A posed model as GLB, and notices about its rig.
+    pub(super) fn posed_glb(&self, id: u32, request: &JsRigOptions) -> Answer<(Vec<u8>, Vec<String>)> {
         let pose = self.read(|state| state.pose().to_vec());
-        if let Some((bytes, report)) = self.reshaped(id, &pose, &[], asked)? {
+        if let Some((bytes, report)) = self.reshaped(id, &pose, &[], request)? {
             return Ok((bytes, report.notices()));
         }
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
@@ -247,29 +248,29 @@ impl Engine {
         })
     }
 
-    /// Frames of a model's clip, each bent by the cage.
+    /// A model as GLB whose morph targets are the frames of a clip, each deformed by the cage; and notices.
     fn baked(&self, id: u32, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
         let field = self.field()?;
         self.read(|state| {
             let model = &state.models().get(id)?.model;
             let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
             frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
-            let told = format!("{} frames became morph targets; the skeleton is left out", frames.len());
-            Ok((model.write_baked(clip, &rest, frames)?, vec![told]))
+            let notice = format!("{} frames became morph targets; the skeleton is left out", frames.len());
+            Ok((model.write_baked(clip, &rest, frames)?, vec![notice]))
         })
     }
 
-    /// A rigged model in a pose of the cage, or at rest with poses as morph targets; none if it has no rig, or is to be written
-    /// without it.
+    /// A rigged model in a pose of the cage, or at rest with poses as morph targets. `None` if it has no rig, or the rig is
+    /// not exported.
     fn reshaped(
         &self,
         id: u32,
         pose: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
-        asked: &RigAsked,
+        request: &JsRigOptions,
     ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
         let is_rigged = |state: &State| Answer::Ok(state.models().get(id)?.model.is_rigged());
-        if asked.plain || !self.read(is_rigged)? {
+        if request.plain || !self.read(is_rigged)? {
             return Ok(None);
         }
         self.with_session(|session| {
@@ -277,7 +278,7 @@ impl Engine {
                 let (member, rest) = (state.models().get(id)?, &state.rest().positions);
                 let (model, own) = (&member.model, state.own_rows(id, session)?);
                 let by = |pose: &[Vec3]| match &own {
-                    Some(Own { weights, frames, rig, .. }) if pose.len() == rest.len() => {
+                    Some(ModelRows { weights, frames, rig, .. }) if pose.len() == rest.len() => {
                         let mut by = displacements(weights, frames, rest, pose);
                         by.extend(displacements(rig, frames, rest, pose));
                         Ok(by)
@@ -290,8 +291,8 @@ impl Engine {
                     .iter()
                     .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
                     .collect::<Answer<Vec<_>>>()?;
-                let mut options = asked.options();
-                // Names may be those of another model.
+                let mut options = request.options();
+                // Skip names of other models.
                 let props = model.props()?;
                 options.rigid.retain(|name| props.contains(name));
                 options.parts = member.parts()?;
@@ -300,7 +301,7 @@ impl Engine {
         })
     }
 
-    /// All vertices in poses of the cage; at rest while they are not bound.
+    /// All vertices in poses of the cage; at rest before a bind.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let (rest, controls) =
             self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
@@ -308,7 +309,7 @@ impl Engine {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
             let n_frames = session.frames().map_or(0, Frames::n_columns);
             let deformed = |pose: &Vec<Vec3>| {
-                // Exactly: sums of weighted controls are rounded.
+                // At rest, return the vertices unchanged: the weighted sums would round.
                 if *pose == controls {
                     return Ok(rest.clone());
                 }
@@ -321,18 +322,18 @@ impl Engine {
     }
 }
 
-/// What is bound of one model: rows of its vertices and of its rig's points, numbered as its own.
-struct Own {
+/// Weights of one model: rows of its vertices and of its rig's points, with indices relative to the model.
+struct ModelRows {
     weights: Weights,
     frames: Frames,
-    /// Vertices, then points of the rig.
+    /// Points outside the cage: vertices, then points of the rig.
     outside: Vec<OutsideVertex>,
     rig: Weights,
 }
 
 impl State {
-    /// Rows of one model; none before there are weights.
-    fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<Own>> {
+    /// Rows of one model; `None` before a bind.
+    fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<ModelRows>> {
         let Some(all) = session.weights() else { return Ok(None) };
         let n = self.models().positions().len();
         let (own, of_rig) = (self.models().get(id)?.vertices.clone(), self.models().extra_of(id)?);
@@ -351,11 +352,11 @@ impl State {
         let outside = bound.iter().flat_map(|bound| &bound.outside).filter_map(numbered).collect();
         let frames = session.frames().cloned().unwrap_or_default();
         let weights = rows_of(all, own.clone());
-        Ok(Some(Own { weights, frames, outside, rig }))
+        Ok(Some(ModelRows { weights, frames, outside, rig }))
     }
 }
 
-/// Some of the rows.
+/// A range of rows.
 fn rows_of(all: &Weights, range: Range<usize>) -> Weights {
     all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
 }

@@ -1,4 +1,4 @@
-//! Moving the cage: gestures, exact numbers, poses.
+//! Methods that move the cage: gestures, typed positions, playback of poses.
 
 use cagework_core::view::View as _;
 use cagework_editor::edit::{Constraint, Gesture, GestureKind};
@@ -8,19 +8,19 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::options::{GizmoAsked, GizmoHandle, taken};
+use crate::options::{GizmoHandle, JsGizmo, decode};
 use crate::state::State;
 use crate::views::object;
 
-/// Movements below this fraction of a pixel are none.
-const STILL: f32 = 1e-3;
+/// Smallest movement that changes the cage, pixels.
+const MIN_MOVE: f32 = 1e-3;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Begins a gesture, grab, rotate or scale; false when nothing is selected.
+    /// Begins a gesture: grab, rotate or scale; false if nothing is selected.
     ///
     /// # Errors
-    /// When the gesture is another.
+    /// If the kind of gesture is unknown.
     #[wasm_bindgen(js_name = beginTransform)]
     pub fn begin_transform(
         &self,
@@ -28,14 +28,14 @@ impl Engine {
         x: f32,
         y: f32,
     ) -> Result<bool, JsValue> {
-        let kind = taken(kind)?;
+        let kind = decode(kind)?;
         Ok(self.change(|state| {
             let at = state.pointer(x, y);
             state.editor.begin(kind, at, Constraint::Free)
         }))
     }
 
-    /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; undefined for none.
+    /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; otherwise undefined.
     ///
     /// # Errors
     /// Never.
@@ -54,10 +54,10 @@ impl Engine {
         Ok(part.map_or(Ok(JsValue::UNDEFINED), |part| object(&handle_of(part)))?)
     }
 
-    /// Begins the gesture of one of the gizmo's handles.
+    /// Begins the gesture of a gizmo handle.
     ///
     /// # Errors
-    /// When there is no such handle.
+    /// If the handle is unknown.
     #[wasm_bindgen(js_name = beginGizmo)]
     pub fn begin_gizmo(
         &self,
@@ -65,12 +65,12 @@ impl Engine {
         x: f32,
         y: f32,
     ) -> Result<bool, JsValue> {
-        let (part, constraint) = part_of(taken(handle)?);
+        let (part, constraint) = part_of(decode(handle)?);
         Ok(self.change(|state| {
             let kind = match state.view.gizmo {
-                GizmoAsked::None | GizmoAsked::Move => GestureKind::Grab,
-                GizmoAsked::Rotate => GestureKind::Rotate,
-                GizmoAsked::Scale => GestureKind::Scale,
+                JsGizmo::None | JsGizmo::Move => GestureKind::Grab,
+                JsGizmo::Rotate => GestureKind::Rotate,
+                JsGizmo::Scale => GestureKind::Scale,
             };
             let at = state.pointer(x, y);
             let began = state.editor.begin(kind, at, constraint);
@@ -81,13 +81,13 @@ impl Engine {
         }))
     }
 
-    /// Follows the pointer.
+    /// Moves the pointer of the gesture, CSS pixels.
     #[wasm_bindgen(js_name = dragTransform)]
     pub fn drag_transform(&self, x: f32, y: f32) {
         self.with_gesture(|gesture, pointer| gesture.drag(pointer(x, y)));
     }
 
-    /// Limits the gesture to an axis, 0 to 2, or to the plane across it; any other number frees it.
+    /// Restricts the gesture to an axis, 0 to 2, or to the plane normal to it; any other number removes the restriction.
     pub fn constrain(&self, axis: i32, plane: bool) {
         self.with_gesture(|gesture, _| {
             gesture.constrain(match (axis, plane) {
@@ -98,26 +98,26 @@ impl Engine {
         });
     }
 
-    /// Takes an amount instead of the pointer; undefined goes back to the pointer.
+    /// Sets a typed amount that replaces the pointer; undefined returns to the pointer.
     #[wasm_bindgen(js_name = typeTransform)]
     pub fn type_transform(&self, amount: Option<f32>) {
         self.with_gesture(|gesture, _| gesture.type_amount(amount));
     }
 
-    /// Radius of proportional editing, diagonals of the cage; 0 for none.
+    /// Sets the radius of proportional editing, in diagonals of the cage; 0 turns it off.
     #[wasm_bindgen(js_name = setProportional)]
     pub fn set_proportional(&self, radius: f32) {
         self.change(|state| state.editor.set_radius(radius, &state.camera));
     }
 
-    /// What the gesture does now.
+    /// Status line of the gesture, such as `Move 0.25 along X`.
     #[wasm_bindgen(js_name = transformLabel)]
     #[must_use]
     pub fn transform_label(&self) -> String {
         self.read(|state| state.editor.gesture().as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
     }
 
-    /// Ends the gesture; true when it moved something and is kept.
+    /// Ends the gesture; true if it moved a vertex and `keep` is set.
     #[wasm_bindgen(js_name = endTransform)]
     #[must_use]
     pub fn end_transform(&self, keep: bool) -> bool {
@@ -138,7 +138,7 @@ impl Engine {
         })
     }
 
-    /// Moves the selection in the view plane, CSS pixels.
+    /// Moves the selection in the view plane, CSS pixels; false if the movement is too small.
     #[must_use]
     pub fn nudge(&self, right: f32, up: f32) -> bool {
         self.change(|state| {
@@ -148,16 +148,16 @@ impl Engine {
         })
     }
 
-    /// What turns and scales go about.
+    /// Sets the centre of rotation and scaling.
     ///
     /// # Errors
-    /// When it is something else.
+    /// If the pivot is unknown.
     #[wasm_bindgen(js_name = setPivot)]
     pub fn set_pivot(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Pivot")] pivot: JsValue,
     ) -> Result<(), JsValue> {
-        let pivot = taken(pivot)?;
+        let pivot = decode(pivot)?;
         self.change(|state| {
             state.editor.pivot = pivot;
             state.is_changed = true;
@@ -165,14 +165,14 @@ impl Engine {
         Ok(())
     }
 
-    /// Moves the cage to a moment of the animation through all saved poses.
+    /// Moves the cage to a time of the animation through all saved poses, seconds.
     #[wasm_bindgen(js_name = playAt)]
     pub fn play_at(&self, seconds: f32) {
         self.change(|state| state.editor.play_at(seconds));
     }
 }
 
-/// The name of a part of the gizmo.
+/// Handle of a part of the gizmo.
 fn handle_of(part: GizmoPart) -> GizmoHandle {
     match part {
         GizmoPart::Axis(0) => GizmoHandle::X,
@@ -185,7 +185,7 @@ fn handle_of(part: GizmoPart) -> GizmoHandle {
     }
 }
 
-/// The part of that name, and what it limits a gesture to.
+/// Part of the gizmo of a handle, and the restriction of its gesture.
 fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
     match handle {
         GizmoHandle::X => (GizmoPart::Axis(0), Constraint::Axis(0)),
@@ -199,7 +199,7 @@ fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
 }
 
 impl Engine {
-    /// Changes the gesture in progress, and moves the cage with it.
+    /// Changes the gesture in progress and moves the cage accordingly.
     fn with_gesture(&self, change: impl FnOnce(&mut Gesture, &dyn Fn(f32, f32) -> Vec2)) {
         self.change(|state| {
             let pointers = state.pointers();
@@ -209,9 +209,9 @@ impl Engine {
 }
 
 impl State {
-    /// Moves the selection; false for less than a visible movement.
+    /// Moves the selection; false if the movement is below [`MIN_MOVE`].
     fn shift(&mut self, by: Vec3) -> bool {
-        let smallest = STILL * self.camera.units_per_pixel(self.camera.target);
+        let smallest = MIN_MOVE * self.camera.units_per_pixel(self.camera.target);
         by.length() >= smallest && self.editor.shift(by)
     }
 }

@@ -1,7 +1,7 @@
-//! The engine: everything that the page's main thread asks Rust for.
+//! The engine: the interface of the page's main thread to Rust.
 //!
-//! Each file adds the methods of one kind. None of them waits, but those that return promises; a change asks the page
-//! for a frame and is drawn with it.
+//! Each file adds the methods of one topic. Only methods that return promises wait. A change requests a frame from the
+//! page, which draws it.
 
 mod cage;
 mod camera;
@@ -38,7 +38,7 @@ use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
 use crate::loaded::Loaded;
 use crate::opening::OpenContents;
-use crate::options::{Coordinates, taken};
+use crate::options::{Coordinates, decode};
 use crate::state::{BoundModels, State, joined};
 use crate::surface::Surface;
 use crate::views::{View, object};
@@ -49,18 +49,18 @@ use crate::views::{View, object};
 pub struct Engine {
     state: Rc<RefCell<State>>,
     gpu: SharedGpu,
-    /// Asks the page for a frame.
+    /// Requests a frame from the page.
     invalidate: Function,
-    /// Gives the page what panels show, after it has changed.
+    /// Passes a changed [`View`] to the page.
     changed: Function,
-    /// What the page was given last.
-    told: Rc<RefCell<View>>,
+    /// The last view passed to the page.
+    last_view: Rc<RefCell<View>>,
 }
 
 #[wasm_bindgen]
 impl Engine {
-    /// An engine that draws into a canvas. `invalidate` is called when a frame is needed, `changed` with a `View` when the document, the
-    /// selection or the weights have changed.
+    /// Creates an engine that draws into a canvas. It calls `invalidate` when a frame is needed, and `changed` with a
+    /// `View` after the document, the selection or the weights change.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`.
@@ -76,11 +76,11 @@ impl Engine {
             gpu: Rc::new(Mutex::new(Some(gpu))),
             invalidate,
             changed,
-            told: Rc::default(),
+            last_view: Rc::default(),
         })
     }
 
-    /// What panels show.
+    /// The view that panels show.
     ///
     /// # Errors
     /// Never.
@@ -89,17 +89,18 @@ impl Engine {
         Ok(self.read(|state| object(&state.document_view()))?)
     }
 
-    /// Opens models in place of those that are open, with what `contents` says; the history starts again. Returns notices. The models'
-    /// handles are used up.
+    /// Replaces the open models, cage and poses, and clears the history. Consumes the handles of the models. Returns
+    /// notices.
     ///
     /// # Errors
-    /// When the GPU has no room for them, or draws too slowly for their many layers; what was open stays open.
+    /// If the GPU runs out of memory, or cannot draw the models' many transparent layers fast enough. The open models stay
+    /// then.
     pub async fn open(
         &self,
         models: Vec<Loaded>,
         #[wasm_bindgen(unchecked_param_type = "OpenContents")] contents: JsValue,
     ) -> Result<Vec<String>, JsValue> {
-        let contents: OpenContents = taken(contents)?;
+        let contents: OpenContents = decode(contents)?;
         let mut models = models;
         let Some(first) = models.first_mut() else {
             return Err(Fault::missing("model", "open one first").into());
@@ -148,11 +149,12 @@ impl Engine {
         Ok(notices)
     }
 
-    /// Takes what the worker has bound: rows, columns and weights, the columns of offsets, and the report. Those of a `final` pass are kept
-    /// for undo.
+    /// Uses the weights of `Binder.bind`: row pointers, columns and weights, the offsets, and the report. Weights of a
+    /// `final` pass are cached for undo.
     ///
     /// # Errors
-    /// When the arrays do not fit models and cage, or the GPU has no room for them; `Cancelled` when they have changed meanwhile.
+    /// If the arrays do not match models and cage, or the GPU runs out of memory. `Cancelled` if models or cage change
+    /// during the upload.
     pub async fn adopt(
         &self,
         indptr: Vec<u32>,
@@ -165,14 +167,14 @@ impl Engine {
         let (revision, key) = self.read(|state| (state.revision, state.editor.key()));
         let n_columns = self.read(|state| state.rest().positions.len() as u32);
         let n_vertices = self.read(|state| state.models().positions().len());
-        let Offsets { frames, outside } = taken(offsets)?;
+        let Offsets { frames, outside } = decode(offsets)?;
         let n_columns = n_columns + frames.n_columns() as u32;
         let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         let (weights, rig) = split(all, n_vertices);
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        // The upload of the cage may still be waiting, and would drop the weights again.
+        // Finish pending uploads first: an upload of the cage drops the weights.
         upload(&self.state, gpu).await?;
         is_current()?;
         let (weights, frames) = (Arc::new(weights), Arc::new(frames));
@@ -182,7 +184,7 @@ impl Engine {
             let joints = rig.as_ref().and_then(|weights| {
                 let of_rig = outside.iter().filter_map(|o| o.vertex.checked_sub(n_vertices as u32));
                 let of_rig: Vec<u32> = of_rig.collect();
-                // Faults of a rig are reported when it is exported.
+                // The export reports errors of a rig.
                 JointDots::new(state.models(), weights, (*frames).clone(), &of_rig).ok()
             });
             let bytes = weights.bytes() + rig.as_ref().map_or(0, Weights::bytes);
@@ -195,24 +197,24 @@ impl Engine {
         Ok(())
     }
 
-    /// Whether there are weights for models and cage as they are, in use or kept from before an undo.
+    /// Whether weights of the current models and cage are in use or cached.
     #[wasm_bindgen(getter, js_name = hasWeights)]
     #[must_use]
     pub fn has_weights(&self) -> bool {
         self.read(|state| state.bound.is_some() || state.cache.contains(state.editor.key()))
     }
 
-    /// The report of the weights in use; undefined without weights.
+    /// Bind report of the weights in use; undefined without weights.
     #[wasm_bindgen(js_name = boundReport, unchecked_return_type = "BindReport | undefined")]
     #[must_use]
     pub fn bound_report(&self) -> JsValue {
         self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
     }
 
-    /// Takes coordinates by formula to compare with; the arrays are those of `adopt`.
+    /// Adds mean value or Green coordinates for comparison. Arrays as for `adopt`.
     ///
     /// # Errors
-    /// As `adopt`.
+    /// Those of `adopt`.
     #[wasm_bindgen(js_name = adoptOther)]
     pub async fn adopt_other(
         &self,
@@ -221,9 +223,9 @@ impl Engine {
         indices: Uint32Array,
         data: Float32Array,
     ) -> Result<(), JsValue> {
-        let kind: Coordinates = taken(kind)?;
+        let kind: Coordinates = decode(kind)?;
         let (revision, n_columns) = self.read(|state| {
-            // Closed forms know the plain cage alone.
+            // Closed-form coordinates have no interior controls.
             let n_faces = state.set().map_or(0, |set| set.cage().triangles().len());
             let n_more = if kind == Coordinates::Green { n_faces } else { 0 };
             (state.revision, (state.cage().n_cage() + n_more) as u32)
@@ -249,30 +251,30 @@ impl Engine {
         Ok(())
     }
 
-    /// Whether there are coordinates of a kind, to compare with.
+    /// Whether coordinates of a kind are available for comparison.
     ///
     /// # Errors
-    /// When it is no kind.
+    /// If the kind is unknown.
     #[wasm_bindgen(js_name = hasOther)]
     pub fn has_other(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
     ) -> Result<bool, JsValue> {
-        let kind = taken(kind)?;
+        let kind = decode(kind)?;
         Ok(self.read(|state| state.others.contains(&kind)))
     }
 
-    /// Counts up with each change of model or rest cage.
+    /// Increases with each change of the models or the rest cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn revision(&self) -> u32 {
         self.read(|state| state.revision)
     }
 
-    /// What a job that was started at a revision results in is taken only if this passes.
+    /// Checks that the result of a job that was started at `revision` is still valid.
     ///
     /// # Errors
-    /// `Cancelled` when there is another model or cage by now.
+    /// `Cancelled` if models or cage have changed since.
     #[wasm_bindgen(js_name = requireCurrent)]
     pub fn require_current(&self, revision: u32) -> Result<(), JsValue> {
         Ok(self.read(|state| state.require(revision))?)
@@ -285,7 +287,7 @@ impl Engine {
         self.read(|state| state.bound.is_some())
     }
 
-    /// Resolves with the reason when the GPU is lost.
+    /// Resolves with the reason when the GPU device is lost.
     ///
     /// # Errors
     /// Never while the engine is alive.
@@ -297,17 +299,17 @@ impl Engine {
         Ok(receiver.await.map_err(|_| Fault::new(ErrorName::DeviceLost, "the GPU is gone"))?)
     }
 
-    /// Gives the device up, as a reset of the driver would; called too when the browser says that it took it away.
+    /// Marks the device as lost. Called when the browser reports a loss, and by tests.
     pub fn lose(&self) {
         if let Some(gpu) = self.gpu.try_lock().as_ref().and_then(|gpu| gpu.as_ref()) {
             gpu.main.context().lose("the browser took it away");
         }
     }
 
-    /// Everything again on a new device. After an error it can be called again.
+    /// Uploads everything to a new device. Can be called again after an error.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`: try again later; or the GPU has no room for the model.
+    /// `NoAdapter`, `NoDevice`: try again later. If the GPU runs out of memory.
     pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
         let (surface, context) = Surface::open(canvas).await?;
         {
@@ -315,7 +317,7 @@ impl Engine {
             let gpu = shared.as_mut().ok_or_else(lost)?;
             let main = gpu.main.recover(context).await.map_err(Fault::from)?;
             *gpu = Gpu { main, others: Vec::new(), surface };
-            // The document may have changed while there was no device.
+            // The document may have changed in the meantime.
             upload(&self.state, gpu).await?;
         }
         self.change(|state| {
@@ -332,8 +334,8 @@ impl Engine {
         read(&self.state.borrow())
     }
 
-    /// Changes the state: what was derived from another document is dropped, the page is told and asked for a frame, and the GPU is
-    /// brought to the document.
+    /// Changes the state, drops derived state of an earlier document, notifies the page, requests a frame, and starts an
+    /// upload if needed.
     fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
         let changed = {
             let mut state = self.state.borrow_mut();
@@ -346,19 +348,19 @@ impl Engine {
         changed
     }
 
-    /// Tells the page what panels show, if that has changed, and asks for a frame.
+    /// Passes the view to the page if it has changed, and requests a frame.
     fn announce(&self) {
         let view = self.read(State::document_view);
-        if *self.told.borrow() != view {
+        if *self.last_view.borrow() != view {
             let given = object(&view);
-            *self.told.borrow_mut() = view;
-            // An error in the page's own function is the page's.
+            *self.last_view.borrow_mut() = view;
+            // Ignore exceptions of the page's callback.
             let _ = given.map(|view| self.changed.call1(&JsValue::NULL, &view));
         }
         let _ = self.invalidate.call0(&JsValue::NULL);
     }
 
-    /// Brings the GPU to the document when it has answered; one upload at a time.
+    /// Starts an upload of the document to the GPU, unless one is in progress.
     fn start_upload(&self) {
         {
             let mut state = self.state.borrow_mut();
@@ -382,7 +384,10 @@ impl Engine {
         });
     }
 
-    /// Reads what is on the GPU, unless it is waiting for an answer.
+    /// Reads the GPU session.
+    ///
+    /// # Errors
+    /// If an upload holds the lock, or the device is lost.
     fn with_session<T>(&self, read: impl FnOnce(&Session) -> Answer<T>) -> Answer<T> {
         let gpu = self
             .gpu
@@ -392,7 +397,7 @@ impl Engine {
     }
 }
 
-/// Weights of the vertices, and apart from them those of the rig's points, if there are any.
+/// Splits weights into those of the vertices and those of the rigs' points; `None` if there are no such points.
 fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     let n = weights.n_rows();
     if n <= n_vertices {

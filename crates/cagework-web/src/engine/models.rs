@@ -1,4 +1,4 @@
-//! Several models in one cage: what comes and goes, and what of them the cage does not bend.
+//! Methods for several models in one cage: adding, painting of fixed regions.
 
 use std::sync::Arc;
 
@@ -16,18 +16,18 @@ use crate::loaded::Loaded;
 use crate::state::State;
 use crate::views::{ModelInfo, object};
 
-/// What is painted whole.
-const ALL: f32 = 255.0;
-/// Share of a dab's radius that it paints whole; from there to its rim it fades.
-const FULL: f32 = 0.5;
+/// Largest painted amount: the vertex does not move.
+const MAX_AMOUNT: f32 = 255.0;
+/// Share of the brush radius that is painted in full; the amount falls to 0 at the rim.
+const FULL_SHARE: f32 = 0.5;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Adds models of files that were read; cage and pose stay, weights are dropped. One step of the history, or none without a label. The
-    /// files' handles are used up.
+    /// Adds models. Keeps cage and pose, drops the weights. With a label, adds a step to the history. Consumes the handles of
+    /// the models.
     ///
     /// # Errors
-    /// As `open`; nothing changes then.
+    /// Those of `open`. Nothing changes then.
     pub async fn add(&self, models: Vec<Loaded>, label: Option<String>) -> Result<(), JsValue> {
         let (up, origin) = self.read(|state| (state.up(), state.models().origin()));
         let (mut added, mut draws) = (Vec::new(), Vec::new());
@@ -75,24 +75,24 @@ impl Engine {
         Ok(())
     }
 
-    /// The models as panels show them.
+    /// Properties of the models, for panels.
     ///
     /// # Errors
-    /// When no model is open.
+    /// If no model is open.
     #[wasm_bindgen(js_name = modelInfo, unchecked_return_type = "ModelInfo")]
     pub fn model_info(&self) -> Result<JsValue, JsValue> {
         Ok(self.read(|state| object(&ModelInfo::of(state.models())?))?)
     }
 
-    /// How much of each vertex of a model is painted to stay, 0 to 255; empty for nothing. `[n_vertices]`
+    /// Painted amounts of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty if unpainted
     ///
     /// # Errors
-    /// When there is no such model.
+    /// If there is no such model.
     pub fn painted(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         Ok(self.read(|state| Answer::Ok(state.models().get(id)?.painted.to_vec()))?)
     }
 
-    /// Greys what stays of a model while it is painted; undefined for none.
+    /// Shows the painted amounts of a model in grey; undefined hides them.
     #[wasm_bindgen(js_name = showPainting)]
     pub fn show_painting(&self, id: Option<u32>) {
         self.change(|state| {
@@ -101,16 +101,17 @@ impl Engine {
         });
     }
 
-    /// Paints the model that is shown so around the point under the pointer: `radius` over the models' size, `amount` 255 to
-    /// stay, 0 to follow. Whether there is such a point; what it changes moves with `setPainted` or the end of the stroke.
+    /// Paints the model of `showPainting` around the surface point under the pointer. `radius`: over the models' diagonal;
+    /// `amount`: 255 keeps vertices in place, 0 lets them move. Returns false if the pointer is not on this model. The
+    /// vertices move after `setPainted` or a commit.
     ///
     /// # Errors
-    /// Before there are weights, or while the GPU is busy.
+    /// Without weights, or while the GPU is busy.
     pub fn paint(&self, x: f32, y: f32, radius: f32, amount: u8) -> Result<bool, JsValue> {
         let Some(id) = self.read(|state| state.painting.as_ref().map(|(id, _)| *id)) else {
             return Ok(false);
         };
-        // Brings the models to where the cage is.
+        // Update the posed models, which `dab` reads.
         self.posed(|_, _| Ok(()))?;
         Ok(self.change(|state| {
             let is_painted = state.dab(id, [x, y], radius, amount);
@@ -121,11 +122,10 @@ impl Engine {
         }))
     }
 
-    /// Radius of the brush of [`Engine::paint`] around the point under the pointer, CSS pixels; undefined where it would paint
-    /// nothing.
+    /// Radius of the brush of [`Engine::paint`] at the pointer, CSS pixels; undefined where it would paint nothing.
     ///
     /// # Errors
-    /// Before there are weights, or while the GPU is busy.
+    /// Without weights, or while the GPU is busy.
     #[wasm_bindgen(js_name = brushRadius)]
     pub fn brush_radius(&self, x: f32, y: f32, radius: f32) -> Result<Option<f32>, JsValue> {
         self.posed(|_, _| Ok(()))?;
@@ -138,8 +138,8 @@ impl Engine {
 }
 
 impl State {
-    /// The point of a model under the pointer, and how far a brush reaches from there, object units; nothing if another model is
-    /// there, or none.
+    /// The surface point of a model under the pointer, and the brush radius, object units. `None` if the pointer is on
+    /// another model or on no model.
     fn touched(&self, id: u32, [x, y]: [f32; 2], radius: f32) -> Option<(Vec3, f32)> {
         let (at, posed) = (self.pointer(x, y), &self.held.posed);
         if posed.len() != self.models().positions().len() {
@@ -153,7 +153,7 @@ impl State {
         (is_own && reach > 0.0).then_some((center, reach))
     }
 
-    /// Paints vertices of a model around the point under the pointer; false if another one is there, or none.
+    /// Paints vertices of a model around the point under the pointer; false if the pointer is not on this model.
     fn dab(&mut self, id: u32, at: [f32; 2], radius: f32, amount: u8) -> bool {
         let Some((center, reach)) = self.touched(id, at, radius) else { return false };
         let Ok(member) = self.models().get(id) else { return false };
@@ -165,9 +165,11 @@ impl State {
         self.editor.paint(id, |painted| {
             painted.resize(n, 0);
             for (painted, at) in painted.iter_mut().zip(posed) {
-                let share = 1.0 - ((at.distance(center) / reach - FULL) / (1.0 - FULL)).clamp(0.0, 1.0);
-                // A second dab at the same place changes nothing.
-                let dab = if amount > 0 { share * f32::from(amount) } else { ALL * (1.0 - share) } as u8;
+                let share =
+                    1.0 - ((at.distance(center) / reach - FULL_SHARE) / (1.0 - FULL_SHARE)).clamp(0.0, 1.0);
+                // Idempotent: a second dab at the same place changes nothing.
+                let dab =
+                    if amount > 0 { share * f32::from(amount) } else { MAX_AMOUNT * (1.0 - share) } as u8;
                 *painted = if amount > 0 { dab.max(*painted) } else { dab.min(*painted) };
             }
         });

@@ -1,4 +1,4 @@
-//! Frames, pictures, and what was computed on the GPU.
+//! Methods that draw frames and pictures, and read positions from the GPU.
 
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
 use cagework_gpu::Session;
@@ -10,12 +10,12 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
-use crate::options::taken;
-use crate::surface::{Drawn, SMALL, Wanted};
+use crate::options::decode;
+use crate::surface::{FrameOutcome, FrameQuality, SMALL_SIDE};
 
 #[wasm_bindgen]
 impl Engine {
-    /// The viewport's size, CSS pixels, and how many pixels one of them is.
+    /// Sets the viewport's size, CSS pixels, and the number of device pixels per CSS pixel.
     pub fn resize(&self, width: f32, height: f32, scale: f32) {
         self.change(|state| {
             state.size = Vec2::new(width, height).max(Vec2::ONE);
@@ -24,22 +24,22 @@ impl Engine {
         });
     }
 
-    /// Draws what there is now; a slow GPU with fewer pixels than there are, unless it is to be `sharp`. Undefined if the GPU
-    /// is busy; it asks again. Else whether the picture is sharp.
+    /// Draws a frame. A slow GPU draws at reduced resolution unless `sharp` is set. Returns whether the frame has full
+    /// resolution; undefined if the GPU is busy, which requests another frame.
     ///
     /// # Errors
     /// `DeviceLost`, `Refused`, `OutOfMemory`.
     #[wasm_bindgen(js_name = drawFrame)]
     pub fn draw_frame(&self, sharp: bool) -> Result<Option<bool>, JsValue> {
-        Ok(match self.try_frame(if sharp { Wanted::Sharp } else { Wanted::Soon })? {
-            Drawn::NotNow => None,
-            Drawn::Roughly => Some(false),
-            Drawn::Sharply => Some(true),
+        Ok(match self.try_frame(if sharp { FrameQuality::Sharp } else { FrameQuality::Soon })? {
+            FrameOutcome::NotNow => None,
+            FrameOutcome::Roughly => Some(false),
+            FrameOutcome::Sharply => Some(true),
         })
     }
 
-    /// Draws a box that follows its cage where nobody sees it: GPUs finish a pipeline when it is first used, and before
-    /// the first model is there they have nothing else to do.
+    /// Draws a bound box into an offscreen target. Drivers finish compiling a pipeline at its first use; this moves the
+    /// delay to the time before the first model opens.
     ///
     /// # Errors
     /// `DeviceLost`, `Refused`, `OutOfMemory`.
@@ -60,19 +60,19 @@ impl Engine {
         session.adopt(identity.map_err(Fault::from)?, Frames::default()).await.map_err(Fault::from)?;
         session.frame_all();
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(session.frame(&view, format, [SMALL; 2], 1.0).map_err(Fault::from)?)
+        Ok(session.frame(&view, format, [SMALL_SIDE; 2], 1.0).map_err(Fault::from)?)
     }
 
-    /// Waits until the GPU has answered all that was asked of it: what reads its weights is refused until then.
+    /// Waits for uploads to finish. Until then, methods that read weights return an error.
     pub async fn ready(&self) {
         drop(self.gpu.lock().await);
     }
 
-    /// A picture, red, green, blue, alpha, rows from the top: of what is shown, or of the model `alone`, transparent around
-    /// it. `[height, width, 4]`
+    /// Renders the scene, or with `alone` only the model on a transparent background. RGBA, rows from the top.
+    /// `[height, width, 4]`
     ///
     /// # Errors
-    /// When it is too large.
+    /// If the picture is too large.
     pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Result<Vec<u8>, JsValue> {
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
@@ -84,21 +84,21 @@ impl Engine {
             height as f32 / state.size.y
         };
         let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
-        // Back to the scene of the view.
+        // Restore the scene of the view.
         self.change(|state| state.is_changed = true);
         Ok(picture?)
     }
 
-    /// The model's vertices as the GPU has them, by coordinates of some kind. `[n_vertices, 3]`
+    /// Reads the deformed vertices of a kind of coordinates from the GPU. `[n_vertices, 3]`
     ///
     /// # Errors
-    /// When there is no model; `Missing` when there are no such coordinates.
+    /// If no model is open. `Missing` if coordinates of this kind are not available.
     #[wasm_bindgen(js_name = readPositions)]
     pub async fn read_positions(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
     ) -> Result<Vec<f32>, JsValue> {
-        let kind = taken(kind)?;
+        let kind = decode(kind)?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         gpu.take(&mut self.state.borrow_mut());
@@ -111,9 +111,9 @@ impl Engine {
 }
 
 impl Engine {
-    fn try_frame(&self, wanted: Wanted) -> Answer<Drawn> {
-        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(Drawn::NotNow) };
-        let Some(gpu) = gpu.as_mut() else { return Ok(Drawn::NotNow) };
+    fn try_frame(&self, wanted: FrameQuality) -> Answer<FrameOutcome> {
+        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(FrameOutcome::NotNow) };
+        let Some(gpu) = gpu.as_mut() else { return Ok(FrameOutcome::NotNow) };
         let mut state = self.state.borrow_mut();
         if let Some(fault) = state.fault.take() {
             return Err(fault);

@@ -1,4 +1,4 @@
-//! Clips: what plays is the model as it would be exported.
+//! Methods that play clips: playback shows the models as they would be exported.
 
 use cagework_core::dynamic::{DisplacementField, Lattice};
 use cagework_core::{Controls, Weights};
@@ -10,27 +10,28 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{Engine, lost};
 use crate::binder::Offsets;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{RigAsked, taken};
-use crate::playing::{Part, Playing, SharedClip};
+use crate::options::{JsRigOptions, decode};
+use crate::playing::{ModelMotion, Playback, SharedClip};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Gets the models ready to be played in the pose of the moment; `showClip` shows it.
+    /// Prepares playback of the models in the current pose; `showClip` shows a time.
     ///
     /// # Errors
-    /// When it is not bound or cannot be exported, or the GPU has no room for its skin.
+    /// If the models are not bound or cannot be exported, or the GPU runs out of memory.
     #[wasm_bindgen(js_name = startClip)]
     pub async fn start_clip(
         &self,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<(), JsValue> {
         let revision = self.revision();
-        let asked: RigAsked = taken(options)?;
-        let field = if asked.dynamic { Some(self.field()?) } else { None };
+        let request: JsRigOptions = decode(options)?;
+        let field = if request.dynamic { Some(self.field()?) } else { None };
         let ids: Vec<u32> = self.read(|state| state.models().iter().map(|member| member.id).collect());
-        let parts = ids.into_iter().map(|id| Ok((id, self.part(id, &asked)?))).collect::<Answer<Vec<_>>>()?;
+        let parts =
+            ids.into_iter().map(|id| Ok((id, self.part(id, &request)?))).collect::<Answer<Vec<_>>>()?;
         let (clips, up) = self.read(|state| (SharedClip::all(state.models()), state.up().turn()));
-        let playing = Playing::new(parts, clips, up, field.clone());
+        let playing = Playback::new(parts, clips, up, field.clone());
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         gpu.main.start_playing(&playing.skin, field).await.map_err(Fault::from)?;
@@ -42,8 +43,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Shows a time of a clip, seconds; at rest without one. `targets`: weights of the morph targets that the clip does not
-    /// drive, or nothing for those of the file. Nothing happens before `startClip`.
+    /// Shows a time of a clip, seconds; without a clip, the rest pose. `targets`: weights of the morph targets that the clip
+    /// does not drive; empty for those of the file. Does nothing before `startClip`.
     #[wasm_bindgen(js_name = showClip)]
     pub fn show_clip(&self, clip: Option<u32>, seconds: f32, targets: &Float32Array) {
         let is_ready = self.read(|state| state.playing.is_some());
@@ -59,14 +60,14 @@ impl Engine {
         });
     }
 
-    /// Whether a clip is shown in place of the cage's pose: another pose of the cage ends it.
+    /// Whether a clip is shown instead of the cage's pose. Changing the pose stops the clip.
     #[wasm_bindgen(getter, js_name = showsClip)]
     #[must_use]
     pub fn shows_clip(&self) -> bool {
         self.read(|state| state.playing.is_some())
     }
 
-    /// The model follows the cage again.
+    /// Stops the clip; the cage controls the model's pose again.
     #[wasm_bindgen(js_name = stopClip)]
     pub fn stop_clip(&self) {
         self.change(|state| {
@@ -75,17 +76,17 @@ impl Engine {
         });
     }
 
-    /// Whether [`Self::take_lattice`] has been called for this cage.
+    /// Whether the lattice of this cage is available.
     #[wasm_bindgen(getter, js_name = hasLattice)]
     #[must_use]
     pub fn has_lattice(&self) -> bool {
         self.read(|state| state.lattice.is_some())
     }
 
-    /// Takes what the cage needs to bend a moving model, as `Binder.bindLattice` bound it; the arrays are those of `adopt`.
+    /// Stores the lattice of `Binder.bindLattice`, which deforms a model that a clip moves. Arrays as for `adopt`.
     ///
     /// # Errors
-    /// When there is no cage or the arrays are another one's.
+    /// Without a cage, or if the arrays belong to another cage.
     #[wasm_bindgen(js_name = takeLattice)]
     pub fn take_lattice(
         &self,
@@ -95,9 +96,9 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<(), JsValue> {
         let lattice = self.read(|state| {
-            let controls = Controls::from(state.the_set()?);
+            let controls = Controls::from(state.require_set()?);
             let lattice = Lattice::new(controls.surface());
-            let Offsets { frames, .. } = taken(offsets)?;
+            let Offsets { frames, .. } = decode(offsets)?;
             let n_columns = controls.n_controls() + frames.n_columns();
             let weights = Weights::new(n_columns as u32, indptr, indices, data)?;
             if weights.n_rows() != lattice.points().len() || !frames.fits(controls.n_controls()) {
@@ -109,44 +110,44 @@ impl Engine {
         Ok(())
     }
 
-    /// Where the vertices are while a clip plays, by the processor; for tests and pictures. `[n_vertices, 3]`
+    /// Vertices during playback, computed on the CPU; for tests and pictures. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = clipPositions)]
     #[must_use]
     pub fn clip_positions(&self) -> Vec<f32> {
         self.read(|state| {
-            let at = state.playing.as_ref().map(Playing::positions);
+            let at = state.playing.as_ref().map(Playback::positions);
             crate::arrays::flat(&at.unwrap_or_default())
         })
     }
 }
 
 impl Engine {
-    /// What plays a model: its export, or the file itself where the cage bends what moves.
-    fn part(&self, id: u32, asked: &RigAsked) -> Answer<Part> {
+    /// Playback of a model: of its export, or with `dynamic` of the original file, which the cage then deforms.
+    fn part(&self, id: u32, request: &JsRigOptions) -> Answer<ModelMotion> {
         let is_gltf =
             self.read(|state| Answer::Ok(state.models().get(id)?.model.format() == ModelFormat::Gltf))?;
-        if is_gltf && !asked.dynamic {
-            let bytes = self.posed_glb(id, asked)?.0;
+        if is_gltf && !request.dynamic {
+            let bytes = self.posed_glb(id, request)?.0;
             let player = self.read(|state| Answer::Ok(state.models().get(id)?.model.player_of(&bytes)?))?;
-            return Ok(Part::Player(Box::new(player)));
+            return Ok(ModelMotion::Player(Box::new(player)));
         }
         if let Some(player) = self.read(|state| Answer::Ok(state.models().get(id)?.model.player()?))? {
-            return Ok(Part::Player(Box::new(player)));
+            return Ok(ModelMotion::Player(Box::new(player)));
         }
-        // Other formats move only with the cage.
+        // Formats without clips move only with the cage.
         let pose =
-            self.read(|state| if asked.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
+            self.read(|state| if request.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
             let own = state.models().get(id)?.share(&posed);
-            Ok(Part::Still(state.up().turned_back(own).into_owned()))
+            Ok(ModelMotion::Still(state.up().turned_back(own).into_owned()))
         })
     }
 
-    /// How far the cage as posed moves each place.
+    /// Displacement field of the posed cage.
     ///
     /// # Errors
-    /// When no lattice has come.
+    /// If the lattice is not available.
     pub(super) fn field(&self) -> Answer<DisplacementField> {
         self.read(|state| {
             let Some((lattice, weights, frames)) = &state.lattice else {

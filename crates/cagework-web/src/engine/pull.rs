@@ -1,4 +1,4 @@
-//! Taking hold of the model: what the page asks while a worker solves.
+//! Methods for pulling the model while a worker solves for the cage.
 
 use std::sync::Arc;
 
@@ -11,27 +11,27 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::{Answer, Fault};
-use crate::options::taken;
+use crate::options::decode;
 use crate::state::State;
 use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The point of the model under the pointer; undefined beside it, before there are weights, and while the GPU is busy.
+    /// Surface point under the pointer; undefined if the pointer is not on a model, without weights, or while the GPU is busy.
     ///
     /// # Errors
     /// Never.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> Result<JsValue, JsValue> {
         if self.read(|state| state.playing.is_some()) {
-            // It is shown elsewhere than where the cage has it.
+            // During playback, the visible surface differs from the posed one.
             return Ok(JsValue::UNDEFINED);
         }
         let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
         Ok(found.map_or(Ok(JsValue::UNDEFINED), |point| object(&point))?)
     }
 
-    /// Where a point of the model is; empty if there is no such point. `[3]`
+    /// Position of a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
     /// Without weights, or while the GPU is busy.
@@ -40,12 +40,12 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
     ) -> Result<Vec<f32>, JsValue> {
-        let point = taken(point)?;
+        let point = decode(point)?;
         let place = self.posed(|state, _| Ok(state.place_of(point)))?;
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
-    /// How a point of the model follows the cage; undefined if there is no such point.
+    /// Weights and nearest vertex of a surface point; undefined if the point does not exist.
     ///
     /// # Errors
     /// Without weights.
@@ -54,14 +54,14 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
     ) -> Result<JsValue, JsValue> {
-        let point: SurfacePoint = taken(point)?;
+        let point: SurfacePoint = decode(point)?;
         let grip = self.posed(|state, session| {
             Ok(session.weights().zip(session.frames()).and_then(|bound| state.grip_of(point, bound)))
         })?;
         Ok(grip.map_or(Ok(JsValue::UNDEFINED), |grip| object(&grip))?)
     }
 
-    /// A point's mirror image on the model; undefined without one.
+    /// Mirror image of a surface point, or undefined.
     ///
     /// # Errors
     /// Never.
@@ -70,12 +70,12 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
     ) -> Result<JsValue, JsValue> {
-        let point = taken(point)?;
+        let point = decode(point)?;
         let image = self.read(|state| state.image_of(point));
         Ok(image.map_or(Ok(JsValue::UNDEFINED), |image| object(&image))?)
     }
 
-    /// Where a point goes that follows the pointer from one place of the view to another, in the plane that faces the eye. `[3]`
+    /// Moves a position parallel to the view plane by `dx`, `dy` CSS pixels. `[3]`
     #[wasm_bindgen(js_name = followed)]
     #[must_use]
     pub fn followed(&self, place: &[f32], dx: f32, dy: f32) -> Vec<f32> {
@@ -85,17 +85,17 @@ impl Engine {
         moved.to_array().to_vec()
     }
 
-    /// Shows what is held: points, the first of which the hand has, and where that should be if it cannot follow.
+    /// Shows grabs and pins; the first point is the grab. `target`: position of the pointer if the grab cannot reach it.
     ///
     /// # Errors
-    /// When these are no points.
+    /// If `points` is not an array of surface points.
     #[wasm_bindgen(js_name = showHeld)]
     pub fn show_held(
         &self,
         #[wasm_bindgen(unchecked_param_type = "readonly SurfacePoint[]")] points: JsValue,
         target: Option<Vec<f32>>,
     ) -> Result<(), JsValue> {
-        let points: Vec<SurfacePoint> = taken(points)?;
+        let points: Vec<SurfacePoint> = decode(points)?;
         if self.read(|state| state.held.points == points && state.held.target.is_none()) && target.is_none() {
             return Ok(());
         }
@@ -107,7 +107,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Greys what stays, `[n_vertices]`; undefined for nothing.
+    /// Shows in grey how much each vertex stays in place, 0 to 1, `[n_vertices]`; undefined hides it.
     #[wasm_bindgen(js_name = showStays)]
     pub fn show_stays(&self, stays: Option<Vec<f32>>) {
         self.change(|state| {
@@ -118,7 +118,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// Reads the state with the model where the cage is.
+    /// Reads the state after updating the posed models.
     pub(super) fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
         self.with_session(|session| {
             session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;

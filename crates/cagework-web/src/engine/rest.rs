@@ -1,4 +1,4 @@
-//! Faults of the cage, and model vertices outside it while it is reshaped.
+//! Methods for faults of the cage, and for vertices outside it during reshaping.
 
 use cagework_cage::check::Places;
 use cagework_core::enclosure::Enclosure;
@@ -9,12 +9,12 @@ use super::Engine;
 use crate::problems::Faults;
 use crate::state::State;
 
-/// Most pairs of a vertex and a triangle that are looked at while the cage is dragged: a frame has no time for more.
+/// Maximum number of vertex–triangle pairs that are tested per frame of a drag.
 const WATCHED_PAIRS: usize = 250_000;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Marks what is wrong with the cage: the places of the worker's `Check`.
+    /// Marks the faults of the cage that the worker's `Check` found.
     #[wasm_bindgen(js_name = showFaults)]
     pub fn show_faults(
         &self,
@@ -31,11 +31,11 @@ impl Engine {
         });
     }
 
-    /// How many of some vertices of the model, spread evenly over it, lie outside of the cage as it is dragged now.
-    /// Quick enough for every movement of the pointer; what counts is the check at the end.
+    /// Number of vertices outside the dragged cage, among a regular subset of the model's vertices. Fast enough for every
+    /// pointer event; the full check runs after the drag.
     #[must_use]
     pub fn strays(&self) -> u32 {
-        // What nobody sees does not change: no frame is asked for.
+        // Nothing visible changes, so do not request a frame.
         let mut state = self.state.borrow_mut();
         let state = &mut *state;
         let State { editor, watched, .. } = state;
@@ -43,7 +43,7 @@ impl Engine {
         let Ok(set) = &document.cage.set else { return 0 };
         let vertices = document.models.positions();
         let (plain, watched) = watched.get_or_insert_with(|| {
-            // Without balls and tubes, which are holes in the surface. It could be made before.
+            // Without balls and tubes, which are holes in the surface.
             let plain = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
                 .unwrap_or_else(|_| ControlSet::plain(set.cage()));
             let surface = Controls::from(&plain).surface();

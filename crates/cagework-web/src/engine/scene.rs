@@ -1,4 +1,4 @@
-//! What is shown, and what its colours mean.
+//! Methods for the scene and its legend.
 
 use cagework_gpu::render::MeshStyle;
 use cagework_gpu::render::colormap::{ERROR_RANGE, MIN_WEIGHT_RANGE};
@@ -7,31 +7,31 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Fault;
-use crate::options::{SceneAsked, SliceShown, taken};
+use crate::options::{JsSceneOptions, SliceShown, decode};
 use crate::views::{ColorMap, Largest, Legend, object};
 
 #[wasm_bindgen]
 impl Engine {
-    /// What to show: `SceneOptions` of contract.ts.
+    /// Sets the options of the scene.
     ///
     /// # Errors
-    /// When it is something else.
+    /// If the options are invalid.
     #[wasm_bindgen(js_name = setScene)]
     pub fn set_scene(
         &self,
         #[wasm_bindgen(unchecked_param_type = "SceneOptions")] scene: JsValue,
     ) -> Result<(), JsValue> {
-        let asked: SceneAsked = taken(scene)?;
+        let request: JsSceneOptions = decode(scene)?;
         self.change(|state| {
-            state.is_moved |= asked.original != state.view.original;
-            state.view = asked;
+            state.is_moved |= request.original != state.view.original;
+            state.view = request;
             state.is_changed = true;
             state.place_viewport();
         });
         Ok(())
     }
 
-    /// What colours of the model or the slice mean; undefined while they mean nothing.
+    /// Legend of the colours of model or slice; undefined if the colours show no quantity.
     ///
     /// # Errors
     /// Never.
@@ -64,7 +64,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// The largest weight of a cage vertex; none while the GPU is busy with others: the page asks again when they are in.
+    /// The largest weight of a column. `None` while the GPU uploads weights; the page calls again after that.
     fn largest_weight(&self, column: u32) -> Option<Largest> {
         self.with_session(|session| {
             let weights =

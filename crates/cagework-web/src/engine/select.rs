@@ -1,4 +1,4 @@
-//! Pointing at the cage and selecting.
+//! Methods that pick and select cage elements.
 
 use cagework_editor::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
 use wasm_bindgen::JsValue;
@@ -6,21 +6,21 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::flat;
-use crate::options::taken;
+use crate::options::decode;
 use crate::state::State;
 
 #[wasm_bindgen]
 impl Engine {
-    /// What clicks select: vertex, edge or face.
+    /// Sets the element type that clicks select: vertex, edge or face.
     ///
     /// # Errors
-    /// When it is something else.
+    /// If the type is unknown.
     #[wasm_bindgen(js_name = setElement)]
     pub fn set_element(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Element")] element: JsValue,
     ) -> Result<(), JsValue> {
-        let element = taken(element)?;
+        let element = decode(element)?;
         self.change(|state| {
             state.editor.element = element;
             state.editor.hovered.clear();
@@ -29,7 +29,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Vertices of the element under the pointer; empty for none.
+    /// Vertices of the element within `radius` CSS pixels of the pointer, or an empty array.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {
@@ -52,7 +52,7 @@ impl Engine {
         })
     }
 
-    /// Marks the element of these vertices.
+    /// Highlights the element with these vertices.
     pub fn hover(&self, vertices: Vec<u32>) {
         if self.read(|state| state.editor.hovered != vertices) {
             self.change(|state| {
@@ -65,13 +65,13 @@ impl Engine {
     /// Selects vertices; `mode` is replace, add, remove or toggle.
     ///
     /// # Errors
-    /// When the mode is another.
+    /// If the mode is unknown.
     pub fn select(
         &self,
         vertices: &[u32],
         #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
     ) -> Result<(), JsValue> {
-        let mode = taken(mode)?;
+        let mode = decode(mode)?;
         self.change_selection(|state| state.editor.selection.change(vertices, mode));
         Ok(())
     }
@@ -79,7 +79,7 @@ impl Engine {
     /// Selects the vertices in a rectangle.
     ///
     /// # Errors
-    /// When the mode is another.
+    /// If the mode is unknown.
     #[wasm_bindgen(js_name = selectBox)]
     pub fn select_box(
         &self,
@@ -89,7 +89,7 @@ impl Engine {
         y1: f32,
         #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
     ) -> Result<(), JsValue> {
-        let mode = taken(mode)?;
+        let mode = decode(mode)?;
         self.change_selection(|state| {
             let corners = [state.pointer(x0, y0), state.pointer(x1, y1)];
             let vertices = vertices_in_box(state.pose(), &state.camera, corners);
@@ -104,7 +104,7 @@ impl Engine {
         self.change_selection(|state| state.editor.selection.all());
     }
 
-    /// Extends the selection to whole parts.
+    /// Extends the selection to whole connected components.
     #[wasm_bindgen(js_name = selectLinked)]
     pub fn select_linked(&self) {
         self.change_selection(|state| state.editor.select_linked());
@@ -122,14 +122,14 @@ impl Engine {
         self.read(|state| state.editor.selection.last().map_or(-1, |v| v as i32))
     }
 
-    /// Middle of the selection; empty without one.
+    /// Mean position of the selection; empty if nothing is selected. `[3]`
     #[wasm_bindgen(js_name = selectionCenter)]
     #[must_use]
     pub fn selection_center(&self) -> Vec<f32> {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
     }
 
-    /// Whether mirror images move along.
+    /// Turns symmetric editing on or off: mirror images of the selection move with it.
     #[wasm_bindgen(js_name = setSymmetry)]
     pub fn set_symmetry(&self, on: bool) {
         self.change(|state| {

@@ -1,4 +1,4 @@
-//! A slice through the grid.
+//! Methods for the slice through the grid.
 
 use std::sync::Arc;
 
@@ -9,15 +9,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Answer;
-use crate::options::{BindAsked, taken};
+use crate::options::{JsBindOptions, decode};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Takes a slice: its axis, where along it (0 to 1), the options of its bind, and the worker's rows of weights, which
-    /// may be missing where no cell is inside.
+    /// Shows a slice. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; then the bind options and the weights of
+    /// `Binder.bindSlice`, which are undefined if no cell is inside.
     ///
     /// # Errors
-    /// When there is no cage or the rows belong to another slice.
+    /// Without a cage, or if the weights belong to another slice.
     #[wasm_bindgen(js_name = takeSlice)]
     pub fn take_slice(
         &self,
@@ -28,10 +28,10 @@ impl Engine {
         indices: Vec<u32>,
         data: Vec<f32>,
     ) -> Result<(), JsValue> {
-        let asked: BindAsked = taken(options)?;
+        let request: JsBindOptions = decode(options)?;
         let slice = self.read(|state| {
-            let set = state.the_set()?;
-            let mut slice = Slice::new(set, &BindOptions::from(asked), axis.min(2), fraction);
+            let set = state.require_set()?;
+            let mut slice = Slice::new(set, &BindOptions::from(request), axis.min(2), fraction);
             if !data.is_empty() {
                 slice.set_weights(Weights::new(
                     Controls::from(set).n_controls() as u32,
