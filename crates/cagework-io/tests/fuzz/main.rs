@@ -226,7 +226,7 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
                     path.display()
                 ),
                 Err(e) => {
-                    println!("fuzz: input {current} of seed {seed} {how}; its file cannot be written: {e}")
+                    println!("fuzz: input {current} of seed {seed} {how}; its file cannot be written: {e}");
                 }
             }
         }

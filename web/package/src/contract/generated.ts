@@ -1,7 +1,7 @@
 // Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.
 
 /**
- * What kinds of errors the page tells apart.
+ * Kinds of errors that the page handles differently.
  */
 export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
 /**
@@ -33,7 +33,7 @@ export type DeltaNorm = "euclidean" | "literal";
  */
 export type OutsidePolicy = "extend" | "stay" | "refuse";
 /**
- * `BindOptions`: those of the core, and where to compute.
+ * Options of a bind, and where it runs.
  */
 export type BindOptions = { backend: Backend,
 /**
@@ -126,11 +126,11 @@ distance: number,
  */
 share: number, };
 /**
- * Offsets of a bind: what weights of controls alone miss.
+ * Offsets of a bind: the frames, whose columns follow those of the controls, and the points outside the cage.
  */
 export type Offsets = {
 /**
- * The columns of the weights after those of the controls.
+ * Frames; their columns follow those of the controls.
  */
 frames: Frames,
 /**
@@ -409,7 +409,7 @@ nonzeros: number, };
 export type Shape = "follow" | "hull";
 export type CageSymmetry = "auto" | "on" | "off";
 /**
- * `CageOptions`.
+ * Options of a generated cage.
  */
 export type CageOptions = { vertices: number, detail: number, quads: boolean, margin: number, symmetry: CageSymmetry, voxels: number, shape: Shape, per_component: boolean, };
 /**
@@ -429,7 +429,7 @@ export type InnerKind = "point" | "line" | "face";
  */
 export type CageControls = {
 /**
- * Steps of subdivision.
+ * Number of subdivision steps.
  */
 smooth: number,
 /**
@@ -437,27 +437,27 @@ smooth: number,
  */
 inner: number,
 /**
- * Points, lines and faces between interior controls, which are counted from the first of them.
+ * Points, lines and faces; indices are relative to the first interior control.
  */
 elements: Array<InnerElement>,
 /**
- * Radius of points and lines, object units; null for a share of the cage.
+ * Radius of points and lines, object units; null for a share of the cage's size.
  */
 radius: number | null, };
 /**
- * `CageInfo`.
+ * Size of the cage.
  */
 export type CageInfo = { vertices: number, edges: number, faces: number,
 /**
- * Quads among the faces.
+ * Number of quads among the faces.
  */
 quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
 /**
- * `CageState`.
+ * The cage, its controls and notices.
  */
 export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
 /**
- * Radius of points and lines inside, object units.
+ * Radius of interior points and lines, object units.
  */
 radius: number, };
 /**
@@ -473,19 +473,19 @@ export type Severity = "error" | "warning" | "note";
  */
 export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
 /**
- * What a button beside a problem does.
+ * Action of a fix.
  */
 export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
 /**
- * What helps, and what its button says.
+ * A fix, and the label of its button.
  */
 export type Fix = { label: string, } & ({ "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" });
 /**
- * A kind of fault, as the page says it.
+ * A kind of fault of a cage.
  */
 export type Problem = { code: Code, severity: Severity,
 /**
- * A whole sentence with numbers.
+ * A complete sentence.
  */
 message: string, count: number, fix: Fix | null, };
 /**
@@ -518,23 +518,23 @@ stays: Array<string>, };
  */
 export type MemberInfo = {
 /**
- * Its number, which stays.
+ * Identifier; never changes.
  */
 id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
 /**
- * Names of its parts, each with its kind: "material:Cloth".
+ * Names of the parts with their kinds, such as `material:Cloth`.
  */
 parts: Array<string>, options: PartOptions,
 /**
- * Whether some of it is painted to stay.
+ * Whether a part of the model is painted to stay in place.
  */
 painted: boolean, };
 /**
- * What a project stores of a model besides its file.
+ * Settings of a model in a project.
  */
 export type MemberSettings = {
 /**
- * Number of its first triangle in points of the surface.
+ * Number of the first triangle in surface points.
  */
 first_triangle: number, options: PartOptions,
 /**
@@ -542,47 +542,47 @@ first_triangle: number, options: PartOptions,
  */
 painted: Array<[number, number]>, };
 /**
- * `ModelInfo`.
+ * Properties of the models in the cage.
  */
 export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
 /**
- * Morph targets of all that is shown, and their weights at rest.
+ * Morph targets of all models, and their weights at rest.
  */
 targets: Array<TargetView>,
 /**
- * Names of what hangs on the skeleton without a skin: it can be kept rigid.
+ * Names of unskinned parts attached to joints or animated nodes; they can be kept rigid.
  */
 props: Array<string>,
 /**
- * Whether exports keep more than the shape.
+ * Whether exports keep a rig.
  */
 rigged: boolean, bounds: Bounds, notices: Array<string>,
 /**
- * Each of the models in the cage; all else is of all of them.
+ * Properties of each model.
  */
 members: Array<MemberInfo>, };
 /**
- * The document's part of a project's settings.
+ * Settings of a document in a project.
  */
 export type DocumentSettings = {
 /**
- * Identifier of the built-in sample whose own cage it is.
+ * Identifier of the built-in sample that the cage belongs to.
  */
 sample?: string | null,
 /**
- * Subdivision and interior controls of the cage, whose last positions the controls are.
+ * Subdivision and interior controls; the controls are the last positions of the cage.
  */
 controls?: CageControls | null,
 /**
- * The pose in the axes of the model's file: [`cagework_io::encode_pose`] in base 64 for URLs. None at rest.
+ * The pose in the axes of the model's file: [`cagework_io::encode_pose`] in URL-safe base 64. Null at rest.
  */
 pose?: string | null,
 /**
- * Points of the model that pulls leave in place.
+ * Surface points that pulls keep in place.
  */
 pins?: Array<SurfacePoint>,
 /**
- * The same of each saved pose.
+ * Surface points that pulls keep in place, of each saved pose.
  */
 pose_pins?: Array<Array<SurfacePoint>>,
 /**
@@ -590,7 +590,7 @@ pose_pins?: Array<Array<SurfacePoint>>,
  */
 pose_shares?: Array<number>,
 /**
- * Visibility, parts and paint of each model.
+ * Visibility, parts and painted amounts of each model.
  */
 models?: Array<MemberSettings>, };
 /**
@@ -598,7 +598,7 @@ models?: Array<MemberSettings>, };
  */
 export type Command = { "do": "set_pose",
 /**
- * Where its vertices and interior controls go, object units.
+ * Positions of cage vertices and interior controls, object units.
  */
 positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
 /**
@@ -606,11 +606,11 @@ positions: readonly (readonly [number, number, number])[], } | { "do": "reset_po
  */
 name: string, } | { "do": "apply_pose",
 /**
- * Which one, from 0.
+ * Index of the pose.
  */
 index: number, } | { "do": "rename_pose",
 /**
- * Which one, from 0.
+ * Index of the pose.
  */
 index: number,
 /**
@@ -618,23 +618,23 @@ index: number,
  */
 name: string, } | { "do": "remove_pose",
 /**
- * Which one, from 0.
+ * Index of the pose.
  */
 index: number, } | { "do": "blend",
 /**
- * Which one, from 0.
+ * Index of the pose.
  */
 index: number,
 /**
- * Its share, 0 to 1.
+ * Share, 0 to 1.
  */
 share: number, } | { "do": "carry_poses",
 /**
- * Controls of the other cage.
+ * Number of controls of the other cage.
  */
 from: number,
 /**
- * Positions for the controls of this cage.
+ * Positions of the controls of this cage, concatenated over the poses. `[n_poses, n_controls]`
  */
 positions: readonly (readonly [number, number, number])[],
 /**
@@ -650,11 +650,11 @@ pins: Array<SurfacePoint>, } | { "do": "replace_cage",
  */
 mesh: unknown,
 /**
- * Subdivision and interior controls; none to keep those that fit.
+ * Subdivision and interior controls; null keeps the current ones that fit.
  */
 controls: CageControls | null,
 /**
- * What the generator reported.
+ * Notices of the generator.
  */
 notices: Array<string>, } | { "do": "move_rest" } | { "do": "edit_rest",
 /**
@@ -666,15 +666,15 @@ edit: RestEdit, } | { "do": "subdivide",
  */
 steps: number, } | { "do": "set_radius",
 /**
- * Object units; none for a share of the cage.
+ * Object units; null for a share of the cage's size.
  */
 radius: number | null, } | { "do": "add_control",
 /**
- * A point, a line through places, or a sheet between them.
+ * A point, a polyline through `places`, or a sheet with corners at `places`.
  */
 kind: InnerKind,
 /**
- * Where, object units.
+ * Positions, object units.
  */
 places: readonly (readonly [number, number, number])[], } | { "do": "add_sheet",
 /**
@@ -682,7 +682,7 @@ places: readonly (readonly [number, number, number])[], } | { "do": "add_sheet",
  */
 center: readonly [number, number, number],
 /**
- * Its half axes at the largest size.
+ * Half axes of the largest size that is tried.
  */
 axes: readonly (readonly [number, number, number])[], } | { "do": "replace_controls",
 /**
@@ -690,15 +690,15 @@ axes: readonly (readonly [number, number, number])[], } | { "do": "replace_contr
  */
 positions: readonly (readonly [number, number, number])[],
 /**
- * Points, lines and faces between them.
+ * Points, lines and faces; indices are relative to `positions`.
  */
 elements: Array<InnerElement>, } | { "do": "remove_model",
 /**
- * Its number.
+ * Id of the model.
  */
 id: number, } | { "do": "set_parts",
 /**
- * Its number.
+ * Id of the model.
  */
 id: number,
 /**
@@ -706,11 +706,11 @@ id: number,
  */
 options: PartOptions, } | { "do": "set_painted",
 /**
- * Its number.
+ * Id of the model.
  */
 id: number,
 /**
- * Amounts, 0 to 255. `[n_vertices]`, or empty for an unpainted model
+ * Amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted model
  */
 amounts: Array<number>, };
 /**
@@ -722,7 +722,7 @@ export type PoseView = {
  */
 name: string,
 /**
- * Whether it belongs to the cage; poses of a cage that was replaced do not.
+ * Whether the pose belongs to the current cage rather than a replaced one.
  */
 fits: boolean, };
 /**
@@ -730,7 +730,7 @@ fits: boolean, };
  */
 export type SelectionView = {
 /**
- * Selected vertices.
+ * Number of selected vertices.
  */
 count: number,
 /**
@@ -738,11 +738,11 @@ count: number,
  */
 last: number | null,
 /**
- * Centre of the selection, object units; none without a selection and during a gesture.
+ * Centre of the selection, object units; null without a selection and during a gesture.
  */
 center: [number, number, number] | null, };
 /**
- * What panels show of a document. Meshes are read separately, when their keys change.
+ * The part of a document that panels show. Meshes are read separately when their keys change.
  */
 export type DocumentView = {
 /**
@@ -766,7 +766,7 @@ poses: Array<PoseView>,
  */
 shares: Array<number>,
 /**
- * Points of the model that pulls leave in place.
+ * Surface points that pulls keep in place.
  */
 pins: Array<SurfacePoint>,
 /**
@@ -774,7 +774,7 @@ pins: Array<SurfacePoint>,
  */
 posed: boolean,
 /**
- * Whether the cage at rest is reshaped.
+ * Whether the cage is being reshaped.
  */
 editingRest: boolean,
 /**
@@ -782,7 +782,7 @@ editingRest: boolean,
  */
 sample: string | null,
 /**
- * Whether the cage is that sample's own.
+ * Whether the cage is the one of the sample.
  */
 sampleCage: boolean,
 /**
@@ -794,7 +794,7 @@ selected: SelectionView,
  */
 steps: number,
 /**
- * Label of the step that undo takes back.
+ * Label of the step that undo reverts.
  */
 undo: string | null,
 /**
@@ -802,15 +802,15 @@ undo: string | null,
  */
 redo: string | null,
 /**
- * Steps that were dropped because the history exceeded its limit.
+ * Number of steps that were dropped because the history exceeded its limit.
  */
 forgotten: number, };
 /**
- * What panels show.
+ * Document and bind state that panels show.
  */
 export type View = {
 /**
- * Whether the models follow the cage: there are weights for both as they are.
+ * Whether the models are bound to the current cage.
  */
 bound: boolean,
 /**
@@ -834,7 +834,7 @@ poses: Array<PoseView>,
  */
 shares: Array<number>,
 /**
- * Points of the model that pulls leave in place.
+ * Surface points that pulls keep in place.
  */
 pins: Array<SurfacePoint>,
 /**
@@ -842,7 +842,7 @@ pins: Array<SurfacePoint>,
  */
 posed: boolean,
 /**
- * Whether the cage at rest is reshaped.
+ * Whether the cage is being reshaped.
  */
 editingRest: boolean,
 /**
@@ -850,7 +850,7 @@ editingRest: boolean,
  */
 sample: string | null,
 /**
- * Whether the cage is that sample's own.
+ * Whether the cage is the one of the sample.
  */
 sampleCage: boolean,
 /**
@@ -862,7 +862,7 @@ selected: SelectionView,
  */
 steps: number,
 /**
- * Label of the step that undo takes back.
+ * Label of the step that undo reverts.
  */
 undo: string | null,
 /**
@@ -870,7 +870,7 @@ undo: string | null,
  */
 redo: string | null,
 /**
- * Steps that were dropped because the history exceeded its limit.
+ * Number of steps that were dropped because the history exceeded its limit.
  */
 forgotten: number, };
 /**
@@ -882,7 +882,7 @@ export type CageContents = {
  */
 positions: Float32Array,
 /**
- * For each face the number of its corners, then them.
+ * For each face its corner count, then its corners.
  */
 corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
 /**
@@ -894,15 +894,15 @@ export type PoseContents = { name: string,
  */
 positions: Float32Array, };
 /**
- * What is opened besides models.
+ * Contents that are opened together with models.
  */
 export type OpenContents = {
 /**
- * Identifier of the built-in sample that it is.
+ * Identifier of the built-in sample, if it is one.
  */
 sample: string | null,
 /**
- * Settings that a project was saved with.
+ * JSON of the page's settings in a project.
  */
 settings: string | null, cage: CageContents | null,
 /**
@@ -910,72 +910,72 @@ settings: string | null, cage: CageContents | null,
  */
 poses: Array<PoseContents>, };
 /**
- * The page's part of a project, as far as it can be used.
+ * Valid settings of a project.
  */
 export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
 /**
- * What was wrong, in whole sentences.
+ * Values that were replaced, a sentence each.
  */
 notices: Array<string>, };
 export type Theme = "light" | "dark";
 /**
- * What colours of the mesh mean.
+ * Quantity that the colours of the mesh show.
  */
 export type Colour = "material" | "clay" | "weight" | "error";
 /**
- * How the model follows the cage.
+ * Kind of coordinates.
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
 /**
- * What the slice shows.
+ * Quantity that the slice shows.
  */
 export type SliceShown = "off" | "kinds" | "value";
 /**
- * The gizmo.
+ * Mode of the gizmo.
  */
 export type Gizmo = "none" | "move" | "rotate" | "scale";
 /**
- * `SceneOptions`.
+ * Options of the scene.
  */
 export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour,
 /**
- * Colours of weights span 0 to 1, not 0 to the largest.
+ * Whether the colours of weights span 0 to 1 rather than 0 to the largest weight.
  */
 weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo,
 /**
- * The cage steps back: the model itself is pulled.
+ * Whether dragging pulls the model; the cage is drawn faintly then.
  */
 pull: boolean,
 /**
- * Side by side, from the left. Those by formula only once they are there; harmonic ones alone are no comparison.
+ * Kinds shown side by side, from the left. Kinds that are not computed yet are skipped.
  */
 compare: Array<Coordinates>, problems: boolean,
 /**
- * Joints are shown as they will be exported; null for none.
+ * How joints are shown: as they will be exported. Null hides them.
  */
 joints: Joints | null, };
 /**
- * Where the camera is.
+ * Position and direction of the camera.
  */
 export type CameraView = {
 /**
- * What it turns around, object units.
+ * Centre of orbiting, object units.
  */
 target: [number, number, number],
 /**
- * Turn around y and height above the horizon, radians.
+ * Rotation about y, and elevation above the horizon, radians.
  */
 yaw: number, pitch: number,
 /**
- * From the eye to the target, object units.
+ * Distance from the eye to the target, object units.
  */
 distance: number, parallel: boolean, };
 /**
- * A point of the models' surface.
+ * A point on the surface of the models.
  */
 export type SurfacePoint = {
 /**
- * Number of its triangle: see [`Models`].
+ * Number of the triangle; see [`Models`].
  */
 triangle: number,
 /**
@@ -983,11 +983,11 @@ triangle: number,
  */
 bary: [number, number, number], };
 /**
- * How a point of the model follows the cage.
+ * Weights and nearest vertex of a surface point.
  */
 export type Grip = {
 /**
- * Its weights. `[n_cage]`
+ * Weights of the point. `[n_cage]`
  */
 row: Array<number>,
 /**
@@ -995,40 +995,40 @@ row: Array<number>,
  */
 seed: number, };
 /**
- * How the model is pulled.
+ * Options of pulling the model.
  */
 export type PullOptions = {
 /**
- * How far along the surface, over the model's size; null for automatic.
+ * Reach along the surface, over the model's size; null for automatic.
  */
 reach: number | null,
 /**
- * The whole model follows.
+ * Whether the whole model follows.
  */
 whole: boolean,
 /**
- * Mirror images stay mirror images.
+ * Whether the pull is symmetric.
  */
 mirrored: boolean, };
 export type Joints = "follow" | "stay" | "turn";
 /**
- * What becomes of a rig.
+ * Options of exporting a rig.
  */
 export type RigOptions = { joints: Joints,
 /**
- * Clips travel as far as they did.
+ * Whether translations of clips keep their length; otherwise they scale with the height of the hips.
  */
 keep_travel: boolean,
 /**
- * Names of what hangs on the skeleton and keeps its shape.
+ * Names of parts that keep their shape.
  */
 rigid: Array<string>,
 /**
- * The shape alone.
+ * Whether to export the shape without the rig.
  */
 plain: boolean,
 /**
- * The cage bends the model while a clip moves it.
+ * Whether the cage deforms the model after a clip moves it.
  */
 dynamic: boolean, };
 /**
@@ -1036,7 +1036,7 @@ dynamic: boolean, };
  */
 export type ClipView = {
 /**
- * Its name, or its number if it has none.
+ * The name, or the number if it has none.
  */
 name: string, seconds: number, };
 /**
@@ -1044,19 +1044,19 @@ name: string, seconds: number, };
  */
 export type TargetView = { name: string, default: number, };
 /**
- * How colours of a legend follow each other.
+ * Colour map of a legend.
  */
 export type ColorMap = "viridis" | "error" | "kinds";
 /**
- * The largest value that colours show, and the vertex of the model that has it.
+ * The largest displayed value, and the model vertex that has it.
  */
 export type Largest = { value: number, vertex: number, };
 /**
- * `Legend`.
+ * Legend of the colours of model or slice.
  */
 export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap,
 /**
- * Of the weights that the model's colours show; none for other colours.
+ * Largest of the displayed weights; `None` for other quantities.
  */
 largest: Largest | null, };
 /**
@@ -1076,20 +1076,20 @@ export type SelectMode = "replace" | "add" | "remove" | "toggle";
  */
 export type Gesture = "grab" | "rotate" | "scale";
 /**
- * A part of the gizmo: an axis, the plane normal to it, or the whole.
+ * Handle of the gizmo: an axis, the plane normal to an axis, or all axes.
  */
 export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | "all";
 /**
- * An edit of the cage where it is selected.
+ * An edit of the selected elements of the cage.
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
-/** Endings of files of models, best first. */
+/** File extensions of models, preferred first. */
 export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off"] as const;
-/** Formats of a shape without anything else. */
+/** Formats that store only a shape. */
 export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;
