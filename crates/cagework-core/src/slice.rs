@@ -23,7 +23,7 @@ pub struct Slice {
     pub layer: u32,
     /// Cells along [`Self::u`] and [`Self::v`].
     pub dims: [u32; 2],
-    /// Outer corner of its first cell, in the plane of the centres, object units.
+    /// Corner of the slice at which its first cell begins, in the plane of the cell centres, object units.
     pub corner: Vec3,
     /// Edge vector of a cell along the next axis (y for x, z for y, x for z), object units.
     pub u: Vec3,

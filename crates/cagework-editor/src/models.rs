@@ -55,7 +55,7 @@ pub struct MemberSettings {
 pub struct Member {
     /// Identifier, unique in the document.
     pub id: u32,
-    /// The file.
+    /// The model as it was read.
     pub model: Arc<Model>,
     /// Visibility and parts.
     pub options: PartOptions,
@@ -383,7 +383,7 @@ impl Models {
         all
     }
 
-    /// Settings of the models in a project; empty for one model with default options.
+    /// Settings of the models, as a project stores them; empty for a single model whose settings are all default.
     #[must_use]
     pub fn settings(&self) -> Vec<MemberSettings> {
         let of = |member: &Member| MemberSettings {

@@ -1,8 +1,8 @@
-//! Jacobi smoothing on the GPU: the paper's Algorithm 3 with Eq. 2 as stop rule.
+//! Jacobi smoothing on the GPU: the paper's Algorithm 3 with Eq. 2 as stopping criterion.
 //!
-//! Changes versus the paper: two fields are swapped, not copied, and every [`SWEEPS_PER_CHECK`] sweeps only
-//! the number delta is read back, not the field. Eq. 2 couples all columns of a cell, so the fields of all
-//! batches are kept, and each batch adds to one buffer of changes per cell.
+//! Unlike the paper, two fields are swapped instead of copied, and only delta is read back, once every [`SWEEPS_PER_CHECK`] sweeps.
+//! Eq. 2 couples all columns of a cell, so the fields of all batches are kept, and every batch adds its changes to one shared
+//! buffer with a value per cell.
 
 use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;

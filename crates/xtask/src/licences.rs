@@ -69,7 +69,8 @@ pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-py", &host()?, &[])?)
 }
 
-/// Writes the notices of the npm package into a folder of it. Vite's list of the packages in its decoder is in `dist`.
+/// Writes the licence notices of the npm package to `folder`, which is part of that package. `dist` contains Vite's list of the npm packages
+/// that its decoder bundles.
 ///
 /// # Errors
 /// Names the package whose licence is not known.

@@ -92,7 +92,7 @@ impl Pull {
         })
     }
 
-    /// Cage vertices and controls inside.
+    /// Number of cage vertices and interior controls.
     #[must_use]
     pub fn n_cage(&self) -> usize {
         self.cage.len()
