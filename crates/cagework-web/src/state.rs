@@ -12,7 +12,7 @@ use cagework_core::{Bounds, ControlSet, Frames, PolygonMesh, Weights};
 use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, DrawModel, GizmoPart};
-use cagework_io::{Model, UpAxis};
+use cagework_io::UpAxis;
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 
@@ -276,12 +276,12 @@ impl State {
         Pointers { width: self.part_width(), last: self.shown().len() as f32 - 1.0 }
     }
 
-    /// Initial camera of a model, and the picture's size, pixels.
-    pub(crate) fn view_of(&self, model: &Model) -> (Camera, [u32; 2]) {
+    /// Camera that frames positions, and the picture's size, pixels.
+    pub(crate) fn view_of(&self, positions: &[Vec3]) -> (Camera, [u32; 2]) {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
         camera.set_viewport(size);
-        if let Some(bounds) = Bounds::of(&model.positions) {
+        if let Some(bounds) = Bounds::of(positions) {
             camera.set_scene(bounds);
             camera.frame(bounds);
         }
@@ -441,6 +441,7 @@ pub(crate) enum Upload {
 mod tests {
     use cagework_core::subdivided_box;
     use cagework_editor::{Command, Contents};
+    use cagework_io::Model;
 
     use super::*;
 

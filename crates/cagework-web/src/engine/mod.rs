@@ -105,7 +105,6 @@ impl Engine {
         let Some(first) = models.first_mut() else {
             return Err(Fault::missing("model", "open one first").into());
         };
-        let (camera, size) = self.read(|state| state.view_of(&first.model));
         let (contents, settings, mut notices) = contents.read(first)?;
         let (up, origin) = (first.model.up(), first.model.origin());
         let mut draws = Vec::new();
@@ -128,6 +127,7 @@ impl Engine {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
             for (model, _) in &models {
+                let (camera, size) = self.read(|state| state.view_of(&model.positions));
                 check_layers(gpu.main.context(), &camera, &model.positions, &model.triangles, size)
                     .map_err(Fault::from)?;
             }

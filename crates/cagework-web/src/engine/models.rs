@@ -47,9 +47,10 @@ impl Engine {
             state.is_adding = true;
         });
         let is_too_much = self.read(|state| {
-            let size = (state.size * state.scale).as_uvec2().to_array();
             let (positions, triangles) = (state.models().positions(), state.models().triangles());
-            check_layers(gpu.main.context(), &state.camera, positions, triangles, size)
+            // The present camera may frame one of them: all would cover far more of the picture than there is.
+            let (camera, size) = state.view_of(positions);
+            check_layers(gpu.main.context(), &camera, positions, triangles, size)
         });
         let outcome = match is_too_much {
             Ok(()) => upload(&self.state, gpu).await,
