@@ -174,15 +174,7 @@ impl Editor {
     /// # Errors
     /// If the command cannot be applied. Nothing changes then.
     pub fn apply(&mut self, command: Command) -> Result<(), EditError> {
-        let before = self.document().clone();
-        let result = self.run(command);
-        if result.is_err() {
-            self.set_document(before);
-        }
-        result
-    }
-
-    fn run(&mut self, command: Command) -> Result<(), EditError> {
+        // Each arm checks everything before its first change.
         match command {
             Command::SetPose { positions } => self.set_pose(positions)?,
             Command::ResetPose => self.reset_pose(),

@@ -207,11 +207,6 @@ impl Editor {
         self.history = History::with_limit(self.history.limit());
     }
 
-    /// Replaces the document; [`Self::commit`] adds the change to the history.
-    pub fn show(&mut self, document: Document) {
-        self.set_document(document);
-    }
-
     /// Replaces the document. Clears the selection if the cage differs.
     pub(crate) fn set_document(&mut self, document: Document) {
         let has_other_cage = document.cage_key != self.document.cage_key;

@@ -18,8 +18,8 @@ use cagework_core::report::{
 use cagework_core::{BindOptions, Frames, InnerElement, Stage};
 use cagework_editor::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_editor::{
-    CageControls, Command, DocumentSettings, DocumentView, InnerKind, MemberSettings, PartOptions, PoseView,
-    RestEdit, SelectionView, SurfacePoint,
+    CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
+    SelectionView, SurfacePoint,
 };
 use cagework_io::{ModelFormat, UpAxis};
 use serde::Serialize;
@@ -112,7 +112,6 @@ fn generated_types_are_up_to_date() {
         Command,
         PoseView,
         SelectionView,
-        DocumentView,
         View,
         CageContents,
         PoseContents,

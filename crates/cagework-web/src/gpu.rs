@@ -71,10 +71,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
             Upload::Cage => {
                 let Some(set) = state.borrow().set().cloned() else { return Ok(()) };
                 gpu.others.clear();
-                {
-                    let on_gpu = &mut state.borrow_mut().on_gpu;
-                    (on_gpu.cage, on_gpu.bound) = (None, None);
-                }
+                state.borrow_mut().on_gpu.cage = None;
                 gpu.main.set_cage(&set).await?;
                 state.borrow_mut().on_gpu.cage = Some(key.cage);
             }

@@ -104,8 +104,6 @@ pub(crate) struct GpuKeys {
     pub(crate) mesh: Option<u64>,
     pub(crate) parts: Option<u64>,
     pub(crate) cage: Option<u64>,
-    /// The weights.
-    pub(crate) bound: Option<Key>,
 }
 
 /// Grabs and pins, and the posed models for picking.
@@ -324,7 +322,6 @@ impl State {
     /// Sets the weights of the current document.
     pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
         self.bound = Some(bound);
-        self.on_gpu.bound = Some(self.editor.key());
         self.playing = None;
         (self.is_moved, self.is_changed) = (true, true);
     }
@@ -364,9 +361,10 @@ impl State {
         }
     }
 
-    /// Marks all data as not uploaded.
+    /// Marks all data as not uploaded; the sessions drop their weights with the mesh.
     pub(crate) fn forget_gpu(&mut self) {
         self.on_gpu = GpuKeys::default();
+        self.bound = None;
     }
 
     /// Marks only the mesh of the document as uploaded.
@@ -542,7 +540,7 @@ mod tests {
         let mut state = uploaded();
         bind(&mut state);
         state.forget_gpu();
-        state.bound = None;
+        assert!(state.bound.is_none());
         assert_eq!(upload_all(&mut state), "mcwp");
     }
 }

@@ -255,7 +255,10 @@ impl Engine {
             let model = &state.models().get(id)?.model;
             let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
             frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
-            let notice = format!("{} frames became morph targets; the skeleton is left out", frames.len());
+            let notice = match frames.len() {
+                1 => "1 frame became a morph target; the skeleton is left out".to_owned(),
+                n => format!("{n} frames became morph targets; the skeleton is left out"),
+            };
             Ok((model.write_baked(clip, &rest, frames)?, vec![notice]))
         })
     }

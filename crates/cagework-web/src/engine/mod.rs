@@ -80,15 +80,6 @@ impl Engine {
         })
     }
 
-    /// The view that panels show.
-    ///
-    /// # Errors
-    /// Never.
-    #[wasm_bindgen(unchecked_return_type = "View")]
-    pub fn view(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| object(&state.document_view()))?)
-    }
-
     /// Replaces the open models, cage and poses, and clears the history. Consumes the handles of the models. Returns
     /// notices.
     ///
@@ -134,7 +125,11 @@ impl Engine {
             let draw = joined(&draws.iter().collect::<Vec<_>>());
             gpu.others.clear();
             self.state.borrow_mut().forget_gpu();
-            gpu.main.set_shared_model(draw).await.map_err(Fault::from)?;
+            if let Err(error) = gpu.main.set_shared_model(draw).await {
+                // Uploads the models that stay open, with their weights.
+                self.change(|_| ());
+                return Err(Fault::from(error).into());
+            }
             self.change(|state| {
                 state.editor.open(models, contents);
                 state.draws = (0..).zip(draws).collect();

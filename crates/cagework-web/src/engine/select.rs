@@ -116,12 +116,6 @@ impl Engine {
         self.read(|state| state.editor.selection.vertices())
     }
 
-    /// The vertex selected last, or -1.
-    #[must_use]
-    pub fn last(&self) -> i32 {
-        self.read(|state| state.editor.selection.last().map_or(-1, |v| v as i32))
-    }
-
     /// Mean position of the selection; empty if nothing is selected. `[3]`
     #[wasm_bindgen(js_name = selectionCenter)]
     #[must_use]
