@@ -219,7 +219,7 @@ impl Editor {
             Command::ReplaceCage { mesh, controls, notices } => {
                 let mut cage = match controls {
                     Some(controls) => RestCage::new(mesh, controls)?,
-                    None => self.document().cage.replaced(&mesh),
+                    None => self.document().cage.replaced(&mesh)?,
                 };
                 cage.notices.extend(notices);
                 self.set_cage(cage);
@@ -368,7 +368,7 @@ impl Editor {
             return Ok(());
         }
         let CageEdit { mesh, touched, .. } = self.edited(edit)?;
-        let replaced = self.document().cage.replaced(&mesh);
+        let replaced = self.document().cage.replaced(&mesh)?;
         self.set_cage(replaced);
         self.document_mut().has_sample_cage = false;
         self.selection.change(&touched, SelectMode::Replace);

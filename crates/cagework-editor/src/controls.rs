@@ -78,8 +78,11 @@ impl RestCage {
     /// Creates a cage from a mesh whose last positions are the interior controls.
     ///
     /// # Errors
-    /// If the controls do not fit into it.
+    /// If a position is not finite, or the controls do not fit into the cage.
     pub fn new(mut mesh: PolygonMesh, controls: CageControls) -> Result<Self, EditError> {
+        if !mesh.positions.iter().all(|p| p.is_finite()) {
+            return Err(EditError::NotFinite { what: "positions of a cage" });
+        }
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
@@ -105,7 +108,10 @@ impl RestCage {
     }
 
     /// Another cage with those of the current controls that fit into it.
-    pub fn replaced(&self, cage: &PolygonMesh) -> Self {
+    ///
+    /// # Errors
+    /// If a position is not finite.
+    pub fn replaced(&self, cage: &PolygonMesh) -> Result<Self, EditError> {
         let with = |inner: &[Vec3], controls: CageControls| {
             let mut mesh = cage.clone();
             mesh.positions.extend(inner);
@@ -113,17 +119,17 @@ impl RestCage {
         };
         let smooth = CageControls { smooth: self.controls.smooth, ..CageControls::default() };
         let (made, fault) = match with(self.inner_positions(), self.controls.clone()) {
-            Ok(made) => return made,
+            Ok(made) => return Ok(made),
             Err(fault) if self.controls.inner > 0 => match with(&[], smooth) {
                 Ok(made) => {
-                    return Self { notices: vec![dropped("The controls inside are", &fault)], ..made };
+                    return Ok(Self { notices: vec![dropped("The controls inside are", &fault)], ..made });
                 }
                 Err(fault) => (with(&[], CageControls::default()), fault),
             },
             Err(fault) => (with(&[], CageControls::default()), fault),
         };
         let notices = vec![dropped("The smooth surface is", &fault)];
-        made.map_or_else(|_| Self::default(), |made| Self { notices, ..made })
+        Ok(Self { notices, ..made? })
     }
 
     /// Positions of interior controls.
@@ -282,9 +288,9 @@ mod tests {
         let of = |min: f32, max: f32| {
             subdivided_box(Bounds { min: Vec3::splat(min), max: Vec3::splat(max) }, 0.0, [2; 3])
         };
-        let larger = made.replaced(&of(-2.0, 2.0));
+        let larger = made.replaced(&of(-2.0, 2.0)).unwrap();
         assert_eq!((larger.controls.inner, larger.mesh.positions.len(), larger.notices.len()), (1, 27, 0));
-        let beside = made.replaced(&of(1.0, 2.0));
+        let beside = made.replaced(&of(1.0, 2.0)).unwrap();
         assert_eq!((beside.controls.inner, beside.mesh.positions.len()), (0, 26));
         assert!(beside.notices[0].contains("outside"));
     }
@@ -294,7 +300,7 @@ mod tests {
         let made = made().with(InnerKind::Point, &[at(0.5)]).unwrap();
         let mut open = made.set.as_ref().unwrap().cage().to_polygon_mesh();
         open.faces.pop();
-        let draft = made.replaced(&open);
+        let draft = made.replaced(&open).unwrap();
         assert!(draft.set.is_err());
         assert_eq!((draft.inner_positions(), draft.controls.inner), (&[at(0.5)][..], 1));
     }

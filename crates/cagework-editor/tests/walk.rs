@@ -1,12 +1,18 @@
-//! Random commands, undo and redo: documents are restored exactly, and nothing panics.
+//! Random commands, undo and redo: documents are restored exactly. Damaged commands and projects are refused or
+//! applied, and leave a valid document. Nothing panics.
+//!
+//! `PROPTEST_CASES=100000 PROPTEST_RNG_SEED=5 cargo test -p cagework-editor --test walk` runs other and more sessions.
 
 use cagework_core::{Bounds, subdivided_box};
 use cagework_editor::edit::SelectMode;
-use cagework_editor::{Command, Contents, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint};
-use cagework_io::Model;
+use cagework_editor::{
+    Command, Contents, DocumentSettings, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint,
+};
+use cagework_io::{Model, read_project};
 use glam::Vec3;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed, TestRunner};
+use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
+use serde_json::{Value, json};
 
 /// A user action.
 #[derive(Clone, Debug)]
@@ -25,7 +31,7 @@ fn vector() -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(prop_oneof![9 => -0.2..0.2_f32, 1 => -9.0..9.0_f32]).prop_map(Vec3::from_array)
 }
 
-fn act() -> impl Strategy<Value = Act> {
+fn command() -> impl Strategy<Value = Command> {
     let index = || 0..4_usize;
     let share = prop_oneof![9 => 0.0..1.0_f32, 1 => Just(f32::NAN)];
     let pin = (0..40_u32, 0.0..1.0_f32)
@@ -39,7 +45,7 @@ fn act() -> impl Strategy<Value = Act> {
     ]);
     let kind = prop::sample::select(vec![InnerKind::Point, InnerKind::Line, InnerKind::Face]);
     let word = prop::sample::select(vec!["all", "material:none", "nobody"]);
-    let command = prop_oneof![
+    prop_oneof![
         prop::collection::vec(vector(), 0..9).prop_map(|positions| Command::SetPose { positions }),
         Just(Command::ResetPose),
         index().prop_map(|k| Command::SavePose { name: format!("pose {k}") }),
@@ -68,9 +74,12 @@ fn act() -> impl Strategy<Value = Act> {
             options: PartOptions { rigid: vec![word.to_owned()], ..PartOptions::default() }
         }),
         (0..4_u32, 0..10_usize).prop_map(|(id, n)| Command::SetPainted { id, amounts: vec![200; n] }),
-    ];
+    ]
+}
+
+fn act() -> impl Strategy<Value = Act> {
     prop_oneof![
-        12 => command.prop_map(Act::Do),
+        12 => command().prop_map(Act::Do),
         4 => prop::collection::vec(0..12_u32, 0..5).prop_map(Act::Select),
         2 => any::<bool>().prop_map(Act::Reshape),
         3 => vector().prop_map(Act::Shift),
@@ -115,14 +124,35 @@ fn undo_and_redo_are_inverse(editor: &mut Editor) {
     assert!(!editor.redo());
 }
 
+/// Checks that the parts of a document fit each other, and makes its view.
+fn is_valid(editor: &Editor) -> Result<(), TestCaseError> {
+    let document = editor.document();
+    prop_assert_eq!(document.pose.len(), document.cage.mesh.positions.len());
+    prop_assert_eq!(document.shares.len(), document.poses.len());
+    prop_assert!(document.pose.iter().all(|p| p.is_finite()));
+    prop_assert!(editor.selection.vertices().iter().all(|&v| (v as usize) < document.pose.len()));
+    let _ = editor.view();
+    Ok(())
+}
+
+/// Deterministic unless the environment sets cases or seed.
+fn runner(cases: u32) -> TestRunner {
+    let is_set = |name: &str| std::env::var_os(name).is_some();
+    let mut config = Config { failure_persistence: None, ..Config::default() };
+    if !is_set("PROPTEST_CASES") {
+        config.cases = cases;
+    }
+    if !is_set("PROPTEST_RNG_SEED") {
+        config.rng_seed = RngSeed::Fixed(7);
+    }
+    TestRunner::new(config)
+}
+
 #[test]
 fn two_thousand_random_acts_can_be_undone_and_redone() {
-    // Deterministic: 40 sessions of 50 acts.
-    let config =
-        Config { cases: 40, rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..Config::default() };
     let steps = std::cell::Cell::new(0);
     let done = std::cell::Cell::new(0);
-    TestRunner::new(config)
+    runner(40)
         .run(&prop::collection::vec(act(), 50), |acts| {
             let mut editor = opened();
             for act in acts {
@@ -156,12 +186,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
                     Act::Undo => drop(editor.undo()),
                     Act::Redo => drop(editor.redo()),
                 }
-                let document = editor.document();
-                prop_assert_eq!(document.pose.len(), document.cage.mesh.positions.len());
-                prop_assert_eq!(document.shares.len(), document.poses.len());
-                prop_assert!(document.pose.iter().all(|p| p.is_finite()));
-                prop_assert!(editor.selection.vertices().iter().all(|&v| (v as usize) < document.pose.len()));
-                let _ = editor.view();
+                is_valid(&editor)?;
             }
             undo_and_redo_are_inverse(&mut editor);
             Ok(())
@@ -169,4 +194,133 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
         .unwrap();
     // Enough commands must succeed, or the walk tests nothing.
     assert!(done.get() > 300 && steps.get() > 100, "{} commands, {} steps", done.get(), steps.get());
+}
+
+/// Values that break what a field promises.
+fn hostile() -> impl Strategy<Value = Value> {
+    prop::sample::select(vec![
+        json!(null),
+        json!(-1),
+        json!(0),
+        json!(4_294_967_295_u32),
+        json!(1e39),
+        json!(-3e38),
+        json!(1e-45),
+        json!(""),
+        json!("\u{0}\u{202e}constructor"),
+        json!([]),
+        json!([1e38, -1e38, 1e39]),
+        json!([[1e38, 1e38, 1e38], [-1e38, 0.0, 0.0]]),
+        json!({}),
+        json!(true),
+    ])
+}
+
+/// Damage of a JSON document: which value, and its replacement; `None` removes it.
+type Damage = (prop::sample::Index, Option<Value>);
+
+fn damages() -> impl Strategy<Value = Vec<Damage>> {
+    prop::collection::vec((any::<prop::sample::Index>(), prop::option::weighted(0.9, hostile())), 0..3)
+}
+
+fn damage(whole: &mut Value, (at, with): &Damage) {
+    fn visit(value: &Value, path: &str, paths: &mut Vec<String>) {
+        paths.push(path.to_owned());
+        match value {
+            Value::Array(all) => {
+                all.iter().enumerate().for_each(|(k, v)| visit(v, &format!("{path}/{k}"), paths));
+            }
+            Value::Object(all) => all.iter().for_each(|(k, v)| visit(v, &format!("{path}/{k}"), paths)),
+            _ => {}
+        }
+    }
+    let mut paths = Vec::new();
+    visit(whole, "", &mut paths);
+    let path = at.get(&paths);
+    if let Some(with) = with {
+        if let Some(value) = whole.pointer_mut(path) {
+            *value = with.clone();
+        }
+    } else if let Some((parent, key)) = path.rsplit_once('/') {
+        match whole.pointer_mut(parent) {
+            Some(Value::Array(all)) => drop(key.parse().map(|k: usize| all.remove(k))),
+            Some(Value::Object(all)) => drop(all.remove(key)),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn damaged_commands_are_refused_or_leave_a_valid_document() {
+    let [read, applied] = [(); 2].map(|()| std::cell::Cell::new(0));
+    runner(60)
+        .run(&prop::collection::vec((command(), damages()), 50), |commands| {
+            let mut editor = opened();
+            for (command, damages) in commands {
+                // A number that JSON lacks, such as NaN, becomes null.
+                let mut text = serde_json::to_value(&command).expect("commands are data");
+                damages.iter().for_each(|d| damage(&mut text, d));
+                let Ok(command) = serde_json::from_value::<Command>(text) else { continue };
+                read.set(read.get() + 1);
+                let before = editor.document().clone();
+                if editor.apply(command).is_ok() {
+                    applied.set(applied.get() + 1);
+                } else {
+                    prop_assert_eq!(editor.document(), &before);
+                }
+                editor.commit("step");
+                is_valid(&editor)?;
+            }
+            undo_and_redo_are_inverse(&mut editor);
+            Ok(())
+        })
+        .unwrap();
+    assert!(read.get() > 500 && applied.get() > 100, "{} read, {} applied", read.get(), applied.get());
+}
+
+#[test]
+fn damaged_projects_open_as_valid_documents() {
+    let mut editor = opened();
+    for command in [
+        Command::AddControl { kind: InnerKind::Point, places: vec![Vec3::splat(0.5)] },
+        Command::SavePose { name: "one".to_owned() },
+        Command::SetPins { pins: vec![SurfacePoint { triangle: 2, bary: [0.5, 0.5, 0.0] }] },
+    ] {
+        editor.apply(command).expect("valid input");
+    }
+    let moved = editor.document().pose.iter().map(|p| 1.1 * *p).collect();
+    editor.apply(Command::SetPose { positions: moved }).expect("valid input");
+    editor.apply(Command::SavePose { name: "two".to_owned() }).expect("valid input");
+    let bytes = editor.write_project("{}").expect("valid input");
+    let project = || read_project("saved.glb", &bytes, 1 << 28).expect("valid input").expect("valid input");
+    let settings: Value = serde_json::from_str(&project().settings).expect("valid input");
+    for field in ["controls", "pose", "pins", "pose_pins", "pose_shares", "models"] {
+        assert!(settings.get(field).is_some(), "{field} is not damaged");
+    }
+    runner(300)
+        .run(&damages(), |damages| {
+            let mut settings = settings.clone();
+            damages.iter().for_each(|d| damage(&mut settings, d));
+            let settings = DocumentSettings::read(&settings.to_string());
+            let project = project();
+            let mut members = settings.models.iter().cloned();
+            let models: Vec<_> = project.models.into_iter().map(|model| (model, members.next())).collect();
+            let mut editor = Editor::default();
+            let contents = Contents {
+                cage: settings.cage(&project.cage).0,
+                poses: settings.poses(project.poses),
+                shares: settings.pose_shares.clone(),
+                pins: settings.pins.clone(),
+                sample: settings.sample.clone(),
+            };
+            editor.open(models, contents);
+            let _ = editor.take_pose(&settings);
+            is_valid(&editor)?;
+            let _ = editor.apply(Command::Blend { index: 0, share: 0.5 });
+            let _ = editor.apply(Command::ApplyPose { index: 1 });
+            is_valid(&editor)?;
+            editor.write_project("{}").expect("what opens can be saved");
+            Ok(())
+        })
+        .unwrap();
 }
