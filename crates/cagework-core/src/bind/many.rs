@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::memory::{VertexCounts, estimate, field_bytes};
+use super::memory::{estimate, field_bytes};
 use super::pipeline::PreparedBind;
-use super::points::WeldedPoints;
+use super::points::{VertexCounts, WeldedPoints};
 use super::solving::{Solution, sample_fields, solve_fields};
 use super::voxels::{Voxelization, VoxelizedCage};
 use super::{BindError, Binding, Watch};

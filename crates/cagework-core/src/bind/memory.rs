@@ -7,9 +7,9 @@
 use glam::DVec3;
 
 use super::BindError;
-use super::offsets::needs_all;
+use super::points::VertexCounts;
 use crate::cage::Cage;
-use crate::controls::Controls;
+use crate::controls::{Controls, InnerControls};
 use crate::grid::Grid;
 use crate::levels::{BoundaryTerm, CutCell, Run};
 use crate::options::{BindOptions, Method, Solver};
@@ -46,12 +46,9 @@ pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
     n_rows as u64 * (n_columns as u64 * 8 + 4)
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct VertexCounts {
-    /// Vertices in the file.
-    pub(super) rows: usize,
-    /// Distinct positions.
-    pub(super) points: usize,
+/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions, and are not corrected.
+pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
+    options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
 }
 
 /// Peak memory of a bind.

@@ -137,6 +137,6 @@ pub fn estimate_memory<'a>(
     options.check()?;
     let controls = controls.into();
     let grid = voxels::Voxelization::grid(controls.surface(), options);
-    let vertices = memory::VertexCounts { rows: n_points, points: n_points };
+    let vertices = points::VertexCounts { rows: n_points, points: n_points };
     Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }

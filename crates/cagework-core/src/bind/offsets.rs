@@ -1,37 +1,16 @@
 //! Constant offsets that compensate errors of the weights: of points outside the cage, and around balls and tubes.
 
-use std::ops::ControlFlow;
-
 use glam::{DVec3, Vec3};
 
-use super::{BindError, Watch, pipeline};
 use crate::assemble::AssembledWeights;
-use crate::controls::{ControlSet, Controls, InnerControls, InnerElement};
+use crate::controls::{Controls, InnerControls, InnerElement};
 use crate::frames::{CAGE_COLUMN, Frames};
-use crate::options::{BindOptions, Method, OutsidePolicy};
-use crate::progress::{Progress, ProgressEvent, Stage};
 use crate::sample::Stencils;
 use crate::solve::rows::{LANES, Row};
 use crate::weights::Weights;
 
 /// Offsets shorter than this, over the cage's diagonal, are rounding and are dropped.
 const MIN_OFFSET: f64 = 1e-7;
-
-/// Progress of an inner bind: polls for cancellation but reports nothing.
-struct SilentProgress<'a>(&'a Watch<'a>);
-
-impl Progress for SilentProgress<'_> {
-    fn report(&self, _: ProgressEvent) -> ControlFlow<()> {
-        match self.0.report(Stage::Sample, 0.0, 0, None) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(_) => ControlFlow::Break(()),
-        }
-    }
-
-    fn now_ms(&self) -> f64 {
-        self.0.now_ms()
-    }
-}
 
 pub(super) struct Offsets<'a> {
     controls: Controls<'a>,
@@ -43,41 +22,32 @@ pub(super) struct Offsets<'a> {
     radius: f64,
 }
 
-/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions, and are not corrected.
-pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
-    options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
-}
-
 impl<'a> Offsets<'a> {
-    /// `blocks`: sampled values, `[n_batches][n_points]`.
-    ///
-    /// # Errors
-    /// As a bind of the joints to the cage alone.
+    /// `blocks`: sampled values, `[n_batches][n_points]`. `joints`: joints of balls and tubes, if any, and weights of
+    /// their points.
     pub(super) fn new(
         controls: Controls<'a>,
         stencils: &Stencils,
         blocks: &[Vec<Row>],
-        options: &BindOptions,
-        watch: &Watch<'_>,
-    ) -> Result<Self, BindError> {
+        joints: Option<(JointPoints<'_>, Weights)>,
+    ) -> Self {
         let of_cage = |triangle: u32| {
             controls.cage_face(controls.surface().face_of_facet()[triangle as usize]).is_some()
         };
         let outside = stencils.outside.iter().filter(|o| of_cage(o.triangle));
         let row = |point: u32| blocks.iter().map(|block| block[point as usize]).collect();
         let outside = outside.map(|o| (o.vertex, o.share, row(o.vertex))).collect();
-        let rounded = controls.inner().filter(|inner| inner.has_radius());
         let mut all = Self { controls, outside, frames: Frames::default(), lengths: Vec::new(), radius: 0.0 };
-        if let Some(inner) = rounded {
-            all.radius = f64::from(inner.radius_in(controls.surface().bounds().extent().max_element()));
-            all.frames = frames(controls, inner, all.radius as f32, options, watch)?;
+        if let Some((joints, weights)) = joints {
+            all.radius = f64::from(joints.radius);
+            all.frames = joints.frames(controls, &weights);
             let at = |joint: u32| controls.rest()[all.frames.joints[joint as usize] as usize];
             let length = |&[a, b]: &[u32; 2]| f64::from(at(a).distance(at(b)));
             all.lengths = all.frames.bones.iter().map(length).collect();
         } else if !all.outside.is_empty() {
             all.frames = Frames::of_cage(controls.cage().positions());
         }
-        Ok(all)
+        all
     }
 
     /// Appends the frames' columns to the rows, and returns the frames. `has_offset`: as in `assemble`.
@@ -147,54 +117,55 @@ impl<'a> Offsets<'a> {
     }
 }
 
-/// Frames of balls and tubes: coordinates of the cage alone at their joints, and central differences of them over the radius.
-fn frames(
-    controls: Controls<'_>,
-    inner: &InnerControls,
+/// Joints of balls and tubes, at which coordinates of the cage alone and their gradient are needed.
+pub(super) struct JointPoints<'a> {
+    inner: &'a InnerControls,
+    /// Indices among the interior controls.
+    joints: Vec<u32>,
     radius: f32,
-    options: &BindOptions,
-    watch: &Watch<'_>,
-) -> Result<Frames, BindError> {
-    let joints: Vec<u32> =
-        (0..inner.positions.len()).filter(|&i| inner.is_rounded(i)).map(|i| i as u32).collect();
-    let number = |i: u32| joints.partition_point(|&j| j < i) as u32;
-    let lines = inner.elements.iter().filter(|e| matches!(e, InnerElement::Line(_)));
-    let bones: Vec<[u32; 2]> =
-        lines.flat_map(|e| e.corners().windows(2)).map(|w| [number(w[0]), number(w[1])]).collect();
-    let steps = Vec3::AXES.map(|axis| radius * axis);
-    let around = |at: Vec3| {
-        [at, at + steps[0], at - steps[0], at + steps[1], at - steps[1], at + steps[2], at - steps[2]]
-    };
-    let points: Vec<Vec3> = joints.iter().flat_map(|&j| around(inner.positions[j as usize])).collect();
+}
 
-    // Half the resolution takes an eighth of the work.
-    let options = BindOptions {
-        grid: (options.grid / 2).max(8),
-        sparsify: 0.0,
-        outside: OutsidePolicy::Extend,
-        extra_points: points.len(),
-        ..*options
-    };
-    let plain = match controls.smooth() {
-        0 => ControlSet::plain(controls.cage()),
-        steps => ControlSet::new(controls.cage(), steps, InnerControls::default())
-            .unwrap_or_else(|_| ControlSet::plain(controls.cage())),
-    };
-    let bound = pipeline::run(&points, Controls::from(&plain), &options, &SilentProgress(watch))?;
-    let n_cage = controls.cage().n_vertices();
-    let dense = |row: usize| {
-        let mut dense = vec![0.0; n_cage];
-        let (columns, values) = bound.weights.row(row);
-        let of_cage = columns.iter().zip(values).filter(|(c, _)| (**c as usize) < n_cage);
-        of_cage.for_each(|(&c, &w)| dense[c as usize] = w);
-        dense
-    };
-    let mut plain = Vec::with_capacity(joints.len() * n_cage);
-    for joint in 0..joints.len() {
-        let rows: [Vec<f32>; 7] = std::array::from_fn(|k| dense(7 * joint + k));
-        let slope = |axis: usize, c: usize| (rows[1 + 2 * axis][c] - rows[2 + 2 * axis][c]) / (2.0 * radius);
-        plain.extend((0..n_cage).map(|c| [rows[0][c], slope(0, c), slope(1, c), slope(2, c)]));
+impl<'a> JointPoints<'a> {
+    /// `None` without balls and tubes.
+    pub(super) fn new(controls: Controls<'a>) -> Option<Self> {
+        let inner = controls.inner().filter(|inner| inner.has_radius())?;
+        let joints = (0..inner.positions.len()).filter(|&i| inner.is_rounded(i)).map(|i| i as u32).collect();
+        let radius = inner.radius_in(controls.surface().bounds().extent().max_element());
+        Some(Self { inner, joints, radius })
     }
-    let joints = joints.iter().map(|j| n_cage as u32 + j).collect();
-    Ok(Frames { joints, bones, plain, ..Frames::of_cage(controls.cage().positions()) })
+
+    /// Each joint, and the six points around it for central differences over the radius. `[7 * n_joints]`
+    pub(super) fn points(&self) -> Vec<Vec3> {
+        let steps = Vec3::AXES.map(|axis| self.radius * axis);
+        let around = |at: Vec3| {
+            [at, at + steps[0], at - steps[0], at + steps[1], at - steps[1], at + steps[2], at - steps[2]]
+        };
+        self.joints.iter().flat_map(|&j| around(self.inner.positions[j as usize])).collect()
+    }
+
+    /// Frames from the weights of [`Self::points`] in the cage alone.
+    fn frames(self, controls: Controls<'_>, weights: &Weights) -> Frames {
+        let Self { inner, joints, radius } = self;
+        let number = |i: u32| joints.partition_point(|&j| j < i) as u32;
+        let lines = inner.elements.iter().filter(|e| matches!(e, InnerElement::Line(_)));
+        let bones: Vec<[u32; 2]> =
+            lines.flat_map(|e| e.corners().windows(2)).map(|w| [number(w[0]), number(w[1])]).collect();
+        let n_cage = controls.cage().n_vertices();
+        let dense = |row: usize| {
+            let mut dense = vec![0.0; n_cage];
+            let (columns, values) = weights.row(row);
+            let of_cage = columns.iter().zip(values).filter(|(c, _)| (**c as usize) < n_cage);
+            of_cage.for_each(|(&c, &w)| dense[c as usize] = w);
+            dense
+        };
+        let mut plain = Vec::with_capacity(joints.len() * n_cage);
+        for joint in 0..joints.len() {
+            let rows: [Vec<f32>; 7] = std::array::from_fn(|k| dense(7 * joint + k));
+            let slope =
+                |axis: usize, c: usize| (rows[1 + 2 * axis][c] - rows[2 + 2 * axis][c]) / (2.0 * radius);
+            plain.extend((0..n_cage).map(|c| [rows[0][c], slope(0, c), slope(1, c), slope(2, c)]));
+        }
+        let joints = joints.iter().map(|j| n_cage as u32 + j).collect();
+        Frames { joints, bones, plain, ..Frames::of_cage(controls.cage().positions()) }
+    }
 }

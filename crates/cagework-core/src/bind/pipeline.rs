@@ -3,26 +3,28 @@
 //! All back ends share the first and last stage: [`PreparedBind::new`], then a solver of the back end produces a
 //! [`Solution`], then [`PreparedBind::finish`].
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::Vec3;
 
 use crate::assemble::{AssembledWeights, RowOptions, assemble};
-use crate::controls::Controls;
+use crate::controls::{ControlSet, Controls, InnerControls};
 use crate::crossing;
 use crate::deform::{OutsideVertex, outside_in_words};
 use crate::frames::Frames;
 use crate::grid::Grid;
 use crate::mesh::Weld;
 use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
-use crate::progress::{Progress, Stage};
+use crate::progress::{Progress, ProgressEvent, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
 use crate::sample::{OutsidePoint, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::team::{Team, VERTEX_RUN};
+use crate::weights::Weights;
 
-use super::memory::estimate;
-use super::offsets::{Offsets, needs_all};
+use super::memory::{estimate, needs_all};
+use super::offsets::{JointPoints, Offsets};
 use super::outside::{oversized, refuse_outside};
 use super::points::WeldedPoints;
 pub use super::solving::Solution;
@@ -154,7 +156,8 @@ impl<'a> PreparedBind<'a> {
         let has_offset = |point| all || self.stencils.is_outside(point);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let (points, team) = (&self.mesh.points, &self.voxelized.team);
-        let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, self.options, watch)?;
+        let joints = bound_joints(self.controls, self.options, watch)?;
+        let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, joints);
         let rows = assemble(self.controls, &mut solved.blocks, points, row_options, has_offset, team);
         drop(std::mem::take(&mut solved.blocks));
         let (rows, frames) = offsets.add_to(rows, points, has_offset);
@@ -242,6 +245,50 @@ impl<'a> PreparedBind<'a> {
             notices,
         };
         Ok(Binding { weights, frames, outside, report })
+    }
+}
+
+/// Joints of balls and tubes, and weights of their points in the cage alone.
+///
+/// # Errors
+/// As a bind.
+fn bound_joints<'a>(
+    controls: Controls<'a>,
+    options: &BindOptions,
+    watch: &Watch<'_>,
+) -> Result<Option<(JointPoints<'a>, Weights)>, BindError> {
+    let Some(joints) = JointPoints::new(controls) else { return Ok(None) };
+    let points = joints.points();
+    // Half the resolution takes an eighth of the work.
+    let options = BindOptions {
+        grid: (options.grid / 2).max(8),
+        sparsify: 0.0,
+        outside: OutsidePolicy::Extend,
+        extra_points: points.len(),
+        ..*options
+    };
+    let plain = match controls.smooth() {
+        0 => ControlSet::plain(controls.cage()),
+        steps => ControlSet::new(controls.cage(), steps, InnerControls::default())
+            .unwrap_or_else(|_| ControlSet::plain(controls.cage())),
+    };
+    let bound = run(&points, Controls::from(&plain), &options, &PollOnly(watch))?;
+    Ok(Some((joints, bound.weights)))
+}
+
+/// Progress of an inner bind: polls for cancellation but reports nothing.
+struct PollOnly<'a>(&'a Watch<'a>);
+
+impl Progress for PollOnly<'_> {
+    fn report(&self, _: ProgressEvent) -> ControlFlow<()> {
+        match self.0.report(Stage::Sample, 0.0, 0, None) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    }
+
+    fn now_ms(&self) -> f64 {
+        self.0.now_ms()
     }
 }
 

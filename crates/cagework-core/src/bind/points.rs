@@ -3,8 +3,16 @@
 use glam::Vec3;
 
 use super::BindError;
-use super::memory::VertexCounts;
 use crate::mesh::{Weld, weld};
+
+/// Numbers of vertices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VertexCounts {
+    /// Vertices in the file.
+    pub(super) rows: usize,
+    /// Distinct positions.
+    pub(super) points: usize,
+}
 
 /// The vertices of a model and their distinct positions.
 pub(super) struct WeldedPoints<'a> {

@@ -136,8 +136,9 @@ fn solve_batches<T: Send>(
 fn batch_solver(hierarchy: &Hierarchy, options: &BindOptions) -> Box<dyn BatchSolver> {
     match options.solver {
         Solver::ConjugateGradient => {
-            let is_preconditioned = options.preconditioner == Preconditioner::VCycle;
-            Box::new(ConjugateGradient::new(hierarchy, is_preconditioned))
+            let v_cycle = options.preconditioner == Preconditioner::VCycle;
+            let preconditioner = v_cycle.then(|| Box::new(Workspace::new(hierarchy)) as _);
+            Box::new(ConjugateGradient::new(hierarchy, preconditioner))
         }
         Solver::Multigrid | Solver::Jacobi => Box::new(Workspace::new(hierarchy)),
     }

@@ -11,12 +11,11 @@
 //!
 //! Sources: Hestenes and Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
 
-use super::BatchSolver;
 use super::hierarchy::Hierarchy;
-use super::multigrid::Workspace;
 use super::operator;
 use super::rows::{LANES, Rhs, Row, ZERO};
 use super::stop::{SolveReport, StopRule};
+use super::{BatchSolver, Preconditioner};
 use crate::simd::dispatch;
 
 /// Most steps over which the convergence rate is measured: longer than the ripple of the changes, 5 to 8 steps.
@@ -45,13 +44,13 @@ pub struct ConjugateGradient {
     /// Operator applied to the direction.
     image: Vec<Row>,
     cut_rhs: Vec<Row>,
-    multigrid: Option<Workspace>,
+    preconditioner: Option<Box<dyn Preconditioner>>,
 }
 
 impl ConjugateGradient {
-    /// Allocates fields of the finest level, and those of a V-cycle if it preconditions.
+    /// Allocates fields of the finest level.
     #[must_use]
-    pub fn new(hierarchy: &Hierarchy, is_preconditioned: bool) -> Self {
+    pub fn new(hierarchy: &Hierarchy, preconditioner: Option<Box<dyn Preconditioner>>) -> Self {
         let field = || vec![ZERO; hierarchy.levels[0].n_rows()];
         Self {
             u: field(),
@@ -60,33 +59,36 @@ impl ConjugateGradient {
             direction: field(),
             image: field(),
             cut_rhs: Vec::new(),
-            multigrid: is_preconditioned.then(|| Workspace::new(hierarchy)),
+            preconditioner,
         }
     }
 
-    /// Continues from the field of a workspace whose cycles stalled, and stores the solution there. `rhs`: one row per
+    /// Continues from `u`, where cycles of the preconditioner stalled, and stores the solution there. `rhs`: one row per
     /// cut cell; `report`: of the cycles, which count towards the limit on iterations.
     pub(super) fn resume(
         &mut self,
         hierarchy: &Hierarchy,
-        workspace: &mut Workspace,
-        rhs: &[Row],
-        rule: StopRule,
-        report: SolveReport,
+        cycle: &mut dyn Preconditioner,
+        (u, rhs): (&mut Vec<Row>, &[Row]),
+        (rule, report): (StopRule, SolveReport),
         done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<SolveReport> {
-        workspace.swap_field(&mut self.u);
+        std::mem::swap(&mut self.u, u);
         operator::residual(&hierarchy.levels[0], &self.u, Rhs::Cut(rhs), &mut self.residual);
-        let report = self.iterate(hierarchy, Some(workspace), rule.of_cycles(), report, done);
-        workspace.swap_field(&mut self.u);
+        let report = self.iterate(hierarchy, Some(cycle), rule.of_cycles(), report, done);
+        std::mem::swap(&mut self.u, u);
         report
     }
 
     /// Applies the preconditioner to the residual. Returns `r . z` and `r . r`.
-    fn precondition(&mut self, hierarchy: &Hierarchy, cycle: &mut Option<&mut Workspace>) -> [Lanes; 2] {
+    fn precondition(
+        &mut self,
+        hierarchy: &Hierarchy,
+        cycle: &mut Option<&mut dyn Preconditioner>,
+    ) -> [Lanes; 2] {
         match cycle {
             None => self.z.copy_from_slice(&self.residual),
-            Some(workspace) => workspace.precondition(hierarchy, &mut self.residual, &mut self.z),
+            Some(cycle) => cycle.precondition(hierarchy, &mut self.residual, &mut self.z),
         }
         let [descent, squares] = [&self.z, &self.residual].map(|other| products(&self.residual, other));
         let climbs: [bool; LANES] = std::array::from_fn(|k| descent[k] <= 0.0 && squares[k] > 0.0);
@@ -105,7 +107,7 @@ impl ConjugateGradient {
     fn iterate(
         &mut self,
         hierarchy: &Hierarchy,
-        mut cycle: Option<&mut Workspace>,
+        mut cycle: Option<&mut dyn Preconditioner>,
         rule: StopRule,
         mut report: SolveReport,
         done: &mut dyn FnMut(u32, f64) -> bool,
@@ -166,10 +168,16 @@ impl BatchSolver for ConjugateGradient {
         for (number, row) in self.cut_rhs.iter().enumerate() {
             self.residual[level.row_of_cut(number)] = *row;
         }
-        let mut workspace = self.multigrid.take();
-        let rule = if workspace.is_some() { rule.of_cycles() } else { rule };
-        let report = self.iterate(hierarchy, workspace.as_mut(), rule, SolveReport::default(), done);
-        self.multigrid = workspace;
+        let mut cycle = self.preconditioner.take();
+        let rule = if cycle.is_some() { rule.of_cycles() } else { rule };
+        let report = self.iterate(
+            hierarchy,
+            cycle.as_mut().map(|cycle| &mut **cycle as _),
+            rule,
+            SolveReport::default(),
+            done,
+        );
+        self.preconditioner = cycle;
         report
     }
 
@@ -179,7 +187,7 @@ impl BatchSolver for ConjugateGradient {
 
     fn bytes(&self) -> usize {
         let rows = 5 * self.u.len() + self.cut_rhs.len();
-        rows * size_of::<Row>() + self.multigrid.as_ref().map_or(0, BatchSolver::bytes)
+        rows * size_of::<Row>() + self.preconditioner.as_ref().map_or(0, |cycle| cycle.bytes())
     }
 }
 
@@ -259,6 +267,7 @@ fn scale(u: &mut [Row], factor: &Lanes) {
 mod tests {
     use super::*;
     use crate::levels::plain::hierarchy;
+    use crate::solve::multigrid::Workspace;
 
     /// Changes that decrease by 0.8 per step leave 0.8 + 0.64 + ... = 0.8 / (1 - 0.8), four times the latest.
     #[test]
@@ -277,7 +286,8 @@ mod tests {
         multigrid.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
         let mut n_steps = Vec::new();
         for is_preconditioned in [false, true] {
-            let mut solver = ConjugateGradient::new(&hierarchy, is_preconditioned);
+            let cycle = is_preconditioned.then(|| Box::new(Workspace::new(&hierarchy)) as _);
+            let mut solver = ConjugateGradient::new(&hierarchy, cycle);
             let report = solver.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
             assert!(report.converged);
             n_steps.push(report.deltas.len());

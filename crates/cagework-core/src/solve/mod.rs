@@ -37,3 +37,12 @@ pub trait BatchSolver {
     /// Size of all fields, bytes.
     fn bytes(&self) -> usize;
 }
+
+/// Preconditioner of conjugate gradients.
+pub trait Preconditioner: std::fmt::Debug + Send {
+    /// An approximate solution `z` of `A z = r`. Both `[n_rows]`.
+    fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>);
+
+    /// Size of all fields, bytes.
+    fn bytes(&self) -> usize;
+}

@@ -23,11 +23,11 @@ mod stream;
 
 pub use convergence::Convergence;
 
-use super::BatchSolver;
 use super::conjugate_gradient::ConjugateGradient;
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
 use super::stop::{SolveReport, StopRule};
+use super::{BatchSolver, Preconditioner};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
@@ -77,21 +77,6 @@ impl Workspace {
             is_finest_dense: false,
             rescue: None,
         }
-    }
-
-    /// One V(2,1) cycle from zero for any right-hand side: an approximate solution `z` of `A z = r`. Both `[n_rows]`.
-    pub fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
-        self.is_finest_dense = true;
-        std::mem::swap(&mut self.f[0], r);
-        std::mem::swap(&mut self.u[0], z);
-        self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
-        std::mem::swap(&mut self.f[0], r);
-        std::mem::swap(&mut self.u[0], z);
-    }
-
-    /// Swaps the finest level's field with another one of its length.
-    pub(super) fn swap_field(&mut self, u: &mut Vec<Row>) {
-        std::mem::swap(&mut self.u[0], u);
     }
 
     /// One red-black sweep of the finest level: the unit in which benchmarks measure the cost of a solve. Call after
@@ -161,6 +146,22 @@ impl Workspace {
     }
 }
 
+impl Preconditioner for Workspace {
+    /// One V(2,1) cycle from zero.
+    fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
+        self.is_finest_dense = true;
+        std::mem::swap(&mut self.f[0], r);
+        std::mem::swap(&mut self.u[0], z);
+        self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
+        std::mem::swap(&mut self.f[0], r);
+        std::mem::swap(&mut self.u[0], z);
+    }
+
+    fn bytes(&self) -> usize {
+        BatchSolver::bytes(self)
+    }
+}
+
 impl BatchSolver for Workspace {
     fn solve(
         &mut self,
@@ -191,11 +192,11 @@ impl BatchSolver for Workspace {
             }
             if stalls {
                 let mut rescue =
-                    self.rescue.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, false)));
-                let rhs = std::mem::take(&mut self.f[0]);
-                let report =
-                    rescue.resume(hierarchy, self, &rhs, rule, convergence.into_report(), cycle_done);
-                self.f[0] = rhs;
+                    self.rescue.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, None)));
+                let (rhs, mut u) = (std::mem::take(&mut self.f[0]), std::mem::take(&mut self.u[0]));
+                let so_far = (rule, convergence.into_report());
+                let report = rescue.resume(hierarchy, self, (&mut u, &rhs), so_far, cycle_done);
+                (self.f[0], self.u[0]) = (rhs, u);
                 self.rescue = Some(rescue);
                 return report;
             }

@@ -88,6 +88,9 @@ pub struct Style {
     pub size: f32,
 }
 
+/// State of rings: points without a fill.
+pub(super) const RING_STATE: u32 = 1;
+
 /// Position of the state bits in an item. Same as in `shaders/overlay.wgsl`.
 pub const STATE_SHIFT: u32 = 28;
 

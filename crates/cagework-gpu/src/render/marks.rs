@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::layout::Style;
+use super::layout::{RING_STATE, Style};
 use super::mesh::Mesh;
 use super::model::DrawModel;
 use super::overlay::{Item, Overlay, item, unique_edges, with_behind};
@@ -15,9 +15,6 @@ use crate::table::{Entry, Table};
 
 /// State of segments; [`Style::widths`] has their line width there.
 const SEGMENT_STATE: u32 = 4;
-
-/// State of rings: points without a fill.
-pub(super) const RING_STATE: u32 = 1;
 
 /// GPU data of [`Marks`].
 #[derive(Debug)]

@@ -1,7 +1,6 @@
 //! Colours of themes, in sRGB.
 
-use super::layout::Style;
-use super::marks::RING_STATE;
+use super::layout::{RING_STATE, Style};
 use super::scene::Theme;
 
 /// States of handles, edges and faces: indices into [`Style::colors`].

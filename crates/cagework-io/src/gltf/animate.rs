@@ -2,13 +2,32 @@
 
 use std::collections::HashSet;
 
+use glam::{DMat4, Vec3};
 use serde_json::{Value, json};
 
 use super::pack::{Pack, push};
-use super::patch::{MeshPlacement, Pose};
 
 /// Time between poses in the animation, seconds.
 pub(super) const SECONDS_PER_POSE: f32 = 1.0;
+
+/// A named shape.
+#[derive(Clone, Copy)]
+pub(crate) struct Pose<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) positions: &'a [Vec3],
+}
+
+/// Mesh and node of an instance in the exported document.
+pub(crate) struct MeshPlacement {
+    pub(super) mesh: usize,
+    pub(super) node: usize,
+    /// Node in the original, if any.
+    pub(super) original: Option<usize>,
+    /// Whether the mesh has a new root node.
+    pub(super) detached: bool,
+    /// Mesh from world space, relative to the origin.
+    pub(super) mesh_from_world: DMat4,
+}
 
 /// Removes the weights, names and animation channels of the original morph targets.
 pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {

@@ -9,17 +9,17 @@ use ::gltf::binary::{Glb, Header};
 use ::gltf::json::Root;
 use data_url::DataUrl;
 use percent_encoding::percent_decode_str;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
 use super::GltfError;
+#[cfg(not(feature = "decompress"))]
+use super::root::DRACO;
+use super::root::{MESHOPT, typed, view_bytes};
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
 use crate::siblings::{Image, NOT_AN_IMAGE, Resolve, SiblingError, Siblings};
 
-/// Compression extensions that need a decoder. Both meshopt names stand for the same streams.
-pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
-pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /// Limit on the items of each of [`LISTS`]. One takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
 /// Lists of a document whose items take no bytes elsewhere in the file.
@@ -27,10 +27,6 @@ const LISTS: [&str; 9] =
     ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
 /// Size of the GLB header, bytes.
 const GLB_HEADER_BYTES: usize = 12;
-/// Members of the document that geometry does not need. Errors in them are ignored.
-const OPTIONAL_MEMBERS: [&str; 8] =
-    ["animations", "cameras", "extras", "images", "materials", "samplers", "textures", "extensions"];
-
 pub(crate) struct GltfContents {
     pub(crate) json: Value,
     /// JSON chunk of a self-contained GLB.
@@ -255,49 +251,6 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Parses the members that geometry needs.
-pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
-    let Value::Object(object) = json else {
-        return Err(GltfError::Json("the JSON is not an object".into()));
-    };
-    let is_geometry = |key: &str, value: &Value| !OPTIONAL_MEMBERS.contains(&key) && !value.is_null();
-    let of_geometry = object.iter().filter(|(key, value)| is_geometry(key, value));
-    let mut geometry: Map<String, Value> =
-        of_geometry.map(|(key, value)| (key.clone(), strict(value))).collect();
-    geometry.insert("asset".into(), json!({ "version": "2.0" }));
-    // `nodes` of a scene is optional in glTF but required by the crate.
-    for scene in geometry.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
-        if let Some(scene) = scene.as_object_mut() {
-            scene.entry("nodes").or_insert_with(|| json!([]));
-        }
-    }
-    let whole = Value::Object(geometry);
-    serde_json::from_value(whole.clone()).map_err(|_| {
-        let lists =
-            whole.as_object().into_iter().flatten().filter_map(|(key, list)| Some((key, list.as_array()?)));
-        let mut items =
-            lists.flat_map(|(key, list)| list.iter().enumerate().map(move |(k, item)| (key, k, item)));
-        let at = items.find(|(key, _, item)| {
-            serde_json::from_value::<Root>(json!({ "asset": whole["asset"], *key: [item] })).is_err()
-        });
-        let place = at.map_or("the document".into(), |(key, k, _)| format!("item {k} of '{}'", shown(key)));
-        GltfError::Json(format!("{place} has a missing value or a value of the wrong type"))
-    })
-}
-
-/// A value in the form that the crate accepts, without `null`, extensions and `extras`, which can have any type.
-fn strict(value: &Value) -> Value {
-    let is_read = |key: &str, value: &Value| !matches!(key, "extras" | "extensions") && !value.is_null();
-    match value {
-        Value::Array(items) => items.iter().map(strict).collect(),
-        Value::Object(object) => {
-            let read = object.iter().filter(|(key, value)| is_read(key, value));
-            Value::Object(read.map(|(key, value)| (key.clone(), strict(value))).collect())
-        }
-        value => value.clone(),
-    }
-}
-
 /// Rewrites integers written as floats, such as 24.0, which glTF 2.0 allows (section 2.7).
 fn write_integers(value: &mut Value, is_integer: bool) {
     const MEMBERS: [&str; 26] = [
@@ -424,14 +377,6 @@ fn load_images(
             }
         })
         .collect()
-}
-
-/// Bytes of a buffer view; `None` if it extends beyond the buffer.
-pub(super) fn view_bytes<'a>(root: &Root, buffers: &'a [Arc<Vec<u8>>], view: u64) -> Option<&'a [u8]> {
-    let view = root.buffer_views.get(usize::try_from(view).ok()?)?;
-    let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).ok()?;
-    let end = start.checked_add(usize::try_from(view.byte_length.0).ok()?)?;
-    buffers.get(view.buffer.value())?.get(start..end)
 }
 
 fn is_data(uri: &str) -> bool {

@@ -14,8 +14,8 @@ use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
 use serde_json::{Map, Value, json};
 
 use super::accessor::{MAX_ELEMENTS, Source};
-use super::container::{DRACO, MESHOPT, typed};
 use super::pack::{INDICES, VERTICES, bounds, push};
+use super::root::{DRACO, MESHOPT, typed};
 
 /// Limit on the decompressed size of all streams, bytes. A few hundred bytes can claim any size.
 const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;

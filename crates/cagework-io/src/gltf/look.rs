@@ -7,8 +7,8 @@ use glam::{Vec2, Vec3};
 use serde_json::Value;
 
 use super::accessor::Source;
-use super::container::view_bytes;
 use super::geometry::{attribute, world_normals};
+use super::root::view_bytes;
 use super::scene::name_of;
 use super::{GltfDocument, Slot};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, sniff_image};

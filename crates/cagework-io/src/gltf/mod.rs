@@ -18,6 +18,7 @@ mod look;
 mod pack;
 mod patch;
 mod rig;
+mod root;
 mod scene;
 mod select;
 mod size;
@@ -37,7 +38,7 @@ use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
 
-pub(crate) use animate::PoseTiming;
+pub(crate) use animate::{Pose, PoseTiming};
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts, named_files};
@@ -45,7 +46,7 @@ pub(crate) use export::write_obj;
 pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
-pub(crate) use patch::{Pose, Rest, embed_images, patch};
+pub(crate) use patch::{Rest, embed_images, patch};
 pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape};
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::GltfDocument;
-use super::container::view_bytes;
+use super::root::view_bytes;
 use crate::error::WriteError;
 
 pub(super) const F32: u32 = 5126;

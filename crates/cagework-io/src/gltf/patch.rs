@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
-use super::animate::{self, PoseTiming};
+use super::animate::{self, MeshPlacement, Pose, PoseTiming};
 use super::geometry::{Frame, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
@@ -24,13 +24,6 @@ use crate::origin::translation;
 
 /// Threshold for |det| / product of column lengths, below which a transform counts as singular in f32.
 const MIN_RELATIVE_DETERMINANT: f64 = 1e-9;
-
-/// A named shape.
-#[derive(Clone, Copy)]
-pub(crate) struct Pose<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) positions: &'a [Vec3],
-}
 
 /// The undeformed model.
 #[derive(Clone, Copy)]
@@ -105,18 +98,6 @@ pub(crate) fn patch(
         animate::play_poses(&mut json, &mut pack, &places, poses, timing);
     }
     pack.finish(json)
-}
-
-/// Mesh and node of an instance in the exported document.
-pub(crate) struct MeshPlacement {
-    pub(crate) mesh: usize,
-    pub(crate) node: usize,
-    /// Node in the original, if any.
-    pub(crate) original: Option<usize>,
-    /// Whether the mesh has a new root node.
-    detached: bool,
-    /// Mesh from world space, relative to the origin.
-    mesh_from_world: DMat4,
 }
 
 /// Gives every instance its own mesh, at a node with an invertible transform.

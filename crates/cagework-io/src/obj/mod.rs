@@ -17,7 +17,6 @@ pub use error::ObjError;
 pub use inner::{read_inner_controls, write_inner_controls};
 pub(crate) use lex::{Line, lines, shown as shown_token, tokens};
 pub(crate) use look::{look, named_files, rest_of};
-pub(crate) use read::{Corner, NONE, ObjDocument, positions_near, read};
-pub(crate) use select::Group;
+pub(crate) use read::{Corner, Group, NONE, ObjDocument, positions_near, read};
 pub use write::write_cage_obj;
 pub(crate) use write::{ObjGroup, patch, write_new};

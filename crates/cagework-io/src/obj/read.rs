@@ -9,7 +9,6 @@ use glam::{DVec3, Vec3};
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, read_materials, rest_of};
-use super::select::Group;
 use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
 use crate::origin::relative;
@@ -25,6 +24,22 @@ pub(crate) struct Corner {
     pub(crate) v: u32,
     pub(crate) vt: u32,
     pub(crate) vn: u32,
+}
+
+/// An `o` or `g` line. An `o` line is valid until the next `o` line, a `g` line until the next `g` line.
+#[derive(Clone, Debug)]
+pub(crate) struct Group {
+    pub(crate) is_object: bool,
+    /// Text after the keyword. A `g` line can contain several names.
+    pub(crate) name: String,
+    /// First face after the line.
+    pub(crate) first_face: u32,
+}
+
+impl Group {
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        self.name == name || (!self.is_object && self.name.split_whitespace().any(|one| one == name))
+    }
 }
 
 /// Parsed OBJ file, as far as exports need it.

@@ -5,22 +5,6 @@ use std::collections::HashSet;
 use super::read::ObjDocument;
 use crate::part_kind::PartKind;
 
-/// An `o` or `g` line. An `o` line is valid until the next `o` line, a `g` line until the next `g` line.
-#[derive(Clone, Debug)]
-pub(crate) struct Group {
-    pub(crate) is_object: bool,
-    /// Text after the keyword. A `g` line can contain several names.
-    pub(crate) name: String,
-    /// First face after the line.
-    pub(crate) first_face: u32,
-}
-
-impl Group {
-    fn is_called(&self, name: &str) -> bool {
-        self.name == name || (!self.is_object && self.name.split_whitespace().any(|one| one == name))
-    }
-}
-
 impl ObjDocument {
     /// Distinct names of materials, objects and groups.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {

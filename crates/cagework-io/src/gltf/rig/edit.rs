@@ -10,6 +10,7 @@ use crate::error::WriteError;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::{self, F32, Pack, VERTICES, each_accessor, push, write_glb};
 use crate::gltf::patch::embed_images_by;
+use crate::gltf::scene::Instance;
 
 /// Alignment of accessors, bytes.
 const ALIGN: usize = 4;
@@ -42,6 +43,12 @@ impl<'a> Edit<'a> {
         let mut edit = Self { document, json, bin, has_written: false, uses, overlapping, appended };
         edit.count_uses();
         edit
+    }
+
+    /// The instance's mesh in the edited document.
+    pub(super) fn mesh_of(&self, instance: &Instance) -> usize {
+        let of_node = |node: u32| self.json["nodes"][node as usize]["mesh"].as_u64();
+        instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
     }
 
     /// Recounts the references, after some were added.

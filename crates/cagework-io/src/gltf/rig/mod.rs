@@ -16,6 +16,7 @@ mod nodes;
 mod overlap;
 mod play;
 mod poses;
+mod report;
 mod reshape;
 mod shape;
 mod surface;
@@ -40,8 +41,10 @@ pub(crate) use clip::clips;
 use lattice::Lattice;
 pub use nodes::{JointPoint, Joints};
 pub use play::{Player, Posed};
-pub(crate) use reshape::{PoseDisplacements, reshape};
-pub use reshape::{ReshapeOptions, ReshapeReport};
+pub(crate) use poses::PoseDisplacements;
+pub use report::ReshapeReport;
+pub use reshape::ReshapeOptions;
+pub(crate) use reshape::reshape;
 use vrm::VrmPoint;
 
 /// Step of the central differences for the deformation gradient at a node, over the model's diagonal.

@@ -9,7 +9,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::surface::rotation;
-use super::tracks::{self, ChannelTarget};
+use super::tracks::{self, ChannelTarget, NodeChange};
 use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
 use crate::gltf::scene::{Worlds, local, name_of};
@@ -36,17 +36,6 @@ const MIN_HIP_HEIGHT: f64 = 0.1;
 const MIN_RIGID_VERTICES: usize = 3;
 /// Range of the scale factor of clip translations.
 const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
-
-/// NodeChange of a node's local transform, for its animation tracks.
-pub(super) struct NodeChange {
-    pub(super) from: DVec3,
-    pub(super) to: DVec3,
-    /// Linear map for deviations from `from` in tracks of constant translation, and in tracks that move.
-    pub(super) still: DMat3,
-    pub(super) moving: DMat3,
-    /// Rotation to apply to rotation keys from the left.
-    pub(super) turn: Option<DQuat>,
-}
 
 /// All nodes after the deformation.
 pub(super) struct NodeUpdate {

@@ -6,13 +6,18 @@ use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::edit::Edit;
-use super::reshape::{PoseDisplacements, mesh_of};
 use super::shape::SurfaceGradients;
 use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
 use crate::gltf::animate::SECONDS_PER_POSE;
 use crate::gltf::pack::push;
+
+/// Displacements of all points in a pose, world space as in the file. `[n_points]`
+pub(crate) struct PoseDisplacements<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) by: &'a [DVec3],
+}
 
 /// Appends one morph target per pose to every mesh, and an animation that plays them. `seconds`: as
 /// [`super::ReshapeOptions::pose_seconds`]. `rigid`: nodes whose meshes stay rigid, and whether each point is
@@ -30,11 +35,11 @@ pub(super) fn append(
     // Number of targets of each mesh. All primitives of a mesh must have the same number.
     let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
     for part in &rig.parts {
-        let most = meshes.entry(mesh_of(edit, &part.instance)).or_insert(0);
+        let most = meshes.entry(edit.mesh_of(&part.instance)).or_insert(0);
         *most = part.targets.len().max(*most);
     }
     for part in &rig.parts {
-        let mesh = mesh_of(edit, &part.instance);
+        let mesh = edit.mesh_of(&part.instance);
         let number = part.primitive as usize;
         for _ in part.targets.len()..meshes[&mesh] {
             let nothing = edit.write(None, &vec![[0.0; 3]; part.local.len()], true, true);
@@ -50,7 +55,7 @@ pub(super) fn append(
         let by = held(rig, rigid, pose.by);
         let turned = SurfaceGradients::new(triangles, &by);
         for part in &rig.parts {
-            let mesh = mesh_of(edit, &part.instance);
+            let mesh = edit.mesh_of(&part.instance);
             let number = part.primitive as usize;
             let shape = rig.shape(part, &turned, &part.frame)?;
             let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
@@ -168,7 +173,7 @@ fn play(
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
     let shapes: HashSet<_> = rig.parts.iter().map(|part| key_of(&part.instance)).collect();
     for instance in rig.document.instances.iter().chain(&rig.document.elsewhere) {
-        let Some(&n_before) = meshes.get(&mesh_of(edit, instance)) else { continue };
+        let Some(&n_before) = meshes.get(&edit.mesh_of(instance)) else { continue };
         let Some(node) = instance.node.filter(|_| shapes.contains(&key_of(instance))) else { continue };
         let defaults = rig.document.default_weights(instance);
         let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);

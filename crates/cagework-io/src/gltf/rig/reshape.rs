@@ -1,22 +1,20 @@
 //! Writes a reshaped document.
 
-use cagework_core::words::counted;
 use std::collections::HashMap;
 
 use cagework_pose::Parts;
 use glam::{DMat4, DVec3, Mat4, Vec3};
-use serde::Serialize;
 use serde_json::Value;
 
 use super::edit::Edit;
-use super::lattice::MAX_ENDS;
 use super::nodes::{Deformation, Joints};
+use super::poses::PoseDisplacements;
+use super::report::ReshapeReport;
 use super::shape::{Shape, SurfaceGradients};
 use super::{Rig, RigPrimitive, key_of, poses, tracks, vrm};
 use crate::error::WriteError;
 use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
-use crate::gltf::scene::Instance;
 use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
 
@@ -34,103 +32,6 @@ pub struct ReshapeOptions {
     /// Times of the poses in seconds, ascending. If empty, poses are played one per second, starting and
     /// ending at rest.
     pub pose_seconds: Vec<f32>,
-}
-
-/// Results of reshaping.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct ReshapeReport {
-    /// Nodes that follow the cage: joints, animated nodes, nodes with meshes, and their descendants.
-    pub joints: usize,
-    /// Nodes among `joints` with a changed transform.
-    pub joints_moved: usize,
-    /// Joints outside the cage that have vertices; they move as points outside the cage.
-    pub joints_outside: usize,
-    /// Joints outside the cage that have no vertices; they follow their parent.
-    pub joints_loose: usize,
-    /// Ends of morph targets: vertices with one target at weight 0 or 1.
-    pub morph_ends: usize,
-    /// Ends outside the cage. They move as points outside the cage.
-    pub morph_ends_outside: usize,
-    /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
-    pub lattice_points: usize,
-    /// Cell size of the lattice, over the model's diagonal.
-    pub lattice_cell: f64,
-    /// Animation tracks that changed.
-    pub tracks: usize,
-    /// Unreadable animation tracks, which stay unchanged.
-    pub tracks_unread: usize,
-    /// Largest condition number of a skinning matrix.
-    pub max_condition: f64,
-    /// Vertices with a singular skinning matrix, which follow their neighbours.
-    pub singular_vertices: usize,
-}
-
-impl ReshapeReport {
-    /// Notices for the user, one sentence each.
-    #[must_use]
-    pub fn notices(&self) -> Vec<String> {
-        let Self { joints, joints_moved, joints_outside, morph_ends, morph_ends_outside, tracks, .. } = self;
-        let mut notices = Vec::new();
-        let mut notice = |n: usize, text: String| notices.extend((n > 0).then_some(text));
-        notice(
-            *joints,
-            format!(
-                "moved {joints_moved} of {} and adapted {}",
-                counted(*joints, "joint or other node", "joints and other nodes"),
-                counted(*tracks, "animation track", "animation tracks")
-            ),
-        );
-        notice(
-            *joints_outside,
-            format!(
-                "{} outside the cage: near it they follow it, farther away they stay",
-                counted(
-                    *joints_outside,
-                    "joint or node with vertices is",
-                    "joints or nodes with vertices are"
-                )
-            ),
-        );
-        notice(
-            *morph_ends_outside,
-            format!(
-                "{morph_ends_outside} of {} leave the cage: near it they follow it, farther away they stay; generate a cage that \
-                 encloses them",
-                counted(*morph_ends, "vertex position in morph targets", "vertex positions in morph targets")
-            ),
-        );
-        let (n, cell) = (self.lattice_points, 100.0 * self.lattice_cell);
-        notice(
-            n,
-            format!(
-                "the morph targets have {morph_ends} vertex positions, more than the limit of {MAX_ENDS} for individual weights: \
-                 they are interpolated between {n} points at a distance of {cell:.1} % of the model's size"
-            ),
-        );
-        let n = self.singular_vertices;
-        notice(
-            n,
-            format!(
-                "{} collapsed by the skin: they follow their neighbours",
-                counted(n, "vertex is", "vertices are")
-            ),
-        );
-        let n = self.tracks_unread;
-        notice(
-            n,
-            format!(
-                "{} and stay unchanged",
-                counted(n, "animation track cannot be read", "animation tracks cannot be read")
-            ),
-        );
-        notices
-    }
-}
-
-/// PoseDisplacements displacements of all points in a pose, world space as in the file. `[n_points]`
-pub(crate) struct PoseDisplacements<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) by: &'a [DVec3],
 }
 
 /// Writes the document with points displaced by `by`; with `poses`, at rest with one more morph target per pose.
@@ -302,14 +203,8 @@ fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u
     all
 }
 
-/// The instance's mesh in the edited document.
-pub(super) fn mesh_of(edit: &Edit<'_>, instance: &Instance) -> usize {
-    let of_node = |node: u32| edit.json["nodes"][node as usize]["mesh"].as_u64();
-    instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
-}
-
 fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &RigPrimitive, shape: &Shape) {
-    let mesh = mesh_of(edit, &part.instance);
+    let mesh = edit.mesh_of(&part.instance);
     let number = part.primitive as usize;
     let before = part.primitive(rig.document);
     let path = |rest: &str| format!("/meshes/{mesh}/primitives/{number}/{rest}");

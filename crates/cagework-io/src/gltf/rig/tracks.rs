@@ -4,8 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Vec3};
 use serde_json::Value;
 
 use super::edit::Edit;
-use super::nodes::NodeChange;
-use super::reshape::ReshapeReport;
+use super::report::ReshapeReport;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::push;
 
@@ -21,6 +20,17 @@ pub(super) enum ChannelTarget {
     /// Morph weights of a node.
     Weights(usize),
     MeshWeights(usize),
+}
+
+/// Change of a node's local transform, for its animation tracks.
+pub(super) struct NodeChange {
+    pub(super) from: DVec3,
+    pub(super) to: DVec3,
+    /// Linear map for deviations from `from` in tracks of constant translation, and in tracks that move.
+    pub(super) still: DMat3,
+    pub(super) moving: DMat3,
+    /// Rotation to apply to rotation keys from the left.
+    pub(super) turn: Option<DQuat>,
 }
 
 /// Target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
