@@ -1,4 +1,4 @@
-//! Import circles: top-level modules of a crate that use each other.
+//! Import circles: modules of a crate or of one folder that use each other.
 //!
 //! Sources are read as tokens, so that paths inside macros count and words in comments do not. An edge is a path through
 //! `crate`, `super` or `self` that ends in another module; a name of the crate's root counts as the module that it is
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crate::command::root;
-use read::Crate;
+use read::{Crate, ROOT};
 
 /// Uses of a module by another one, `(from, to)`, and the first line of each (`file:line`).
 type Edges = BTreeMap<(String, String), String>;
@@ -24,9 +24,11 @@ type Edges = BTreeMap<(String, String), String>;
 pub(super) fn check() -> Result<(), String> {
     let roots = crate_roots()?;
     for (path, with_tests) in &roots {
-        let edges = edges(&Crate::read(path, *with_tests)?);
-        if let Some(circle) = shortest_circle(&edges) {
-            return Err(show(path, &circle, &edges));
+        let source = Crate::read(path, *with_tests)?;
+        for edges in std::iter::once(edges(&source)).chain(edges_of_folders(&source)) {
+            if let Some(circle) = shortest_circle(&edges) {
+                return Err(show(path, &circle, &edges));
+            }
         }
     }
     println!("arrows: no circle between the modules of {} crates", roots.len());
@@ -64,11 +66,31 @@ fn edges(source: &Crate) -> Edges {
     let mut edges = Edges::new();
     for path in &source.paths {
         let Some(to) = source.module_of(&path.segments) else { continue };
-        if to != path.from {
-            edges.entry((path.from.clone(), to)).or_insert_with(|| path.place.clone());
+        let from = path.from.first().map_or(ROOT, String::as_str);
+        if to != from {
+            edges.entry((from.to_owned(), to)).or_insert_with(|| path.place.clone());
         }
     }
     edges
+}
+
+/// Edges between the children of each module, by their full paths.
+fn edges_of_folders(source: &Crate) -> impl Iterator<Item = Edges> {
+    source.modules.iter().map(|folder| {
+        let mut edges = Edges::new();
+        let child = |path: &[String]| {
+            let child = path.get(..=folder.len()).filter(|child| child.starts_with(folder))?;
+            source.modules.contains(child).then(|| child.join("::"))
+        };
+        for path in &source.paths {
+            if let (Some(from), Some(to)) = (child(&path.from), child(&path.segments))
+                && from != to
+            {
+                edges.entry((from, to)).or_insert_with(|| path.place.clone());
+            }
+        }
+        edges
+    })
 }
 
 /// The circle with the fewest modules. Its first module is repeated at the end.

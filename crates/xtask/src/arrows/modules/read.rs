@@ -12,8 +12,8 @@ pub(super) const ROOT: &str = "crate";
 
 /// A path that a module mentions.
 pub(super) struct Mention {
-    /// Top-level module, or [`ROOT`].
-    pub(super) from: String,
+    /// Path of the module that mentions it, from the crate's root.
+    pub(super) from: Vec<String>,
     /// Segments from the crate's root: modules, then an item or `*`.
     pub(super) segments: Vec<String>,
     /// `file:line`
@@ -25,8 +25,8 @@ pub(super) struct Mention {
 pub(super) struct Crate {
     /// Whether code under `#[cfg(test)]` is read.
     with_tests: bool,
-    /// Modules that the root declares.
-    modules: BTreeSet<String>,
+    /// Paths of all modules from the crate's root.
+    pub(super) modules: BTreeSet<Vec<String>>,
     /// Names that the root imports, with their paths.
     imported: BTreeMap<String, Vec<String>>,
     /// Every path that may be an edge.
@@ -66,13 +66,17 @@ impl Crate {
     /// Top-level module of a path's target: [`ROOT`] for the root's own items, `None` outside the crate.
     pub(super) fn module_of(&self, segments: &[String]) -> Option<String> {
         let first = segments.first()?;
-        if self.modules.contains(first) {
+        if self.is_at_root(first) {
             return Some(first.clone());
         }
         match self.imported.get(first) {
-            Some(from) => from.first().filter(|m| self.modules.contains(*m)).cloned(),
+            Some(from) => from.first().filter(|m| self.is_at_root(m)).cloned(),
             None => Some(ROOT.to_owned()),
         }
+    }
+
+    fn is_at_root(&self, name: &str) -> bool {
+        self.modules.contains(&[name.to_owned()][..])
     }
 
     fn read_file(&mut self, place: &Place) -> Result<(), String> {
@@ -123,9 +127,7 @@ impl Crate {
         let Some(TokenTree::Ident(name)) = rest.get(1) else { return Ok(()) };
         let name = name.to_string();
         let module = [&place.module[..], std::slice::from_ref(&name)].concat();
-        if place.module.is_empty() {
-            self.modules.insert(name.clone());
-        }
+        self.modules.insert(module.clone());
         let children = place.children.join(&name);
         match rest.get(2) {
             Some(TokenTree::Group(group)) => {
@@ -169,11 +171,11 @@ impl Crate {
             "self" => &place.module,
             "super" => &place.module[..place.module.len().saturating_sub(ups)],
             // In the root, modules need no prefix; which names are modules is known when all of it has been read.
-            _ if place.module.is_empty() && self.modules.contains(first) => &[],
+            _ if place.module.is_empty() && self.is_at_root(first) => &[],
             _ => return,
         };
         let segments: Vec<String> = base.iter().cloned().chain(rest).collect();
-        let from = place.module.first().map_or(ROOT, String::as_str).to_owned();
+        let from = place.module.clone();
         let file = place.file.strip_prefix(root()).unwrap_or(place.file);
         self.paths.push(Mention { from, segments, place: format!("{}:{}", file.display(), path.line) });
     }

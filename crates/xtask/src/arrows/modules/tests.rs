@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::read::Crate;
-use super::{Edges, edges, shortest_circle, show};
+use super::{Edges, edges, edges_of_folders, shortest_circle, show};
 
 fn edges_of(root: &str, with_tests: bool) -> Edges {
     edges(&Crate::of_text(root, with_tests).expect("the text is Rust"))
@@ -51,6 +51,17 @@ fn what_the_root_defines_is_a_module_too() {
 #[test]
 fn children_count_as_their_top_level_module() {
     assert_eq!(circle("mod a { mod x { use super::super::b; } } mod b { use crate::a::x; }"), "a -> b -> a");
+}
+
+#[test]
+fn children_of_one_module_are_checked_too() {
+    let folders = |root: &str| {
+        let source = Crate::of_text(root, false).expect("the text is Rust");
+        edges_of_folders(&source).filter_map(|edges| shortest_circle(&edges)).collect::<Vec<_>>().concat()
+    };
+    let text = "mod a { mod x { use super::y::Y; } mod y { fn f() { super::x::g() } } }";
+    assert_eq!(folders(text), ["a::x", "a::y", "a::x"]);
+    assert!(folders("mod a { mod x { use super::y::Y; } mod y { use super::Z; } struct Z; }").is_empty());
 }
 
 #[test]
