@@ -1,3 +1,6 @@
+import { createHash } from "node:crypto";
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
 import { defineConfig, type Plugin, type Rolldown } from "vite";
 
 /** Files in which Vite lists the licences of bundled packages. crates/xtask/src/licences.rs reads and deletes them. */
@@ -22,13 +25,40 @@ const licencesOfWorkers = (): Plugin => ({
   },
 });
 
+const PUBLIC = join(import.meta.dirname, "public");
+
+/** Writes the service worker, preceded by the list of all files of this build. */
+const writeServiceWorker: Plugin = {
+  name: "service-worker",
+  generateBundle: {
+    order: "post",
+    handler(_, bundle) {
+      const isLicences = (name: string) => Object.values(LICENCES).includes(name);
+      const built = Object.values(bundle).filter(({ fileName }) => !isLicences(fileName));
+      const entry = built.find((file) => file.type === "chunk" && file.isEntry)?.fileName;
+      if (!entry) throw new Error("the build has no entry");
+      const named = readdirSync(PUBLIC, { recursive: true, withFileTypes: true })
+        .filter((file) => file.isFile())
+        .map((file) => join(file.parentPath, file.name).slice(PUBLIC.length + 1));
+      const hashed = built.map(({ fileName }) => fileName).filter((name) => name !== "index.html");
+      const worker = readFileSync(join(import.meta.dirname, "src/offline/worker.js"), "utf8");
+      const hash = createHash("sha256").update(worker);
+      for (const name of named) hash.update(readFileSync(join(PUBLIC, name)));
+      for (const file of built) hash.update(file.type === "chunk" ? file.code : file.source);
+      const build = { id: hash.digest("hex").slice(0, 16), entry, hashed, named };
+      const source = `const BUILD = ${JSON.stringify(build, null, 2)};\n${worker}`;
+      this.emitFile({ type: "asset", fileName: "sw.js", source });
+    },
+  },
+};
+
 /** URLs are relative, so the built page works under any path of any server. */
 export default defineConfig({
   root: import.meta.dirname,
   // The page imports its own npm package from the sources.
   resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },
   base: "./",
-  plugins: [findLicences],
+  plugins: [findLicences, writeServiceWorker],
   build: {
     outDir: "../dist",
     emptyOutDir: true,

@@ -1,11 +1,13 @@
 /** The first visit: a sample that can be dragged at once. */
 
+import { box } from "./models";
 import { followsAHandle } from "./stories";
-import { cagePositions, drag, drawn, expect, largestMove, open, shoot, test } from "./support";
+import { cagePositions, drag, drawn, drop, expect, largestMove, open, shoot, test } from "./support";
 
 test("opens below any path with a bound sample, draws nothing when idle, and shares its pose by a link", async ({
   page,
   context,
+  complaints,
 }) => {
   const foreign: string[] = [];
   page.on("request", (request) => {
@@ -63,6 +65,19 @@ test("opens below any path with a bound sample, draws nothing when idle, and sha
     expect(text).not.toMatch(/^(vite|syn|wasm-bindgen-cli-support) v/m);
     const library = await page.request.get("./rust-standard-library.html");
     expect(library.ok()).toBe(true);
+  });
+  await test.step("parts that cannot be loaded are not blamed on the file", async () => {
+    await context.setOffline(true);
+    const alert = page.locator("#toasts [role=alert]");
+    await page.getByRole("button", { name: "Take the tour" }).click();
+    await expect(alert).toContainText("The tour could not start");
+    await drop(page, [{ name: "good.obj", bytes: box(0.5) }]);
+    await expect(alert).toContainText(
+      "good.obj could not be openedPart of the page could not be loaded. Check the connection and reload; your work is kept.",
+    );
+    await shoot(page, "unloaded");
+    expect(await alert.getByRole("button", { name: "Reload the page" }).count()).toBe(1);
+    complaints.length = 0;
   });
   expect(foreign, "all requests go to the server of the page").toEqual([]);
 });

@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
 
-// Different ports allow tests of two copies of the repository at once.
+// Different ports allow tests of two copies of the repository at once. With 0 the system chooses one.
 const PORT = Number(process.env.E2E_PORT ?? 4179);
 const FOLDER = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 const BELOW = "/~student/some%20where/cagework";
@@ -16,7 +16,9 @@ const TYPES = {
   ".wasm": "application/wasm",
   ".svg": "image/svg+xml",
   ".webp": "image/webp",
+  ".png": "image/png",
   ".json": "application/json",
+  ".webmanifest": "application/manifest+json",
   ".txt": "text/plain; charset=utf-8",
 };
 
@@ -32,4 +34,8 @@ createServer(async (request, response) => {
     response.statusCode = 404;
     response.end("not found");
   }
-}).listen(PORT, "127.0.0.1");
+})
+  .listen(PORT, "127.0.0.1")
+  .on("listening", function () {
+    console.log(`http://127.0.0.1:${this.address().port}/`);
+  });

@@ -19,7 +19,15 @@ export const SCREENS = join(import.meta.dirname, "../../target/screens");
 const OF_THE_DRIVER = /GL Driver Message .*queueSerial/;
 
 /** Tests fail if the console has errors or warnings at their end. */
-export const test = base.extend<{ complaints: string[] }>({
+export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }>({
+  /** Whether the page may register its service worker, which would answer in place of routes. */
+  serviceWorker: [false, { option: true }],
+  context: async ({ context, serviceWorker }, use) => {
+    if (!serviceWorker) {
+      await context.addInitScript(() => void Reflect.deleteProperty(Navigator.prototype, "serviceWorker"));
+    }
+    await use(context);
+  },
   complaints: [
     async ({ page }, use) => {
       const complaints: string[] = [];

@@ -62,6 +62,8 @@ export interface App {
   chooseControls(): void;
   /** Opens the first sample. The open work stays kept. */
   startFresh(): void;
+  /** Reloads the page with the open work. */
+  reload(): Promise<void>;
   /** Last position of the pointer, CSS pixels in the view. */
   pointer: () => { x: number; y: number };
   /** Shortcut of a command as text, for example "Ctrl+Z". */
@@ -133,7 +135,13 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     file: () => app.chooseModel(),
     add: () => app.chooseMore(),
     regenerate: () => void cage.regenerate(),
-    reload: () => location.reload(),
+    reload: () => void reload(),
+  };
+  const reload = async () => {
+    await works.flush();
+    // A link would be opened instead of the kept work.
+    if (store.get().savedAt !== null) history.replaceState(null, "", location.pathname + location.search);
+    location.reload();
   };
   const mac = isMac(navigator.platform);
   const app: App = {
@@ -168,6 +176,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
     chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
     startFresh,
+    reload,
     pointer: () => ({ x: 0, y: 0 }),
     key: (command) => shortcutText(command, mac),
   };

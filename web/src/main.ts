@@ -8,6 +8,7 @@ import { attachBrush } from "./input/brush";
 import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
+import { keepOffline } from "./offline/keep";
 import { openSession } from "./session";
 import { createStore } from "./signals";
 import { isFresh, startUp } from "./start";
@@ -36,7 +37,7 @@ function restart(): void {
 async function main(): Promise<void> {
   const stage = createStage(byId("stage"));
   const store = createStore(INITIAL);
-  const { Toasts, tell } = createToasts();
+  const { Toasts, tell, offer } = createToasts();
   let session: Session | undefined;
   const app = createApp({
     store,
@@ -51,6 +52,12 @@ async function main(): Promise<void> {
     askAfterCrash(crash, () => {
       forgetCrash();
       void app.works.distrust().finally(restart);
+    });
+  });
+  const offline = keepOffline((adopt) => {
+    offer(T.offline.ready, {
+      label: T.offline.reload,
+      run: () => void app.works.flush().then(adopt).then(app.reload),
     });
   });
   const lost = createLost(stage.freshCanvas, () => {
@@ -72,7 +79,7 @@ async function main(): Promise<void> {
   attachKeyboard({ viewport: stage.viewport, app, run: app.run, original: (on) => app.view.original(on) });
   attachDrop(byId("panel"), app);
   lost.watch(session);
-  startUp({ app, stage, crashes });
+  startUp({ app, stage, crashes, offline });
 }
 
 void main();

@@ -7,6 +7,7 @@ import { stopOf } from "./actions/tour";
 import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
 import { percent } from "./format";
+import type { Offline } from "./offline/keep";
 import { decodeShare } from "./share";
 import { loadTheme } from "./store";
 import { showReport } from "./ui/crashed";
@@ -21,9 +22,10 @@ export interface Start {
   app: App;
   stage: Stage;
   crashes: Crashes;
+  offline: Offline;
 }
 
-export function startUp({ app, stage, crashes }: Start): void {
+export function startUp({ app, stage, crashes, offline }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
   store.set({ adapter: session.adapter, lack: session.lack, samples: session.samples, busy: null });
@@ -62,6 +64,9 @@ export function startUp({ app, stage, crashes }: Start): void {
     if (!store.get().bound) return;
     crashes.settled();
     stop();
+    // Idle callbacks are missing in Safari.
+    const whenIdle = globalThis.requestIdleCallback ?? setTimeout;
+    whenIdle(() => void offline.register());
   });
   void open(app, crashes.before);
   window.addEventListener("hashchange", () => {

@@ -21,7 +21,7 @@ export interface Explained {
   fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
 
-const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained["fix"]>>>> = {
+const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullable<Explained["fix"]>>>> = {
   Memory: "coarser",
   WeightsMemory: "fewer",
   Gpu: "cpu",
@@ -32,12 +32,14 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained[
   Outside: "regenerate",
   NoneInside: "regenerate",
   DeviceLost: "reload",
+  Unloaded: "reload",
 };
 
 /** An error with headline, message and remedy. */
 export function explain(error: unknown, title: string): Explained {
   const name = error instanceof Error ? error.name : "";
-  const message = sentence(error instanceof Error ? error.message : String(error));
+  const text = error instanceof Error ? error.message : String(error);
+  const message = name === "Unloaded" ? T.offline.unloaded : sentence(text);
   const fix = FIXES[name as ErrorName];
   return fix ? { title, message, fix } : { title, message };
 }

@@ -29,10 +29,13 @@ function workers() {
   });
   const answer = (of: number, data: FromWorker) =>
     all[of]?.target.dispatchEvent(new MessageEvent("message", { data }));
-  const stop = (of: number) => all[of]?.target.dispatchEvent(new Event("error"));
+  const stop = (of: number) =>
+    all[of]?.target.dispatchEvent(Object.assign(new Event("error"), { message: "out of memory" }));
+  /** As browsers report a script that cannot be loaded. */
+  const miss = (of: number) => all[of]?.target.dispatchEvent(new Event("error"));
   const jobs = () => all.map((one) => one.jobs);
   const run = (id: string) => client.run("sample", { id });
-  return { all, client, answer, stop, jobs, run };
+  return { all, client, answer, stop, miss, jobs, run };
 }
 
 const said = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
@@ -70,6 +73,13 @@ it("a stopped worker is restarted by the next job", async () => {
   expect(all.length).toBe(2);
   stop(1);
   expect(await said(second.done)).toBe("Worker");
+});
+
+it("a worker whose script cannot be loaded is an error of its own", async () => {
+  const { miss, run } = workers();
+  const job = run("a");
+  miss(0);
+  expect(await said(job.done)).toBe("Unloaded");
 });
 
 it("input that cannot be cloned throws; a closed client starts no job", async () => {

@@ -7,6 +7,7 @@ import dracoWasm from "draco3dgltf/draco_decoder_gltf.wasm?url";
 import createDecoder from "draco3dgltf/draco_decoder_gltf_nodejs.js";
 import { MeshoptDecoder } from "meshoptimizer/decoder";
 import { named } from "./session/client";
+import { fetchPart } from "./session/parts";
 
 const GLB = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
@@ -72,7 +73,7 @@ function normaliseWeights(document: Document): void {
 }
 
 async function openDraco(): Promise<unknown> {
-  const wasmBinary = await (await fetch(dracoWasm)).arrayBuffer();
+  const wasmBinary = await fetchPart(dracoWasm, (response) => response.arrayBuffer());
   return createDecoder({ wasmBinary });
 }
 

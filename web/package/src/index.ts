@@ -3,13 +3,14 @@
 import { createApi } from "./api";
 import { compile } from "./session/artifact";
 import { createClient } from "./session/client";
+import { loadPart } from "./session/parts";
 import type { Api } from "./types";
 
 /** Limit of parallel workers: each bind uses a core, and more of them would only use memory. */
 const MOST = 4;
 
 const api = /* @__PURE__ */ createApi(async () => {
-  const { WEBGPU } = await import("./session/webgpu");
+  const { WEBGPU } = await loadPart(import("./session/webgpu"));
   const module = await compile(WEBGPU.wasm);
   await WEBGPU.pkg.default({ module_or_path: module });
   const most = Math.min(MOST, navigator.hardwareConcurrency);

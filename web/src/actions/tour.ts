@@ -1,5 +1,6 @@
 /** Starts the tour, whose code is downloaded at the first start. */
 
+import { loadPart } from "@cagework/core/session/parts";
 import type { Guide, GuideNeeds, Loaded } from "../tour";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
@@ -18,7 +19,7 @@ export function createTour(ctx: Context, needs: GuideNeeds): TourActions {
   return {
     async start(stop) {
       await attempt(ctx, T.failed.tour, async () => {
-        loaded ??= (await import("../tour")).load(ctx, needs);
+        loaded ??= (await loadPart(import("../tour"))).load(ctx, needs);
         await loaded.guide.start(stop);
       });
     },

@@ -21,11 +21,20 @@ interface Toast {
   readonly title?: string;
   readonly text: string;
   readonly fixes: readonly Fix[];
+  /** Whether the message stays until it is closed. */
+  readonly stays?: boolean;
 }
 
 let next = 0;
 
-export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell } {
+export interface ToastParts {
+  readonly Toasts: () => preact.JSX.Element;
+  readonly tell: Tell;
+  /** Shows an offer that stays until it is taken or closed. */
+  offer(text: string, fix: Fix): void;
+}
+
+export function createToasts(): ToastParts {
   const said = signal<readonly Toast[]>([]);
   const problems = signal<readonly Toast[]>([]);
 
@@ -33,7 +42,9 @@ export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell }
   const add = (list: typeof said, toast: Omit<Toast, "id">) => {
     const others = list.value.filter(({ title, text }) => title !== toast.title || text !== toast.text);
     next += 1;
-    list.value = [...others, { ...toast, id: next }].slice(-MOST);
+    const all = [...others, { ...toast, id: next }];
+    const latest = all.filter(({ stays }) => !stays).slice(-MOST);
+    list.value = all.filter((one) => one.stays || latest.includes(one));
   };
   const closing = (list: typeof said) => (id: number) => {
     list.value = list.value.filter((toast) => toast.id !== id);
@@ -55,6 +66,7 @@ export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell }
         problems.value = [];
       },
     },
+    offer: (text, fix) => add(said, { text, fixes: [fix], stays: true }),
   };
 }
 
@@ -110,11 +122,11 @@ function Fixes({ fixes, close }: { fixes: readonly Fix[]; close: () => void }) {
   );
 }
 
-function Said({ toast: { text, fixes }, close }: { toast: Toast; close: () => void }) {
+function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: () => void }) {
   const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
   const leaveIn = (ms: number) => {
     clearTimeout(timer.current);
-    timer.current = setTimeout(close, ms);
+    if (!stays) timer.current = setTimeout(close, ms);
   };
   // Do not close a message that is hovered or focused.
   const stay = () => clearTimeout(timer.current);

@@ -1,5 +1,7 @@
 /** The module's two builds: for WebGPU, and for WebGL2, which is downloaded only when needed. */
 
+import { fetchPart } from "./parts";
+
 /** The exports that both builds share. */
 export type Package = typeof import("../pkg/cagework");
 
@@ -12,10 +14,10 @@ export interface Artifact {
 
 /** Downloads and compiles a module; streams it if the server sends the MIME type of wasm. */
 export async function compile(url: string): Promise<WebAssembly.Module> {
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`${url} could not be downloaded (${response.status})`);
-  if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
-    return WebAssembly.compileStreaming(response);
-  }
-  return WebAssembly.compile(await response.arrayBuffer());
+  return fetchPart(url, async (response) => {
+    if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
+      return WebAssembly.compileStreaming(response);
+    }
+    return WebAssembly.compile(await response.arrayBuffer());
+  });
 }

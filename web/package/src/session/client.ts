@@ -34,6 +34,11 @@ export function named(name: string, message: string): Error {
   return error;
 }
 
+/** An error named Unloaded: there is no connection, or the server has a newer version of the program. */
+export function unloaded(reason: string): Error {
+  return named("Unloaded", `part of the program could not be loaded (${reason}): check the connection`);
+}
+
 const closing = () => named("Cancelled", "the page is closing");
 
 /**
@@ -52,7 +57,10 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     started.addEventListener("error", (event) => {
       event.preventDefault();
       // Ignore errors of a worker that was replaced.
-      if (started === worker) lose(named("Worker", event.message || "the worker stopped"));
+      if (started !== worker) return;
+      // Only errors of a running script have a message.
+      const isRunning = "message" in event;
+      lose(isRunning ? named("Worker", event.message || "the worker stopped") : unloaded("its worker"));
     });
     say(started, { kind: "start", module });
     return started;

@@ -3,6 +3,7 @@
 import type { Lack } from "../contract";
 import { findAdapter, hasWebGl2, lackOf } from "./adapter";
 import { type Artifact, compile } from "./artifact";
+import { loadPart } from "./parts";
 import { WEBGPU } from "./webgpu";
 
 /** Canvases to draw on. A canvas that was used with one graphics API cannot be used with the other. */
@@ -37,7 +38,7 @@ export async function openOn<T>(canvases: Canvases, start: (opened: OpenedOn) =>
   } catch (error) {
     const lack = lackOf(error);
     if (!lack || !hasWebGl2()) throw error;
-    const { WEBGL } = await import("./webgl");
+    const { WEBGL } = await loadPart(import("./webgl"));
     try {
       const module = await compile(WEBGL.wasm);
       const canvas = canvases.freshCanvas();

@@ -5,6 +5,7 @@ import type { Loaded, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Bytes, readFiles, siblingOf } from "./files";
 import type { Jobs, ReadModel } from "./messages";
+import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
 
 type Tell = (step: Reading) => void;
@@ -121,7 +122,7 @@ export async function read(
   } catch (error) {
     if (!(error instanceof Error) || error.name !== "Compressed") throw error;
     say(tell, "decompress");
-    const { decompress } = await import("../decode");
+    const { decompress } = await loadPart(import("../decode"));
     const { loaded, bytes } = timed(await decompress(file.name, file.bytes, sibling));
     return { loaded, bytes: { ...bytes, packed: file.bytes } };
   }

@@ -38,6 +38,12 @@ export const failed = {
   tour: "The tour could not start",
 };
 
+export const offline = {
+  unloaded: "Part of the page could not be loaded. Check the connection and reload; your work is kept.",
+  ready: "A new version of this page is ready.",
+  reload: "Reload for the new version",
+};
+
 export const lost = {
   title: "The graphics device was lost",
   back: "Restoring everything…",

@@ -5,7 +5,7 @@ import { bar, panel, tour } from "./bar";
 import { bind, report } from "./bind";
 import { cage } from "./cage";
 import { clips } from "./clips";
-import { crash, failed, fixes, lost } from "./errors";
+import { crash, failed, fixes, lost, offline } from "./errors";
 import { exports } from "./exports";
 import { model, opening } from "./model";
 import { models } from "./models";
@@ -30,6 +30,7 @@ export const EN = {
   failed,
   without,
   lost,
+  offline,
   crash,
   bar,
   panel,
