@@ -25,6 +25,9 @@ const licencesOfWorkers = (): Plugin => ({
   },
 });
 
+/** gltf-transform and draco3dgltf import modules of Node, which they use only there. */
+const FOR_NODE = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
+
 const PUBLIC = join(import.meta.dirname, "public");
 
 /** Writes the service worker, preceded by the list of all files of this build. */
@@ -66,6 +69,12 @@ export default defineConfig({
     assetsInlineLimit: 0,
     license: { fileName: LICENCES.page },
     modulePreload: { polyfill: false },
+    rolldownOptions: {
+      onwarn(warning, print) {
+        if (!FOR_NODE.test(warning.message)) print(warning);
+      },
+      checks: { pluginTimings: false },
+    },
   },
   worker: { format: "es", plugins: () => [licencesOfWorkers()] },
   server: { host: "127.0.0.1" },

@@ -70,9 +70,17 @@ export function percent(share: number, maximumFractionDigits = 0): string {
   return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
 }
 
-/** A coordinate for a number field: five significant digits, no trailing zeros, no minus zero. */
-export function coordinate(value: number): string {
-  return String(value === 0 ? 0 : Number(value.toPrecision(5)));
+/** Characters that fit into a number field of the panel. */
+const FIELD = 9;
+
+/**
+ * A coordinate for a number field: up to five significant digits, no trailing zeros, no minus zero. Values that are rounding noise
+ * of an object of the given size are zero.
+ */
+export function coordinate(value: number, size = 0): string {
+  if (Math.abs(value) <= 1e-6 * size) return "0";
+  const rounded = [5, 4, 3].map((digits) => String(Number(value.toPrecision(digits))));
+  return rounded.find((text) => text.length <= FIELD) ?? scientific(value);
 }
 
 /** A file name without its extension; of a project, without both of them. */

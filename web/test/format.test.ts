@@ -32,7 +32,11 @@ describe("formats", () => {
   });
   it("show coordinates with five digits at every scale, without minus zero", () => {
     expect(coordinate(-0)).toBe("0");
-    expect(coordinate(-0.0000123456)).toBe("-0.000012346");
+    expect(coordinate(-0.0012345678)).toBe("-0.001235");
+    expect(coordinate(-0.0000123456)).toBe("-1.23e-5");
+    expect(coordinate(-1.4895e-8, 0.2)).toBe("0");
+    expect(coordinate(-1.4895e-8)).toBe("-1.49e-8");
+    expect(coordinate(-1234567.8)).toBe("-1234600");
     expect(coordinate(1.23456)).toBe("1.2346");
     expect(coordinate(0.1 + 0.2)).toBe("0.3");
   });

@@ -10,8 +10,9 @@ import { rectangle } from "../src/input/pointer";
 import { INITIAL, type StepName } from "../src/state";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
-import { historyPoints, scaleOf } from "../src/ui/plot";
+import { historyPoints, type Place, placeLabel, scaleOf } from "../src/ui/plot";
 import { verdict } from "../src/ui/report";
+import { placeTip } from "../src/ui/tips";
 import { recognise } from "../src/ui/unsupported";
 import { PLAIN } from "./fake";
 
@@ -51,7 +52,49 @@ describe("two fingers", () => {
   });
 });
 
+describe("tool tips", () => {
+  const window = { width: 390, height: 300 };
+  const tip = { width: 100, height: 24 };
+  const box = (x: number, y: number) => ({ x, y, width: 36, height: 36, right: x + 36, bottom: y + 36 });
+  const at = (x: number, y: number, isInColumn = false) =>
+    placeTip(box(x, y) as DOMRectReadOnly, tip, isInColumn, window);
+  it("are below their element, or above at the lower edge", () => {
+    expect(at(100, 100)).toEqual({ x: 68, y: 142 });
+    expect(at(0, 260)).toEqual({ x: 6, y: 230 });
+  });
+  it("are beside a tool of a column, and cover no other tool", () => {
+    expect(at(12, 100, true)).toEqual({ x: 54, y: 106 });
+    expect(at(350, 290, true)).toEqual({ x: 244, y: 270 });
+  });
+});
+
 describe("the plot", () => {
+  it("writes the threshold where no curve crosses the words", () => {
+    const width = 100;
+    const crosses = (lines: readonly (readonly Place[])[], at: number) => {
+      const { x, y } = placeLabel(lines, at, width);
+      return lines.some((line) =>
+        line.slice(1).some(([x1, y1], k) => {
+          const [x0, y0] = line[k] ?? [x1, y1];
+          return Array.from({ length: 101 }, (_, s) => s / 100).some((s) => {
+            const [px, py] = [x0 + s * (x1 - x0), y0 + s * (y1 - y0)];
+            return px >= x && px <= x + width && py <= y && py >= y - 9;
+          });
+        }),
+      );
+    };
+    const steep: Place[] = [
+      [38, 10],
+      [60, 130],
+    ];
+    const flat: Place[] = [
+      [38, 10],
+      [320, 125],
+    ];
+    for (const lines of [[steep], [flat], [steep, flat]]) {
+      for (const at of [60, 100, 120, 136]) expect(crosses(lines, at), `${lines.length}, ${at}`).toBe(false);
+    }
+  });
   it("spans powers of ten and includes the threshold", () => {
     const scale = scaleOf(
       [

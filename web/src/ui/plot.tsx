@@ -25,8 +25,9 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
-/** Height of a text line. */
+/** Height of a text line, and mean width of a letter. */
 const LABEL = 11;
+const LETTER = 5.2;
 
 export interface Scale {
   lowest: number;
@@ -54,6 +55,37 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   };
 }
 
+/** A point in the drawing. */
+export type Place = readonly [x: number, y: number];
+
+/**
+ * Start of the baseline of the threshold's label, below or above its line at height `at`: the first place that no curve crosses.
+ * Curves fall from the left.
+ */
+export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
+  const right = WIDTH - RIGHT - 4 - width;
+  const places = [LEFT + 4, right, (LEFT + right) / 2].flatMap((x) =>
+    [at + LABEL, at - 4].filter((y) => y <= HEIGHT - BOTTOM && y >= TOP + LABEL).map((y) => ({ x, y })),
+  );
+  const isFree = ({ x, y }: { x: number; y: number }) =>
+    lines.every((line) => {
+      const heights = heightsBetween(line, x - 3, x + width + 3);
+      return heights.every((one) => one > y + 4) || heights.every((one) => one < y - LABEL);
+    });
+  return places.find(isFree) ?? places[0] ?? { x: LEFT + 4, y: at - 4 };
+}
+
+/** Heights of a line at its corners between two places, and at these places. */
+function heightsBetween(line: readonly Place[], from: number, to: number): number[] {
+  const heights = line.filter(([x]) => x >= from && x <= to).map(([, y]) => y);
+  for (const at of [from, to]) {
+    const next = line.findIndex(([x]) => x >= at);
+    const [a, b] = [line[next - 1], line[next]];
+    if (a && b) heights.push(a[1] + ((b[1] - a[1]) * (at - a[0])) / (b[0] - a[0]));
+  }
+  return heights;
+}
+
 export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number }) {
   const { lowest, highest, last, logarithmic } = scaleOf(curves, tau);
   const along = (iteration: number) =>
@@ -71,10 +103,8 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
   const bottom = HEIGHT - 8;
   const middle = (LEFT + WIDTH - RIGHT) / 2;
-  // Curves fall from the left, so the label is placed below its line where there is room, and on the right if the axis is
-  // logarithmic.
-  const tauBelow = y(tau) <= HEIGHT - BOTTOM - LABEL;
-  const tauAt = logarithmic ? WIDTH - RIGHT - 4 : LEFT + 4;
+  const lines = curves.map(({ points }) => points.map(([i, delta]): Place => [x(i), y(delta)]));
+  const label = placeLabel(lines, y(tau), T.bind.doneBelow.length * LETTER);
   return (
     <svg
       viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
@@ -99,22 +129,20 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
       {tau > 0 && (
         <>
           <line x1={LEFT} x2={WIDTH - RIGHT} y1={y(tau)} y2={y(tau)} class="tau" />
-          <Label
-            x={tauAt}
-            y={y(tau) + (tauBelow ? LABEL : -4)}
-            text={T.bind.doneBelow}
-            anchor={logarithmic ? "end" : "start"}
-          />
+          <Label x={label.x} y={label.y} text={T.bind.doneBelow} anchor="start" />
         </>
       )}
-      {curves.map(({ kind, points }) => {
-        const end = points.at(-1);
+      {curves.map(({ kind }, k) => {
+        const line = lines[k] ?? [];
+        const end = line.at(-1);
         if (!end) return null;
-        const line = points.map(([i, delta]) => `${x(i).toFixed(1)},${y(delta).toFixed(1)}`);
         return (
           <g key={kind}>
-            <polyline points={line.join(" ")} class={`curve ${kind}`} />
-            <circle cx={x(end[0])} cy={y(end[1])} r={3} class={`point ${kind}`} />
+            <polyline
+              points={line.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ")}
+              class={`curve ${kind}`}
+            />
+            <circle cx={end[0]} cy={end[1]} r={3} class={`point ${kind}`} />
           </g>
         );
       })}

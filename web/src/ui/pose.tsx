@@ -55,7 +55,8 @@ function PullOptions({ app }: { app: App }) {
 
 /** Position of the selection in number fields. */
 function Selection({ app }: { app: App }) {
-  const { cage, selected, editingRest, pivot } = app.store.get();
+  const { model, cage, selected, editingRest, pivot } = app.store.get();
+  const size = model ? Math.max(...model.bounds.max.map((high, i) => high - (model.bounds.min[i] ?? 0))) : 0;
   const { count, last, center } = selected;
   const inner = (last ?? 0) - (cage?.info.vertices ?? 0);
   const one = editingRest ? T.pose.vertexAtRest : T.pose.vertex;
@@ -93,7 +94,7 @@ function Selection({ app }: { app: App }) {
               <span aria-hidden="true">{axis}</span>
               <NumberInput
                 name={T.pose.axis(axis)}
-                value={coordinate(center?.[index] ?? 0)}
+                value={coordinate(center?.[index] ?? 0, size)}
                 onCommit={(value) => move(index, value)}
               />
             </div>

@@ -7,6 +7,29 @@ const READ_MS = 2500;
 /** Distance of a tip to its element and to the window's edge, CSS pixels. */
 const GAP = 6;
 
+interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Corner of a tip: below its element, or above where there is no room; beside an element of a column. */
+export function placeTip(box: DOMRectReadOnly, tip: Size, isInColumn: boolean, window: Size) {
+  const inside = (at: number, size: number, limit: number) => Math.min(Math.max(GAP, at), limit - size - GAP);
+  if (isInColumn) {
+    const right = box.right + GAP;
+    const x = right + tip.width < window.width ? right : box.x - tip.width - GAP;
+    return { x, y: inside(box.y + (box.height - tip.height) / 2, tip.height, window.height) };
+  }
+  const below = box.bottom + GAP;
+  const y = below + tip.height < window.height ? below : box.y - tip.height - GAP;
+  return { x: inside(box.x + (box.width - tip.width) / 2, tip.width, window.width), y };
+}
+
+/** Whether an element is in a toolbar that runs downwards. */
+function isInColumn(element: Element): boolean {
+  return element.closest("[role=toolbar]")?.getAttribute("aria-orientation") === "vertical";
+}
+
 export function attachTips(): void {
   const tip = document.createElement("div");
   tip.className = "tip";
@@ -31,9 +54,10 @@ export function attachTips(): void {
     if (!tip.matches(":popover-open")) tip.showPopover();
     const box = target.getBoundingClientRect();
     const { width, height } = tip.getBoundingClientRect();
-    const x = Math.min(Math.max(GAP, box.x + (box.width - width) / 2), innerWidth - width - GAP);
-    const below = box.bottom + GAP;
-    const y = below + height < innerHeight ? below : box.top - height - GAP;
+    const { x, y } = placeTip(box, { width, height }, isInColumn(target), {
+      width: innerWidth,
+      height: innerHeight,
+    });
     tip.style.translate = `${x}px ${y}px`;
   };
   const later = (target: Element | null, ms: number) => {

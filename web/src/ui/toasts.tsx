@@ -138,8 +138,8 @@ function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: (
     <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(SHOWN_MS)} onFocusIn={stay}>
       <Icon name="info" />
       <p>{text}</p>
-      <Fixes fixes={fixes} close={close} />
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
+      <Fixes fixes={fixes} close={close} />
     </div>
   );
 }
