@@ -1,6 +1,6 @@
 // Adds the cage's displacement field to skinned positions: x += u(x). u is given at the nodes of a lattice and
 // interpolated linearly. One invocation per vertex, in place, after skin_vertices. A storage buffer, because 16-bit
-// textures are too coarse and 32-bit ones not filterable everywhere. CPU: cagework_core::dynamic::bend_vertices.
+// textures are too coarse and 32-bit ones not filterable everywhere. CPU: cagework_core::field::bend_vertices.
 
 struct Field {
     /// First node, object units.

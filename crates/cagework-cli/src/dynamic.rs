@@ -1,7 +1,7 @@
 //! `cagework deform --dynamic`: a clip moves the model, and the cage bends each frame.
 
 use cagework_core::BindOptions;
-use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
+use cagework_core::field::{self, FieldWeights, Lattice, bend_vertices};
 use cagework_io::{Clip, ModelFormat, shown};
 use serde::Serialize;
 
@@ -57,12 +57,12 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, &model, args.read.memory, &controls)?;
     let posed = cage.load_pose(pose)?;
-    let lattice = Lattice::new(cage.controls().surface());
+    let lattice = Lattice::new(cage.controls().surface(), field::CLIP_CELLS);
     let options =
         BindOptions { held: model.bytes(), memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
     let binding = bind_positions(&lattice.points(), cage.controls(), false, &options)?;
     let rest = cage.cage.positions();
-    let field = DisplacementField::new(lattice, &binding.weights, &binding.frames, rest, &posed);
+    let field = FieldWeights::new(lattice, binding.weights, binding.frames).pose(rest, &posed);
     let mut at_rest = model.positions.clone();
     frames.iter_mut().chain([&mut at_rest]).for_each(|frame| bend_vertices(&field, frame));
     let n = frames.len();

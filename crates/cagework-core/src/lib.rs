@@ -11,8 +11,9 @@ pub mod contact;
 pub mod controls;
 pub mod crossing;
 pub mod deform;
-pub mod dynamic;
+
 pub mod enclosure;
+pub mod field;
 pub mod fill;
 pub mod frames;
 pub mod geometry;

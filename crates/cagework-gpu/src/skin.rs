@@ -1,6 +1,6 @@
 //! Skinning on the GPU while a clip plays, into the vertex buffer of [`crate::Deformer`].
 
-use cagework_core::dynamic::{DisplacementField, bend_vertices};
+use cagework_core::field::{Field, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use glam::{Mat4, Vec3};
 
@@ -18,7 +18,7 @@ pub struct Skinner {
     palette: Vec<Mat4>,
     targets: Vec<f32>,
     /// Added after skinning.
-    field: Option<DisplacementField>,
+    field: Option<Field>,
     kernel: Option<SkinKernels>,
 }
 
@@ -62,7 +62,7 @@ impl SkinTables {
 /// A displacement field in the layout of the kernel: the lattice, then values. Floats are stored as bits. `[2
 /// + n_nodes]`
 #[must_use]
-pub fn field_table(field: &DisplacementField) -> Vec<[u32; 4]> {
+pub fn field_table(field: &Field) -> Vec<[u32; 4]> {
     let lattice = &field.lattice;
     let origin = lattice.origin.extend(lattice.cell).to_array().map(f32::to_bits);
     let values = field.values.iter().map(|value| value.to_array().map(f32::to_bits));
@@ -77,7 +77,7 @@ impl Skinner {
     pub(crate) async fn new(
         context: &GpuContext,
         skin: Skin,
-        field: Option<DisplacementField>,
+        field: Option<Field>,
         positions: Option<&wgpu::Buffer>,
     ) -> Result<Self, GpuError> {
         let n_palette = skin.joints.iter().map(|(joint, _)| joint + 1).max().unwrap_or(1);

@@ -8,7 +8,7 @@ use cagework_cage::check::repair_smooth;
 use cagework_cage::generate::{CageOptions, GeneratedCage, generate};
 use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
-use cagework_core::dynamic::Lattice;
+use cagework_core::field::{self, Lattice};
 use cagework_core::green::green_weights;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
@@ -174,7 +174,7 @@ impl Binder {
         let mut request: JsBindOptions = decode(options)?;
         request.options.outside = OutsidePolicy::Extend;
         let set = control_set(&cage, &corners, controls)?;
-        let lattice = Lattice::new(Controls::from(&set).surface());
+        let lattice = Lattice::new(Controls::from(&set).surface(), field::CLIP_CELLS);
         let binding = self.run(&lattice.points(), &set, request, progress).await?;
         let offsets = Offsets { frames: binding.frames, outside: Vec::new() };
         Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use cagework_core::dynamic::{DisplacementField, bend_vertices};
+use cagework_core::field::{Field, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_io::{Player, Posed};
 use glam::{Mat4, Vec3};
@@ -75,7 +75,7 @@ pub(crate) struct Playback {
     /// Weights of all morph targets. `[n_targets]`
     targets: Vec<f32>,
     /// Field of the cage that deforms the models, if `dynamic`.
-    pub(crate) field: Option<DisplacementField>,
+    pub(crate) field: Option<Field>,
     /// Whether the current time is not on the GPU yet.
     pub(crate) is_new: bool,
 }
@@ -86,7 +86,7 @@ impl Playback {
         parts: Vec<(u32, ModelMotion)>,
         clips: Vec<SharedClip>,
         up: Mat4,
-        field: Option<DisplacementField>,
+        field: Option<Field>,
     ) -> Self {
         let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
         let (mut played, mut n_palette, mut n_targets) = (Vec::new(), 0, 0);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::Weights;
-use cagework_core::dynamic::bend_vertices;
+use cagework_core::field::bend_vertices;
 use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
 use glam::{Quat, Vec3};

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
-use cagework_core::dynamic::Lattice;
 use cagework_core::enclosure::Enclosure;
+use cagework_core::field::FieldWeights;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, ControlSet, Frames, PolygonMesh, Weights};
 use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
@@ -47,8 +47,8 @@ pub(crate) struct State {
     pub(crate) rig_notices: Vec<String>,
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
-    /// Lattice for deforming a model that a clip moves, with weights and frames of its points.
-    pub(crate) lattice: Option<(Lattice, Weights, Frames)>,
+    /// Weights on a lattice, for deforming a model that a clip moves.
+    pub(crate) lattice: Option<FieldWeights>,
     /// Kinds of coordinates available for comparison.
     pub(crate) others: Vec<Coordinates>,
     pub(crate) active_part: Option<GizmoPart>,

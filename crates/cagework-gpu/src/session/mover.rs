@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use cagework_core::deform::vertex_normals;
-use cagework_core::dynamic::DisplacementField;
+use cagework_core::field::Field;
 use cagework_core::skin::Skin;
 use cagework_core::{Frames, Weights};
 use cagework_pose::parts::BoundParts;
@@ -125,7 +125,7 @@ impl Mover {
         context: &GpuContext,
         model: &DrawModel,
         skin: &Skin,
-        field: Option<DisplacementField>,
+        field: Option<Field>,
     ) -> Result<Skinner, GpuError> {
         let skin = skin.with_copies(&model.copies);
         let positions =

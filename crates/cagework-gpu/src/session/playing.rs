@@ -1,6 +1,6 @@
 //! Clips: the mesh follows its skin.
 
-use cagework_core::dynamic::DisplacementField;
+use cagework_core::field::Field;
 use cagework_core::skin::Skin;
 use glam::Mat4;
 
@@ -14,11 +14,7 @@ impl Session {
     /// # Errors
     /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] if the skin's size does not match; otherwise
     /// as [`crate::buffers::Allocator::zeros`].
-    pub async fn start_playing(
-        &mut self,
-        skin: &Skin,
-        field: Option<DisplacementField>,
-    ) -> Result<(), GpuError> {
+    pub async fn start_playing(&mut self, skin: &Skin, field: Option<Field>) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
         let Some(bound) = &self.bound else { return Err(GpuError::NotReady { missing: "bind" }) };
         if skin.positions.len() != model.positions.len() {

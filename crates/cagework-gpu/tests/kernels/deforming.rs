@@ -1,6 +1,6 @@
 //! Kernels of each frame: deformation, including vertices outside the cage, skinning, and normals.
 
-use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
+use cagework_core::field::{Field, Lattice, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, SlicedWeights};
 use cagework_core::{Cage, PolygonMesh, TriMesh, Weights, stencil};
@@ -109,7 +109,7 @@ fn bend_vertices_matches_cpu() {
     let mut rng = Rng(16);
     let TriMesh { positions, triangles } = egg(5, 6);
     let faces = triangles.iter().map(|t| t.to_vec()).collect();
-    let lattice = Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap());
+    let lattice = Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap(), 48);
     let n = lattice.dims.element_product() as usize;
     let values = (0..n).map(|_| rng.point().extend(0.0)).collect();
     let size = lattice.cell * lattice.dims.as_vec3();
@@ -118,7 +118,7 @@ fn bend_vertices_matches_cpu() {
         .map(|_| lattice.origin + 0.5 * size + 0.7 * size * rng.point())
         .chain([lattice.origin, lattice.origin + size])
         .collect();
-    let field = DisplacementField { lattice, values };
+    let field = Field::of_values(lattice, values);
     let (table, moved) = (field_table(&field), padded(&points, 1.0));
     let result = run(&kernels::BEND_VERTICES, ROWS, points.len() as u32, &[bytes(&table), bytes(&moved)]);
     bend_vertices(&field, &mut points);

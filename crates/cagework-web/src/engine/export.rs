@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use cagework_core::deform::{OutsideVertex, displacements};
-use cagework_core::dynamic::bend_vertices;
+use cagework_core::field::bend_vertices;
 use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{

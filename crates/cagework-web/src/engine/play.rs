@@ -1,6 +1,6 @@
 //! Methods that play clips: playback shows the models as they would be exported.
 
-use cagework_core::dynamic::{DisplacementField, Lattice};
+use cagework_core::field::{self, Field, FieldWeights, Lattice};
 use cagework_core::{Controls, Weights};
 use cagework_io::ModelFormat;
 use js_sys::Float32Array;
@@ -97,14 +97,14 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let lattice = self.read(|state| {
             let controls = Controls::from(state.require_set()?);
-            let lattice = Lattice::new(controls.surface());
+            let lattice = Lattice::new(controls.surface(), field::CLIP_CELLS);
             let Offsets { frames, .. } = decode(offsets)?;
             let n_columns = controls.n_controls() + frames.n_columns();
             let weights = Weights::new(n_columns as u32, indptr, indices, data)?;
             if weights.n_rows() != lattice.points().len() || !frames.fits(controls.n_controls()) {
                 return Err(Fault::new(ErrorName::Error, "the weights are those of another cage's lattice"));
             }
-            Answer::Ok((lattice, weights, frames))
+            Answer::Ok(FieldWeights::new(lattice, weights, frames))
         })?;
         self.state.borrow_mut().lattice = Some(lattice);
         Ok(())
@@ -148,13 +148,13 @@ impl Engine {
     ///
     /// # Errors
     /// If the lattice is not available.
-    pub(super) fn field(&self) -> Answer<DisplacementField> {
+    pub(super) fn field(&self) -> Answer<Field> {
         self.read(|state| {
-            let Some((lattice, weights, frames)) = &state.lattice else {
+            let Some(lattice) = &state.lattice else {
                 return Err(Fault::missing("lattice", "bind it first"));
             };
             let (rest, posed) = (&state.rest().positions, state.pose());
-            Ok(DisplacementField::new(lattice.clone(), weights, frames, rest, posed))
+            Ok(lattice.pose(rest, posed))
         })
     }
 }

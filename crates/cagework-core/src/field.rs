@@ -1,0 +1,453 @@
+//! The deformation as a field in space, for points that are not bound: probes and points of other files, Gaussian
+//! splats, and vertices that a skeleton moves before the cage does (dynamic binding, Joshi et al. 2007).
+//!
+//! Weights are bound at the nodes of a regular lattice, inside the cage and within two cells of it. For a pose, each node
+//! has a displacement u = sum_i w_i (c_i' - c_i) and a deformation gradient F = I + du/dx, by central differences. Both
+//! are interpolated trilinearly. Outside, u solves Laplace's equation with zero at the lattice's boundary.
+
+use glam::{DMat3, DVec3, IVec3, Mat3, UVec3, Vec3, Vec4};
+
+use crate::bind::{BindError, bind};
+use crate::cage::Cage;
+use crate::controls::Controls;
+use crate::deform::displacements;
+use crate::frames::Frames;
+use crate::geometry::closest_point_on_triangle;
+use crate::options::{BindOptions, OutsidePolicy};
+use crate::progress::Progress;
+use crate::weights::Weights;
+
+/// Default number of lattice cells along the longest side of the cage's box.
+pub const CELLS: u32 = 64;
+/// Cells of the lattice that bends clips: coarser, because a page computes it when a clip starts.
+pub const CLIP_CELLS: u32 = 48;
+/// Lattice cells on each side of the box, over the cells along its longest side.
+const MARGIN: f32 = 0.25;
+/// Distance from the cage, in cells, up to which nodes are bound.
+const BOUND_CELLS: u32 = 2;
+/// Cascade that solves the outer field: strides of successively finer lattices, and Gauss-Seidel sweeps on each.
+const STRIDES: [(u32, usize); 4] = [(8, 40), (4, 12), (2, 8), (1, 8)];
+/// Edge of the cells that sort deformed nodes, in lattice cells.
+const INVERSE_CELLS: f32 = 2.0;
+/// Limit on the index of such a cell along an axis.
+const MAX_CELL_INDEX: f32 = 1e6;
+/// Limit on Newton steps of an inverse.
+const MAX_NEWTON_STEPS: usize = 8;
+/// Distance from the target at which Newton's method stops, over the longest side of the cage's box.
+const INVERSE_TOLERANCE: f64 = 1e-7;
+/// An inverse fails if the distance from the target is larger, over the longest side of the cage's box.
+const MAX_INVERSE_ERROR: f64 = 1e-6;
+
+/// Nodes of a regular lattice around a cage, x fastest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lattice {
+    /// First node, object units.
+    pub origin: Vec3,
+    /// Edge of a cell, object units.
+    pub cell: f32,
+    /// Nodes along each axis.
+    pub dims: UVec3,
+    /// Nodes inside the cage or within `BOUND_CELLS` cells of it, ascending.
+    bound: Vec<u32>,
+}
+
+impl Lattice {
+    /// The lattice around a cage in its rest pose, with `cells` cells along the longest side of its box.
+    #[must_use]
+    pub fn new(cage: &Cage, cells: u32) -> Self {
+        let bounds = cage.bounds();
+        let size = bounds.max - bounds.min;
+        let cell = size.max_element() / cells as f32;
+        let margin = (MARGIN * cells as f32).ceil();
+        // A multiple of the coarsest stride.
+        let inner = (size / cell).ceil().as_uvec3() + 2 * margin as u32;
+        let dims = inner.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1;
+        let mut lattice = Self { origin: bounds.min - margin * cell, cell, dims, bound: Vec::new() };
+        lattice.bound = lattice.around(cage);
+        lattice
+    }
+
+    /// Positions of the nodes to bind to the cage.
+    #[must_use]
+    pub fn points(&self) -> Vec<Vec3> {
+        self.bound.iter().map(|&index| self.position(index)).collect()
+    }
+
+    fn position(&self, index: u32) -> Vec3 {
+        self.origin + self.cell * self.node(index).as_vec3()
+    }
+
+    /// Cell that contains a point, clamped to the lattice: its first node, and the point's position in it, 0 to 1.
+    fn place(&self, point: Vec3) -> (usize, Vec3) {
+        let at = (point - self.origin) / self.cell;
+        let first = at.floor().clamp(Vec3::ZERO, (self.dims - 2).as_vec3());
+        (self.index(first.as_uvec3()), (at - first).clamp(Vec3::ZERO, Vec3::ONE))
+    }
+
+    /// Flood fill from the first node: returns the nodes it does not reach without coming near the cage.
+    fn around(&self, cage: &Cage) -> Vec<u32> {
+        let n = self.dims.element_product();
+        let (origin, cell, reach) = (self.origin.as_dvec3(), f64::from(self.cell), f64::from(BOUND_CELLS));
+        let mut is_near = vec![false; n as usize];
+        for facet in 0..cage.facets().len() as u32 {
+            let corners = cage.facet_corners(facet).map(|corner| (corner - origin) / cell);
+            let low = corners.iter().fold(corners[0], |a, &b| a.min(b)) - reach;
+            let high = corners.iter().fold(corners[0], |a, &b| a.max(b)) + reach;
+            let [low, high] = [low.ceil().as_uvec3(), high.floor().as_uvec3()];
+            for z in low.z..=high.z {
+                for y in low.y..=high.y {
+                    for node in (low.x..=high.x).map(|x| UVec3::new(x, y, z)) {
+                        let at = node.as_dvec3();
+                        let is_close = || closest_point_on_triangle(at, corners).point.distance(at) <= reach;
+                        let is_near = &mut is_near[self.index(node)];
+                        *is_near = *is_near || is_close();
+                    }
+                }
+            }
+        }
+        let mut is_bound = vec![true; n as usize];
+        let mut reached = vec![0];
+        while let Some(index) = reached.pop() {
+            let node = self.node(index);
+            for axis in 0..3 {
+                let step = self.stride_of(axis) as u32;
+                let before = (node[axis] > 0).then(|| index - step);
+                let after = (node[axis] + 1 < self.dims[axis]).then(|| index + step);
+                for next in before.into_iter().chain(after) {
+                    if is_bound[next as usize] && !is_near[next as usize] {
+                        is_bound[next as usize] = false;
+                        reached.push(next);
+                    }
+                }
+            }
+        }
+        (0..n).filter(|&index| is_bound[index as usize]).collect()
+    }
+
+    /// Index difference of neighbours along an axis.
+    fn stride_of(&self, axis: usize) -> usize {
+        self.dims.to_array()[..axis].iter().product::<u32>() as usize
+    }
+
+    /// Nodes of a cell from its first node, x fastest.
+    fn corners(&self, first: usize) -> [usize; 8] {
+        let (y, z) = (self.stride_of(1), self.stride_of(2));
+        [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1].map(|step| first + step)
+    }
+
+    /// Longest side of the cage's box, object units.
+    fn longest_side(&self) -> f32 {
+        let cells = self.dims.max_element() as f32 - 1.0;
+        cells / (1.0 + 2.0 * MARGIN) * self.cell
+    }
+
+    fn index(&self, node: UVec3) -> usize {
+        (node.x + self.dims.x * (node.y + self.dims.y * node.z)) as usize
+    }
+
+    fn node(&self, index: u32) -> UVec3 {
+        UVec3::new(index % self.dims.x, index / self.dims.x % self.dims.y, index / self.dims.x / self.dims.y)
+    }
+}
+
+/// Weights of the controls at the bound nodes of a lattice.
+#[derive(Clone, Debug)]
+pub struct FieldWeights {
+    lattice: Lattice,
+    weights: Weights,
+    frames: Frames,
+}
+
+impl FieldWeights {
+    /// Binds a lattice with `cells` cells along the longest side of the cage's box. The options apply except
+    /// `outside`: weights outside the cage are extended.
+    ///
+    /// # Errors
+    /// Those of a bind.
+    pub fn bind<'a>(
+        controls: impl Into<Controls<'a>>,
+        cells: u32,
+        options: &BindOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, BindError> {
+        let controls = controls.into();
+        let lattice = Lattice::new(controls.surface(), cells);
+        let options = BindOptions { outside: OutsidePolicy::Extend, ..*options };
+        let binding = bind(&lattice.points(), controls, &options, progress)?;
+        Ok(Self::new(lattice, binding.weights, binding.frames))
+    }
+
+    /// Weights that were bound at [`Lattice::points`].
+    ///
+    /// # Panics
+    /// If there is not one row per point.
+    #[must_use]
+    pub fn new(lattice: Lattice, weights: Weights, frames: Frames) -> Self {
+        assert_eq!(weights.n_rows(), lattice.bound.len(), "one row per bound node");
+        Self { lattice, weights, frames }
+    }
+
+    /// The field of a pose. `rest`, `posed`: `[n_controls]`, object units.
+    ///
+    /// # Panics
+    /// If the lengths do not match the columns of the weights.
+    #[must_use]
+    pub fn pose(&self, rest: &[Vec3], posed: &[Vec3]) -> Field {
+        let lattice = &self.lattice;
+        let by = displacements(&self.weights, &self.frames, rest, posed);
+        let mut values = vec![Vec4::ZERO; lattice.dims.element_product() as usize];
+        for (&node, by) in lattice.bound.iter().zip(by) {
+            values[node as usize] = by.as_vec3().extend(1.0);
+        }
+        let mut field = Field { lattice: lattice.clone(), values, gradients: Vec::new() };
+        for (level, (stride, sweeps)) in STRIDES.into_iter().enumerate() {
+            if level > 0 {
+                field.interpolate(stride);
+            }
+            for _ in 0..sweeps {
+                field.relax(stride);
+            }
+        }
+        field.gradients = field.node_gradients();
+        field
+    }
+}
+
+/// A deformation in space: displacement and gradient at the nodes of a lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// The lattice of its nodes.
+    pub lattice: Lattice,
+    /// Displacements, object units. The fourth component is 1 at bound nodes, otherwise 0. `[dims.z, dims.y, dims.x]`
+    pub values: Vec<Vec4>,
+    /// F - I at the nodes. `[dims.z, dims.y, dims.x]`
+    gradients: Vec<Mat3>,
+}
+
+impl Field {
+    /// A field of given displacements; the fourth component as in [`Self::values`]. `[dims.z, dims.y, dims.x]`
+    #[must_use]
+    pub fn of_values(lattice: Lattice, values: Vec<Vec4>) -> Self {
+        let mut field = Self { lattice, values, gradients: Vec::new() };
+        field.gradients = field.node_gradients();
+        field
+    }
+
+    /// Displacement of a point; zero outside the lattice. Object units.
+    #[must_use]
+    pub fn displacement(&self, point: Vec3) -> Vec3 {
+        self.interpolated(point, |node| self.values[node].truncate())
+    }
+
+    /// Deformation gradient F at a point: the map of small vectors there. The identity outside the lattice.
+    #[must_use]
+    pub fn gradient(&self, point: Vec3) -> Mat3 {
+        let at = (point - self.lattice.origin) / self.lattice.cell;
+        if at.cmplt(Vec3::ZERO).any() || at.cmpgt((self.lattice.dims - 1).as_vec3()).any() {
+            return Mat3::IDENTITY;
+        }
+        Mat3::IDENTITY + self.interpolated(point, |node| self.gradients[node])
+    }
+
+    /// Deformation gradients of all nodes. `[dims.z, dims.y, dims.x]`
+    pub fn gradients(&self) -> impl ExactSizeIterator<Item = Mat3> {
+        self.gradients.iter().map(|&g| Mat3::IDENTITY + g)
+    }
+
+    /// Position of a point after the deformation.
+    #[must_use]
+    pub fn map(&self, point: Vec3) -> Vec3 {
+        point + self.displacement(point)
+    }
+
+    /// Displacement at a point, and the derivative of the trilinear interpolation there.
+    fn linearized(&self, point: DVec3) -> (DVec3, DMat3) {
+        let (first, share) = self.lattice.place(point.as_vec3());
+        let cell = f64::from(self.lattice.cell);
+        let share = share.as_dvec3();
+        let (mut by, mut gradient) = (DVec3::ZERO, DMat3::ZERO);
+        for (k, node) in self.lattice.corners(first).into_iter().enumerate() {
+            let value = self.values[node].truncate().as_dvec3();
+            let side = [k & 1, k >> 1 & 1, k >> 2];
+            let weight: [f64; 3] =
+                std::array::from_fn(|a| if side[a] == 1 { share[a] } else { 1.0 - share[a] });
+            let slope: [f64; 3] = std::array::from_fn(|a| if side[a] == 1 { 1.0 } else { -1.0 });
+            by += weight.iter().product::<f64>() * value;
+            gradient.x_axis += slope[0] * weight[1] * weight[2] * value;
+            gradient.y_axis += weight[0] * slope[1] * weight[2] * value;
+            gradient.z_axis += weight[0] * weight[1] * slope[2] * value;
+        }
+        (by, gradient * cell.recip())
+    }
+
+    /// Trilinear interpolation of nodal values, with those of the boundary outside the lattice.
+    fn interpolated<T>(&self, point: Vec3, value: impl Fn(usize) -> T) -> T
+    where
+        T: std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
+    {
+        let (first, share) = self.lattice.place(point);
+        let [c000, c100, c010, c110, c001, c101, c011, c111] = self.lattice.corners(first).map(value);
+        let mix = |a: T, b: T, share: f32| a * (1.0 - share) + b * share;
+        let [y00, y10, y01, y11] = [
+            mix(c000, c100, share.x),
+            mix(c010, c110, share.x),
+            mix(c001, c101, share.x),
+            mix(c011, c111, share.x),
+        ];
+        mix(mix(y00, y10, share.y), mix(y01, y11, share.y), share.z)
+    }
+
+    /// F - I at each node: central differences, or one-sided ones at the boundary of the lattice and, at bound nodes,
+    /// beside nodes that are not bound.
+    fn node_gradients(&self) -> Vec<Mat3> {
+        let Lattice { dims, cell, .. } = self.lattice;
+        let mut gradients = Vec::with_capacity(self.values.len());
+        for z in 0..dims.z {
+            for y in 0..dims.y {
+                for x in 0..dims.x {
+                    let node = UVec3::new(x, y, z);
+                    let k = self.lattice.index(node);
+                    let is_bound = self.values[k].w > 0.0;
+                    let column = |axis: usize| {
+                        let step = self.lattice.stride_of(axis);
+                        let usable = |at: usize| !is_bound || self.values[at].w > 0.0;
+                        let before = (node[axis] > 0).then(|| k - step).filter(|&at| usable(at));
+                        let after = (node[axis] + 1 < dims[axis]).then(|| k + step).filter(|&at| usable(at));
+                        let n_cells = f32::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+                        let by = self.values[after.unwrap_or(k)] - self.values[before.unwrap_or(k)];
+                        by.truncate() / (cell * n_cells.max(1.0))
+                    };
+                    gradients.push(Mat3::from_cols(column(0), column(1), column(2)));
+                }
+            }
+        }
+        gradients
+    }
+
+    /// Interpolates the free nodes that the lattice of twice the stride lacks, as means of two neighbours, axis by axis.
+    fn interpolate(&mut self, stride: u32) {
+        let at = |axis: usize, from: u32, step: u32| (from..self.lattice.dims[axis]).step_by(step as usize);
+        for axis in 0..3 {
+            let step = stride as usize * self.lattice.stride_of(axis);
+            // Along earlier axes all nodes of this stride are already set.
+            let steps = [0, 1, 2].map(|other| if other < axis { stride } else { 2 * stride });
+            for z in at(2, if axis == 2 { stride } else { 0 }, steps[2]) {
+                for y in at(1, if axis == 1 { stride } else { 0 }, steps[1]) {
+                    for x in at(0, if axis == 0 { stride } else { 0 }, steps[0]) {
+                        let k = self.lattice.index(UVec3::new(x, y, z));
+                        if self.values[k].w == 0.0 {
+                            let sum = self.values[k - step] + self.values[k + step];
+                            self.values[k] = (0.5 * sum).truncate().extend(0.0);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A Gauss-Seidel sweep over the free nodes of a stride; boundary nodes stay 0.
+    fn relax(&mut self, stride: u32) {
+        let dims = self.lattice.dims;
+        let steps = [0, 1, 2].map(|axis| stride as usize * self.lattice.stride_of(axis));
+        let inner = |n: u32| (stride..n - 1).step_by(stride as usize);
+        for z in inner(dims.z) {
+            for y in inner(dims.y) {
+                for x in inner(dims.x) {
+                    let k = self.lattice.index(UVec3::new(x, y, z));
+                    if self.values[k].w == 0.0 {
+                        let sum: Vec4 = steps.iter().map(|s| self.values[k - s] + self.values[k + s]).sum();
+                        self.values[k] = (sum / 6.0).truncate().extend(0.0);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The inverse of a field's map.
+///
+/// Newton's method starts at the bound node that the field moves closest to the target, because outside the cage a
+/// strongly bent field may move other points there, too.
+#[derive(Debug)]
+pub struct InverseField<'a> {
+    field: &'a Field,
+    /// Bound nodes by the cell of their deformed position, ascending.
+    nodes: Vec<(u64, u32)>,
+}
+
+impl<'a> InverseField<'a> {
+    /// Sorts the bound nodes by deformed position.
+    #[must_use]
+    pub fn new(field: &'a Field) -> Self {
+        let mut inverse = Self { field, nodes: Vec::new() };
+        let of_node = |&node: &u32| (inverse.cell_of(inverse.moved(node)).map_or(0, key), node);
+        let mut nodes: Vec<(u64, u32)> = field.lattice.bound.iter().map(of_node).collect();
+        nodes.sort_unstable();
+        inverse.nodes = nodes;
+        inverse
+    }
+
+    /// The point that [`Field::map`] moves to `target`. `None` if Newton's method does not converge, for example where
+    /// the deformation folds.
+    #[must_use]
+    pub fn find(&self, target: Vec3) -> Option<Vec3> {
+        let start = self.closest_node(target).map(|node| self.field.lattice.position(node));
+        start.and_then(|start| self.newton(start, target)).or_else(|| self.newton(target, target))
+    }
+
+    fn newton(&self, start: Vec3, target: Vec3) -> Option<Vec3> {
+        let size = f64::from(self.field.lattice.longest_side());
+        let (mut point, target) = (start.as_dvec3(), target.as_dvec3());
+        let mut best = (f64::INFINITY, point);
+        for _ in 0..=MAX_NEWTON_STEPS {
+            let (by, gradient) = self.field.linearized(point);
+            let error = target - (point + by);
+            if error.length() < best.0 {
+                best = (error.length(), point);
+            }
+            let jacobian = DMat3::IDENTITY + gradient;
+            if best.0 <= INVERSE_TOLERANCE * size || jacobian.determinant().abs() <= f64::EPSILON {
+                break;
+            }
+            point += jacobian.inverse() * error;
+        }
+        (best.0 <= MAX_INVERSE_ERROR * size).then(|| best.1.as_vec3())
+    }
+
+    /// The bound node whose deformed position is closest, among those in the 27 cells around the target.
+    fn closest_node(&self, target: Vec3) -> Option<u32> {
+        let cell = self.cell_of(target)?;
+        let steps = (0..27).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+        let nodes = steps.flat_map(|step| {
+            let key = key(cell + step);
+            let first = self.nodes.partition_point(|(other, _)| *other < key);
+            self.nodes[first..].iter().take_while(move |(other, _)| *other == key).map(|(_, node)| *node)
+        });
+        let distance = |&node: &u32| self.moved(node).distance_squared(target);
+        nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    fn moved(&self, node: u32) -> Vec3 {
+        self.field.lattice.position(node) + self.field.values[node as usize].truncate()
+    }
+
+    /// Cell of a deformed position; `None` far from the lattice.
+    fn cell_of(&self, position: Vec3) -> Option<IVec3> {
+        let lattice = &self.field.lattice;
+        let cell = ((position - lattice.origin) / (INVERSE_CELLS * lattice.cell)).floor();
+        (cell.abs().max_element() < MAX_CELL_INDEX).then(|| cell.as_ivec3())
+    }
+}
+
+/// A number for each cell.
+fn key(cell: IVec3) -> u64 {
+    let bits = |x: i32| u64::from((x + (1 << 20)) as u32);
+    bits(cell.x) | bits(cell.y) << 21 | bits(cell.z) << 42
+}
+
+/// Displaces points by the field, in place: trilinear interpolation, zero outside the lattice.
+pub fn bend_vertices(field: &Field, positions: &mut [Vec3]) {
+    for position in positions {
+        *position += field.displacement(*position);
+    }
+}

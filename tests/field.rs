@@ -1,0 +1,170 @@
+//! The deformation as a field, tested on cages of the samples.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+
+use cagework_cage::samples;
+use cagework_core::deform::deform_bound;
+use cagework_core::field::{self, Field, FieldWeights, InverseField, bend_vertices};
+use cagework_core::progress::Silent;
+use cagework_core::sample::ClosestOnCage;
+use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
+use cagework_tests::random::Random;
+use glam::{Mat3, Vec3};
+
+/// A sample's vertices and cage, and the field of a pose of the cage.
+fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec3>, Cage, Field) {
+    let sample = samples::build(id).unwrap();
+    let cage = Cage::new(&sample.cage).unwrap();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let field = weights.pose(cage.positions(), &posed(&sample));
+    (sample.mesh.positions, cage, field)
+}
+
+/// Every seventh vertex whose distance from the cage is at least `cells` lattice cells.
+fn deep_vertices(positions: &[Vec3], cage: &Cage, field: &Field, cells: f32) -> Vec<usize> {
+    let reach = f64::from(cells * field.lattice.cell);
+    let is_deep = |&v: &usize| ClosestOnCage::new(cage).find(positions[v].as_dvec3()).distance >= reach;
+    (0..positions.len()).step_by(7).filter(is_deep).collect()
+}
+
+#[test]
+fn field_approximates_the_exact_deformation_of_vertices_inside() {
+    let (positions, cage, field) = field_of("strider", |sample| sample.poses[0].1.clone());
+    let posed = &samples::build("strider").unwrap().poses[0].1;
+    let binding = bind(&positions, &cage, &BindOptions::default(), &Silent).unwrap();
+    let exact = deform_bound(&binding.weights, &binding.frames, posed);
+    let mut bent = positions.clone();
+    bend_vertices(&field, &mut bent);
+    let error = |v: usize| bent[v].distance(exact[v]) / cage.diagonal();
+    let mean = (0..bent.len()).map(error).sum::<f32>() / bent.len() as f32;
+    let max = (0..bent.len()).map(error).fold(0.0, f32::max);
+    let deep = deep_vertices(&positions, &cage, &field, 1.0);
+    let max_deep = deep.iter().map(|&v| error(v)).fold(0.0, f32::max);
+    // The pose moves vertices by up to 0.56 of the diagonal; a cell is 0.014 of it. Measured: 3e-5, 1.7e-3, 5e-4.
+    assert!(mean <= 5e-5 && max <= 3e-3 && max_deep <= 1e-3 && deep.len() > 50, "{mean} {max} {max_deep}");
+}
+
+#[test]
+fn affine_map_of_the_cage_is_reproduced_inside() {
+    let matrix = Mat3::from_cols_array(&[1.2, 0.3, 0.0, -0.1, 0.9, 0.2, 0.0, 0.1, 1.1]);
+    let affine = |p: Vec3| matrix * p + Vec3::new(0.1, -0.2, 0.3);
+    let (positions, cage, field) =
+        field_of("rat", |sample| sample.cage.positions.iter().map(|&p| affine(p)).collect());
+    // At this distance all corners of a vertex's lattice cell are inside the cage.
+    let deep = deep_vertices(&positions, &cage, &field, 3.0_f32.sqrt());
+    assert!(deep.len() > 50, "{}", deep.len());
+    let mut bent = positions.clone();
+    bend_vertices(&field, &mut bent);
+    for v in deep {
+        assert!(bent[v].distance(affine(positions[v])) <= 1e-5 * cage.diagonal(), "{v}");
+        let error = field.gradient(positions[v]) - matrix;
+        assert!(error.to_cols_array().iter().all(|e| e.abs() <= 1e-3), "{v}: {error}");
+    }
+}
+
+#[test]
+fn field_decays_continuously_to_zero_at_the_edge_of_the_lattice() {
+    let up = Vec3::new(0.0, 0.5, 0.0);
+    let (_, cage, field) = field_of("rat", |sample| sample.cage.positions.iter().map(|&p| p + up).collect());
+    let centre = cage.bounds().center();
+    // A translated cage has a constant displacement, which decays outside of it.
+    let edge = field.lattice.origin.x + (field.lattice.dims.x - 1) as f32 * field.lattice.cell;
+    let far = Vec3::new(edge, centre.y, centre.z);
+    let mut along: Vec<Vec3> =
+        (0..200).map(|k| centre.lerp(far, k as f32 / 199.0)).chain([far + Vec3::X]).collect();
+    let before = along.clone();
+    bend_vertices(&field, &mut along);
+    let by: Vec<f32> = along.iter().zip(&before).map(|(a, b)| (*a - *b).y).collect();
+    assert!((by[0] - up.y).abs() <= 1e-5 && by[199].abs() <= 1e-6 && by[200] == 0.0, "{by:?}");
+    assert!(by.windows(2).all(|w| w[0] - w[1] <= 0.03 * up.y && w[1] <= w[0] + 1e-3), "{by:?}");
+    // Maximum principle: the largest values of a harmonic field are on the boundary.
+    assert!(field.values.iter().all(|value| value.truncate().length() <= up.y * 1.0001));
+}
+
+#[test]
+fn a_cage_at_rest_moves_nothing() {
+    let (positions, _, field) =
+        field_of("clamp", |sample| Cage::new(&sample.cage).unwrap().positions().to_vec());
+    let mut bent = positions.clone();
+    bend_vertices(&field, &mut bent);
+    assert_eq!(bent, positions);
+}
+
+/// A bar of 1 x 1 x 4 in its cage, bent by 120 degrees about the y axis: z becomes the arc.
+fn bent_bar() -> (Cage, Vec<Vec3>) {
+    let bounds = Bounds { min: Vec3::new(-0.5, -0.5, 0.0), max: Vec3::new(0.5, 0.5, 4.0) };
+    let cage = Cage::new(&subdivided_box(bounds, 0.05, [3, 3, 9])).unwrap();
+    let radius = 4.0 / 120_f32.to_radians();
+    let bend = |p: &Vec3| {
+        let (sin, cos) = (p.z / radius).sin_cos();
+        Vec3::new(radius - (radius - p.x) * cos, p.y, (radius - p.x) * sin)
+    };
+    let posed = cage.positions().iter().map(bend).collect();
+    (cage, posed)
+}
+
+fn points_in_bar() -> Vec<Vec3> {
+    let mut random = Random::new(5);
+    (0..2000).map(|_| random.point(Vec3::new(-0.5, -0.5, 0.0), Vec3::new(0.5, 0.5, 4.0))).collect()
+}
+
+#[test]
+fn field_and_gradient_match_points_that_are_bound() {
+    let (cage, posed) = bent_bar();
+    let points = points_in_bar();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let field = weights.pose(cage.positions(), &posed);
+    // The gradient of bound points, by central differences over 1e-3 of the diagonal on a finer grid.
+    let step = 1e-3 * cage.diagonal();
+    let around = |p: Vec3| {
+        let [x, y, z] = Vec3::AXES.map(|axis| step * axis);
+        [p + x, p - x, p + y, p - y, p + z, p - z, p]
+    };
+    let all: Vec<Vec3> = points.iter().flat_map(|&p| around(p)).collect();
+    let options = BindOptions { grid: 128, ..BindOptions::default() };
+    let binding = bind(&all, &cage, &options, &Silent).unwrap();
+    let moved = deform_bound(&binding.weights, &binding.frames, &posed);
+    let (mut errors, mut gradient_errors) = (Vec::new(), Vec::new());
+    for (k, &p) in points.iter().enumerate() {
+        let own = &moved[7 * k..];
+        errors.push(field.map(p).distance(own[6]) / cage.diagonal());
+        let column = |axis: usize| (own[2 * axis] - own[2 * axis + 1]) / (2.0 * step);
+        let expected = Mat3::from_cols(column(0), column(1), column(2));
+        let difference = field.gradient(p) - expected;
+        gradient_errors.push(norm(difference) / norm(expected));
+        assert!(field.gradient(p).determinant() > 0.0, "{p}");
+    }
+    let [at_half, at_most] = quantiles(&mut errors);
+    let [gradient_at_half, gradient_at_most] = quantiles(&mut gradient_errors);
+    println!("{at_half} {at_most} {gradient_at_half} {gradient_at_most}");
+    assert!(at_half <= 2e-5 && at_most <= 2e-4, "position: {at_half} {at_most}");
+    assert!(
+        gradient_at_half <= 0.003 && gradient_at_most <= 0.02,
+        "gradient: {gradient_at_half} {gradient_at_most}"
+    );
+}
+
+fn norm(matrix: Mat3) -> f32 {
+    matrix.to_cols_array().iter().map(|x| x * x).sum::<f32>().sqrt()
+}
+
+/// The median, and the value below which 99 % are.
+fn quantiles(values: &mut [f32]) -> [f32; 2] {
+    values.sort_by(f32::total_cmp);
+    [values[values.len() / 2], values[values.len() * 99 / 100]]
+}
+
+#[test]
+fn mapped_points_are_mapped_back() {
+    let (cage, posed) = bent_bar();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let field = weights.pose(cage.positions(), &posed);
+    let inverse = InverseField::new(&field);
+    for p in points_in_bar() {
+        let back = inverse.find(field.map(p));
+        assert!(back.is_some_and(|back| back.distance(p) <= 1e-5 * cage.diagonal()), "{p} {back:?}");
+    }
+    // Far outside, nothing moves.
+    let far = Vec3::splat(100.0);
+    assert_eq!((field.map(far), inverse.find(far), field.gradient(far)), (far, Some(far), Mat3::IDENTITY));
+}
