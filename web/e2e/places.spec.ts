@@ -1,7 +1,58 @@
 /** Accessibility, and resources that are lost or reused. */
 
+import type { Locator, Page } from "@playwright/test";
 import { complaintsOfAxe, survives } from "./stories";
-import { calm, expect, open, shoot, test } from "./support";
+import { cagePositions, calm, dropBox, expect, open, shoot, test } from "./support";
+
+/** Whether an element shows all of its text. */
+const isWhole = (of: Locator) => of.evaluate((element) => element.scrollWidth <= element.clientWidth);
+
+const boxOf = async (of: Locator) => (await of.boundingBox()) ?? { x: 0, y: 0, width: 0, height: 0 };
+
+type Box = Awaited<ReturnType<typeof boxOf>>;
+
+const overlap = (a: Box, b: Box) =>
+  a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+
+/** Names, messages, tips and tools fit in windows of several sizes; toolbars are one tab stop. */
+async function fits(page: Page): Promise<void> {
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await dropBox(page, "a-model-whose-file-name-is-much-longer-than-the-bar-has-room-for-it");
+  expect(await isWhole(page.getByRole("heading", { name: "Cagework" }))).toBe(true);
+
+  await page.getByRole("button", { name: "Copy a link to this pose" }).click();
+  const toast = page.locator(".toast").last();
+  const [outer, button] = [await boxOf(toast), await boxOf(toast.getByRole("button").last())];
+  expect(button.x + button.width).toBeLessThanOrEqual(outer.x + outer.width);
+  await shoot(page, "long-names");
+
+  const tools = page.getByRole("toolbar", { name: "Tools" }).getByRole("button");
+  await tools.first().hover();
+  const tip = page.getByRole("tooltip");
+  await expect(tip).toBeVisible();
+  for (const tool of await tools.all()) {
+    if (await tool.isVisible()) expect(overlap(await boxOf(tip), await boxOf(tool))).toBe(false);
+  }
+
+  const before = await cagePositions(page);
+  await tools.first().focus();
+  await page.keyboard.press("ArrowDown");
+  await expect(tools.nth(1)).toBeFocused();
+  await page.keyboard.press("End");
+  await expect(tools.last()).toBeFocused();
+  expect(await cagePositions(page), "arrow keys move nothing else").toEqual(before);
+  expect(await tools.evaluateAll((all) => all.filter(({ tabIndex }) => tabIndex === 0).length)).toBe(1);
+
+  await page.setViewportSize({ width: 844, height: 390 });
+  const [bar, view] = [
+    await boxOf(page.getByRole("toolbar", { name: "Tools" })),
+    await boxOf(page.locator("#stage")),
+  ];
+  expect(bar.x + bar.width - view.x, "the toolbar is beside the model").toBeLessThan(0.15 * view.width);
+  expect(bar.y + bar.height).toBeLessThanOrEqual(view.y + view.height);
+  await shoot(page, "landscape");
+  await page.setViewportSize({ width: 1024, height: 640 });
+}
 
 test("a lost device is recovered, axe finds no fault in any step, and models leave no memory behind", async ({
   page,
@@ -19,6 +70,8 @@ test("a lost device is recovered, axe finds no fault in any step, and models lea
       await shoot(page, `${scheme}-${step.toLowerCase()}`);
     }
   }
+
+  await fits(page);
 
   const bytes = await page.evaluate(async () => {
     const session = globalThis.cagework;

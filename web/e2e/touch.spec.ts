@@ -3,6 +3,7 @@
 import type { CDPSession } from "@playwright/test";
 import {
   cagePositions,
+  drawing,
   expect,
   grip,
   handle,
@@ -53,6 +54,22 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     await page.keyboard.press("Alt+a");
   });
   const cdp = await page.context().newCDPSession(page);
+  await test.step("nothing mentions a mouse, and two fingers on the model leave no mark", async () => {
+    for (const step of ["Model", "Pose"]) {
+      await page.getByRole("button", { name: step, exact: false }).first().tap();
+      await expect(page.locator("#panel")).not.toContainText(/wheel|shift-click|drop /i);
+    }
+    const before = await drawing(page);
+    const { x, y } = await grip(page, [0.5, 0.4]);
+    const spots = [
+      { x, y, id: 0 },
+      { x: x + 60, y, id: 1 },
+    ];
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: spots.slice(0, 1) });
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: spots });
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    expect((await drawing(page)).equals(before)).toBe(true);
+  });
   const rest = await cagePositions(page);
   // Without perspective, all points move by the same distance.
   await page.getByRole("button", { name: "Parallel projection" }).tap();

@@ -7,12 +7,14 @@ import { nextAmount } from "../src/amount";
 import type { BindReport, CageState } from "../src/contract";
 import { drawn } from "../src/derived";
 import { rectangle } from "../src/input/pointer";
-import { INITIAL, type StepName } from "../src/state";
+import { type AppState, INITIAL, type StepName } from "../src/state";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, type Place, placeLabel, scaleOf } from "../src/ui/plot";
 import { verdict } from "../src/ui/report";
+import { hintOf } from "../src/ui/status";
 import { placeTip } from "../src/ui/tips";
+import { nextTool } from "../src/ui/toolbar";
 import { recognise } from "../src/ui/unsupported";
 import { PLAIN } from "./fake";
 
@@ -65,6 +67,44 @@ describe("tool tips", () => {
   it("are beside a tool of a column, and cover no other tool", () => {
     expect(at(12, 100, true)).toEqual({ x: 54, y: 106 });
     expect(at(350, 290, true)).toEqual({ x: 244, y: 270 });
+  });
+});
+
+describe("hints", () => {
+  const cage = {} as CageState;
+  const hint = (patch: Partial<AppState>, scene: Partial<AppState["scene"]>, isTouch = false) =>
+    hintOf({ ...INITIAL, cage, bound: true, ...patch, scene: { ...INITIAL.scene, ...scene } }, isTouch);
+  it("name only what the tool can do with what is visible", () => {
+    expect(hint({}, {})).toMatch(/^Pull the model, or drag a handle/);
+    expect(hint({}, { cage: false })).toMatch(/^Pull the model ·/);
+    expect(hint({}, { pull: false })).toMatch(/^Drag a handle/);
+    expect(hint({}, { pull: false, cage: false })).not.toMatch(/Drag a handle|Pull the model/);
+    const selected = { count: 1, last: 0, center: null };
+    expect(hint({ selected }, { pull: false, gizmo: "move" })).toMatch(/gizmo/);
+    expect(hint({ editingRest: true }, { cage: false })).not.toMatch(/Drag a handle/);
+  });
+  it("mention no wheel, mouse button or key on a phone", () => {
+    const states: Partial<AppState>[] = [
+      {},
+      { editingRest: true },
+      { clip: { ...INITIAL.clip, clip: 0 } },
+      { painting: { id: 0, radius: 1, erase: false } },
+      { bound: false },
+    ];
+    for (const state of states) {
+      for (const scene of [{}, { pull: false }, { cage: false }, { gizmo: "move" as const, pull: false }]) {
+        expect(hint(state, scene, true)).not.toMatch(/scroll|wheel|right-drag|shift|click|\?|Tab|Esc/i);
+      }
+    }
+  });
+});
+
+describe("a toolbar", () => {
+  it("moves the focus along its direction, around its ends", () => {
+    expect([nextTool("ArrowDown", true, 0, 3), nextTool("ArrowUp", true, 0, 3)]).toEqual([1, 2]);
+    expect([nextTool("ArrowRight", false, 2, 3), nextTool("ArrowLeft", false, 2, 3)]).toEqual([0, 1]);
+    expect([nextTool("Home", true, 2, 3), nextTool("End", false, 0, 3)]).toEqual([0, 2]);
+    expect([nextTool("ArrowRight", true, 0, 3), nextTool("a", true, 0, 3)]).toEqual([undefined, undefined]);
   });
 });
 

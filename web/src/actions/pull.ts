@@ -13,6 +13,8 @@ export interface Pulling {
   prepare(): void;
   /** Marks the point that would be grabbed at this position. Returns whether there is one. */
   hover(x: number, y: number): boolean;
+  /** Removes the mark of `hover`. */
+  leave(): void;
   /** Grabs the model at a position of the view. False if it is not there. */
   begin(x: number, y: number): boolean;
   /** Grabs a vertex of the cage. */
@@ -201,6 +203,9 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       const point = isReady() ? engine().surfaceAt(x, y) : undefined;
       show(point);
       return point !== undefined;
+    },
+    leave() {
+      if (!current) show();
     },
     begin(x, y) {
       const point = isReady() ? engine().surfaceAt(x, y) : undefined;

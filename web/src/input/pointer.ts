@@ -214,6 +214,7 @@ export function attachPointer(stage: Stage, app: App): void {
     engine,
     interrupt() {
       release(last, false);
+      pull.leave();
     },
   });
 
@@ -267,11 +268,15 @@ export function attachPointer(stage: Stage, app: App): void {
   const up = (event: PointerEvent, keep: boolean) => {
     if (event.pointerType === "touch" && touch.up(event.pointerId)) return;
     release(place(event), keep);
+    // A finger that was lifted points at nothing.
+    if (event.pointerType === "touch") pull.leave();
   };
   viewport.addEventListener("pointerup", (event) => up(event, true));
   viewport.addEventListener("pointercancel", (event) => up(event, false));
   viewport.addEventListener("pointerleave", () => {
-    if (!drag && store.get().cage) engine().hover(new Uint32Array());
+    if (drag || !store.get().cage) return;
+    engine().hover(new Uint32Array());
+    pull.leave();
   });
   viewport.addEventListener("contextmenu", (event) => event.preventDefault());
   viewport.addEventListener(

@@ -9,12 +9,14 @@ import { T } from "../words";
 import { Badge, Button, Facts, Head, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
+import { useTouch } from "./touch";
 
 /** Placeholders until a sample's picture is loaded. */
 const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp: "bind" };
 
 export function ModelPanel({ app }: { app: App }) {
   const { model, sample, samples, works } = app.store.get();
+  const isTouch = useTouch();
   const open = model && (
     <>
       {model.members.length === 1 && (
@@ -30,11 +32,11 @@ export function ModelPanel({ app }: { app: App }) {
   );
   return (
     <div class="stack loose">
-      <Head title={T.model.title} sentence={T.model.sentence} />
+      <Head title={T.model.title} sentence={isTouch ? T.model.sentenceTouch : T.model.sentence} />
       <div class="dropzone">
         <Icon name="upload" />
         <div class="grow">
-          <strong>{T.model.drop}</strong>
+          <strong>{isTouch ? T.model.dropTouch : T.model.drop}</strong>
           <p class="hint">{T.model.kinds}</p>
         </div>
         <div class="row wrap">

@@ -7,6 +7,7 @@ import { percent } from "../format";
 import { T } from "../words";
 import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls";
 import { Icon, type IconName } from "./icons";
+import { useTouch } from "./touch";
 
 /** Range of the brush radius, relative to the model's size. */
 const THINNEST = 0.01;
@@ -19,6 +20,7 @@ const WAYS: readonly (readonly [How, IconName])[] = [
 
 export function Models({ app, model }: { app: App; model: ModelInfo }) {
   const [only, ...others] = model.members;
+  const isTouch = useTouch();
   return (
     <Section title={T.models.title}>
       <div class="stack" data-adds="">
@@ -35,7 +37,7 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
         )}
         <div class="row">
           <Button label={T.models.add} icon="plus" kind="small" onClick={app.chooseMore} />
-          <p class="hint grow">{T.models.addHint}</p>
+          <p class="hint grow">{isTouch ? T.models.addHintTouch : T.models.addHint}</p>
         </div>
       </div>
     </Section>

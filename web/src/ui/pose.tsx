@@ -8,6 +8,7 @@ import { T } from "../words";
 import { Clips } from "./clips";
 import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon } from "./icons";
+import { useTouch } from "./touch";
 
 const PIVOTS = ["middle", "border", "last"] as const satisfies readonly Pivot[];
 
@@ -38,10 +39,12 @@ export function PosePanel({ app }: { app: App }) {
 }
 
 function PullOptions({ app }: { app: App }) {
-  const { pins, pullWhole } = app.store.get();
+  const { pins, pullWhole, scene } = app.store.get();
+  const how = useTouch() ? T.pull.sentenceTouch : T.pull.sentence(app.key("pin"));
+  const sentence = scene.pull ? how : T.pull.off;
   return (
     <div class="stack">
-      <p class="hint">{T.pull.sentence(app.key("pin"))}</p>
+      <p class="hint">{sentence}</p>
       <Toggle label={T.pull.whole} sentence={T.pull.wholeSentence} on={pullWhole} onChange={app.pull.whole} />
       {pins.length > 0 && (
         <div class="row">
@@ -55,10 +58,12 @@ function PullOptions({ app }: { app: App }) {
 
 /** Position of the selection in number fields. */
 function Selection({ app }: { app: App }) {
-  const { model, cage, selected, editingRest, pivot } = app.store.get();
+  const { model, cage, selected, editingRest, pivot, scene } = app.store.get();
   const size = model ? Math.max(...model.bounds.max.map((high, i) => high - (model.bounds.min[i] ?? 0))) : 0;
   const { count, last, center } = selected;
   const inner = (last ?? 0) - (cage?.info.vertices ?? 0);
+  const how = useTouch() ? T.pose.noneTouch : T.pose.none;
+  const none = scene.cage ? how : T.pose.noneHidden;
   const one = editingRest ? T.pose.vertexAtRest : T.pose.vertex;
   const move = (index: number, value: number) => {
     const [x = 0, y = 0, z = 0] = (center ?? []).map((old, i) => (i === index ? value : old));
@@ -68,7 +73,7 @@ function Selection({ app }: { app: App }) {
     <div class="stack">
       <p class="hint">
         {count === 0
-          ? T.pose.none
+          ? none
           : count === 1
             ? inner < 0
               ? one(last ?? 0)
@@ -107,6 +112,7 @@ function Selection({ app }: { app: App }) {
 
 function Help({ app }: { app: App }) {
   const { symmetry, unmatched, proportionalOn, proportional } = app.store.get();
+  const isTouch = useTouch();
   return (
     <>
       <Toggle
@@ -118,7 +124,7 @@ function Help({ app }: { app: App }) {
       {symmetry && unmatched > 0 && <p class="hint warn-text">{T.pose.unmatched(unmatched)}</p>}
       <Toggle
         label={T.pose.proportional}
-        sentence={T.pose.proportionalSentence}
+        sentence={isTouch ? T.pose.proportionalTouch : T.pose.proportionalSentence}
         on={proportionalOn}
         onChange={(on) => app.view.proportional(on)}
       />

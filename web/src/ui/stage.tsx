@@ -1,6 +1,6 @@
 /** Overlays of the view: tools, legend, status line. */
 
-import { useLayoutEffect, useState } from "preact/hooks";
+import { useLayoutEffect } from "preact/hooks";
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
 import type { Element as CageElement, CageState, SceneOptions } from "../contract";
@@ -12,6 +12,8 @@ import { Button, IconButton, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
 import { hintOf, statusOf, underWay } from "./status";
+import { Toolbar } from "./toolbar";
+import { useTouch } from "./touch";
 
 /** All overlays of the view. Sets `data-rest` and `data-painting` on `stage` for the style sheet. */
 export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
@@ -115,7 +117,7 @@ function Tools({ app }: { app: App }) {
     />
   );
   return (
-    <div class="floating tools" role="toolbar" aria-label={T.view.tools} aria-orientation="vertical">
+    <Toolbar label={T.view.tools} kind="tools">
       {command("pull", T.pull.tool, "toolPull", scene.pull)}
       {command("select", T.view.gizmos.none, "toolSelect", !scene.pull && scene.gizmo === "none")}
       {GIZMOS.map(([gizmo, icon, key]) => (
@@ -145,20 +147,19 @@ function Tools({ app }: { app: App }) {
         icon="plus"
         label={T.view.add}
         onClick={() => app.store.set({ additive: !additive })}
-        shortcut={T.view.addKey}
         kind="touch-only"
         pressed={additive}
       />
       {command("symmetry", T.pose.mirror, "symmetry", symmetry)}
       {command("proportional", T.pose.proportional, "proportional", proportionalOn)}
-    </div>
+    </Toolbar>
   );
 }
 
 function Looks({ app }: { app: App }) {
   const { seeOpen, ortho } = app.store.get();
   return (
-    <div class="floating looks" role="toolbar" aria-label={T.view.looks}>
+    <Toolbar label={T.view.looks} kind="looks">
       <IconButton
         icon="eye"
         label={T.view.see}
@@ -179,20 +180,8 @@ function Looks({ app }: { app: App }) {
         shortcut={app.key("ortho")}
         pressed={ortho}
       />
-    </div>
+    </Toolbar>
   );
-}
-
-/** Whether the main pointer is a finger. It can change while the page is open. */
-function useTouch(): boolean {
-  const [query] = useState(() => matchMedia("(pointer: coarse)"));
-  const [isTouch, setTouch] = useState(query.matches);
-  useLayoutEffect(() => {
-    const hear = () => setTouch(query.matches);
-    query.addEventListener("change", hear);
-    return () => query.removeEventListener("change", hear);
-  }, [query]);
-  return isTouch;
 }
 
 function BottomLine({ app }: { app: App }) {

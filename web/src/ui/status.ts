@@ -36,12 +36,20 @@ function settled(state: AppState): string {
 
 /** Hint next to the status. */
 export function hintOf(state: AppState, isTouch: boolean): string {
-  const { cage, bound, bindRun, editingRest, clip, placing, painting } = state;
+  const { cage, bound, bindRun, editingRest, clip, placing, painting, scene } = state;
   if (placing) return T.hints.placing;
   if (painting) return isTouch ? T.models.hintTouch : T.models.hint;
   if (!cage) return T.hints.noCage;
-  if (clip.clip !== null) return T.hints.clip;
+  if (clip.clip !== null) return isTouch ? T.hints.clipTouch : T.hints.clip;
+  if (editingRest && !scene.cage) return T.hints.restHidden;
   if (editingRest) return isTouch ? T.hints.restTouch : T.hints.rest;
   if (!bound) return bindRun ? T.hints.binding : T.hints.unbound;
-  return isTouch ? T.hints.touch : T.hints.pose;
+  const drag = T.hints.drags[dragOf(state)];
+  return isTouch ? T.hints.touch(drag) : T.hints.mouse(drag);
+}
+
+function dragOf({ scene, selected }: AppState): keyof typeof T.hints.drags {
+  if (scene.pull) return scene.cage ? "pullOrHandle" : "pull";
+  if (!scene.cage) return "nothing";
+  return scene.gizmo !== "none" && selected.count > 0 ? "gizmo" : "handle";
 }

@@ -6,7 +6,10 @@ export const model = {
   title: "Choose a model",
   sentence:
     "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or drop your own file on this page.",
+  sentenceTouch:
+    "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or open your own file.",
   drop: "Drop models here",
+  dropTouch: "Your own model",
   kinds: `${endings("disjunction")}, together with the files they refer to, or a whole folder. Several models share one cage.`,
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
@@ -57,7 +60,7 @@ export const opening = {
   noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,
   dropped: "Nothing was dropped.",
   kinds: `Cagework opens ${endings("conjunction")} files.`,
-  companions: "These files belong to a .gltf or .obj file. Drop that file together with them.",
+  companions: "These files belong to a .gltf or .obj file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
     const what = companions > 0 ? `${models} with ${plural(companions, "file")}` : models;

@@ -36,6 +36,7 @@ export const models = {
   clear: "Clear",
   done: "Done",
   add: "Add to this cage",
+  addHintTouch: "Clothes, hair, gear.",
   addHint: "Clothes, hair, gear. You can also drop them on this list.",
   makeAround: "Make a cage around all",
   outside: "The added model reaches outside the cage.",

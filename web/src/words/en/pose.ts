@@ -7,6 +7,8 @@ export const pose = {
   sentence: "Pull the model itself, or drag the handles of its cage.",
   cage: "The cage",
   none: "Nothing selected. Click a handle in the view, or press ] to step through them.",
+  noneHidden: "Nothing selected. The cage is hidden: show it in See.",
+  noneTouch: "Nothing selected. Tap a handle in the view.",
   vertex: (i: number) => `Vertex ${i} of the cage`,
   inner: (i: number) => `Control ${i} inside`,
   vertexAtRest: (i: number) => `Vertex ${i} of the cage at rest`,
@@ -20,6 +22,7 @@ export const pose = {
   proportional: "Proportional editing",
   proportionalSentence:
     "Nearby vertices follow, less with distance. While dragging, the wheel sets the reach.",
+  proportionalTouch: "Nearby vertices follow, less with distance.",
   far: "Reach",
   ofCage: (share: string) => `${share} of the cage`,
   pivot: "Turn and scale about",
@@ -58,6 +61,8 @@ export const pull = {
   tool: "Pull the model",
   sentence: (pin: string) =>
     `Drag any point of the model. Grey areas stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
+  sentenceTouch: "Drag any point of the model with a finger. Grey areas stay. A long press pins a point.",
+  off: "Only handles can be dragged now. Choose the tool Pull the model to pull.",
   whole: "The whole model follows",
   wholeSentence: "Only pins stay: good for turning a body with its feet pinned.",
   pins: (n: number) => `${plural(n, "pin")} on the model`,

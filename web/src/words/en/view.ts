@@ -19,7 +19,6 @@ export const view = {
   elements: { vertex: "Select vertices", edge: "Select edges", face: "Select faces" },
   box: "Select with a box",
   add: "Add to the selection",
-  addKey: "Shift+click",
   see: "See: colours, grid, comparison",
   frame: "Frame everything",
   ofPlain: (coordinates: string) => `${coordinates}, plain cage`,
@@ -49,14 +48,25 @@ export const status = {
 
 export const hints = {
   clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose None.",
+  clipTouch: "A clip is shown: one finger turns, two move and zoom. To pose the model, choose None.",
   noCage: "A model needs a cage around it before it can be posed.",
   placing: "It is placed in the middle of the model, under the pointer. Drag to turn the view.",
+  restHidden: "The cage is hidden: show it in See, then drag its handles.",
   restTouch: "Drag a handle to reshape the cage; the model stays still.",
   rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
   unbound: "Bind the model so that it follows its cage.",
-  touch: "Pull the model with a finger. On the background, one finger turns, two move and zoom.",
-  pose: "Pull the model, or drag a handle · drag the background to turn · right-drag to move · scroll to zoom · ? for keys",
+  /** What a drag does, by the tool and by what is visible. */
+  drags: {
+    pull: "Pull the model",
+    pullOrHandle: "Pull the model, or drag a handle",
+    handle: "Drag a handle",
+    gizmo: "Drag the gizmo or a handle",
+    nothing: "The cage is hidden: show it in See, or choose Pull",
+  },
+  touch: (drag: string) => `${drag}. On the background, one finger turns, two move and zoom.`,
+  mouse: (drag: string) =>
+    `${drag} · drag the background to turn · right-drag to move · scroll to zoom · ? for keys`,
 };
 
 export const toast = { close: "Close message" };
