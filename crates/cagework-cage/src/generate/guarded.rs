@@ -70,6 +70,8 @@ pub(super) struct GuardedSurface<'a> {
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
+    /// Position in its list of the last triangle that was not clear.
+    last_unclear: usize,
 }
 
 impl<'a> GuardedSurface<'a> {
@@ -91,6 +93,7 @@ impl<'a> GuardedSurface<'a> {
             buckets: Buckets::new(half, n),
             bounds: vec![None; n],
             near: Vec::new(),
+            last_unclear: 0,
         };
         for t in 0..n {
             for i in guarded.triangles[t] {
@@ -222,7 +225,10 @@ impl<'a> GuardedSurface<'a> {
                 return false;
             }
         }
-        if new.iter().any(|t| !self.is_clear(t.at)) {
+        // Candidates of one star mostly fail at the same triangle: test that one first.
+        let mut order = (0..new.len()).map(|k| (k + self.last_unclear) % new.len());
+        if let Some(k) = order.find(|&k| !self.is_clear(new[k].at)) {
+            self.last_unclear = k;
             return false;
         }
         if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, MIN_GAP))) {

@@ -61,11 +61,11 @@ const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 /// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
 const N_NARROW_BANDS: usize = 3;
 
-/// For models in several pieces: a coarser lattice is tried at once if collapsing within the budget leaves more than this multiple
-/// of the target, as bridges between pieces cannot be collapsed.
+/// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried at once if collapsing within the budget
+/// leaves more than this multiple of the target, as bridges between pieces and walls of gaps cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// For such models: ratio of the vertices that collapsing within the budget leaves to the final number of vertices.
+/// In these cases: ratio of the vertices that collapsing within the budget leaves to the final number of vertices.
 const LATER_RATIO: f64 = 3.7;
 
 /// Estimated vertices per open gap: a ring on each side.
@@ -133,9 +133,6 @@ fn generate_plain(
         let mut shell = Shell::new(positions, triangles, bounds, (voxels, stretch), options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
-        if gaps.len() > most_gaps {
-            shell.gaps.clear();
-        }
         // Handles and gaps of the solid may need more vertices than the target; a coarser lattice closes them.
         let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
         let n_half = shell.hull.positions.len();
@@ -143,6 +140,9 @@ fn generate_plain(
             let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
             voxels = (shrunk as usize).max(base);
             continue;
+        }
+        if gaps.len() <= most_gaps {
+            shell.find_gaps(positions, triangles, [voxels, most_gaps]);
         }
         let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
         let (cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {
@@ -225,7 +225,8 @@ fn simplify_hull(
                 (least > 0.0 && shell.gaps.is_empty()) || (budget.is_none() && keeps_plates && !has_plates);
             let is_far = left as f64 > MAX_FIRST_RATIO * f64::from(options.target);
             let is_in_pieces = shell.separate > options.target as usize / 10;
-            if k == N_NARROW_BANDS && may_coarsen && is_far && is_in_pieces {
+            let is_refined = !shell.gaps.is_empty() && shell.fineness > 1.0;
+            if k == N_NARROW_BANDS && may_coarsen && is_far && (is_in_pieces || is_refined) {
                 return Ok(Simplification::TooMany((left as f64 / LATER_RATIO) as usize));
             }
             if left <= aim || is_repeated || (budget.is_none() && left <= target) {

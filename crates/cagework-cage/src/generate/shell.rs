@@ -13,7 +13,7 @@ use super::guarded::{GuardedSurface, Obstacle};
 use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
-use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP, first_voxels};
+use super::{CageOptions, Shape, Symmetry, first_voxels};
 use cagework_core::progress::Cancelled;
 
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
@@ -93,6 +93,7 @@ pub(super) struct Shell {
     pub(super) longest: f64,
     /// Voxels that the cage must keep clear of.
     pub(super) obstacle: Obstacle,
+    solid: Voxels,
     filled: Voxels,
     /// The smoothed hull: clear of the obstacle and of itself.
     pub(super) hull: Surface,
@@ -104,7 +105,7 @@ pub(super) struct Shell {
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
     pub(super) clearance: f64,
-    /// Gaps that the hull leaves open, largest first; as many as there are vertices for.
+    /// Gaps that the hull leaves open, largest first, set by [`Self::find_gaps`].
     pub(super) gaps: Vec<Gap>,
 }
 
@@ -162,13 +163,10 @@ impl Shell {
         }
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole, stretch };
         let hull = smooth_hull(&stairs, &obstacle);
-        let parts = solid.parts();
-        let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
-        let most = options.target as usize / VERTICES_PER_GAP;
-        let found = gaps(&solid, &filled, reach).into_iter();
-        let gaps = found.filter(|gap| !gap.is_hollow(&lattice, positions, triangles)).take(most).collect();
         Ok(Self {
-            gaps,
+            gaps: Vec::new(),
+            parts: solid.parts(),
+            solid,
             clearance: clearance * lattice.shortest(),
             fineness: n as f64 / first_voxels(options.target as usize) as f64,
             longest: (bounds[1] - bounds[0]).max_element(),
@@ -178,12 +176,19 @@ impl Shell {
             hull,
             stairs,
             separate,
-            parts,
         })
     }
 }
 
 impl Shell {
+    /// Finds at most `most` gaps that the hull leaves open. `n`: voxels along the model's longest side.
+    pub(super) fn find_gaps(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], [n, most]: [usize; 2]) {
+        let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
+        let found = gaps(&self.solid, &self.filled, reach).into_iter();
+        let found = found.filter(|gap| !gap.is_hollow(&self.lattice, positions, triangles));
+        self.gaps = found.take(most).collect();
+    }
+
     /// The hull and layers of voxels around it.
     pub(super) fn band(&self, layers: usize) -> Voxels {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
@@ -320,7 +325,10 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
     let mut joined = JoinedVoxels { hull, from: vec![[usize::MAX; 3]; hull.dims.iter().product()] };
     let mut queue = VecDeque::new();
     joined.add_part(parts[0], &mut queue);
-    while let Some(voxel) = queue.pop_front() {
+    let mut left = parts.len() - 1;
+    while left > 0
+        && let Some(voxel) = queue.pop_front()
+    {
         for next in hull.neighbours(voxel) {
             // Keep the outermost layer empty.
             let edge = (0..3).any(|k| next[k] <= layers || next[k] + layers + 1 >= hull.dims[k]);
@@ -347,6 +355,7 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
             let index = joined.index(next);
             joined.from[index] = [usize::MAX; 3];
             joined.add_part(next, &mut queue);
+            left -= 1;
         }
     }
     if let Some(axis) = mirror {
