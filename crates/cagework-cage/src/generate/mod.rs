@@ -269,7 +269,7 @@ fn relax_and_verify(
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<Option<Cage>, Cancelled> {
     let collapsed = guarded.surface();
-    unfold::unfold(&mut guarded);
+    unfold::unfold(&mut guarded, false);
     relax::relax(&mut guarded, quadrics, &|share| go_on(0.6 + 0.2 * share))?;
     let triangles = guarded.surface();
     if of_quads {

@@ -52,7 +52,7 @@ pub(super) fn quads(
             }
         }
     }
-    unfold(surface);
+    unfold(surface, true);
     pairing = pair(surface, &pairing, true);
     settle(surface, &mut pairing);
     Ok(pairing)

@@ -18,8 +18,16 @@ const MIN_DECREASE: f64 = 1e-3;
 /// Smallest cosine between a triangle's normals before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
-/// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those less.
-pub(super) fn unfold(surface: &mut GuardedSurface<'_>) {
+/// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those less. `all_ways`: whether folds that are left
+/// are tried again with moves along each edge and against each normal, too.
+pub(super) fn unfold(surface: &mut GuardedSurface<'_>, all_ways: bool) {
+    run(surface, false);
+    if all_ways {
+        run(surface, true);
+    }
+}
+
+fn run(surface: &mut GuardedSurface<'_>, all_ways: bool) {
     for _ in 0..ROUNDS {
         let mut changed = false;
         for t in 0..surface.triangles.len() as u32 {
@@ -28,7 +36,7 @@ pub(super) fn unfold(surface: &mut GuardedSurface<'_>) {
             }
             changed |= (0..3).any(|k| swap(surface, t, k));
             for v in surface.triangles[t as usize] {
-                changed |= shift(surface, v);
+                changed |= shift(surface, v, all_ways);
             }
         }
         if !changed {
@@ -52,7 +60,7 @@ fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
 }
 
 /// Moves a vertex where its triangles have less excess.
-fn shift(surface: &mut GuardedSurface<'_>, v: u32) -> bool {
+fn shift(surface: &mut GuardedSurface<'_>, v: u32, all_ways: bool) -> bool {
     let gone = surface.around[v as usize].clone();
     let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
     let limit = surface.excess(&star, &gone) - MIN_DECREASE;
@@ -68,6 +76,10 @@ fn shift(surface: &mut GuardedSurface<'_>, v: u32) -> bool {
     let mut directions = vec![outward, -outward, ways.iter().sum::<DVec3>()];
     directions.extend(DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]));
     directions.extend(star.iter().map(Corners::normal));
+    if all_ways {
+        directions.extend(star.iter().map(|t| -t.normal()));
+        directions.extend(ways.iter().flat_map(|&way| [way, -way]));
+    }
     let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
     let mut better = Vec::new();
     for direction in directions {
@@ -120,7 +132,7 @@ mod tests {
         let before = excess(&guarded);
         let of_rim = (180.0 - 2.0 * 0.15_f64.atan().to_degrees()).to_radians().cos();
         assert!((before - 8.0 * (-0.5 - of_rim)).abs() < 1e-9, "{before}");
-        unfold(&mut guarded);
+        unfold(&mut guarded, false);
         assert!(excess(&guarded) < 1e-9, "{:?}", guarded.positions);
     }
 }
