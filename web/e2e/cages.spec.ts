@@ -80,13 +80,27 @@ test("a gap between legs stays open by default and at a chosen width", async ({ 
   await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertex count allows");
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
+  const primary = page.locator(".panel-foot .primary");
+  await expect(primary).toHaveText("Pose it");
   await gaps.fill("128");
   await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of its size");
-  await page.getByRole("button", { name: "Make this cage" }).click();
+  await expect(primary).toHaveText("Make this cage");
+  await shoot(page, "cage-unmade");
+  await primary.click();
   await bound(page);
+  await expect(primary).toHaveText("Pose it");
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
   await shoot(page, "cage-gap");
+
+  await test.step("a cage with fewer vertices than requested says which option would change it", async () => {
+    await page.getByLabel("Vertices, at most").fill("400");
+    await gaps.fill("16");
+    await primary.click();
+    await bound(page);
+    await expect(page.getByText(/For more of the 400, move Closeness to the right/)).toBeVisible();
+    await shoot(page, "cage-fewer");
+  });
 
   await test.step("a cage with more vertices than requested is reported", async () => {
     await drop(page, [{ name: "spring.obj", bytes: spring() }]);

@@ -30,6 +30,29 @@ export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
 
+/** The settings that determine the cage which `make` of actions/cage.ts returns, as a text to compare. */
+export function cageKey({ cageSource, cageOptions, cageClip, boxDivisions }: CageSettings): string {
+  if (cageSource === "auto") return JSON.stringify([cageOptions, cageClip]);
+  return cageSource === "box" ? `box ${boxDivisions}` : cageSource;
+}
+
+type CageSettings = Pick<AppState, "cageSource" | "cageOptions" | "cageClip" | "boxDivisions">;
+
+/** Whether the settings of the Cage panel are not those of the cage. */
+export function hasUnmadeCage(state: AppState): boolean {
+  return state.cage !== null && state.cageMade !== cageKey(state);
+}
+
+/** Below this share of the requested vertices, the panel explains why a generated cage has so few. */
+const FEW = 0.9;
+
+/** Whether a generated cage has far fewer vertices than requested, because it follows the shape as closely as requested. */
+export function isCageSparse(state: AppState): boolean {
+  const { cage, cageOptions, cageSource, sampleCage } = state;
+  const isGenerated = cage !== null && cageSource === "auto" && !sampleCage && !hasUnmadeCage(state);
+  return isGenerated && cage.info.vertices < FEW * cageOptions.vertices;
+}
+
 /** Saved poses that fit the current cage. */
 export function fittingPoses(state: AppState): readonly PoseView[] {
   return state.poses.filter((pose) => pose.fits);

@@ -19,6 +19,7 @@ import type {
   View,
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import { cageKey } from "./derived";
 import type { Theme } from "./store";
 import { T } from "./words";
 import type { Work } from "./works/entry";
@@ -73,6 +74,8 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   check: Check | null;
   cageSource: CageSource;
   cageOptions: CageOptions;
+  /** `cageKey` of the settings with which the cage was made or opened. */
+  cageMade: string;
   /** Name of a clip whose frames generated cages also enclose; null for none. */
   cageClip: string | null;
   boxDivisions: number;
@@ -175,12 +178,17 @@ export const DOCUMENT_STATE = {
   redoLabel: null,
 } satisfies Partial<AppState>;
 
-/** Initial values of the keys that belong to the open model, see docs/page.md. */
-export const MODEL_STATE = {
+const CAGE_SETTINGS = {
   cageSource: "auto",
   cageOptions: CAGE_DEFAULTS,
   cageClip: null,
   boxDivisions: 2,
+} satisfies Partial<AppState>;
+
+/** Initial values of the keys that belong to the open model, see docs/page.md. */
+export const MODEL_STATE = {
+  ...CAGE_SETTINGS,
+  cageMade: cageKey(CAGE_SETTINGS),
   cageProgress: null,
   bindOptions: BIND_DEFAULTS,
   appliedOptions: null,

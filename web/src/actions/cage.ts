@@ -1,6 +1,7 @@
 /** Makes cages: generated, a box, or from a file. Repairs them. */
 
 import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
+import { cageKey } from "../derived";
 import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
 import type { CageSource } from "../state";
@@ -106,8 +107,10 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
       return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
           const { cageSource, boxDivisions } = ctx.store.get();
+          const cageMade = cageKey(ctx.store.get());
           const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
           take(T.did.makeCage, cageSource === "box" ? box() : await generate(cageSource, signal));
+          ctx.store.set({ cageMade });
         }),
       );
     },
@@ -119,7 +122,7 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
           const name = files[0]?.name ?? "the cage";
           const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
           const cage = await waitFor(ctx, signal, T.opening.file(name), read);
-          ctx.store.set({ cageSource: "file" });
+          ctx.store.set({ cageSource: "file", cageMade: "file" });
           take(T.did.loadCage, cage);
         }),
       );

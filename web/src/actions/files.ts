@@ -2,6 +2,7 @@
 
 import type { BindOptions, NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS } from "../defaults";
+import { cageKey } from "../derived";
 import type { DocumentMirror } from "../document";
 import { planDrop } from "../drop";
 import { stem } from "../format";
@@ -69,6 +70,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       ...(cageOptions ? { cageOptions } : {}),
       ...(rigOptions ? { rigOptions } : {}),
     });
+    store.set({ cageMade: cageKey(store.get()) });
     needs.view.symmetry(symmetry ?? false);
     for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));

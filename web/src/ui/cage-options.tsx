@@ -2,7 +2,7 @@
 
 import type { App } from "../app";
 import type { CageOptions } from "../contract";
-import { RANGES } from "../defaults";
+import { FINEST_DETAIL, RANGES } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
 import { Segments, Slider, Toggle } from "./controls";
@@ -12,11 +12,11 @@ const COARSEST = 16;
 /** Gaps narrower than this many voxels are closed. */
 const GAP_VOXELS = 3;
 
-/** The detail slider is logarithmic: 0 is four times the default distance, 1 a quarter of it. */
-const COARSE_DETAIL = 0.112;
+/** The slider of closeness is logarithmic: 0 is four times the default distance, 1 a quarter of it. */
 const FINER = 16;
-const detailOf = (fineness: number) => COARSE_DETAIL * FINER ** -fineness;
-const finenessOf = (detail: number) => Math.log(COARSE_DETAIL / detail) / Math.log(FINER);
+const COARSEST_DETAIL = FINEST_DETAIL * FINER;
+const detailOf = (closeness: number) => COARSEST_DETAIL * FINER ** -closeness;
+const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Math.log(FINER);
 
 export function Automatic({ app }: { app: App }) {
   const { cageOptions: options, cageClip, model } = app.store.get();
@@ -35,13 +35,13 @@ export function Automatic({ app }: { app: App }) {
         onInput={(vertices) => change({ vertices })}
       />
       <Slider
-        label={T.cage.detail}
+        label={T.cage.closeness}
         min={0}
         max={1}
         step={0.05}
-        format={() => T.cage.ofSize(percent(options.detail, 1))}
-        value={finenessOf(options.detail)}
-        onInput={(fineness) => change({ detail: detailOf(fineness) })}
+        format={() => T.cage.within(percent(options.detail, 1))}
+        value={closenessOf(options.detail)}
+        onInput={(closeness) => change({ detail: detailOf(closeness) })}
       />
       <Toggle
         label={T.cage.quads}

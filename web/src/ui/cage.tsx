@@ -1,7 +1,9 @@
 /** Step 2: source of the cage, its problems, and reshaping. */
 
 import type { App } from "../app";
-import type { Element as CageElement, CageState, Check, Problem, RestEdit } from "../contract";
+import type { Element as CageElement, CageOptions, CageState, Check, Problem, RestEdit } from "../contract";
+import { FINEST_DETAIL } from "../defaults";
+import { isCageSparse } from "../derived";
 import { count, percent } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";
@@ -14,7 +16,7 @@ import { Inside, Smooth } from "./inside";
 const SOURCES = ["auto", "hull", "box", "file"] as const satisfies readonly CageSource[];
 
 export function CagePanel({ app }: { app: App }) {
-  const { cageSource, boxDivisions, cageProgress, model, cage, check } = app.store.get();
+  const { cageSource, boxDivisions, cageProgress, cage, check } = app.store.get();
   const { set } = app.store;
   return (
     <div class="stack loose">
@@ -44,21 +46,11 @@ export function CagePanel({ app }: { app: App }) {
             {percent(cageProgress)}
           </progress>
         )}
-        {cageSource === "file" ? (
-          <Button label={T.cage.load} onClick={app.chooseCage} icon="file" kind="block" disabled={!model} />
-        ) : (
-          <Button
-            label={T.cage.make}
-            onClick={() => void app.cage.make()}
-            icon="cage"
-            kind="block"
-            disabled={cageProgress !== null || !model}
-          />
-        )}
       </div>
       <Section title={T.cage.result}>
         <div class="stack">
           {cage ? <CageCard cage={cage} check={check} /> : <p class="empty">{T.cage.none}</p>}
+          {isCageSparse(app.store.get()) && <p class="hint">{sparse(app.store.get().cageOptions)}</p>}
           {check?.problems.map((problem) => (
             <ProblemCard key={problem.message} problem={problem} app={app} />
           ))}
@@ -73,6 +65,12 @@ export function CagePanel({ app }: { app: App }) {
       <Section title={T.cage.shape}>{cage && <Reshape app={app} />}</Section>
     </div>
   );
+}
+
+/** Why a cage has fewer vertices than requested, and the option that would change it. */
+function sparse({ vertices, detail }: CageOptions): string {
+  const share = percent(detail, 1);
+  return detail > 1.01 * FINEST_DETAIL ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
 }
 
 const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "extrude" | "remove"])[] = [

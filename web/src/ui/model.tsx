@@ -6,7 +6,7 @@ import type { ModelInfo, Sample, UpAxis } from "../contract";
 import { count, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { Badge, Button, Facts, Head, Section, Segments } from "./controls";
+import { Button, Facts, Head, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
 import { useTouch } from "./touch";
@@ -19,8 +19,10 @@ export function ModelPanel({ app }: { app: App }) {
   const isTouch = useTouch();
   const open = model && (
     <>
-      {model.members.length === 1 && (
-        <ModelCard model={model} about={samples.find(({ id }) => id === sample)?.sentence} />
+      {model.members.length === 1 ? (
+        <ModelCard app={app} model={model} about={samples.find(({ id }) => id === sample)?.sentence} />
+      ) : (
+        <Up app={app} model={model} />
       )}
       <Models app={app} model={model} />
       {model.notices.map((notice) => (
@@ -63,17 +65,6 @@ export function ModelPanel({ app }: { app: App }) {
         </ul>
       </Section>
       {sample !== null && open}
-      {model && (
-        <Segments<UpAxis>
-          label={T.model.up}
-          choices={[
-            { value: "y", label: "Y", tip: T.model.upY },
-            { value: "z", label: "Z", tip: T.model.upZ },
-          ]}
-          value={model.up}
-          onChange={(axis) => void app.files.turn(axis)}
-        />
-      )}
       <Privacy />
       <p class="hint">
         <a href="./licences.txt" target="_blank" rel="noopener">
@@ -81,6 +72,20 @@ export function ModelPanel({ app }: { app: App }) {
         </a>
       </p>
     </div>
+  );
+}
+
+function Up({ app, model }: { app: App; model: ModelInfo }) {
+  return (
+    <Segments<UpAxis>
+      label={T.model.up}
+      choices={[
+        { value: "y", label: "Y", tip: T.model.upY },
+        { value: "z", label: "Z", tip: T.model.upZ },
+      ]}
+      value={model.up}
+      onChange={(axis) => void app.files.turn(axis)}
+    />
   );
 }
 
@@ -127,7 +132,7 @@ function SampleCard({ app, sample: { id, label }, isOpen }: { app: App; sample: 
   );
 }
 
-function ModelCard({ model, about }: { model: ModelInfo; about: string | undefined }) {
+function ModelCard({ app, model, about }: { app: App; model: ModelInfo; about: string | undefined }) {
   const { min, max } = model.bounds;
   const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
   const rows: [string, string][] = [
@@ -143,7 +148,7 @@ function ModelCard({ model, about }: { model: ModelInfo; about: string | undefin
     <section class="card stack tight" aria-label={T.model.isOpen}>
       <div class="row">
         <strong class="grow clip">{model.name}</strong>
-        <Badge kind="good" icon="check" text={T.model.open} />
+        <Up app={app} model={model} />
       </div>
       {about && <p class="hint">{about}</p>}
       <Facts rows={rows} />

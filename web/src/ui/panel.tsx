@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { cageBroken } from "../derived";
+import { cageBroken, hasUnmadeCage } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
@@ -33,8 +33,13 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
         primary: state.bound ? pose : { label: T.panel.next, run: () => app.go("cage") },
         second: open,
       };
-    case "cage":
-      return { primary: cageAction(state, app) ?? (state.bound ? pose : bind(T.panel.bindModel)) };
+    case "cage": {
+      const needed = cageAction(state, app);
+      if (needed) return { primary: needed };
+      const next = state.bound ? pose : bind(T.panel.bindModel);
+      const make = makeAction(state, app);
+      return hasUnmadeCage(state) ? { primary: make, second: next } : { primary: next, second: make };
+    }
     case "bind":
       if (state.bindRun) return { primary: cancel(app.bind.cancel) };
       if (!state.bound) return { primary: bind(T.panel.bind) };
@@ -60,12 +65,18 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
 
 const cancel = (run: () => void): Action => ({ label: T.cancel, icon: "stop", plain: true, run });
 
+/** Makes the cage of the panel's settings. */
+function makeAction({ cageSource }: AppState, app: App): Action {
+  if (cageSource === "file") return { label: T.cage.load, icon: "file", run: app.chooseCage };
+  return { label: T.cage.make, run: () => void app.cage.make() };
+}
+
 /** What the cage still needs before it can be bound; undefined when it is ready. */
 function cageAction(state: AppState, app: App): Action | undefined {
   if (state.cageProgress !== null) return cancel(app.cage.cancel);
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
   if (!state.cage) return make(T.panel.makeCage);
-  if (!cageBroken(state)) return undefined;
+  if (!cageBroken(state) || hasUnmadeCage(state)) return undefined;
   const fix = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
   return fix ? { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) } : make(T.panel.newCage);
 }

@@ -3,6 +3,10 @@ import { expect, it } from "vitest";
 import { createCage } from "../../src/actions/cage";
 import { createEdit } from "../../src/actions/edit";
 import type { Carriable } from "../../src/actions/poses";
+import type { App } from "../../src/app";
+import type { CageOptions } from "../../src/contract";
+import { isCageSparse } from "../../src/derived";
+import { nextActions } from "../../src/ui/panel";
 import { cageOf, createFake, settled } from "../fake";
 
 function page() {
@@ -67,6 +71,42 @@ it("of two requested cages only the later is used", async () => {
   asked.at(-1)?.resolve(cageOf(8, 5));
   expect(await Promise.all(both)).toEqual([false, true]);
   expect([height(), problems.length, store.get().cageProgress]).toEqual([5, 0, null]);
+});
+
+it("settings that the cage does not have make it the next action, until it is made", async () => {
+  const { cage, asked, store, ctx } = page();
+  const app = { ctx, store, cage, run: () => undefined, go: () => undefined } as unknown as App;
+  store.set({ step: "cage" });
+  const labels = () => {
+    const { primary, second } = nextActions(store.get(), app);
+    return [primary.label, second?.label];
+  };
+  const make = async (vertices: number) => {
+    const made = cage.make();
+    await settled();
+    asked.at(-1)?.resolve(cageOf(vertices));
+    await made;
+  };
+  const change = (patch: Partial<CageOptions>) =>
+    store.set({ cageOptions: { ...store.get().cageOptions, ...patch } });
+  await make(76);
+  expect(labels()).toEqual(["Bind the model", "Make this cage"]);
+  store.set({ bound: true });
+  expect(labels()).toEqual(["Pose it", "Make this cage"]);
+  expect(isCageSparse(store.get()), "76 of 80").toBe(false);
+  change({ vertices: 400 });
+  expect(labels()).toEqual(["Make this cage", "Pose it"]);
+  expect(isCageSparse(store.get()), "not made yet").toBe(false);
+  await make(116);
+  expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", true]);
+  store.set({ cageSource: "hull" });
+  expect(labels()).toEqual(["Make this cage", "Bind the model"]);
+  // The options of automatic cages do not matter to a hull.
+  await make(24);
+  change({ vertices: 100 });
+  expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", false]);
+  store.set({ cageSource: "file" });
+  expect(labels()).toEqual(["Open a cage file", "Bind the model"]);
 });
 
 it("cancel keeps the current cage", async () => {

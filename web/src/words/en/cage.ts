@@ -14,7 +14,8 @@ export const cage = {
     file: `A closed mesh that you modelled around it, as a ${endings("disjunction")} file.`,
   },
   wanted: "Vertices, at most",
-  detail: "Distance from the shape",
+  closeness: "Closeness",
+  within: (share: string) => `within ${share} of its size`,
   quads: "Quads",
   quadsSentence: "Four-sided faces where two triangles make a good one.",
   ofQuads: "Quads",
@@ -91,6 +92,10 @@ export const cage = {
   faces: "Faces",
   posesWait: "The pose and saved poses belong to the previous cage and are kept with it.",
   bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
+  sparse: (share: string, wanted: string) =>
+    `These vertices follow the shape within ${share} of its size. For more of the ${wanted}, move Closeness to the right.`,
+  sparsest: (share: string) =>
+    `These vertices follow the shape within ${share} of its size, the closest setting.`,
   fineEnough: "Fine enough",
   more: (made: number, wanted: number) =>
     `The model's holes and gaps need ${made} vertices instead of ${wanted}.`,

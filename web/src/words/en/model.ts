@@ -19,7 +19,6 @@ export const model = {
   upZ: "For models that otherwise lie on their back",
   licences: "Licences",
   isOpen: "The model that is open",
-  open: "Open",
   vertices: "Vertices",
   triangles: "Triangles",
   size: "Size",
