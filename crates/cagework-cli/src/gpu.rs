@@ -5,19 +5,10 @@ use std::sync::Arc;
 
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError};
-use cagework_io::{LookAlpha, LookImage, LookWrap, Model};
+use cagework_io::{LookAlpha, LookImage, LookWrap, Model, TexturePlan};
 use image::ImageReader;
 
 use crate::error::CliError;
-
-/// Largest texture that is decoded, pixels (8192 x 8192). A damaged header may claim any size.
-const MAX_TEXTURE_PIXELS: u64 = 1 << 26;
-
-/// Largest number of pixels of all textures together: 256 MiB of memory here, a third more on the GPU with mipmaps.
-const MAX_TOTAL_PIXELS: u64 = 1 << 26;
-
-/// Textures with a longer side are scaled down to it, pixels.
-const MAX_TEXTURE_SIDE: u32 = 2048;
 
 /// Opens a GPU.
 ///
@@ -30,14 +21,14 @@ pub(crate) fn open() -> Result<GpuContext, GpuError> {
 /// Converts a model for drawing. Also returns notices about textures that are scaled down or not drawn.
 pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
-    let mut notices = Vec::new();
+    let TexturePlan { side, admitted, mut notices } = TexturePlan::new(&[&look]);
     let mut textures = Vec::new();
-    let mut left = MAX_TOTAL_PIXELS;
     // Groups with an undecodable image are drawn in their base colour.
     let numbers: Vec<Option<u32>> = look
         .images
         .iter()
-        .map(|image| match decode(image, &mut left) {
+        .zip(&admitted[0])
+        .map(|(image, is_admitted)| match is_admitted.then(|| decode(image, side))? {
             Ok((texture, notice)) => {
                 notices.extend(notice);
                 textures.push(texture);
@@ -92,28 +83,14 @@ fn wrap(wrap: LookWrap) -> Wrap {
     }
 }
 
-/// Decodes a texture and subtracts its pixels from `left`. Also returns a notice if it was scaled down.
-fn decode(image: &LookImage, left: &mut u64) -> Result<(DrawTexture, Option<String>), String> {
-    let reader = || {
-        let reader = ImageReader::new(Cursor::new(&image.bytes)).with_guessed_format();
-        reader.map_err(|e| e.to_string())
-    };
-    let (width, height) = reader()?.into_dimensions().map_err(|e| e.to_string())?;
-    let pixels = u64::from(width) * u64::from(height);
-    if pixels > MAX_TEXTURE_PIXELS {
-        return Err(format!(
-            "it has {width} x {height} pixels, more than the limit of {MAX_TEXTURE_PIXELS}: make it smaller"
-        ));
-    }
-    let drawn = pixels.min(u64::from(MAX_TEXTURE_SIDE).pow(2));
-    let rest = left.checked_sub(drawn);
-    *left = rest.ok_or_else(|| {
-        format!("the textures have more than {MAX_TOTAL_PIXELS} pixels in total: make them smaller")
-    })?;
-    let mut decoded = reader()?.decode().map_err(|e| e.to_string())?;
+/// Decodes a texture. Also returns a notice if it was scaled down to `side`.
+fn decode(image: &LookImage, side: u32) -> Result<(DrawTexture, Option<String>), String> {
+    let reader = ImageReader::new(Cursor::new(&image.bytes)).with_guessed_format();
+    let mut decoded = reader.map_err(|e| e.to_string())?.decode().map_err(|e| e.to_string())?;
+    let (width, height) = (decoded.width(), decoded.height());
     let mut notice = None;
-    if width.max(height) > MAX_TEXTURE_SIDE {
-        decoded = decoded.thumbnail(MAX_TEXTURE_SIDE, MAX_TEXTURE_SIDE);
+    if width.max(height) > side {
+        decoded = decoded.thumbnail(side, side);
         let size =
             format!("{width} x {height} pixels: drawn with {} x {}", decoded.width(), decoded.height());
         notice = Some(format!("texture '{}' has {size}", image.name));

@@ -31,6 +31,7 @@ mod select;
 mod shown;
 mod siblings;
 mod stl;
+mod textures;
 mod up;
 
 pub use counts::Counts;
@@ -54,6 +55,7 @@ pub use rigged::UnknownClip;
 pub use select::SelectError;
 pub use shown::{escaped, json_fault, shown, value_fault};
 pub use siblings::Resolve;
+pub use textures::TexturePlan;
 pub use up::UpAxis;
 
 /// The example of the README.

@@ -82,7 +82,7 @@ pub enum LookWrap {
 pub struct LookImage {
     /// Name in the file, for messages.
     pub name: String,
-    /// Encoded PNG, JPEG, WebP or KTX2.
+    /// Encoded PNG, JPEG, WebP or KTX2; empty if the image overlaps others in the file.
     pub bytes: Vec<u8>,
     /// Media type, detected from the bytes.
     pub mime: String,

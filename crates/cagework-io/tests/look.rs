@@ -4,7 +4,7 @@
 
 mod common;
 
-use cagework_io::{Look, LookAlpha, LookWrap, Model};
+use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan};
 use common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 use serde_json::json;
 
@@ -56,6 +56,34 @@ fn image_in_a_buffer_view_is_read() {
     let look = look(&b);
     // The media type is detected from the content, not taken from the document.
     assert_eq!((look.images[0].bytes.as_slice(), look.images[0].mime.as_str()), (&PNG[..], "image/png"));
+}
+
+/// Ten windows of one buffer, each of a different length, are images. Copies of all would need ten times the file.
+#[test]
+fn overlapping_images_need_no_more_memory_than_the_file() {
+    let mut b = textured_square();
+    let view = b.view(&[&PNG[..], &[0; 1000]].concat());
+    let (mut views, mut images, mut primitives) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..10 {
+        let mut window = b.json["bufferViews"][view].clone();
+        window["byteLength"] = json!(1000 + k);
+        views.push(window);
+        images.push(json!({ "bufferView": view + 1 + k }));
+        let mut primitive = b.json["meshes"][0]["primitives"][0].clone();
+        primitive["material"] = json!(k);
+        primitives.push(primitive);
+    }
+    b.json["bufferViews"].as_array_mut().unwrap().extend(views);
+    let material = |k| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": k } } });
+    b.json["materials"] = (0..10).map(material).collect();
+    b.json["textures"] = (0..10).map(|k| json!({ "source": k })).collect();
+    b.json["images"] = json!(images);
+    b.json["meshes"][0]["primitives"] = json!(primitives);
+    let found = look(&b);
+    assert_eq!(found.images.len(), 10);
+    assert!(found.images.iter().map(|image| image.bytes.len()).sum::<usize>() <= b.glb().len());
+    let plan = TexturePlan::new(&[&found]);
+    assert!(plan.notices.iter().any(|notice| notice.contains("overlap")), "{:?}", plan.notices);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cagework_core::PolygonMesh;
 use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
-use cagework_io::{Look, LookAlpha, LookWrap, Model, UpAxis, read_project};
+use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan, UpAxis, read_project};
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -24,6 +24,8 @@ pub struct Loaded {
     cage: Option<PolygonMesh>,
     look: Look,
     textures: Vec<DrawTexture>,
+    /// Longer side to which textures are scaled down, pixels.
+    side: u32,
     poses: Vec<(String, Vec<Vec3>)>,
     settings: Option<String>,
     /// Index of the model in its project.
@@ -43,19 +45,18 @@ impl Loaded {
         Ok(Self::from_bytes(name, bytes, sibling)?)
     }
 
-    /// Reads materials and textures. Separate from [`Self::read`], so that the page can handle events in between.
+    /// Reads materials and textures of all models of the file, before [`Self::take_next`]. Separate from [`Self::read`], so
+    /// that the page can handle events in between.
     pub fn prepare(&mut self) {
-        self.look = self.model.look();
-        self.textures = vec![DrawTexture::default(); self.look.images.len()];
-        let wrap = |wrap: LookWrap| match wrap {
-            LookWrap::Repeat => Wrap::Repeat,
-            LookWrap::Mirror => Wrap::Mirror,
-            LookWrap::Clamp => Wrap::Clamp,
-        };
-        for group in &self.look.groups {
-            if let Some(image) = group.image {
-                self.textures[image as usize].wrap = group.wrap.map(wrap);
-            }
+        self.more.iter_mut().for_each(Self::read_look);
+        self.read_look();
+        let looks: Vec<&Look> =
+            [&self.look].into_iter().chain(self.more.iter().map(|next| &next.look)).collect();
+        let TexturePlan { side, admitted, notices } = TexturePlan::new(&looks);
+        self.model.notices.extend(notices);
+        self.keep_images(side, &admitted[0]);
+        for (next, admitted) in self.more.iter_mut().zip(&admitted[1..]) {
+            next.keep_images(side, admitted);
         }
     }
 
@@ -138,7 +139,14 @@ impl Loaded {
         self.look.images.len()
     }
 
-    /// Encoded file of a texture.
+    /// Longer side to which textures are scaled down, pixels.
+    #[wasm_bindgen(getter, js_name = textureSide)]
+    #[must_use]
+    pub fn texture_side(&self) -> u32 {
+        self.side
+    }
+
+    /// Encoded file of a texture; empty if the texture is not drawn.
     #[wasm_bindgen(js_name = textureBytes)]
     #[must_use]
     pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
@@ -195,9 +203,31 @@ impl Loaded {
     }
 
     fn new(model: Model) -> Self {
-        let (look, textures) = (Look::default(), Vec::new());
-        let more = VecDeque::new();
-        Self { model, cage: None, look, textures, poses: Vec::new(), settings: None, number: 0, more }
+        let (look, textures, side) = (Look::default(), Vec::new(), 0);
+        let (poses, more) = (Vec::new(), VecDeque::new());
+        Self { model, cage: None, look, textures, side, poses, settings: None, number: 0, more }
+    }
+
+    fn read_look(&mut self) {
+        self.look = self.model.look();
+        self.textures = vec![DrawTexture::default(); self.look.images.len()];
+        let wrap = |wrap: LookWrap| match wrap {
+            LookWrap::Repeat => Wrap::Repeat,
+            LookWrap::Mirror => Wrap::Mirror,
+            LookWrap::Clamp => Wrap::Clamp,
+        };
+        for group in &self.look.groups {
+            if let Some(image) = group.image {
+                self.textures[image as usize].wrap = group.wrap.map(wrap);
+            }
+        }
+    }
+
+    /// Drops the images that are not decoded.
+    fn keep_images(&mut self, side: u32, admitted: &[bool]) {
+        self.side = side;
+        let images = self.look.images.iter_mut().zip(admitted);
+        images.filter(|(_, is_admitted)| !**is_admitted).for_each(|(image, _)| image.bytes = Vec::new());
     }
 
     /// Poses of a project.

@@ -1,6 +1,7 @@
 //! Materials of a glTF: base colours and their textures.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use ::gltf::json::mesh::Semantic;
 use glam::{Vec2, Vec3};
@@ -21,12 +22,18 @@ struct Images<'a> {
     /// By address and length of the bytes.
     numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
+    /// Bytes of buffers that are not yet copied to `found`. Views of images can overlap.
+    left: usize,
 }
 
 /// Appearance of a document. `positions`, `triangles`: of the model.
 pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
     let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();
-    let mut images = Images { document, numbers: HashMap::new(), found: Vec::new() };
+    let mut buffers: Vec<_> = document.buffers.iter().collect();
+    buffers.sort_unstable_by_key(|buffer| Arc::as_ptr(buffer));
+    buffers.dedup_by_key(|buffer| Arc::as_ptr(buffer));
+    let left = buffers.iter().map(|buffer| buffer.len()).sum();
+    let mut images = Images { document, numbers: HashMap::new(), found: Vec::new(), left };
     let mut normals = vec![Vec3::ZERO; positions.len()];
     let mut groups = Vec::new();
     for slot in &document.slots {
@@ -158,9 +165,10 @@ fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], 
 }
 
 impl Images<'_> {
-    /// Index of an image in the output; `None` if it is missing or not an image.
+    /// Index of an image in the output; `None` if it is missing or not an image. Images without bytes overlap others.
     fn number(&mut self, image: usize) -> Option<u32> {
         let document = self.document;
+        let is_view = document.images.get(image)?.is_none();
         let (name, bytes) = match document.images.get(image)? {
             Some(image) => (image.name.to_string(), image.bytes.as_slice()),
             None => {
@@ -172,7 +180,10 @@ impl Images<'_> {
         };
         let mime = sniff_image(bytes)?;
         let number = *self.numbers.entry((bytes.as_ptr(), bytes.len())).or_insert_with(|| {
-            self.found.push(LookImage { name, bytes: bytes.to_vec(), mime: mime.to_owned() });
+            let rest = if is_view { self.left.checked_sub(bytes.len()) } else { Some(self.left) };
+            let own = if rest.is_some() { bytes.to_vec() } else { Vec::new() };
+            self.left = rest.unwrap_or(self.left);
+            self.found.push(LookImage { name, bytes: own, mime: mime.to_owned() });
             self.found.len() as u32 - 1
         });
         Some(number)

@@ -94,9 +94,9 @@ export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...L
   if (read.packed) loaded.setPacked(read.packed);
   if (read.up) loaded.setUp(read.up);
   await pause();
+  loaded.prepare();
   const all: [Loaded, ...Loaded[]] = [loaded, ...furtherOf(loaded)];
   all.forEach((one, number) => {
-    one.prepare();
     read.textures[number]?.forEach((texture, k) => {
       if (texture) one.setTexture(k, texture.width, texture.height, texture.rgba);
     });

@@ -21,8 +21,8 @@ export async function readModel(
   const { loaded, bytes } = await read(pkg, files, tell);
   const began = performance.now();
   if (up) loaded.setUp(up);
+  loaded.prepare();
   const all = [loaded, ...furtherOf(loaded)];
-  for (const one of all) one.prepare();
   const took = bytes.took + performance.now() - began;
   const decoded = [];
   for (const one of all) {

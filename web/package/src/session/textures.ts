@@ -3,9 +3,6 @@
 import type { Loaded } from "../pkg/cagework";
 import type { Texture } from "./messages";
 
-/** Textures are scaled down to this size, pixels, so that ten of them fit into a phone's memory. */
-const LARGEST = 2048;
-
 /** Decodes all textures of a file and counts failures. Calls `tell` with the fraction done. */
 export async function decodeTextures(
   loaded: Loaded,
@@ -20,7 +17,7 @@ export async function decodeTextures(
     if (bytes.length === 0) continue;
     try {
       const file = new Blob([bytes as BlobPart], { type: loaded.textureType(index) });
-      const { width, height, data } = await decode(file);
+      const { width, height, data } = await decode(file, loaded.textureSide);
       textures[index] = { width, height, rgba: new Uint8Array(data.buffer) };
     } catch {
       // A damaged image is replaced by the material's plain colour.
@@ -30,10 +27,11 @@ export async function decodeTextures(
   return { textures, failed };
 }
 
-async function decode(file: Blob): Promise<ImageData> {
+/** Decodes an image. If its longer side is more than `side` pixels, scales it down. */
+async function decode(file: Blob, side: number): Promise<ImageData> {
   const options: ImageBitmapOptions = { colorSpaceConversion: "none", premultiplyAlpha: "none" };
   const whole = await createImageBitmap(file, options);
-  const scale = Math.min(1, LARGEST / Math.max(whole.width, whole.height));
+  const scale = Math.min(1, side / Math.max(whole.width, whole.height));
   const width = Math.max(1, Math.round(scale * whole.width));
   const height = Math.max(1, Math.round(scale * whole.height));
   const canvas = new OffscreenCanvas(width, height);
