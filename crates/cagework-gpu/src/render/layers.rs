@@ -6,9 +6,9 @@ use super::camera::Camera;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. Takes 10 s
-/// of one core in llvmpipe; in browsers about 3 s at reduced resolution, several times while a model opens.
-const MAX_SOFTWARE_PIXELS: f64 = 1e8;
+/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. A picture takes 10 s
+/// of one core in llvmpipe; a frame of the page about 1 s in SwiftShader.
+const MAX_SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 2.5e7 } else { 1e8 };
 
 /// Cost of a triangle per pixel of its longest side, in addition to its area, because slivers have almost no
 /// area. Measured with a fan of 100,000 slivers in SwiftShader (browsers) and llvmpipe.
