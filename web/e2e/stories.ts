@@ -93,7 +93,7 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
 
 /** Shows the three coordinates side by side: equal at rest, different in a pose. */
 async function comparesAll(page: Page): Promise<void> {
-  await dropsAWorm(page);
+  await dropsAWorm(page, "compared");
   const choices = page.getByRole("group", { name: "Coordinates side by side" });
   const choice = (name: string) => choices.getByRole("checkbox", { name });
   await expect(choice("Harmonic"), "there is nothing else to show").toBeDisabled();
@@ -135,15 +135,16 @@ async function comparesAll(page: Page): Promise<void> {
   for (const gap of await apart()) expect(gap, "posed").toBeGreaterThan(1e-3 * size);
 }
 
-async function dropsAWorm(page: Page): Promise<void> {
-  await drop(page, [{ name: "worm.glb", bytes: await glb() }]);
-  await expect(page).toHaveTitle(/worm/);
+/** `name`: not that of the open model, since the title shows when the model is open. */
+async function dropsAWorm(page: Page, name: string): Promise<void> {
+  await drop(page, [{ name: `${name}.glb`, bytes: await glb() }]);
+  await expect(page).toHaveTitle(new RegExp(name));
   await bound(page);
 }
 
 /** Drops a model and poses it. */
 export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]): Promise<void> {
-  await dropsAWorm(page);
+  await dropsAWorm(page, "worm");
   await drag(page, dx, dy);
 }
 

@@ -12,7 +12,7 @@ declare global {
   var wasLost: Promise<unknown> | undefined;
 }
 
-/** Folder of screenshots, for inspection. */
+/** Folder of screenshots, for inspection with SHARP=1. */
 export const SCREENS = join(import.meta.dirname, "../../target/screens");
 
 /** A rare performance warning of the software GL driver. */
@@ -331,8 +331,9 @@ const isSharp = () => {
 /** How long a screenshot waits for full resolution, ms. The canvas stays coarse during computations. */
 const SHARPENED = 2000;
 
-/** Saves a screenshot. */
+/** With SHARP=1, saves a screenshot. */
 export async function shoot(page: Page, name: string): Promise<void> {
+  if (!process.env.SHARP) return;
   await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }

@@ -88,12 +88,11 @@ test("changed work is saved before another model opens, listed, restored, delete
       await expect(page).toHaveTitle(new RegExp(sample, "i"));
       await bound(page);
     };
-    await show("strider");
     await show("clamp");
     expect(await savedSince(page, 0)).toBe(false);
     await drag(page, 50, 30);
     // Within the delay of the autosave.
-    await show("strider");
+    await show("rat");
     await showList(page);
     await expect(items).toHaveText([/^Clamp/]);
     await page.keyboard.press("Escape");
