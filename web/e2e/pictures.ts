@@ -13,7 +13,7 @@ const SIDE = 216;
 
 test("pictures of the samples", async ({ page }) => {
   await open(page);
-  const ids = await page.evaluate(() => globalThis.cagework?.samples.map(({ id }) => id) ?? []);
+  const ids = await page.evaluate(() => globalThis.cagework?.samples ?? []);
   for (const id of ids) {
     const data = await page.evaluate(
       async ([id, side, scene]) => {

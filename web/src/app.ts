@@ -106,7 +106,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const painting = createPainting(ctx, edit, settle);
   const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project);
-  const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
+  const startFresh = () => void files.openSample(store.get().samples[0] ?? "");
   const works = createWorks(ctx, { write: project.write, openFiles, startFresh });
   const files = createFiles(ctx, {
     know,

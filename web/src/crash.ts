@@ -58,14 +58,15 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
 
 /** What was open or in progress. */
 export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): string {
-  if (busy) return T.crash.while(`${busy.charAt(0).toLowerCase()}${busy.slice(1)}`);
+  if (busy) return T.crash.while(busy);
   return model ? T.crash.with(model.name) : T.crash.nothing;
 }
 
+/** English, because developers read it. */
 function reportOf(error: Error, during: string, state: AppState): string {
   const { model, cage, adapter, bindOptions } = state;
   return [
-    `${T.product} stopped: ${error.message}`,
+    `Cagework stopped: ${error.message}`,
     during,
     `When: ${new Date().toISOString()}`,
     `Browser: ${navigator.userAgent}`,

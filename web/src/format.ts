@@ -2,12 +2,21 @@
 
 import { MODEL_ENDINGS } from "./defaults";
 
-/** Language of the words in words/index.ts. */
-export const LOCALE = "en";
+/** The language, as set by words/index.ts. */
+export let LOCALE = "en";
 
-const INTEGER = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
-const LIST = new Intl.ListFormat(LOCALE);
-const PLURAL = new Intl.PluralRules(LOCALE);
+const formats = () => ({
+  integer: new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 }),
+  digits: new Intl.NumberFormat(LOCALE, { maximumSignificantDigits: 3, useGrouping: false }),
+  list: new Intl.ListFormat(LOCALE),
+  plural: new Intl.PluralRules(LOCALE),
+});
+let format = formats();
+
+export function setLocale(locale: string): void {
+  LOCALE = locale;
+  format = formats();
+}
 
 /** 3, "minute" -> "3 min". */
 export function inUnit(value: number, unit: string, maximumFractionDigits = 0): string {
@@ -21,12 +30,12 @@ export function inUnit(value: number, unit: string, maximumFractionDigits = 0): 
 
 /** 12345 -> "12,345". */
 export function count(value: number): string {
-  return INTEGER.format(value);
+  return format.integer.format(value);
 }
 
 /** 1 -> "1 vertex", 2 -> "2 vertices". */
 export function plural(value: number, one: string, many = `${one}s`): string {
-  return `${count(value)} ${PLURAL.select(value) === "one" ? one : many}`;
+  return `${count(value)} ${format.plural.select(value) === "one" ? one : many}`;
 }
 
 /** ".glb, .obj, and .stl": the extensions of model files. */
@@ -36,7 +45,7 @@ export function endings(type: "conjunction" | "disjunction"): string {
 
 /** "a, b, and c". */
 export function list(names: readonly string[]): string {
-  return LIST.format(names);
+  return format.list.format(names);
 }
 
 /** Bytes with one to three digits before the point: 1536 -> "1.5 kB". */
@@ -59,9 +68,9 @@ export function duration(ms: number): string {
 export function scientific(value: number): string {
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 0.01 && size < 10_000) return String(Number(value.toPrecision(3)));
+  if (size >= 0.01 && size < 10_000) return format.digits.format(value);
   const [mantissa, exponent] = value.toExponential(2).split("e");
-  return `${Number(mantissa)}e${Number(exponent)}`;
+  return `${format.digits.format(Number(mantissa))}e${Number(exponent)}`;
 }
 
 /** A fraction as percent, clamped to 0 and 100. */

@@ -20,7 +20,7 @@ import { createLost } from "./ui/lost";
 import { mount, mountUnsupported } from "./ui/page";
 import { createToasts } from "./ui/toasts";
 import { createStage } from "./ui/viewport";
-import { T } from "./words";
+import { chooseLanguage, T } from "./words";
 
 function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
@@ -35,8 +35,9 @@ function restart(): void {
 }
 
 async function main(): Promise<void> {
+  await chooseLanguage();
   const stage = createStage(byId("stage"));
-  const store = createStore(INITIAL);
+  const store = createStore({ ...INITIAL, busy: T.opening.starting });
   const { Toasts, tell, offer } = createToasts();
   let session: Session | undefined;
   const app = createApp({

@@ -10,7 +10,8 @@ import { createApart, load } from "@cagework/core/session/reader";
 import { polygons } from "@cagework/core/session/reading";
 import type { BindOptions, Job, OpenContents, Opened, ReadFile, Session, View } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./defaults";
-import { once, prepareSample, samples } from "./session/opening";
+import { once, prepareSample } from "./session/opening";
+import { T } from "./words";
 
 declare global {
   /** For the browser's console, and for tests. */
@@ -47,7 +48,9 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
   const client = createClient(module, openWorker);
-  const buildSample = prepareSample(client, samples(pkg)[0]?.id, fresh);
+  // Identifier, name and description of each.
+  const samples = pkg.Binder.samples().filter((_, k) => k % 3 === 0);
+  const buildSample = prepareSample(client, samples[0], fresh);
   const frames = createFrames();
   /** Reports errors of `changed` here, because Rust ignores errors of its callbacks. */
   const report = (view: View) => {
@@ -138,7 +141,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     engine,
     adapter,
     lack,
-    samples: samples(pkg),
+    samples,
     readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
     shareReader: reading.share,
     open: (read: ReadFile) => openRead(read as ReadModel, null).finally(begin),
@@ -169,9 +172,10 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     },
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);
-      const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
-      const name = `${label}.glb`;
-      return openRead({ ...OWN, name, bytes: glb, cage }, id, [...poses]).finally(begin);
+      const words = T.samples[id];
+      const name = `${words?.name ?? id}.glb`;
+      const named = poses.map((pose, k) => ({ ...pose, name: words?.poses[k] ?? pose.name }));
+      return openRead({ ...OWN, name, bytes: glb, cage }, id, named).finally(begin);
     },
     async turn(bytes, up) {
       const name = "turned.glb";

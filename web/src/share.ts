@@ -1,6 +1,8 @@
 /** Share links: sample, pose and view in the URL's fragment, which browsers do not send to the server. */
 
 import type { CageControls, CameraView, SceneOptions } from "./contract";
+import { PageError } from "./strings";
+import { T } from "./words";
 
 /** What a link contains in addition to the pose. */
 export interface Seen {
@@ -50,8 +52,8 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   const seen = fields.get("seen");
   const controls = fields.get("controls");
   if (sample === null && pose === null) return undefined;
-  if (!sample) throw new Error("it does not say which sample it shows");
-  if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} characters`);
+  if (!sample) throw new PageError(T.link.noSample);
+  if (fragment.length > LONGEST) throw new PageError(T.link.long(LONGEST));
   return {
     sample,
     ...(pose === null ? {} : { pose: await read("pose", pose) }),
@@ -60,25 +62,25 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   };
 }
 
-async function read(what: string, text: string): Promise<Uint8Array> {
+async function read(what: "pose" | "view" | "controls", text: string): Promise<Uint8Array> {
   try {
     return await unpack(fromBase64Url(text));
   } catch {
-    throw new Error(`its ${what} cannot be read`);
+    throw new PageError(T.link.unreadable[what]);
   }
 }
 
 /** Checks the structure only; the engine validates camera and scene. */
 function parse(json: Uint8Array): Seen {
   const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
-  if (!seen?.camera || !Array.isArray(seen.selected)) throw new Error("its view cannot be read");
+  if (!seen?.camera || !Array.isArray(seen.selected)) throw new PageError(T.link.unreadable.view);
   return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
 }
 
 /** Checks the structure only. */
 function parseControls(json: Uint8Array): SharedControls {
   const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
-  if (!said?.controls || !Array.isArray(said.inner)) throw new Error("its controls cannot be read");
+  if (!said?.controls || !Array.isArray(said.inner)) throw new PageError(T.link.unreadable.controls);
   return { controls: said.controls, inner: said.inner };
 }
 

@@ -10,6 +10,7 @@ import { percent } from "./format";
 import type { Offline } from "./offline/keep";
 import { decodeShare } from "./share";
 import { loadTheme } from "./store";
+import { PageError } from "./strings";
 import { showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
 import { T } from "./words";
@@ -102,7 +103,7 @@ async function openFirst(app: App): Promise<void> {
   const { works, samples } = app.store.get();
   if (works.length > 1) app.store.set({ worksOpen: true });
   const [first] = samples;
-  if (first) await app.files.openSample(first.id);
+  if (first) await app.files.openSample(first);
 }
 
 interface Link {
@@ -117,8 +118,8 @@ async function openShared(app: App): Promise<Link> {
     const link = await decodeShare(location.hash);
     if (!link) return { opened };
     const { sample, pose, seen, controls } = link;
-    if (!app.store.get().samples.some(({ id }) => id === sample)) {
-      throw new Error(`there is no sample called "${sample.slice(0, 40)}" here`);
+    if (!app.store.get().samples.includes(sample)) {
+      throw new PageError(T.link.unknown(sample.slice(0, 40)));
     }
     opened = await app.files.openSample(sample);
     if (!opened) return { opened };

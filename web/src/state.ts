@@ -13,7 +13,6 @@ import type {
   ModelInfo,
   Pivot,
   RigOptions,
-  Sample,
   SceneOptions,
   Stage,
   View,
@@ -21,7 +20,7 @@ import type {
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import { cageKey } from "./derived";
 import type { Theme } from "./store";
-import { T } from "./words";
+import type { Message } from "./strings";
 import type { Work } from "./works/entry";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
@@ -59,7 +58,8 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   adapter: string;
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
   lack: Lack | null;
-  samples: readonly Sample[];
+  /** Identifiers. */
+  samples: readonly string[];
   /** Describes the operation that blocks the page; null without one. */
   busy: string | null;
   /** Its progress, in words. */
@@ -90,7 +90,7 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Reports of earlier binds of this cage, for comparison, latest first. */
   earlier: readonly BindReport[];
   /** Bytes the next bind needs, or why it cannot run. */
-  memory: number | string;
+  memory: number | Message;
   scene: SceneOptions;
   seeOpen: boolean;
   legend: Legend | null;
@@ -224,7 +224,7 @@ export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeo
   adapter: "",
   lack: null,
   samples: [],
-  busy: T.opening.starting,
+  busy: null,
   busyStep: "",
   cancelBusy: null,
   goOn: null,

@@ -1,22 +1,37 @@
-/** Turns messages and errors from Rust into sentences. */
+/** Turns errors into messages: sentences from words/, or messages from Rust, which are English in every language. */
 
 import type { ErrorName } from "./contract";
 import { T } from "./words";
 
+/** A sentence in the page's language, or in English. */
+export type Message = string | { readonly english: string };
+
+export const textOf = (message: Message) => (typeof message === "string" ? message : message.english);
+
+/** An error whose message is in the page's language. */
+export class PageError extends Error {}
+
+/** The message of an error, or of anything else that was thrown. */
+export function messageOf(error: unknown): Message {
+  if (error instanceof PageError) return error.message;
+  if (error instanceof Error && error.name === "Unloaded") return T.offline.unloaded;
+  return sentence(error instanceof Error ? error.message : String(error));
+}
+
 /** Capitalises a message from Rust and adds a full stop if it is missing. */
-export function sentence(text: string): string {
+export function sentence(text: string): Message {
   const trimmed = text.trim();
   if (trimmed === "") return T.somethingWrong;
   // File names keep their case.
   const isName = /^\S*\.\w/.test(trimmed);
   const first = isName ? trimmed : trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
-  return /[.!?:]$/.test(first) ? first : `${first}.`;
+  return { english: /[.!?:]$/.test(first) ? first : `${first}.` };
 }
 
 export interface Explained {
   /** Headline: what failed. */
   title: string;
-  message: string;
+  message: Message;
   /** A remedy that the page offers. */
   fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
@@ -38,8 +53,7 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullab
 /** An error with headline, message and remedy. */
 export function explain(error: unknown, title: string): Explained {
   const name = error instanceof Error ? error.name : "";
-  const text = error instanceof Error ? error.message : String(error);
-  const message = name === "Unloaded" ? T.offline.unloaded : sentence(text);
+  const message = messageOf(error);
   const fix = FIXES[name as ErrorName];
   return fix ? { title, message, fix } : { title, message };
 }

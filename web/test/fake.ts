@@ -20,7 +20,7 @@ import { type DocumentMirror, followDocument } from "../src/document";
 import { createQueue } from "../src/queue";
 import { createStore, type Store } from "../src/signals";
 import { INITIAL } from "../src/state";
-import type { Explained } from "../src/strings";
+import { type Explained, textOf } from "../src/strings";
 
 /** A requested job. */
 export interface Asked {
@@ -288,7 +288,7 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
-    transformLabel: () => "Move",
+    transformLabel: () => "Move 0.25 along X",
   };
   const engine = new Proxy({} as Engine, {
     get: (_, name: keyof Engine) => known[name] ?? (() => calls.push(String(name))),
@@ -296,7 +296,7 @@ export function createFake(): Fake {
 
   const session: Partial<Session> = {
     engine,
-    samples: [{ id: "rat", label: "Rat" }],
+    samples: ["rat"],
     readFiles: (files) => job("read", files),
     open: (read) => job<Opened>("open", read).done,
     shareReader: () => () => {},
@@ -333,11 +333,15 @@ export function createFake(): Fake {
     viewport: () => ({ width: 400, height: 300 }) as DOMRect,
     tell: {
       say: (text, ...offered) => {
-        said.push(text);
+        said.push(textOf(text));
         fake.offered = offered;
       },
-      problem: (explained, fix) =>
-        problems.push(fix ? ({ ...explained, fix: fix.label } as never) : explained),
+      problem: ({ message, ...explained }, fix) =>
+        problems.push({
+          ...explained,
+          message: textOf(message),
+          ...(fix ? { fix: fix.label as never } : {}),
+        }),
       clear: () => problems.splice(0),
     },
     fixFor: (fix) => ({ label: fix, run: () => undefined }),

@@ -8,7 +8,7 @@ import type { BindReport, CageState } from "../src/contract";
 import { drawn } from "../src/derived";
 import { rectangle } from "../src/input/pointer";
 import { type AppState, INITIAL, type StepName } from "../src/state";
-import { explain, isCancelled, sentence } from "../src/strings";
+import { explain, isCancelled, sentence, textOf } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, type Place, placeLabel, scaleOf } from "../src/ui/plot";
 import { verdict } from "../src/ui/report";
@@ -211,11 +211,11 @@ describe("the verdict on a bind", () => {
 
 describe("words", () => {
   it("turn Rust's messages into sentences", () => {
-    expect(sentence("cage is not closed: edge 12-40 has one triangle")).toBe(
+    expect(textOf(sentence("cage is not closed: edge 12-40 has one triangle"))).toBe(
       "Cage is not closed: edge 12-40 has one triangle.",
     );
     expect(sentence("  ")).toBe("Something went wrong.");
-    expect(sentence("horse.glb: cut off")).toBe("horse.glb: cut off.");
+    expect(textOf(sentence("horse.glb: cut off"))).toBe("horse.glb: cut off.");
   });
   it("offer a fix by the error's name", () => {
     const error = new Error("needs 3 GB");
@@ -225,7 +225,7 @@ describe("words", () => {
     expect(explain(error, "No bind").fix).toBe("fewer");
     error.name = "NoneInside";
     expect(explain(error, "No bind").fix).toBe("regenerate");
-    expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: "Plain." });
+    expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: { english: "Plain." } });
   });
   it("recognise a cancellation", () => {
     const error = new Error("cancelled");

@@ -18,7 +18,7 @@ describe("share links", () => {
       sample: "rat",
       controls,
     });
-    await expect(decodeShare("#sample=rat&controls=****")).rejects.toThrow("its controls cannot be read");
+    await expect(decodeShare("#sample=rat&controls=****")).rejects.toThrow("Its controls cannot be read");
   });
 
   it("use only characters allowed in a URL", async () => {
@@ -36,11 +36,11 @@ describe("share links", () => {
   });
 
   it("report damaged links", async () => {
-    await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow("its pose cannot be read");
+    await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow("Its pose cannot be read");
     await expect(decodeShare(`#sample=rat&pose=${"A".repeat(20_000)}`)).rejects.toThrow("16384 characters");
     await expect(decodeShare("#sample=&pose=AAAA")).rejects.toThrow("which sample");
     const link = await encodeShare({ sample: "rat", pose });
-    await expect(decodeShare(link.slice(0, -60))).rejects.toThrow("its pose cannot be read");
+    await expect(decodeShare(link.slice(0, -60))).rejects.toThrow("Its pose cannot be read");
   });
 
   it("encode every byte", () => {

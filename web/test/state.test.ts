@@ -11,7 +11,7 @@ describe("store", () => {
     effect(() => void heard.push(`busy ${store.get().busy}`));
     store.set({ step: "cage" });
     store.set({ step: "cage", memory: 3 });
-    expect(heard).toEqual(["model", "busy Starting", "cage"]);
+    expect(heard).toEqual(["model", "busy null", "cage"]);
     expect({ ...store.get() }).toMatchObject({ step: "cage", memory: 3 });
   });
 

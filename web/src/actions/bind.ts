@@ -6,7 +6,7 @@ import { cageBroken, drawn } from "../derived";
 import { createEta, type Eta } from "../eta";
 import { follow } from "../queue";
 import type { BindRun } from "../state";
-import { sentence } from "../strings";
+import { messageOf, sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
@@ -34,7 +34,7 @@ export function createBind(ctx: Context): BindActions {
     try {
       store.set({ memory: ctx.session().estimateMemory(bindOptions) });
     } catch (error) {
-      store.set({ memory: sentence(error instanceof Error ? error.message : String(error)) });
+      store.set({ memory: messageOf(error) });
     }
   };
   effect(estimate);

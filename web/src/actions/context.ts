@@ -4,7 +4,7 @@ import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import { onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
-import { type Explained, explain, isCancelled } from "../strings";
+import { type Explained, explain, isCancelled, type Message } from "../strings";
 import { T } from "../words";
 
 export interface Fix {
@@ -14,7 +14,7 @@ export interface Fix {
 
 export interface Tell {
   /** Shows a short message that disappears by itself. */
-  say(text: string, ...fixes: Fix[]): void;
+  say(text: Message, ...fixes: Fix[]): void;
   /** Shows an error that stays until it is closed or fixed. */
   problem(explained: Explained, fix?: Fix): void;
   /** Removes all errors, because a new attempt begins. */

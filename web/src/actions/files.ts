@@ -1,6 +1,6 @@
 /** Opens samples, files and projects, then makes a cage and binds automatically. */
 
-import type { BindOptions, NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
+import type { BindOptions, NamedFile, Opened, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS } from "../defaults";
 import { cageKey } from "../derived";
 import type { DocumentMirror } from "../document";
@@ -60,7 +60,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
     store.set({
       ...stateOfNextModel(store.get()),
-      model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
+      model: { ...opened.model, name: shownName(opened, sample) },
       busy: others.length > 0 ? store.get().busy : null,
     });
     if (opened.check) needs.know(opened.check);
@@ -73,7 +73,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     store.set({ cageMade: cageKey(store.get()) });
     needs.view.symmetry(symmetry ?? false);
     for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
-    if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
+    if (settings.notices.length > 0) ctx.tell.say(sentence(settings.notices.join(" ")));
     // Add the other models first, so that the cage encloses all of them.
     if (signal && others.length > 0) await needs.models.join(others, signal);
     store.set({ busy: null });
@@ -131,10 +131,9 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
 
   return {
     openSample(id, bind) {
-      const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
       // Free the worker for the sample: it also generates cages and binds.
       for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
-      return busy(T.opening.file(label), T.failed.sample, () =>
+      return busy(T.opening.file(T.samples[id]?.name ?? id), T.failed.sample, () =>
         replace(() => ctx.session().openSample(id), id, { bind }),
       );
     },
@@ -166,9 +165,9 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
 }
 
 /** Name shown for the model: a sample's label, or the name of a project's model. */
-function shownName(opened: Opened, sample: string | null, samples: readonly Sample[]): string {
+function shownName(opened: Opened, sample: string | null): string {
   const { name } = opened.model;
-  const label = samples.find(({ id }) => id === sample)?.label;
+  const own = T.samples[sample ?? ""]?.name;
   // Several models keep their common name.
-  return label ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
+  return own ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
 }

@@ -2,7 +2,7 @@
 
 import { loadPart } from "@cagework/core/session/parts";
 import type { Guide, GuideNeeds, Loaded } from "../tour";
-import { T } from "../words";
+import { loadTour, T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface TourActions {
@@ -19,7 +19,8 @@ export function createTour(ctx: Context, needs: GuideNeeds): TourActions {
   return {
     async start(stop) {
       await attempt(ctx, T.failed.tour, async () => {
-        loaded ??= (await loadPart(import("../tour"))).load(ctx, needs);
+        const [{ load }] = await loadPart(Promise.all([import("../tour"), loadTour()]));
+        loaded ??= load(ctx, needs);
         await loaded.guide.start(stop);
       });
     },

@@ -31,8 +31,8 @@ export interface Session {
   readonly adapter: string;
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
   readonly lack: Lack | null;
-  /** Identifier and label of each built-in sample; the first one is opened at start. */
-  readonly samples: readonly Sample[];
+  /** Identifiers of the built-in samples; the first one is opened at start. */
+  readonly samples: readonly string[];
 
   /**
    * Reads one model with its companion files, or a project GLB, in its own worker. Files of a folder are found by `path`.
@@ -133,13 +133,6 @@ export interface Session {
   /** Bytes of the module's memory on this thread. */
   memory(): number;
   close(): void;
-}
-
-export interface Sample {
-  readonly id: string;
-  readonly label: string;
-  /** Describes the sample. */
-  readonly sentence?: string;
 }
 
 /** A file that a worker has read successfully. */

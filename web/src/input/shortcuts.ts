@@ -1,126 +1,121 @@
 /** The shortcut table. The keyboard handler, the tool tips and the shortcut sheet read it. */
 
+import { T } from "../words";
+
 /** Where a shortcut applies: everywhere, during a gesture (G, R or S), while the rest cage is edited, or on the tour. */
 export type Scope = "page" | "gesture" | "rest" | "tour";
 
 interface Entry {
   readonly keys: readonly string[];
-  readonly label: string;
   readonly group: Group;
   readonly scope?: Scope;
   /** Keys shown on the sheet, where one row stands for several commands. */
   readonly shown?: readonly string[];
 }
 
-export const GROUPS = ["Move", "While moving", "Select", "Look", "Cage", "Poses", "File"] as const;
+export const GROUPS = ["move", "moving", "select", "look", "cage", "poses", "file"] as const;
 export type Group = (typeof GROUPS)[number];
 
 /** Keys have the form that `keyOf` returns; `mod` is Ctrl, or Cmd on a Mac. */
 const TABLE = {
-  grab: { keys: ["g"], label: "Move the selection", group: "Move" },
-  rotate: { keys: ["r"], label: "Rotate", group: "Move" },
-  scale: { keys: ["s"], label: "Scale", group: "Move" },
+  grab: { keys: ["g"], group: "move" },
+  rotate: { keys: ["r"], group: "move" },
+  scale: { keys: ["s"], group: "move" },
   axisX: {
     keys: ["x"],
-    label: "Only along this axis; with Shift, along the other two",
-    group: "While moving",
+    group: "moving",
     scope: "gesture",
     shown: ["x", "y", "z"],
   },
-  axisY: { keys: ["y"], label: "", group: "While moving", scope: "gesture" },
-  axisZ: { keys: ["z"], label: "", group: "While moving", scope: "gesture" },
-  planeX: { keys: ["shift+x"], label: "", group: "While moving", scope: "gesture" },
-  planeY: { keys: ["shift+y"], label: "", group: "While moving", scope: "gesture" },
-  planeZ: { keys: ["shift+z"], label: "", group: "While moving", scope: "gesture" },
+  axisY: { keys: ["y"], group: "moving", scope: "gesture" },
+  axisZ: { keys: ["z"], group: "moving", scope: "gesture" },
+  planeX: { keys: ["shift+x"], group: "moving", scope: "gesture" },
+  planeY: { keys: ["shift+y"], group: "moving", scope: "gesture" },
+  planeZ: { keys: ["shift+z"], group: "moving", scope: "gesture" },
   keep: {
     keys: ["enter"],
-    label: "Keep the move; a click does too",
-    group: "While moving",
+    group: "moving",
     scope: "gesture",
   },
   cancel: {
     keys: ["escape"],
-    label: "Cancel the move; otherwise close the open panel",
-    group: "While moving",
+    group: "moving",
   },
-  gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
-  gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
-  gizmoScale: { keys: ["t"], label: "Gizmo to scale", group: "Move" },
-  toolPull: { keys: ["q"], label: "Pull the model", group: "Move" },
-  pin: { keys: ["p"], label: "Pin or unpin the point under the pointer", group: "Move" },
-  toolSelect: { keys: ["shift+q"], label: "Only the cage: select and drag", group: "Move" },
-  symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
-  proportional: { keys: ["o"], label: "Proportional editing; the wheel sets the reach", group: "Move" },
+  gizmoMove: { keys: ["w"], group: "move" },
+  gizmoRotate: { keys: ["e"], group: "move" },
+  gizmoScale: { keys: ["t"], group: "move" },
+  toolPull: { keys: ["q"], group: "move" },
+  pin: { keys: ["p"], group: "move" },
+  toolSelect: { keys: ["shift+q"], group: "move" },
+  symmetry: { keys: ["m"], group: "move" },
+  proportional: { keys: ["o"], group: "move" },
   nudgeLeft: {
     keys: ["arrowleft"],
-    label: "Nudge the selection, or pull the model; with Shift, ten times as far",
-    group: "Move",
+    group: "move",
     shown: ["arrowleft", "arrowup", "arrowdown", "arrowright"],
   },
-  nudgeRight: { keys: ["arrowright"], label: "", group: "Move" },
-  nudgeUp: { keys: ["arrowup"], label: "", group: "Move" },
-  nudgeDown: { keys: ["arrowdown"], label: "", group: "Move" },
-  nudgeLeftFar: { keys: ["shift+arrowleft"], label: "", group: "Move" },
-  nudgeRightFar: { keys: ["shift+arrowright"], label: "", group: "Move" },
-  nudgeUpFar: { keys: ["shift+arrowup"], label: "", group: "Move" },
-  nudgeDownFar: { keys: ["shift+arrowdown"], label: "", group: "Move" },
-  undo: { keys: ["mod+z"], label: "Undo", group: "Move" },
-  redo: { keys: ["shift+mod+z", "mod+y"], label: "Redo", group: "Move" },
+  nudgeRight: { keys: ["arrowright"], group: "move" },
+  nudgeUp: { keys: ["arrowup"], group: "move" },
+  nudgeDown: { keys: ["arrowdown"], group: "move" },
+  nudgeLeftFar: { keys: ["shift+arrowleft"], group: "move" },
+  nudgeRightFar: { keys: ["shift+arrowright"], group: "move" },
+  nudgeUpFar: { keys: ["shift+arrowup"], group: "move" },
+  nudgeDownFar: { keys: ["shift+arrowdown"], group: "move" },
+  undo: { keys: ["mod+z"], group: "move" },
+  redo: { keys: ["shift+mod+z", "mod+y"], group: "move" },
 
-  selectAll: { keys: ["a"], label: "Select all", group: "Select" },
-  selectNone: { keys: ["alt+a"], label: "Select nothing", group: "Select" },
-  selectLinked: { keys: ["l"], label: "Select connected vertices", group: "Select" },
-  selectInvert: { keys: ["mod+i"], label: "Invert the selection", group: "Select" },
-  boxSelect: { keys: ["b"], label: "Select with a box", group: "Select" },
-  elementMode: { keys: ["v"], label: "Vertices, edges or faces", group: "Select" },
-  previousVertex: { keys: ["["], label: "Previous vertex", group: "Select" },
-  nextVertex: { keys: ["]"], label: "Next vertex", group: "Select" },
+  selectAll: { keys: ["a"], group: "select" },
+  selectNone: { keys: ["alt+a"], group: "select" },
+  selectLinked: { keys: ["l"], group: "select" },
+  selectInvert: { keys: ["mod+i"], group: "select" },
+  boxSelect: { keys: ["b"], group: "select" },
+  elementMode: { keys: ["v"], group: "select" },
+  previousVertex: { keys: ["["], group: "select" },
+  nextVertex: { keys: ["]"], group: "select" },
 
-  frameSelection: { keys: ["f"], label: "Frame the selection", group: "Look" },
-  frameAll: { keys: ["home", "shift+f"], label: "Frame everything", group: "Look" },
-  viewFront: { keys: ["1"], label: "Front; with Ctrl, back", group: "Look" },
-  viewRight: { keys: ["3"], label: "Right; with Ctrl, left", group: "Look" },
-  viewTop: { keys: ["7"], label: "Top; with Ctrl, bottom", group: "Look" },
-  viewBack: { keys: ["mod+1"], label: "", group: "Look" },
-  viewLeft: { keys: ["mod+3"], label: "", group: "Look" },
-  viewBottom: { keys: ["mod+7"], label: "", group: "Look" },
-  ortho: { keys: ["5"], label: "Perspective or parallel", group: "Look" },
-  original: { keys: [" "], label: "Hold: show the original", group: "Look" },
-  toggleCage: { keys: ["h"], label: "Hide or show the cage", group: "Look" },
-  toggleWire: { keys: ["z"], label: "The model at rest, as wireframe", group: "Look" },
-  heatMap: { keys: ["k"], label: "Weights of the selected vertex", group: "Look" },
-  see: { keys: ["n"], label: "The See panel", group: "Look" },
+  frameSelection: { keys: ["f"], group: "look" },
+  frameAll: { keys: ["home", "shift+f"], group: "look" },
+  viewFront: { keys: ["1"], group: "look" },
+  viewRight: { keys: ["3"], group: "look" },
+  viewTop: { keys: ["7"], group: "look" },
+  viewBack: { keys: ["mod+1"], group: "look" },
+  viewLeft: { keys: ["mod+3"], group: "look" },
+  viewBottom: { keys: ["mod+7"], group: "look" },
+  ortho: { keys: ["5"], group: "look" },
+  original: { keys: [" "], group: "look" },
+  toggleCage: { keys: ["h"], group: "look" },
+  toggleWire: { keys: ["z"], group: "look" },
+  heatMap: { keys: ["k"], group: "look" },
+  see: { keys: ["n"], group: "look" },
 
-  tour: { keys: ["shift+t"], label: "The tour, ten stops", group: "Look" },
+  tour: { keys: ["shift+t"], group: "look" },
   nextStop: {
     keys: ["pagedown", "."],
-    label: "Next or previous stop of the tour",
-    group: "Look",
+    group: "look",
     scope: "tour",
     shown: ["pagedown", "pageup", ".", ","],
   },
-  previousStop: { keys: ["pageup", ","], label: "", group: "Look", scope: "tour" },
+  previousStop: { keys: ["pageup", ","], group: "look", scope: "tour" },
 
-  restMode: { keys: ["tab"], label: "Reshape the cage, or pose", group: "Cage" },
-  split: { keys: ["shift+s"], label: "Split an edge", group: "Cage", scope: "rest" },
-  collapse: { keys: ["shift+c"], label: "Collapse an edge", group: "Cage", scope: "rest" },
-  extrude: { keys: ["shift+e"], label: "Extrude a face", group: "Cage", scope: "rest" },
+  restMode: { keys: ["tab"], group: "cage" },
+  split: { keys: ["shift+s"], group: "cage", scope: "rest" },
+  collapse: { keys: ["shift+c"], group: "cage", scope: "rest" },
+  extrude: { keys: ["shift+e"], group: "cage", scope: "rest" },
   remove: {
     keys: ["delete", "backspace"],
-    label: "Delete, and fill the gap",
-    group: "Cage",
+    group: "cage",
     scope: "rest",
   },
 
-  savePose: { keys: ["shift+p"], label: "Save this pose", group: "Poses" },
-  play: { keys: ["j"], label: "Play the poses, or stop", group: "Poses" },
-  playClip: { keys: ["shift+j"], label: "Play the model's clip, or pause", group: "Poses" },
-  resetPose: { keys: ["alt+g"], label: "Back to the rest pose", group: "Poses" },
+  savePose: { keys: ["shift+p"], group: "poses" },
+  play: { keys: ["j"], group: "poses" },
+  playClip: { keys: ["shift+j"], group: "poses" },
+  resetPose: { keys: ["alt+g"], group: "poses" },
 
-  open: { keys: ["mod+o"], label: "Open a file", group: "File" },
-  saveProject: { keys: ["mod+s"], label: "Save the project", group: "File" },
-  bind: { keys: ["mod+enter"], label: "Bind", group: "File" },
-  sheet: { keys: ["?"], label: "This sheet", group: "File" },
+  open: { keys: ["mod+o"], group: "file" },
+  saveProject: { keys: ["mod+s"], group: "file" },
+  bind: { keys: ["mod+enter"], group: "file" },
+  sheet: { keys: ["?"], group: "file" },
 } as const satisfies Record<string, Entry>;
 
 export type Command = keyof typeof TABLE;
@@ -176,28 +171,13 @@ export function commandOf(
   return (scopes.rest ? of("rest") : undefined) ?? (scopes.tour ? of("tour") : undefined) ?? of("page");
 }
 
-const NAMES: Record<string, string> = {
-  arrowleft: "←",
-  arrowright: "→",
-  arrowup: "↑",
-  arrowdown: "↓",
-  " ": "Space",
-  escape: "Esc",
-  delete: "Del",
-  pagedown: "PgDn",
-  pageup: "PgUp",
-};
+const ARROWS = { arrowleft: "←", arrowright: "→", arrowup: "↑", arrowdown: "↓" };
+const MAC_KEYS = { mod: "⌘", shift: "⇧", alt: "⌥" };
 
 /** Key caps of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], or with Cmd on a Mac. */
 export function caps(keys: string, mac: boolean): string[] {
-  return keys.split("+").map((part) => {
-    if (part === "mod") return mac ? "⌘" : "Ctrl";
-    if (part === "shift") return mac ? "⇧" : "Shift";
-    if (part === "alt") return mac ? "⌥" : "Alt";
-    const name = NAMES[part];
-    if (name) return name;
-    return part.length === 1 ? part.toUpperCase() : part.charAt(0).toUpperCase() + part.slice(1);
-  });
+  const names: Readonly<Record<string, string>> = { ...ARROWS, ...T.sheet.keys, ...(mac ? MAC_KEYS : {}) };
+  return keys.split("+").map((part) => names[part] ?? part.toUpperCase());
 }
 
 /** The first key combination of a command, for tool tips. */

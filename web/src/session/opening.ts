@@ -1,8 +1,6 @@
-/** Startup: the list of samples, and the first sample built in advance. */
+/** Startup: the first sample is built in advance. */
 
-import type { Package } from "@cagework/core/session/artifact";
 import type { Client } from "@cagework/core/session/client";
-import type { Sample } from "../contract";
 
 /** Runs `work` on the first call only. */
 export function once(work: () => void): () => void {
@@ -27,13 +25,4 @@ export function prepareSample(client: Client, first: string | undefined, fresh: 
     early = Promise.resolve(undefined);
     return (id === first ? await waiting : undefined) ?? build(id);
   };
-}
-
-/** All built-in samples. The first one is opened at startup. */
-export function samples(pkg: Package): readonly Sample[] {
-  const words = pkg.Binder.samples();
-  return Array.from({ length: words.length / 3 }, (_, k) => {
-    const [id = "", label = "", sentence = ""] = words.slice(3 * k, 3 * k + 3);
-    return { id, label, sentence };
-  });
 }

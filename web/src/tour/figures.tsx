@@ -9,8 +9,7 @@ import { curvesOf } from "../ui/curves";
 import { Plot } from "../ui/plot";
 import { CompareTable, solverName } from "../ui/report";
 import { Comparison } from "../ui/see";
-import { T } from "../words";
-import { TOUR } from "../words/tour";
+import { T, TOUR } from "../words";
 import type { Guide } from "./guide";
 import { BONE, GRIDS, isOf, ofPaper, STEPS, type StopName, solvers, stopsOf, TAUS } from "./stops";
 

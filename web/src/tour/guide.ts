@@ -199,7 +199,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     async end() {
       const was = before;
       if (!was) return;
-      const sample = was.sample ?? store.get().samples[0]?.id ?? "";
+      const sample = was.sample ?? store.get().samples[0] ?? "";
       const isStill = isOpened(sample);
       if (isStill) rest(undefined);
       guide.overtaken(null);

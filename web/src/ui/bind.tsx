@@ -8,7 +8,7 @@ import { timeLeft } from "../eta";
 import { percent } from "../format";
 import type { BindRun } from "../state";
 import { T } from "../words";
-import { Button, Fold, Head, NumberField, Section, Segments, Slider, Toggle } from "./controls";
+import { Button, Fold, Head, NumberField, Say, Section, Segments, Slider, Toggle } from "./controls";
 import { curvesOf } from "./curves";
 import { Icon } from "./icons";
 import { Plot } from "./plot";
@@ -174,12 +174,12 @@ function Memory({ app }: { app: App }) {
   const state = app.store.get();
   const { memory } = state;
   if (!state.cage || cageBroken(state)) return null;
-  const isWrong = typeof memory === "string";
+  const isWrong = typeof memory !== "number";
   return (
-    <p class={isWrong ? "memory bad" : "memory"}>
+    <div class={isWrong ? "memory bad" : "memory"}>
       <Icon name={isWrong ? "warning" : "info"} />
-      {isWrong ? memory : T.bind.needs(memory)}
-    </p>
+      <Say text={isWrong ? memory : T.bind.needs(memory)} />
+    </div>
   );
 }
 

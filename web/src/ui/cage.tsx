@@ -1,7 +1,15 @@
 /** Step 2: source of the cage, its problems, and reshaping. */
 
 import type { App } from "../app";
-import type { Element as CageElement, CageOptions, CageState, Check, Problem, RestEdit } from "../contract";
+import type {
+  Element as CageElement,
+  CageOptions,
+  CageState,
+  Check,
+  Mend,
+  Problem,
+  RestEdit,
+} from "../contract";
 import { FINEST_DETAIL } from "../defaults";
 import { isCageSparse } from "../derived";
 import { count, percent } from "../format";
@@ -9,7 +17,7 @@ import type { CageSource } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Automatic } from "./cage-options";
-import { Badge, Button, Facts, Head, Section, Segments, Slider, Toggle } from "./controls";
+import { Badge, Button, Facts, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Inside, Smooth } from "./inside";
 
@@ -141,9 +149,7 @@ function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
         ]}
       />
       {cage.info.notices.map((notice) => (
-        <p class="hint" key={notice}>
-          {sentence(notice)}
-        </p>
+        <Say key={notice} kind="hint" text={sentence(notice)} />
       ))}
     </div>
   );
@@ -159,6 +165,12 @@ function CageBadge({ cage, check }: { cage: CageState; check: Check | null }) {
   );
 }
 
+/** Label of the button that fixes `count` faults. */
+export function sayMend(fix: Mend, count: number): string {
+  if (fix.kind === "repair") return T.cage.repairs[fix.repair](count);
+  return fix.kind === "grid" ? T.cage.bindFiner(fix.cells) : T.panel.newCage;
+}
+
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
   const { fix } = problem;
   // A finer grid is offered only while the chosen one is coarser.
@@ -166,8 +178,10 @@ function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
   return (
     <div class={`problem-card ${problem.severity}`}>
       <Icon name={problem.severity === "note" ? "info" : "warning"} />
-      <p class="grow">{sentence(problem.message)}</p>
-      {fix && !isDone && <Button label={fix.label} onClick={() => app.cage.mend(fix)} kind="small" />}
+      <Say kind="grow" text={sentence(problem.message)} />
+      {fix && !isDone && (
+        <Button label={sayMend(fix, problem.count)} onClick={() => app.cage.mend(fix)} kind="small" />
+      )}
       {isDone && <Badge kind="good" icon="check" text={T.cage.fineEnough} />}
     </div>
   );

@@ -2,7 +2,17 @@
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { type Message, textOf } from "../strings";
 import { Icon, type IconName } from "./icons";
+
+/** A message, marked if it is in another language than the page. */
+export function Say({ text, kind }: { text: Message; kind?: string }) {
+  return (
+    <p class={kind} lang={typeof text === "string" ? undefined : "en"}>
+      {textOf(text)}
+    </p>
+  );
+}
 
 interface ButtonProps {
   label: string;

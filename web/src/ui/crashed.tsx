@@ -48,7 +48,7 @@ function Report({ crash: { report } }: { crash: Crash }) {
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: scrollable regions must be reachable by keyboard
     <section class="report" tabIndex={0} aria-label={T.crash.report}>
-      <pre>{report}</pre>
+      <pre lang="en">{report}</pre>
     </section>
   );
 }

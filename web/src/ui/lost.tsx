@@ -2,23 +2,24 @@
 
 import { signal } from "@preact/signals";
 import type { Session } from "../contract";
-import { sentence } from "../strings";
+import { type Message, messageOf, sentence } from "../strings";
 import { T } from "../words";
-import { Button } from "./controls";
+import { Button, Say } from "./controls";
 import { Icon } from "./icons";
 
 /** After two losses within this time, ms, the page asks before it tries again: the device may be broken. */
 const AGAIN_MS = 10_000;
 
-interface Message {
+interface Loss {
   readonly title: string;
+  readonly reason?: Message;
   readonly text: string;
   readonly retry: boolean;
 }
 
 /** Returns the overlay, and `watch`, which starts recovery when the session reports a loss. */
 export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () => void) {
-  const message = signal<Message | null>(null);
+  const message = signal<Loss | null>(null);
   let recover = async () => {};
 
   const watch = (session: Session) => {
@@ -30,8 +31,7 @@ export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () =
         message.value = null;
         recovered();
       } catch (error) {
-        const reason = sentence(error instanceof Error ? error.message : String(error));
-        message.value = { title: T.lost.notBack, text: T.lost.kept(reason), retry: true };
+        message.value = { title: T.lost.notBack, reason: messageOf(error), text: T.lost.kept, retry: true };
       }
     };
     session.onLost((reason) => {
@@ -39,19 +39,20 @@ export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () =
       const isAgain = now - last < AGAIN_MS;
       last = now;
       if (isAgain)
-        message.value = { title: T.lost.again, text: T.lost.others(sentence(reason)), retry: true };
+        message.value = { title: T.lost.again, reason: sentence(reason), text: T.lost.others, retry: true };
       else void recover();
     });
   };
 
   const Lost = () => {
     if (!message.value) return null;
-    const { title, text, retry } = message.value;
+    const { title, reason, text, retry } = message.value;
     return (
       <div class="lost" role="alert">
         <div class="lost-card">
           <Icon name="warning" />
           <strong>{title}</strong>
+          {reason && <Say text={reason} />}
           <p>{text}</p>
           {retry && (
             <div class="row">

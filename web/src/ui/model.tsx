@@ -2,11 +2,11 @@
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
-import type { ModelInfo, Sample, UpAxis } from "../contract";
+import type { ModelInfo, UpAxis } from "../contract";
 import { count, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { Button, Facts, Head, Section, Segments } from "./controls";
+import { Button, Facts, Head, Say, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
 import { useTouch } from "./touch";
@@ -19,16 +19,10 @@ export function ModelPanel({ app }: { app: App }) {
   const isTouch = useTouch();
   const open = model && (
     <>
-      {model.members.length === 1 ? (
-        <ModelCard app={app} model={model} about={samples.find(({ id }) => id === sample)?.sentence} />
-      ) : (
-        <Up app={app} model={model} />
-      )}
+      {model.members.length === 1 ? <ModelCard app={app} model={model} /> : <Up app={app} model={model} />}
       <Models app={app} model={model} />
       {model.notices.map((notice) => (
-        <p class="hint" key={notice}>
-          {sentence(notice)}
-        </p>
+        <Say key={notice} kind="hint" text={sentence(notice)} />
       ))}
     </>
   );
@@ -59,8 +53,8 @@ export function ModelPanel({ app }: { app: App }) {
       {sample === null && open}
       <Section title={T.model.samples}>
         <ul class="gallery">
-          {samples.map((one) => (
-            <SampleCard key={one.id} app={app} sample={one} isOpen={one.id === sample} />
+          {samples.map((id) => (
+            <SampleCard key={id} app={app} id={id} isOpen={id === sample} />
           ))}
         </ul>
       </Section>
@@ -98,9 +92,9 @@ export function Privacy() {
   );
 }
 
-function SampleCard({ app, sample: { id, label }, isOpen }: { app: App; sample: Sample; isOpen: boolean }) {
+function SampleCard({ app, id, isOpen }: { app: App; id: string; isOpen: boolean }) {
   const [hasPicture, setHasPicture] = useState(true);
-  const about = T.model.tips[id];
+  const { name = id, tip } = T.samples[id] ?? {};
   return (
     <li>
       <button
@@ -124,15 +118,15 @@ function SampleCard({ app, sample: { id, label }, isOpen }: { app: App; sample: 
           )}
         </span>
         <span class="grow">
-          <strong>{label}</strong>
-          {about && <span class="hint">{about}</span>}
+          <strong>{name}</strong>
+          {tip && <span class="hint">{tip}</span>}
         </span>
       </button>
     </li>
   );
 }
 
-function ModelCard({ app, model, about }: { app: App; model: ModelInfo; about: string | undefined }) {
+function ModelCard({ app, model }: { app: App; model: ModelInfo }) {
   const { min, max } = model.bounds;
   const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
   const rows: [string, string][] = [
@@ -150,7 +144,6 @@ function ModelCard({ app, model, about }: { app: App; model: ModelInfo; about: s
         <strong class="grow clip">{model.name}</strong>
         <Up app={app} model={model} />
       </div>
-      {about && <p class="hint">{about}</p>}
       <Facts rows={rows} />
     </section>
   );

@@ -6,7 +6,7 @@ import { cageBroken, hasUnmadeCage } from "../derived";
 import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
-import { CagePanel } from "./cage";
+import { CagePanel, sayMend } from "./cage";
 import { Button } from "./controls";
 import { ExportPanel } from "./export";
 import type { IconName } from "./icons";
@@ -77,8 +77,10 @@ function cageAction(state: AppState, app: App): Action | undefined {
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
   if (!state.cage) return make(T.panel.makeCage);
   if (!cageBroken(state) || hasUnmadeCage(state)) return undefined;
-  const fix = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
-  return fix ? { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) } : make(T.panel.newCage);
+  const found = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix);
+  if (!found?.fix) return make(T.panel.newCage);
+  const { fix, count } = found;
+  return { label: sayMend(fix, count), icon: "patch", run: () => app.cage.mend(fix) };
 }
 
 const BODIES: Record<StepName, (props: { app: App }) => preact.JSX.Element> = {

@@ -4,7 +4,7 @@ import type { BindReport, MeanMax } from "../contract";
 import { bytes, count, duration, percent, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { Badge, Facts, Fold } from "./controls";
+import { Badge, Facts, Fold, Say } from "./controls";
 
 /** A largest rest error below this fraction of the cage's diagonal is invisible: a tenth of a pixel on a 4K screen. */
 const INVISIBLE = 2.5e-5;
@@ -71,9 +71,7 @@ export function ReportCard({ report }: { report: BindReport }) {
         />
       </Fold>
       {report.notices.map((notice) => (
-        <p class="hint" key={notice}>
-          {sentence(notice)}
-        </p>
+        <Say key={notice} kind="hint" text={sentence(notice)} />
       ))}
     </section>
   );
@@ -95,7 +93,7 @@ export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): s
 /** Short name of a bind: method, solver, grid and backend. */
 function wayOf(report: BindReport): string {
   const { method, grid, backend } = report;
-  return `${T.report.short[method]}, ${solverName(report)}, ${grid}, ${backend.toUpperCase()}`;
+  return `${T.report.short[method]}, ${solverName(report)}, ${grid}, ${T.report.backends[backend]}`;
 }
 
 /** Fraction of the weight matrix that is stored. */

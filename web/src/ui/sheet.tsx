@@ -30,9 +30,9 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
         </section>
         {GROUPS.map((group) => (
           <section class="keys" key={group}>
-            <h3>{group}</h3>
+            <h3>{T.sheet.groups[group]}</h3>
             <dl>
-              {SHORTCUTS.filter((s) => s.group === group && s.label !== "").map((shortcut) => (
+              {SHORTCUTS.filter((s) => s.group === group && T.sheet.commands[s.command]).map((shortcut) => (
                 <Row key={shortcut.command} shortcut={shortcut} mac={mac} />
               ))}
             </dl>
@@ -69,7 +69,7 @@ function Row({ shortcut, mac }: { shortcut: Shortcut; mac: boolean }) {
           </>
         ))}
       </dt>
-      <dd>{shortcut.label}</dd>
+      <dd>{T.sheet.commands[shortcut.command]}</dd>
     </>
   );
 }

@@ -8,7 +8,7 @@ import { elementInUse } from "../derived";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { Button, IconButton, Segments } from "./controls";
+import { Button, IconButton, Say, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
 import { hintOf, statusOf, underWay } from "./status";
@@ -90,10 +90,10 @@ function Encloses({ app }: { app: App }) {
   const message = strays > 0 ? T.cage.partOutside : fault && sentence(fault.message);
   const kind = cage?.usable === false ? "bad" : message ? "warn" : check ? "good" : "";
   return (
-    <span class={`floating badge encloses ${kind}`} role="status">
+    <div class={`floating badge encloses ${kind}`} role="status">
       {(message || check) && <Icon name={message ? "warning" : "check"} />}
-      {message ?? (check ? T.cage.encloses : T.cage.checking)}
-    </span>
+      <Say text={message ?? (check ? T.cage.encloses : T.cage.checking)} />
+    </div>
   );
 }
 

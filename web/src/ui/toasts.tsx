@@ -6,8 +6,9 @@
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import type { Fix, Tell } from "../actions/context";
+import { type Message, textOf } from "../strings";
 import { T } from "../words";
-import { Button, IconButton } from "./controls";
+import { Button, IconButton, Say } from "./controls";
 import { Icon } from "./icons";
 
 /** Time a message is shown, ms; longer if it has a button. */
@@ -19,7 +20,7 @@ const MOST = 3;
 interface Toast {
   readonly id: number;
   readonly title?: string;
-  readonly text: string;
+  readonly text: Message;
   readonly fixes: readonly Fix[];
   /** Whether the message stays until it is closed. */
   readonly stays?: boolean;
@@ -40,7 +41,8 @@ export function createToasts(): ToastParts {
 
   /** A repeated message replaces the earlier one. */
   const add = (list: typeof said, toast: Omit<Toast, "id">) => {
-    const others = list.value.filter(({ title, text }) => title !== toast.title || text !== toast.text);
+    const isSame = ({ title, text }: Toast) => title === toast.title && textOf(text) === textOf(toast.text);
+    const others = list.value.filter((other) => !isSame(other));
     next += 1;
     const all = [...others, { ...toast, id: next }];
     const latest = all.filter(({ stays }) => !stays).slice(-MOST);
@@ -137,7 +139,7 @@ function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: (
   return (
     <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(SHOWN_MS)} onFocusIn={stay}>
       <Icon name="info" />
-      <p>{text}</p>
+      <Say text={text} />
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
       <Fixes fixes={fixes} close={close} />
     </div>
@@ -150,7 +152,7 @@ function Problem({ toast: { title, text, fixes }, close }: { toast: Toast; close
       <Icon name="warning" />
       <div class="grow">
         <strong>{title}</strong>
-        <p>{text}</p>
+        <Say text={text} />
       </div>
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
       <Fixes fixes={fixes} close={close} />

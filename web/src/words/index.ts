@@ -1,5 +1,34 @@
-/** The language of the page. */
+/** The language of the page. To add one: a folder like en/, and a line in `LANGUAGES`. */
 
-import { EN, type Words } from "./en";
+import { setLocale } from "../format";
+import { EN } from "./en";
 
-export const T: Words = EN;
+/** What each language defines. */
+export type Language = typeof EN;
+
+const LANGUAGES = new Map<string, () => Promise<Language>>([
+  ["en", async () => EN],
+  ["pseudo", async () => (await import("./pseudo")).PSEUDO],
+]);
+
+let language = EN;
+/** The sentences of the page. */
+export let T = EN.words;
+/** The sentences of the tour, after `loadTour`. */
+export let TOUR: Awaited<ReturnType<Language["tourWords"]>>;
+
+/** Selects the language that the address asks for (`?lang=`), or else the first one that the browser prefers. */
+export async function chooseLanguage(): Promise<void> {
+  const asked = new URLSearchParams(location.search).get("lang") ?? "";
+  const preferred = navigator.languages.map((tag) => tag.replace(/-.*/, ""));
+  const name = [asked, ...preferred].find((name) => LANGUAGES.has(name));
+  // Offline, a language may not be there.
+  language = (await LANGUAGES.get(name ?? "en")?.().catch(() => undefined)) ?? EN;
+  T = language.words;
+  setLocale(language.locale);
+  document.documentElement.lang = language.locale;
+}
+
+export async function loadTour(): Promise<void> {
+  TOUR = await language.tourWords();
+}

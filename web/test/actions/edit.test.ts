@@ -24,7 +24,7 @@ it("a gesture adds one undo step, a cancelled one adds none", () => {
   expect(edit.begin("grab", 0, 0)).toBe(true);
   expect(edit.begin("rotate", 0, 0), "one at a time").toBe(false);
   edit.drag(1, 1);
-  expect(store.get().gesture).toBe("Move");
+  expect(store.get().gesture).toBe("Move 0.25 along X");
   edit.end(true);
   edit.begin("scale", 0, 0);
   edit.end(false);
@@ -37,7 +37,7 @@ it("typed numbers set the amount of a gesture", () => {
   teach({ typeTransform: (amount) => amounts.push(amount ?? Number.NaN) });
   edit.begin("grab", 0, 0);
   expect([edit.type("1"), edit.type("."), edit.type("5"), edit.type("q")]).toEqual([true, true, true, false]);
-  expect([amounts.at(-1), store.get().gesture]).toEqual([1.5, "Move  [1.5]"]);
+  expect([amounts.at(-1), store.get().gesture]).toEqual([1.5, "Move 0.25 along X  [1.5]"]);
 });
 
 it("consecutive nudges are one undo step, and come before the next command", () => {

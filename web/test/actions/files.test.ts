@@ -157,7 +157,7 @@ it("a project restores settings except the memory limit, and reports what it can
 
 it("a sample that cannot be built is named", async () => {
   const { files, asked, store, problems } = page();
-  store.set({ samples: [{ id: "rat", label: "Rat" }] });
+  store.set({ samples: ["rat"] });
   const opened = files.openSample("rat");
   await settled();
   expect(store.get().busy).toBe("Opening Rat");

@@ -3,7 +3,7 @@
 import type { Lack } from "../contract";
 import { named } from "./client";
 
-/** Name of the GPU that the browser would use. */
+/** Name of the GPU that the browser would use; empty if the browser does not tell. */
 export async function findAdapter(): Promise<string> {
   const { gpu } = navigator;
   if (!gpu) throw named("NoWebGPU", "this browser has no WebGPU");
@@ -11,7 +11,7 @@ export async function findAdapter(): Promise<string> {
   if (!adapter) throw named("NoAdapter", "this browser found no GPU that it may use");
   const { description, vendor, architecture, device } = adapter.info;
   const words = description || [vendor, architecture || device].filter(Boolean).join(" ");
-  return words ? tidy(words) : "this GPU";
+  return tidy(words);
 }
 
 /** Capitalises words: browsers report lower case. */

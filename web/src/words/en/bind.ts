@@ -83,6 +83,7 @@ export const report = {
   short: { embedded: "Embedded", classic: "Classic" },
   solvers: { multigrid: "multigrid", jacobi: "Jacobi", cg: "conjugate gradients" },
   vCycles: " with V-cycles",
+  backends: { gpu: "GPU", cpu: "CPU" },
   boundIn: (ms: number) => `Bound in ${duration(ms)}`,
   roundOff: "Converged to f32",
   converged: "Converged",

@@ -11,7 +11,9 @@ export const cage = {
     auto: "Follows the limbs of the model and encloses every vertex. It is checked before you see it.",
     hull: "A rough hull of about 24 vertices: good for bodies without limbs, and quick to pose.",
     box: "A box around the model, its sides divided into squares: free-form deformation, good for studying.",
-    file: `A closed mesh that you modelled around it, as a ${endings("disjunction")} file.`,
+    get file() {
+      return `A closed mesh that you modelled around it, as a ${endings("disjunction")} file.`;
+    },
   },
   wanted: "Vertices, at most",
   closeness: "Closeness",
@@ -97,6 +99,15 @@ export const cage = {
   sparsest: (share: string) =>
     `These vertices follow the shape within ${share} of its size, the closest setting.`,
   fineEnough: "Fine enough",
+  repairs: {
+    weld: () => "Join them",
+    drop_degenerate: (n: number) => (n === 1 ? "Drop it" : `Drop all ${n}`),
+    mirror: () => "Mirror this half",
+    fill_holes: () => "Fill the holes",
+    flip: () => "Turn them outward",
+    grow: () => "Grow the cage",
+  },
+  bindFiner: (cells: number) => `Bind with ${cells} cells`,
   more: (made: number, wanted: number) =>
     `The model's holes and gaps need ${made} vertices instead of ${wanted}.`,
 };

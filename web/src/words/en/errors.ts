@@ -44,13 +44,25 @@ export const offline = {
   reload: "Reload for the new version",
 };
 
+/** What is wrong with a link. */
+export const link = {
+  noSample: "It does not say which sample it shows.",
+  long: (most: number) => `It is longer than ${most} characters.`,
+  unreadable: {
+    pose: "Its pose cannot be read.",
+    view: "Its view cannot be read.",
+    controls: "Its controls cannot be read.",
+  },
+  unknown: (sample: string) => `There is no sample called "${sample}" here.`,
+};
+
 export const lost = {
   title: "The graphics device was lost",
   back: "Restoring everything…",
   notBack: "The graphics device could not be restored",
-  kept: (reason: string) => `${reason} Your work is kept in this browser.`,
+  kept: "Your work is kept in this browser.",
   again: "The graphics device was lost again",
-  others: (reason: string) => `${reason} Close other programs that use it, then try again.`,
+  others: "Close other programs that use it, then try again.",
 };
 
 export const crash = {
@@ -60,7 +72,7 @@ export const crash = {
   fresh: "“Start fresh” opens a sample. Your work is still kept; open it from the list when you want it.",
   report: "Report",
   showReport: "Show the report",
-  while: (busy: string) => `It happened while ${busy}.`,
+  while: (busy: string) => `It happened while ${busy.charAt(0).toLowerCase()}${busy.slice(1)}.`,
   with: (name: string) => `It happened with ${name} open.`,
   nothing: "Nothing was open yet.",
 };

@@ -1,13 +1,12 @@
-/** Every sentence of the page in English, one file per panel. To add a language, copy this folder and list it in ../index.ts and
- * ../tour.ts. */
+/** Every sentence of the page in English, one file per panel. */
 
 import { bar, panel, tour } from "./bar";
 import { bind, report } from "./bind";
 import { cage } from "./cage";
 import { clips } from "./clips";
-import { crash, failed, fixes, lost, offline } from "./errors";
+import { crash, failed, fixes, link, lost, offline } from "./errors";
 import { exports } from "./exports";
-import { model, opening } from "./model";
+import { model, opening, samples } from "./model";
 import { models } from "./models";
 import { did, pose, pull } from "./pose";
 import { legend, see } from "./see";
@@ -16,7 +15,7 @@ import { eta, hints, status, toast, view } from "./view";
 import { without } from "./without";
 import { works } from "./works";
 
-export const EN = {
+const words = {
   product: "Cagework",
   privacy: "Your files never leave this computer: everything is computed in this page.",
   close: "Close",
@@ -29,6 +28,7 @@ export const EN = {
   fixes,
   failed,
   without,
+  link,
   lost,
   offline,
   crash,
@@ -37,6 +37,7 @@ export const EN = {
   model,
   models,
   opening,
+  samples,
   works,
   cage,
   bind,
@@ -57,5 +58,10 @@ export const EN = {
   tour,
 };
 
-/** The keys that each language must define. */
-export type Words = typeof EN;
+export const EN = {
+  /** Language of numbers, units and lists, and of the document. */
+  locale: "en",
+  words,
+  /** Downloads the sentences of the tour, which starts later or never. */
+  tourWords: async () => (await import("./tour")).tourWords,
+};

@@ -10,7 +10,9 @@ export const model = {
     "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or open your own file.",
   drop: "Drop models here",
   dropTouch: "Your own model",
-  kinds: `${endings("disjunction")}, together with the files they refer to, or a whole folder. Several models share one cage.`,
+  get kinds() {
+    return `${endings("disjunction")}, together with the files they refer to, or a whole folder. Several models share one cage.`;
+  },
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
   samples: "Samples",
@@ -28,13 +30,37 @@ export const model = {
   joints: (n: number) => plural(n, "joint"),
   clips: (n: number) => plural(n, "clip"),
   morphTargets: (n: number) => plural(n, "morph target"),
-  tips: {
-    rat: "The paper's rat. Pull its nose to turn its head: the feet stay.",
-    humanoid: "Lift a knee: the other leg, a hand's breadth away, stays.",
-    clamp: "Pull the lower jaw open, then compare with mean value and Green coordinates.",
-    strider: "Legs as thin as a grid cell. Pull one foot: the other legs stay.",
-  } as Record<string, string>,
 };
+
+/** The built-in models, by identifier: names of model and poses, and what to try. */
+export const samples: Readonly<Record<string, Sample>> = {
+  rat: {
+    name: "Rat",
+    poses: ["Tail up, head turned", "Looking round"],
+    tip: "The paper's rat. Pull its nose to turn its head: the feet stay.",
+  },
+  humanoid: {
+    name: "Legs close together",
+    poses: ["A step", "Knee up"],
+    tip: "Lift a knee: the other leg, a hand's breadth away, stays.",
+  },
+  clamp: {
+    name: "Clamp",
+    poses: ["Lower jaw open", "Lower jaw pulled down"],
+    tip: "Pull the lower jaw open, then compare with mean value and Green coordinates.",
+  },
+  strider: {
+    name: "Strider",
+    poses: ["Front legs raised", "One leg up"],
+    tip: "Legs as thin as a grid cell. Pull one foot: the other legs stay.",
+  },
+};
+
+interface Sample {
+  readonly name: string;
+  readonly poses: readonly string[];
+  readonly tip: string;
+}
 
 export const opening = {
   starting: "Starting",
@@ -58,7 +84,9 @@ export const opening = {
   empty: "This file is empty",
   noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,
   dropped: "Nothing was dropped.",
-  kinds: `Cagework opens ${endings("conjunction")} files.`,
+  get kinds() {
+    return `Cagework opens ${endings("conjunction")} files.`;
+  },
   companions: "These files belong to a .gltf or .obj file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {

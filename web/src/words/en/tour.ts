@@ -5,7 +5,7 @@ import { count, duration, scientific } from "../../format";
 
 type Reports = readonly BindReport[];
 
-export const EN_TOUR = {
+export const tourWords = {
   name: "Tour",
   of: (stop: number, all: number) => `${stop} of ${all}`,
   all: "Stops of the tour",
