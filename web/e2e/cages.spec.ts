@@ -77,7 +77,7 @@ test("a gap between legs stays open by default and at a chosen width", async ({ 
   await bound(page);
   await page.getByRole("button", { name: /^Cage/ }).first().click();
   const gaps = page.getByLabel("Gaps that stay open");
-  await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertex count allows");
+  await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertices allow");
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
   const primary = page.locator(".panel-foot .primary");

@@ -25,7 +25,7 @@ export const cage = {
   tight: "as tight as possible",
   ofSize: (share: string) => `${share} of its size`,
   gaps: "Gaps that stay open",
-  asVertices: "as the vertex count allows",
+  asVertices: "as the vertices allow",
   from: (share: string) => `from ${share} of its size`,
   symmetry: "Symmetric left and right",
   symmetries: { auto: "If the model is", on: "Yes", off: "No" },
