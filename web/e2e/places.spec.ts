@@ -26,6 +26,17 @@ async function fits(page: Page): Promise<void> {
   expect(button.x + button.width).toBeLessThanOrEqual(outer.x + outer.width);
   await shoot(page, "long-names");
 
+  await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+  await page.keyboard.press("]");
+  const fields = page.locator(".axis-field input");
+  await expect(fields).toHaveCount(3);
+  for (const field of await fields.all()) {
+    await field.evaluate((input: HTMLInputElement) => {
+      input.value = "-0.001235";
+    });
+    expect(await isWhole(field)).toBe(true);
+  }
+
   const tools = page.getByRole("toolbar", { name: "Tools" }).getByRole("button");
   await tools.first().hover();
   const tip = page.getByRole("tooltip");

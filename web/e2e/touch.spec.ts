@@ -59,6 +59,23 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
       await page.getByRole("button", { name: step, exact: false }).first().tap();
       await expect(page.locator("#panel")).not.toContainText(/wheel|shift-click|drop /i);
     }
+    await page.keyboard.press("]");
+    await expect(page.locator(".axis-field input")).toHaveCount(3);
+    for (const size of [
+      { width: 390, height: 844 },
+      { width: 844, height: 390 },
+    ]) {
+      await page.setViewportSize(size);
+      for (const field of await page.locator(".axis-field input").all()) {
+        const isWhole = await field.evaluate((input: HTMLInputElement) => {
+          input.value = "-0.001235";
+          return input.scrollWidth <= input.clientWidth;
+        });
+        expect(isWhole, JSON.stringify(size)).toBe(true);
+      }
+    }
+    await page.setViewportSize({ width: 412, height: 760 });
+    await page.keyboard.press("Alt+a");
     const before = await drawing(page);
     const { x, y } = await grip(page, [0.5, 0.4]);
     const spots = [
