@@ -4,10 +4,9 @@ use std::ops::ControlFlow;
 
 use cagework_core::bind::BindError;
 use cagework_core::deform::{deform_bound, deform_vertices};
-use cagework_core::green::{green_controls, green_weights};
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
-use cagework_core::{Binding, Bounds, Cage, Frames, Weights, subdivided_box};
+use cagework_core::{Binding, Bounds, Cage, Coordinates, Frames, Weights, subdivided_box};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
 use cagework_pose::Parts;
@@ -146,15 +145,15 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let bounds = Bounds::of(&positions).expect("there are some");
     // Green coordinates are defined inside the cage only.
     let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
-    let green = green_weights(&positions, &cage, u64::MAX, &Silent).expect("all are inside");
+    let green = Coordinates::Green.weights(&positions, &cage, u64::MAX, &Silent).expect("all are inside");
     let pose = posed(cage.positions());
-    let expected = flat(&deform_vertices(&green, &green_controls(&cage, &pose)));
+    let expected = flat(&deform_vertices(&green, &Coordinates::Green.columns(&cage, &pose)));
     for draws_only in [false, true] {
         let mut session = session_with(&ContextOptions { draws_only, ..ContextOptions::default() });
         block_on(session.set_cage(&cage)).expect("the cage is good");
         let error = block_on(session.adopt(green.clone(), Frames::default())).unwrap_err().to_string();
         assert!(error.contains("controls"), "{error}");
-        block_on(session.adopt_green(green.clone())).expect("they belong to it");
+        block_on(session.adopt_closed_form(Coordinates::Green, green.clone())).expect("they belong to it");
         session.pose(&pose);
         let found = flat(&block_on(session.read_positions()).expect("they come back"));
         assert_close(&found, &expected, 2e-5);

@@ -5,6 +5,7 @@ import { BIND_DEFAULTS, type BindOptions, CAGE_DEFAULTS } from "@cagework/core/c
 export {
   BIND_DEFAULTS,
   CAGE_DEFAULTS,
+  COORDINATES,
   MODEL_ENDINGS,
   RANGES,
   RIG_DEFAULTS,

@@ -21,7 +21,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
-pub(crate) use render::{CompareArg, RenderArgs, ShowArg};
+pub(crate) use render::{RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
 pub(crate) use solve::{MemoryArgs, SolveArgs};
 

@@ -56,7 +56,7 @@ pub(crate) enum CliError {
     /// A repair of the cage failed.
     #[error(transparent)]
     Repair(#[from] RepairError),
-    /// Mean value or Green coordinates could not be computed.
+    /// Coordinates by a closed form could not be computed.
     #[error(transparent)]
     ClosedForm(#[from] ClosedFormError),
     /// A plot or picture could not be drawn or encoded.

@@ -5,16 +5,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cagework_core::bind::Binding;
-use cagework_core::green::green_weights;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Controls, Frames, Weights, mean_value_weights};
+use cagework_core::{BindOptions, Controls, Coordinates, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
 use cagework_io::{Model, shown};
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::args::{CageSource, CompareArg, RenderArgs, ShowArg};
+use crate::args::{CageSource, RenderArgs, ShowArg};
 use crate::bind::bind_positions;
 use crate::controls::with_inner;
 use crate::deform::load_weights;
@@ -32,7 +31,7 @@ struct RenderSummary {
     adapter: String,
     /// Coordinates of the left and the right picture, with `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    compared: Option<[&'static str; 2]>,
+    compared: Option<[String; 2]>,
     /// Time to draw and read back, without binding, file input and output.
     render_ms: f64,
     notices: Vec<String>,
@@ -73,24 +72,15 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     session.set_scene(scene);
     if let (Some(cage), Some(compared)) = (&cage, args.compare) {
         let mut twin = pollster::block_on(session.twin())?;
-        let n_controls = cage.controls().n_controls();
-        let limit = args.read.memory.bytes();
-        match compared {
-            CompareArg::MeanValue => {
-                let weights = mean_value_weights(&model.positions, &cage.cage, limit, &Bar::start())?
-                    .widened(n_controls);
-                pollster::block_on(twin.adopt(weights, Frames::default()))?;
-            }
-            CompareArg::Plain => {
-                let options = args.solve.options(args.grid, args.read.memory);
-                let Binding { weights, frames, .. } =
-                    bind_positions(&model.positions, (&cage.cage).into(), args.solve.on_gpu(), &options)?;
-                pollster::block_on(twin.adopt(weights.widened(n_controls), frames))?;
-            }
-            CompareArg::Green => {
-                let weights = green_weights(&model.positions, &cage.cage, limit, &Bar::start())?;
-                pollster::block_on(twin.adopt_green(weights))?;
-            }
+        if compared == Coordinates::Harmonic {
+            let options = args.solve.options(args.grid, args.read.memory);
+            let Binding { weights, frames, .. } =
+                bind_positions(&model.positions, (&cage.cage).into(), args.solve.on_gpu(), &options)?;
+            pollster::block_on(twin.adopt(weights, frames))?;
+        } else {
+            let limit = args.read.memory.bytes();
+            let weights = compared.weights(&model.positions, &cage.cage, limit, &Bar::start())?;
+            pollster::block_on(twin.adopt_closed_form(compared, weights))?;
         }
         other = Some(twin);
     }
@@ -108,10 +98,9 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
 
     let started = Instant::now();
     let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
-    let compared = args.compare.map(|compared| match compared {
-        CompareArg::MeanValue => ["harmonic coordinates", "mean value coordinates"],
-        CompareArg::Green => ["harmonic coordinates", "Green coordinates"],
-        CompareArg::Plain => ["harmonic coordinates", "harmonic coordinates of the plain cage"],
+    let compared = args.compare.map(|right| {
+        let of = if right == Coordinates::Harmonic { " of the plain cage" } else { "" };
+        ["harmonic coordinates".to_owned(), format!("{} coordinates{of}", right.name())]
     });
     if let Some(mut other) = other {
         *other.camera_mut() = *session.camera();
@@ -137,13 +126,6 @@ fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     if args.compare.is_some() && matches!(args.show, ShowArg::Cells | ShowArg::Slice) {
         let message = "--compare shows a deformed model, but --show is a slice of the grid".to_owned();
         return Err(CliError::Mismatch { message, hint });
-    }
-    if args.compare == Some(CompareArg::Green) && args.controls.controls.is_some() {
-        let message = "Green coordinates do not support inner controls".to_owned();
-        return Err(CliError::Mismatch {
-            message,
-            hint: "compare with mean-value or plain, or leave out --controls",
-        });
     }
     if args.compare.is_some() && args.size.0[0] < MIN_PAIR_WIDTH {
         let message = format!("--compare needs a picture at least {MIN_PAIR_WIDTH} pixels wide");
@@ -276,7 +258,7 @@ fn text(summary: &RenderSummary) -> String {
         summary.render_ms,
         shown(&summary.output)
     );
-    if let Some([left, right]) = summary.compared {
+    if let Some([left, right]) = &summary.compared {
         out += &format!("left: {left}; right: {right}\n");
     }
     for notice in &summary.notices {

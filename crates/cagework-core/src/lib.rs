@@ -6,9 +6,9 @@
 pub mod assemble;
 pub mod bind;
 pub mod cage;
-pub mod closed_form;
 pub mod contact;
 pub mod controls;
+pub mod coordinates;
 pub mod crossing;
 pub mod deform;
 
@@ -17,10 +17,8 @@ pub mod field;
 pub mod fill;
 pub mod frames;
 pub mod geometry;
-pub mod green;
 pub mod grid;
 pub mod levels;
-pub mod mean_value;
 pub mod mesh;
 pub mod options;
 pub mod progress;
@@ -42,10 +40,9 @@ pub mod words;
 
 pub use bind::{BindError, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect, subdivided_box};
-pub use closed_form::ClosedFormError;
 pub use controls::{ControlError, ControlSet, Controls, InnerControls, InnerElement};
+pub use coordinates::{ClosedFormError, Coordinates};
 pub use frames::Frames;
-pub use mean_value::mean_value_weights;
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use options::BindOptions;
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};

@@ -45,6 +45,8 @@ macro_rules! choice {
     };
 }
 
+pub(crate) use choice;
+
 choice! {
     /// Discretisation of the cage.
     Method {

@@ -132,12 +132,6 @@ impl Weights {
         Self::from_parts(n_columns, indptr, Vec::with_capacity(n_nonzeros), Vec::with_capacity(n_nonzeros))
     }
 
-    /// The matrix padded with zero columns to `n_columns`.
-    #[must_use]
-    pub fn widened(self, n_columns: usize) -> Self {
-        Self { n_columns: self.n_columns.max(n_columns as u32), ..self }
-    }
-
     /// A range of columns, renumbered from 0.
     #[must_use]
     pub fn columns(&self, range: std::ops::Range<u32>) -> Self {

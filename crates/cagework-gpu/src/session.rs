@@ -4,7 +4,7 @@
 //! a worker binds and passes weights ([`Session::bind`] there, [`Session::adopt`] here).
 
 mod again;
-mod green;
+mod columns;
 mod mover;
 mod parts;
 mod picture;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
-use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Frames, Progress, Weights};
+use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Coordinates, Frames, Progress, Weights};
 use cagework_pose::parts::{BoundParts, Parts};
 use glam::{Vec2, Vec3};
 
@@ -27,7 +27,7 @@ use crate::skin::Skinner;
 
 pub use picture::MAX_PICTURE;
 
-use green::check_size;
+use columns::check_size;
 use mover::Mover;
 
 /// A model, its cage and weights on one GPU.
@@ -52,11 +52,10 @@ pub struct Session {
 /// Weights on the CPU and GPU.
 #[derive(Debug)]
 struct SessionBind {
+    kind: Coordinates,
     /// Shared, so that [`Session::recover`] needs no copy.
     weights: Arc<Weights>,
     frames: Arc<Frames>,
-    /// Green coordinates: further columns for the cage's triangles.
-    is_green: bool,
     mover: Mover,
     /// Held and rigid parts, if any.
     parts: Option<Arc<BoundParts>>,
@@ -146,16 +145,17 @@ impl Session {
         let (model, controls) = self.parts()?;
         if self.context.draws_only() {
             let binding = cagework_core::bind(&model.positions, controls, options, progress)?;
-            self.bound(binding.weights.into(), binding.frames.into(), false, None).await?;
+            self.bound(Coordinates::Harmonic, binding.weights.into(), binding.frames.into(), None).await?;
             return Ok(binding.report);
         }
         let (binding, weights) =
             bind_gpu(&model.positions, controls, options, progress, &self.context).await?;
-        self.bound(binding.weights.into(), binding.frames.into(), false, Some(weights)).await?;
+        self.bound(Coordinates::Harmonic, binding.weights.into(), binding.frames.into(), Some(weights))
+            .await?;
         Ok(binding.report)
     }
 
-    /// Uses weights that were computed elsewhere.
+    /// Uses weights of harmonic coordinates that were computed elsewhere.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if sizes do not match them;
@@ -173,7 +173,7 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         check_size(&weights, rows, columns + frames.n_columns())?;
-        self.bound(weights, frames, false, None).await
+        self.bound(Coordinates::Harmonic, weights, frames, None).await
     }
 
     fn parts(&self) -> Result<(&Arc<DrawModel>, Controls<'_>), GpuError> {
@@ -186,17 +186,17 @@ impl Session {
 
     async fn bound(
         &mut self,
+        kind: Coordinates,
         weights: Arc<Weights>,
         frames: Arc<Frames>,
-        is_green: bool,
         on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
         let mover = Mover::new(&self.context, model, &weights, &frames, on_gpu).await?;
-        mover.pose(&self.context, &self.columns(is_green, &self.pose));
+        mover.pose(&self.context, &self.columns(kind, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
-        self.bound = Some(SessionBind { weights, frames, is_green, mover, parts: None });
+        self.bound = Some(SessionBind { kind, weights, frames, mover, parts: None });
         self.hold().await?;
         self.write_values();
         Ok(())
@@ -229,7 +229,7 @@ impl Session {
         self.pose.copy_from_slice(cage_positions);
         self.renderer.pose(&self.context, cage_positions);
         if let Some(bound) = &self.bound {
-            bound.mover.pose(&self.context, &self.columns(bound.is_green, cage_positions));
+            bound.mover.pose(&self.context, &self.columns(bound.kind, cage_positions));
             self.moved = true;
         }
     }
@@ -289,7 +289,7 @@ impl Session {
         let values: Vec<f32> = match self.scene.mesh {
             MeshStyle::Weights { column } => bound.weights.column(column).collect(),
             MeshStyle::Errors => {
-                let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
+                let at_rest = self.columns(bound.kind, Controls::from(set).rest());
                 let rebuilt = deform_bound(&bound.weights, &bound.frames, &at_rest);
                 let scale = 1.0 / set.cage().diagonal();
                 rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()

@@ -9,11 +9,10 @@ use cagework_cage::generate::{CageOptions, GeneratedCage, generate};
 use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{self, Lattice};
-use cagework_core::green::green_weights;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Binding, ControlSet, Controls, PolygonMesh, mean_value_weights};
+use cagework_core::{BindOptions, Binding, ControlSet, Controls, Coordinates, PolygonMesh};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use glam::Vec3;
 use js_sys::Function;
@@ -26,7 +25,7 @@ use cagework_editor::CageControls;
 
 use crate::controls::{control_set, from_js};
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{Coordinates, JsBindOptions, JsCageOptions, READ_LIMIT, decode};
+use crate::options::{JsBindOptions, JsCageOptions, READ_LIMIT, decode};
 use crate::problems::{self, Check};
 use crate::views::object;
 
@@ -96,7 +95,7 @@ impl Binder {
         })
     }
 
-    /// Mean value or Green coordinates in the cage without interior controls. Arrays as for `bind`.
+    /// Coordinates by a closed form in the cage without interior controls. Arrays as for `bind`.
     ///
     /// # Errors
     /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
@@ -110,18 +109,9 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
     ) -> Result<Bound, JsValue> {
         let set = control_set(cage, corners, controls)?;
-        let by_formula = match decode(kind)? {
-            Coordinates::MeanValue => mean_value_weights,
-            Coordinates::Green => green_weights,
-            Coordinates::Harmonic => {
-                return Err(Fault::new(
-                    ErrorName::Error,
-                    "harmonic coordinates have no closed form: use bind instead",
-                )
-                .into());
-            }
-        };
-        let weights = by_formula(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
+        let kind: Coordinates = decode(kind)?;
+        let weights =
+            kind.weights(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
         Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 

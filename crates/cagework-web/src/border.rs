@@ -10,12 +10,12 @@ use cagework_cage::generate::{
 };
 use cagework_core::deform::OutsideVertex;
 use cagework_core::options::{
-    Backend, CellShape, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
+    Backend, CellShape, Choice, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
 };
 use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
-use cagework_core::{BindOptions, Frames, InnerElement, Stage};
+use cagework_core::{BindOptions, Coordinates, Frames, InnerElement, Stage};
 use cagework_editor::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_editor::{
     CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
@@ -30,8 +30,8 @@ use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::opening::{CageContents, OpenContents, PoseContents};
 use crate::options::{
-    Colour, Coordinates, GizmoHandle, JsBindOptions, JsCageOptions, JsGizmo, JsJoints, JsPullOptions,
-    JsRigOptions, JsSceneOptions, JsSymmetry, JsTheme, SliceShown,
+    Colour, GizmoHandle, JsBindOptions, JsCageOptions, JsGizmo, JsJoints, JsPullOptions, JsRigOptions,
+    JsSceneOptions, JsSymmetry, JsTheme, SliceShown,
 };
 use crate::settings::Settings;
 use crate::views::{
@@ -149,6 +149,8 @@ fn generated_types_are_up_to_date() {
     text += &constant("CAGE_DEFAULTS", "CageOptions", &JsCageOptions::from(CageOptions::default()));
     text += &constant("RIG_DEFAULTS", "RigOptions", &JsRigOptions::default());
     text += &constant("SCENE_DEFAULTS", "SceneOptions", &JsSceneOptions::default());
+    let kinds: Vec<&str> = Coordinates::ALL.iter().map(|(word, _)| *word).collect();
+    text += &constant("COORDINATES", "readonly Coordinates[]", &kinds);
     let formats = ModelFormat::ALL.into_iter();
     let endings: Vec<&str> = formats.clone().flat_map(ModelFormat::endings).copied().collect();
     writeln!(

@@ -7,10 +7,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use async_lock::Mutex;
+use cagework_core::Coordinates;
 use cagework_gpu::Session;
 
 use crate::error::Answer;
-use crate::options::Coordinates;
 use crate::state::{GpuKeys, State, Upload};
 use crate::surface::Surface;
 

@@ -1,8 +1,8 @@
 //! Option types as JavaScript passes them; contract.ts has their declarations.
 
 use cagework_cage::generate::{CageOptions, Shape, Symmetry};
-use cagework_core::BindOptions;
 use cagework_core::options::{Backend, Solver};
+use cagework_core::{BindOptions, Coordinates};
 use cagework_gpu::render::Theme;
 use cagework_io::{Joints, ReshapeOptions, value_fault};
 use serde::de::DeserializeOwned;
@@ -182,16 +182,6 @@ pub(crate) enum Colour {
     Clay,
     Weight,
     Error,
-}
-
-/// Kind of coordinates.
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-pub(crate) enum Coordinates {
-    Harmonic,
-    MeanValue,
-    Green,
 }
 
 /// Quantity that the slice shows.

@@ -8,7 +8,7 @@ use cagework_core::deform::OutsideVertex;
 use cagework_core::enclosure::Enclosure;
 use cagework_core::field::FieldWeights;
 use cagework_core::slice::Slice;
-use cagework_core::{Bounds, ControlSet, Frames, PolygonMesh, Weights};
+use cagework_core::{Bounds, ControlSet, Coordinates, Frames, PolygonMesh, Weights};
 use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, DrawModel, GizmoPart};
@@ -18,7 +18,7 @@ use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 use crate::joints::JointDots;
-use crate::options::{Coordinates, JsSceneOptions};
+use crate::options::JsSceneOptions;
 use crate::playing::Playback;
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState, View};

@@ -132,7 +132,7 @@ export function createBind(ctx: Context): BindActions {
     async prepareCompare(kinds) {
       for (const kind of kinds) {
         if (kind === "harmonic") continue;
-        const isThere = await attempt(ctx, T.failed.formula[kind], () =>
+        const isThere = await attempt(ctx, T.failed.formula(T.coordinates[kind]), () =>
           ctx.queue.add("compare", async (signal) => {
             const session = ctx.session();
             if (!session.engine.hasOther(kind)) await follow(signal, session.bindByFormula(kind));

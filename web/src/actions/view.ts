@@ -40,8 +40,6 @@ export interface View {
 
 /** Pause before a moved slice is computed, ms: a slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
-/** Coordinates that can be compared, in display order. */
-export const COORDINATES = ["harmonic", "mean_value", "green"] as const satisfies Coordinates[];
 
 /**
  * Whether these are compared: at least two. Others are never shown alone, because gestures act on the harmonic shape.

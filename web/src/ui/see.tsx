@@ -1,8 +1,9 @@
 /** The See panel: colours, wireframes, grid slice, and coordinates side by side. */
 
-import { COORDINATES, isComparison } from "../actions/view";
+import { isComparison } from "../actions/view";
 import type { App } from "../app";
 import type { Coordinates, SceneOptions } from "../contract";
+import { COORDINATES } from "../defaults";
 import { percent } from "../format";
 import type { Slice } from "../state";
 import { T } from "../words";

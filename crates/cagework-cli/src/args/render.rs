@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use cagework_core::Coordinates;
+use cagework_core::options::Choice;
 use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
@@ -44,8 +47,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) weights: Option<PathBuf>,
     /// Draw two pictures side by side: harmonic coordinates on the left, these coordinates on the right.
-    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "mean-value", requires = "cage")]
-    pub(crate) compare: Option<CompareArg>,
+    #[arg(long, value_parser = compared(), num_args = 0..=1, default_missing_value = "mean-value", requires = "cage")]
+    pub(crate) compare: Option<Coordinates>,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = ShowArg::Solid)]
     pub(crate) show: ShowArg,
@@ -92,15 +95,21 @@ pub(crate) struct RenderArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// Coordinates to compare harmonic coordinates with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum CompareArg {
-    /// Mean value coordinates (closed form; a vertex also moves parts of the model across a gap of the cage).
-    MeanValue,
-    /// Green coordinates (closed form; they preserve the shape of details and do not interpolate the cage).
-    Green,
-    /// Harmonic coordinates of the cage without --smooth and --controls.
-    Plain,
+/// Word of harmonic coordinates as those to compare with.
+const PLAIN: &str = "plain";
+
+/// Parser of the coordinates to compare with.
+fn compared() -> impl TypedValueParser<Value = Coordinates> {
+    let forms =
+        Coordinates::ALL.iter().filter(|(_, kind)| *kind != Coordinates::Harmonic).map(|(word, kind)| {
+            let name = kind.name();
+            let help = format!("{}{} coordinates ({})", name[..1].to_uppercase(), &name[1..], kind.about());
+            PossibleValue::new(word.replace('_', "-")).help(help)
+        });
+    let plain =
+        PossibleValue::new(PLAIN).help("Harmonic coordinates of the cage without --smooth and --controls");
+    PossibleValuesParser::new(forms.chain([plain]))
+        .try_map(|word| if word == PLAIN { Ok(Coordinates::Harmonic) } else { word.parse() })
 }
 
 /// What to draw.

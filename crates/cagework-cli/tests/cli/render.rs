@@ -153,6 +153,12 @@ fn compare_draws_both_coordinates_side_by_side() {
     assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{} pixels differ at rest", differing(&rest));
     let (green, _) = picture("--compare green --pose pose.obj");
     assert!(differing(&green) > 10 * MAX_ROUND_OFF_PIXELS && green != posed);
+    // Only the harmonic coordinates on the left have the control inside.
+    sandbox.write("inner.obj", "v 0.5 1.3 0\np 1\n");
+    for kind in ["mean-value", "green", "plain"] {
+        let (rest, _) = picture(&format!("--compare {kind} --controls inner.obj --radius 0.2"));
+        assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{kind}: {} pixels differ", differing(&rest));
+    }
     let (alone, done) = picture("--pose pose.obj");
     assert!(done.get("compared").is_none());
     assert_ne!(alone, posed);

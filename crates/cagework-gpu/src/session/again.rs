@@ -43,7 +43,7 @@ impl Session {
         }
         if let Some(bound) = &self.bound {
             let (weights, frames) = (Arc::clone(&bound.weights), Arc::clone(&bound.frames));
-            session.bound(weights, frames, bound.is_green, None).await?;
+            session.bound(bound.kind, weights, frames, None).await?;
         }
         if !self.pose.is_empty() {
             session.pose(&self.pose);

@@ -35,9 +35,9 @@ impl Session {
             return Ok(());
         };
         let is_nothing = self.parts.rigid.is_empty() && self.parts.stays.iter().all(|&s| s == 0.0);
-        let columns = self.columns(bound.is_green, &self.pose).into_owned();
+        let columns = self.columns(bound.kind, &self.pose).into_owned();
         let ready = (!is_nothing).then(|| {
-            let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
+            let at_rest = self.columns(bound.kind, Controls::from(set).rest());
             Arc::new(BoundParts::new(&self.parts, &model.positions, &bound.weights, &bound.frames, &at_rest))
         });
         if let Some(bound) = &mut self.bound {
@@ -56,7 +56,7 @@ impl Session {
     #[must_use]
     pub fn deformed(&self, pose: &[Vec3]) -> Option<Vec<Vec3>> {
         let bound = self.bound.as_ref()?;
-        let columns = self.columns(bound.is_green, pose);
+        let columns = self.columns(bound.kind, pose);
         let mut positions = deform_bound(&bound.weights, &bound.frames, &columns);
         if let Some(parts) = &bound.parts {
             hold_parts(&parts.rest, &parts.piece_of, &parts.motions(&columns), &mut positions);

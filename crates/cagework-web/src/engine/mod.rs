@@ -22,7 +22,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use async_lock::Mutex;
-use cagework_core::{Frames, Weights};
+use cagework_core::{Coordinates, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, check_layers};
 use js_sys::{Float32Array, Function, Uint32Array};
@@ -38,7 +38,7 @@ use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
 use crate::loaded::Loaded;
 use crate::opening::OpenContents;
-use crate::options::{Coordinates, decode};
+use crate::options::decode;
 use crate::state::{BoundModels, State, joined};
 use crate::surface::Surface;
 use crate::views::{View, object};
@@ -206,7 +206,7 @@ impl Engine {
         self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
     }
 
-    /// Adds mean value or Green coordinates for comparison. Arrays as for `adopt`.
+    /// Adds coordinates by a closed form for comparison. Arrays as for `adopt`.
     ///
     /// # Errors
     /// Those of `adopt`.
@@ -219,22 +219,14 @@ impl Engine {
         data: Float32Array,
     ) -> Result<(), JsValue> {
         let kind: Coordinates = decode(kind)?;
-        let (revision, n_columns) = self.read(|state| {
-            // Closed-form coordinates have no interior controls.
-            let n_faces = state.set().map_or(0, |set| set.cage().triangles().len());
-            let n_more = if kind == Coordinates::Green { n_faces } else { 0 };
-            (state.revision, (state.cage().n_cage() + n_more) as u32)
-        });
+        let (revision, n_columns) = self
+            .read(|state| (state.revision, state.set().map_or(0, |set| kind.n_columns(set.cage())) as u32));
         let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         self.read(|state| state.require(revision))?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
-        match kind {
-            Coordinates::Green => other.adopt_green(weights).await,
-            _ => other.adopt(weights, Frames::default()).await,
-        }
-        .map_err(Fault::from)?;
+        other.adopt_closed_form(kind, weights).await.map_err(Fault::from)?;
         self.read(|state| state.require(revision))?;
         gpu.others.retain(|(before, _)| *before != kind);
         gpu.others.push((kind, other));

@@ -1023,6 +1023,7 @@ export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"e
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
+export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
 export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off"] as const;
 /** Formats that store only a shape. */

@@ -16,10 +16,7 @@ export const failed = {
   slice: "The slice could not be computed",
   pull: "The model cannot be pulled",
   carry: "The poses could not be carried over",
-  formula: {
-    mean_value: "Mean value coordinates could not be computed",
-    green: "Green coordinates could not be computed",
-  },
+  formula: (name: string) => `${name} coordinates could not be computed`,
   check: "The cage could not be checked",
   clip: "The clip cannot be played",
   noCage: "No cage could be made",

@@ -9,12 +9,10 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
+use super::closed_form::ClosedForm;
 use crate::cage::Cage;
-use crate::closed_form::{ClosedFormError, dense};
-use crate::progress::Progress;
-use crate::weights::Weights;
 
 /// Sine, or distance over the cage's diagonal, below which directions are coplanar: square root of f64 rounding.
 const PLANE_TOLERANCE: f64 = 1e-8;
@@ -23,30 +21,13 @@ const PLANE_TOLERANCE: f64 = 1e-8;
 /// a small ball on the surface.
 const MIN_SUM: f64 = 0.99;
 
-/// Green coordinates at `points` (`[n_vertices]`, object units, inside the cage), dense. `[n_vertices, n_cage + n_triangles]`
-///
-/// # Errors
-/// [`ClosedFormError`]: a point is not finite or not inside, the weights exceed `memory_limit` bytes, or `progress` cancelled.
-pub fn green_weights(
-    points: &[Vec3],
-    cage: &Cage,
-    memory_limit: u64,
-    progress: &dyn Progress,
-) -> Result<Weights, ClosedFormError> {
-    let columns = cage.n_vertices() + cage.triangles().len();
-    dense("Green", points, columns, memory_limit, progress, |point, row| coordinates(point, cage, row))
-}
-
-/// Controls for the columns of [`green_weights`] in a pose: cage vertices, then `s n` of the triangles (section 3.1 of
-/// the paper). `positions`: `[n_cage]`, object units. Returns `[n_cage + n_triangles]`.
-///
-/// # Panics
-/// If there are fewer positions than cage vertices.
-#[must_use]
-pub fn green_controls(cage: &Cage, positions: &[Vec3]) -> Vec<Vec3> {
-    let normals = stretched_normals(cage, |i| positions[i as usize].as_dvec3()).map(DVec3::as_vec3);
-    positions[..cage.n_vertices()].iter().copied().chain(normals).collect()
-}
+/// Columns: the cage's vertices, then its triangles, with `s n` as vectors (section 3.1 of the paper). Defined inside the cage.
+pub(super) const FORM: ClosedForm = ClosedForm {
+    row: coordinates,
+    triangles: Some(|cage, positions| {
+        stretched_normals(cage, |i| positions[i as usize].as_dvec3()).map(DVec3::as_vec3).collect()
+    }),
+};
 
 /// Scaled normals `s n` of the triangles with the cage's vertices at `at`. `[n_triangles]`
 fn stretched_normals(cage: &Cage, at: impl Fn(u32) -> DVec3) -> impl Iterator<Item = DVec3> {
@@ -119,13 +100,13 @@ fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use glam::DQuat;
+    use glam::{DQuat, Vec3};
     use proptest::prelude::*;
-
-    use crate::progress::Silent;
 
     use super::*;
     use crate::cage::shapes;
+    use crate::coordinates::{ClosedFormError, Coordinates};
+    use crate::progress::Silent;
 
     /// Error of the midpoint rule below for points a tenth of the cage's size from its faces.
     const MIDPOINT_ERROR: f64 = 2e-5;
@@ -139,8 +120,8 @@ mod tests {
     fn assert_reproduced(cage: &Cage, point: DVec3, within: f64) {
         let row = at(cage, point);
         let sum: f64 = row[..cage.n_vertices()].iter().sum();
-        let controls = green_controls(cage, cage.positions());
-        let combined: DVec3 = row.iter().zip(&controls).map(|(&w, p)| w * p.as_dvec3()).sum();
+        let controls = Coordinates::Green.columns(cage, cage.positions());
+        let combined: DVec3 = row.iter().zip(controls.iter()).map(|(&w, p)| w * p.as_dvec3()).sum();
         assert!((sum - 1.0).abs() <= within, "weights sum to {sum} at {point}");
         assert!(combined.distance(point) <= within, "{combined} is not {point}");
     }
@@ -188,18 +169,20 @@ mod tests {
     fn point_outside_or_not_finite_is_an_error_with_its_index() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let inside = cage.bounds().center();
-        let outside = green_weights(&[inside, inside + 9.0], &cage, u64::MAX, &Silent).unwrap_err();
+        let outside =
+            Coordinates::Green.weights(&[inside, inside + 9.0], &cage, u64::MAX, &Silent).unwrap_err();
         assert_eq!(
             outside.to_string(),
             "Green coordinates are not defined at mesh vertex 1, which is outside the cage: enlarge the cage"
         );
-        let memory = green_weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
+        let memory =
+            Coordinates::Green.weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
         // A cube has 8 vertices and 12 triangles.
         assert_eq!(memory, ClosedFormError::Memory { needed: 16_000, limit: 15_999 });
         let cancel = |_: crate::progress::ProgressEvent| std::ops::ControlFlow::Break(());
-        let cancelled = green_weights(&[inside], &cage, u64::MAX, &cancel).unwrap_err();
+        let cancelled = Coordinates::Green.weights(&[inside], &cage, u64::MAX, &cancel).unwrap_err();
         assert!(matches!(cancelled, ClosedFormError::Cancelled(_)));
-        let not_finite = green_weights(&[Vec3::NAN], &cage, u64::MAX, &Silent).unwrap_err();
+        let not_finite = Coordinates::Green.weights(&[Vec3::NAN], &cage, u64::MAX, &Silent).unwrap_err();
         assert_eq!(not_finite, ClosedFormError::NotFinite { vertex: 0 });
     }
 

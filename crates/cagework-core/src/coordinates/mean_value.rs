@@ -9,12 +9,10 @@
 //! arctangent. The robust form of section 3.3 takes the root of `1 - c^2`, which loses half of all digits near the
 //! plane of a triangle. Polygons are triangulated as in [`Cage::triangles`].
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
+use super::closed_form::ClosedForm;
 use crate::cage::Cage;
-use crate::closed_form::{ClosedFormError, dense};
-use crate::progress::Progress;
-use crate::weights::Weights;
 
 /// Sine below which directions are coplanar or collinear, and distance over the cage's diagonal below which a point is on the
 /// surface. At this value, the square root of f64 rounding, the errors of the formula and of omitting the triangle are both 1e-8.
@@ -24,20 +22,8 @@ const SURFACE_TOLERANCE: f64 = 1e-8;
 /// times [`SURFACE_TOLERANCE`], whose effect grows near an edge.
 const FULL_TURN_TOLERANCE: f64 = 1e-7;
 
-/// Mean value coordinates at `points` (`[n_vertices]`, object units, inside or outside the cage), dense. `[n_vertices, n_cage]`
-///
-/// # Errors
-/// [`ClosedFormError`]: a point is not finite or has no coordinates, the weights exceed `memory_limit` bytes, or `progress` cancelled.
-pub fn mean_value_weights(
-    points: &[Vec3],
-    cage: &Cage,
-    memory_limit: u64,
-    progress: &dyn Progress,
-) -> Result<Weights, ClosedFormError> {
-    dense("mean value", points, cage.n_vertices(), memory_limit, progress, |point, row| {
-        coordinates(point, cage, row)
-    })
-}
+/// Columns: the cage's vertices. Defined inside and outside the cage.
+pub(super) const FORM: ClosedForm = ClosedForm { row: coordinates, triangles: None };
 
 /// Mean value coordinates at a point; returns whether they are defined. `row`: `[n_cage]`, zero on entry.
 fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
@@ -85,12 +71,13 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use proptest::prelude::*;
-
-    use crate::progress::Silent;
 
     use super::*;
     use crate::cage::shapes;
+    use crate::coordinates::{ClosedFormError, Coordinates};
+    use crate::progress::Silent;
 
     /// [`SURFACE_TOLERANCE`] with a margin for cosines below 1.
     const TOLERANCE: f64 = 1e-7;
@@ -137,7 +124,7 @@ mod tests {
     #[test]
     fn vertex_has_weight_one_at_itself() {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
-        let weights = mean_value_weights(cage.positions(), &cage, u64::MAX, &Silent).unwrap();
+        let weights = Coordinates::MeanValue.weights(cage.positions(), &cage, u64::MAX, &Silent).unwrap();
         for (v, (columns, row)) in weights.rows().enumerate() {
             assert_eq!(columns, (0..16).collect::<Vec<u32>>());
             assert!(row.iter().enumerate().all(|(i, &w)| w == if i == v { 1.0 } else { 0.0 }));
@@ -157,7 +144,7 @@ mod tests {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let points = [Vec3::ONE, Vec3::NAN];
         assert_eq!(
-            mean_value_weights(&points, &cage, u64::MAX, &Silent),
+            Coordinates::MeanValue.weights(&points, &cage, u64::MAX, &Silent),
             Err(ClosedFormError::NotFinite { vertex: 1 })
         );
     }

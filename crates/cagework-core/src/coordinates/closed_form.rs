@@ -1,14 +1,38 @@
-//! Shared parts of closed-form coordinates (mean value and Green), which serve as comparison for harmonic ones.
+//! Closed forms of coordinates, which serve as comparison for harmonic ones, evaluated at many points.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+use crate::cage::Cage;
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
+
+/// Vectors for the columns of the cage's triangles, in a pose of its vertices. `[n_triangles]`
+type PoseTriangles = fn(&Cage, &[Vec3]) -> Vec<Vec3>;
+
+/// Formula of coordinates in a cage without controls inside.
+pub(super) struct ClosedForm {
+    /// Fills a row of zeros, `[n_columns]`, at a point; returns whether the coordinates are defined there.
+    pub(super) row: fn(DVec3, &Cage, &mut [f64]) -> bool,
+    /// Columns of triangles follow those of the vertices, if any.
+    pub(super) triangles: Option<PoseTriangles>,
+}
+
+impl ClosedForm {
+    pub(super) fn n_columns(&self, cage: &Cage) -> usize {
+        cage.n_vertices() + self.triangles.map_or(0, |_| cage.triangles().len())
+    }
+}
 
 /// Why closed-form coordinates cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ClosedFormError {
+    /// Harmonic coordinates need a bind.
+    #[error("{kind} coordinates have no closed form: use bind instead")]
+    NoForm {
+        /// Name of the kind.
+        kind: &'static str,
+    },
     /// A point is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
@@ -20,7 +44,7 @@ pub enum ClosedFormError {
         "{kind} coordinates are not defined at mesh vertex {vertex}, which is outside the cage: enlarge the cage"
     )]
     Undefined {
-        /// Mean value or Green.
+        /// Name of the kind.
         kind: &'static str,
         /// The point.
         vertex: u32,
@@ -53,16 +77,16 @@ pub enum ClosedFormError {
 /// Rows between two progress reports.
 const RUN: usize = 1 << 10;
 
-/// Dense rows of weights, within `memory_limit` bytes. `coordinates(point, row)` fills a row of zeros, `[columns]`, and
-/// returns whether they are defined at the point.
-pub(crate) fn dense(
+/// Dense rows of weights, within `memory_limit` bytes.
+pub(super) fn dense(
     kind: &'static str,
+    form: &ClosedForm,
     points: &[Vec3],
-    columns: usize,
+    cage: &Cage,
     memory_limit: u64,
     progress: &dyn Progress,
-    coordinates: impl Fn(DVec3, &mut [f64]) -> bool + Sync,
 ) -> Result<Weights, ClosedFormError> {
+    let columns = form.n_columns(cage);
     let rows = points.len();
     if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
         return Err(ClosedFormError::NotFinite { vertex: vertex as u32 });
@@ -84,7 +108,7 @@ pub(crate) fn dense(
         }
         let found = crate::team::map_indices(of_run.len(), |v| {
             let mut row = vec![0.0; columns];
-            let defined = coordinates(of_run[v].as_dvec3(), &mut row);
+            let defined = (form.row)(of_run[v].as_dvec3(), cage, &mut row);
             defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
         });
         for (v, row) in (run * RUN..).zip(found) {
