@@ -18,7 +18,7 @@ import { createTour, type TourActions } from "./actions/tour";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
 import type { NamedFile, Session } from "./contract";
-import { MODEL_ENDINGS, RANGES } from "./defaults";
+import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, RANGES } from "./defaults";
 import { type DocumentMirror, followDocument } from "./document";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
@@ -71,7 +71,7 @@ export interface App {
 }
 
 const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
-const MODELS = `${CAGES},.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json`;
+const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
 
 export interface Needs {
   store: Store;

@@ -85,6 +85,6 @@ pub enum PoseError {
         /// Name of the cage.
         cage: String,
         /// How to export a pose that keeps the order.
-        hint: &'static str,
+        hint: String,
     },
 }

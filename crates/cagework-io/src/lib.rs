@@ -10,7 +10,6 @@
 
 mod counts;
 mod error;
-mod format;
 mod gltf;
 mod look;
 mod memory;
@@ -36,14 +35,13 @@ mod up;
 
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
-pub use format::{FormatError, ModelFormat};
 pub use gltf::{
     Clip, GltfError, JointPoint, Joints, PROJECT_EXTENSION, Player, Posed, ReshapeOptions, ReshapeReport,
     write_mesh_glb,
 };
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
-pub use model::{Model, PoseState, ReadError};
+pub use model::{FormatError, Model, ModelFormat, PoseState, ReadError};
 pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use origin::origin_near;

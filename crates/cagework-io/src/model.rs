@@ -1,9 +1,12 @@
 //! A model: vertices, triangles and the document they were read from.
 
 mod cage;
+mod format;
+mod read;
 mod write;
 
 pub use cage::PoseState;
+pub use format::{FormatError, ModelFormat};
 
 use std::borrow::Cow;
 
@@ -12,16 +15,15 @@ use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::counts::Counts;
-use crate::format::{FormatError, ModelFormat};
 use crate::gltf::{self, GltfDocument, GltfError};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
-use crate::origin::{far_notice, origin_near, relative};
-use crate::polygons::{Encoding, Polygons, PolygonsError};
+use crate::origin::{far_notice, relative};
+use crate::polygons::{Encoding, PolygonsError};
 use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::up::UpAxis;
-use crate::{off, ply, stl};
+use read::Source;
 
 /// Error of reading a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -107,23 +109,19 @@ impl Model {
         }
     }
 
-    /// Names of the external files that the model refers to: buffers and images of a glTF; material libraries
-    /// and their textures of an OBJ, for which `resolve` is called. Empty if the file cannot be read.
+    /// Names of the external files that the model refers to: buffers, images, material libraries. Those of an OBJ name
+    /// textures in turn, for which `resolve` is called. Empty if the file cannot be read.
     pub fn named_files(
         name: &str,
         bytes: &[u8],
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Vec<String> {
-        match ModelFormat::of_file(name, bytes) {
-            Ok(ModelFormat::Gltf) => gltf::named_files(bytes, memory_limit),
-            Ok(ModelFormat::Obj) => obj::named_files(bytes, resolve, memory_limit),
-            _ => Vec::new(),
-        }
+        ModelFormat::of_file(name, bytes)
+            .map_or(Vec::new(), |format| format.named_files(bytes, resolve, memory_limit))
     }
 
-    /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The format is detected from the content; `name` is used
-    /// in messages. Models far from the world origin are stored relative to [`Self::origin`], without loss.
+    /// Reads a file of any [`ModelFormat`], detected from the content; `name` is used in messages. Models far from the world origin are stored relative to [`Self::origin`], without loss.
     ///
     /// `resolve` is called once for each external file (buffers and textures of a `.gltf`, materials and textures of an
     /// OBJ) with its relative path; `data:` URIs are decoded here. A missing buffer is an error, other missing files
@@ -168,89 +166,7 @@ impl Model {
         near: bool,
     ) -> Result<Self, ReadError> {
         let format = ModelFormat::of_file(name, bytes)?;
-        match format {
-            ModelFormat::Gltf => {
-                let fault = |source| ReadError::Gltf { name: name.into(), source };
-                let model = gltf::read(name, bytes, resolve, memory_limit, (!near).then_some(DVec3::ZERO))
-                    .map_err(fault)?;
-                Ok(Self {
-                    name: name.into(),
-                    positions: model.positions,
-                    triangles: model.triangles,
-                    counts: model.counts,
-                    notices: model.notices,
-                    up: UpAxis::Y,
-                    origin: model.origin,
-                    bytes: model.document.bytes,
-                    format,
-                    encoding: Encoding::default(),
-                    has_normals: false,
-                    document: Document::Gltf(Box::new(model.document)),
-                })
-            }
-            ModelFormat::Obj => {
-                let model = obj::read(bytes, resolve, memory_limit)
-                    .map_err(|source| ReadError::Obj { name: name.into(), source })?;
-                let corner = |c: u32| model.document.corners[c as usize].v;
-                let origin = if near { origin_near(&model.positions) } else { DVec3::ZERO };
-                let positions = if origin == DVec3::ZERO {
-                    model.positions
-                } else {
-                    obj::positions_near(&model.document.bytes, origin)
-                };
-                Ok(Self {
-                    name: name.into(),
-                    triangles: model.document.triangles.iter().map(|t| t.map(corner)).collect(),
-                    positions,
-                    counts: Counts {
-                        nodes: model.groups,
-                        meshes: 1,
-                        primitives: 1,
-                        materials: model.document.materials.len(),
-                        ..Counts::default()
-                    },
-                    notices: model.notices,
-                    up: UpAxis::Y,
-                    origin,
-                    bytes: model.bytes,
-                    format,
-                    encoding: Encoding::default(),
-                    has_normals: false,
-                    document: Document::Obj(Box::new(model.document)),
-                })
-            }
-            ModelFormat::Ply | ModelFormat::Stl | ModelFormat::Off => {
-                let read = match format {
-                    ModelFormat::Ply => ply::read,
-                    ModelFormat::Stl => stl::read,
-                    _ => off::read,
-                };
-                let fault = |source| ReadError::Polygons { name: name.into(), source };
-                let mut read = read(bytes, memory_limit, near).map_err(fault)?;
-                let document = read.document().map_err(fault)?;
-                let corner = |c: u32| document.corners[c as usize].v;
-                let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);
-                Ok(Self {
-                    name: name.into(),
-                    triangles: document.triangles.iter().map(|t| t.map(corner)).collect(),
-                    counts: Counts {
-                        nodes: document.groups.len().max(1),
-                        meshes: 1,
-                        primitives: 1,
-                        ..Counts::default()
-                    },
-                    notices: read.notices,
-                    up: UpAxis::Y,
-                    origin: read.origin,
-                    bytes: Polygons::check_memory(0, vertices, corners, u64::MAX).unwrap_or(u64::MAX),
-                    format,
-                    encoding: read.encoding,
-                    has_normals: read.has_normals,
-                    positions: read.positions,
-                    document: Document::Obj(Box::new(document)),
-                })
-            }
-        }
+        format.read(Source { name, bytes, resolve, memory_limit, near })
     }
 
     /// Approximate memory of the model and its document, bytes.
@@ -262,18 +178,7 @@ impl Model {
     /// Approximate additional memory while exporting to `format`, bytes.
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
-        /// Old and new normals, new positions and the output; OBJ files without normals need a third.
-        const VERTEX_BYTES: u64 = 300;
-        const TRIANGLE_BYTES: u64 = 60;
-        /// JSON of new accessors and buffer views.
-        const PRIMITIVE_BYTES: u64 = 6000;
-        let n = |count: usize| count as u64;
-        let shape = VERTEX_BYTES * n(self.positions.len()) + TRIANGLE_BYTES * n(self.triangles.len());
-        match format {
-            ModelFormat::Gltf => shape + PRIMITIVE_BYTES * n(self.counts.primitives) + self.bytes,
-            ModelFormat::Obj => shape / 3 + self.bytes,
-            ModelFormat::Ply | ModelFormat::Stl | ModelFormat::Off => shape,
-        }
+        format.bytes_to_write(self)
     }
 
     /// Additional memory for `n_poses` morph targets on top of [`Self::bytes_to_write`], bytes.

@@ -1,13 +1,12 @@
 //! OFF reader and writer (Geomview's object file format, text only): vertices with colours or normals, and polygons.
 
-use std::collections::HashMap;
 use std::fmt::Write as _;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::obj::{lines, shown_token, tokens};
 use crate::origin::Coordinate;
-use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
+use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, color_bytes, fault, numbers};
 
 /// Whether the first word is `OFF`, with optional prefix letters for vertex attributes.
 pub(crate) fn is_off(bytes: &[u8]) -> bool {
@@ -116,26 +115,20 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     Ok(read)
 }
 
-/// Writes COFF if there are vertex colours (sRGB, 0 to 1), NOFF if there are normals, OFF otherwise.
-pub(crate) fn write(
-    positions: &[Vec3],
-    origin: DVec3,
-    faces: &[Vec<u32>],
-    colors: &HashMap<u32, [f32; 3]>,
-    normals: &[Vec3],
-) -> Vec<u8> {
-    let kind = match (colors.is_empty(), normals.is_empty()) {
-        (false, _) => "COFF",
-        (true, false) => "NOFF",
-        (true, true) => "OFF",
+/// Writes COFF if there are vertex colours, NOFF if there are normals, OFF otherwise.
+pub(crate) fn write(shape: &Shape<'_>) -> Vec<u8> {
+    let (faces, colors, normals) = (shape.faces(), shape.colors(), shape.normals());
+    let kind = match (colors.is_some(), normals.is_empty()) {
+        (true, _) => "COFF",
+        (false, false) => "NOFF",
+        (false, true) => "OFF",
     };
-    let mut text = format!("{kind}\n{} {} 0\n", positions.len(), faces.len());
-    for (v, p) in (0..).zip(positions) {
-        let [x, y, z] = Coordinate::of(origin, *p);
+    let mut text = format!("{kind}\n{} {} 0\n", shape.positions.len(), faces.len());
+    for (v, p) in (0..).zip(shape.positions.iter()) {
+        let [x, y, z] = Coordinate::of(shape.origin, *p);
         let _ = write!(text, "{x} {y} {z}");
-        if !colors.is_empty() {
-            let bytes =
-                colors.get(&v).map_or([255; 3], |c| c.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));
+        if let Some(colors) = colors {
+            let bytes = color_bytes(colors.get(&v));
             let _ = write!(text, " {} {} {} 255", bytes[0], bytes[1], bytes[2]);
         } else if let Some(n) = normals.get(v as usize) {
             let _ = write!(text, " {} {} {}", n.x, n.y, n.z);

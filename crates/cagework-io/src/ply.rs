@@ -1,6 +1,5 @@
 //! PLY reader and writer: vertices with colours, and polygons.
 
-use cagework_core::deform::vertex_normals;
 use glam::{DVec3, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
@@ -10,7 +9,7 @@ use ply_rs_bw::ply::{
 use ply_rs_bw::writer::Writer;
 
 use crate::ply_text::{fault_of, readable, stray_line};
-use crate::polygons::{Encoding, Polygons, PolygonsError};
+use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, color_bytes};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Vertex properties that are read.
@@ -127,6 +126,12 @@ fn unstrip(strips: &[Element]) -> Vec<Element> {
         .collect()
 }
 
+/// Whether the first line is `ply`.
+pub(crate) fn is_ply(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
+}
+
 /// Reads a file using at most `memory_limit` bytes. `near`: store positions relative to an origin near them.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let original = bytes;
@@ -206,25 +211,11 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     Ok(read)
 }
 
-/// Contents of a PLY file.
-pub(crate) struct PlyContents<'a> {
-    pub(crate) positions: &'a [Vec3],
-    pub(crate) origin: DVec3,
-    /// For computing normals.
-    pub(crate) triangles: &'a [[u32; 3]],
-    pub(crate) faces: Vec<Vec<u32>>,
-    pub(crate) color: &'a dyn Fn(u32) -> Option<[f32; 3]>,
-    pub(crate) has_colors: bool,
-    pub(crate) has_normals: bool,
-    pub(crate) encoding: Encoding,
-}
-
-/// Writes a PLY file.
-pub(crate) fn write(given: PlyContents<'_>) -> Vec<u8> {
-    let PlyContents { positions, origin, triangles, faces, color, has_colors, has_normals, encoding } = given;
-    let normals = if has_normals { vertex_normals(positions, triangles) } else { Vec::new() };
+/// Writes polygons, colours and normals of vertices in the encoding of the source, by default binary little-endian.
+pub(crate) fn write(shape: &Shape<'_>) -> Vec<u8> {
+    let (origin, faces, colors, normals) = (shape.origin, shape.faces(), shape.colors(), shape.normals());
     let mut header = Header::new();
-    header.encoding = match encoding {
+    header.encoding = match shape.encoding {
         Encoding::Text => PlyEncoding::Ascii,
         Encoding::LittleEndian => PlyEncoding::BinaryLittleEndian,
         Encoding::BigEndian => PlyEncoding::BinaryBigEndian,
@@ -241,10 +232,10 @@ pub(crate) fn write(given: PlyContents<'_>) -> Vec<u8> {
     let is_near = origin == DVec3::ZERO;
     let mut properties =
         scalars(POSITION, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
-    if has_normals {
+    if !normals.is_empty() {
         properties.extend(scalars(NORMAL, ScalarType::Float));
     }
-    if has_colors {
+    if colors.is_some() {
         properties.extend(scalars(COLOR, ScalarType::UChar));
     }
     element("vertex", properties);
@@ -255,12 +246,12 @@ pub(crate) fn write(given: PlyContents<'_>) -> Vec<u8> {
     let vertex = |(v, p): (usize, &Vec3)| Element {
         place: (origin + p.as_dvec3()).to_array(),
         normal: normals.get(v).map_or([0.0; 3], Vec3::to_array),
-        color: color(v as u32).unwrap_or([1.0; 3]).map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8),
+        color: color_bytes(colors.and_then(|colors| colors.get(&(v as u32)))),
         ..Element::default()
     };
     let mut ply = Ply::<Element>::new();
     ply.header = header;
-    ply.payload.insert("vertex".into(), positions.iter().enumerate().map(vertex).collect());
+    ply.payload.insert("vertex".into(), shape.positions.iter().enumerate().map(vertex).collect());
     let faces = faces.into_iter().map(|corners| Element { corners, ..Element::default() });
     ply.payload.insert("face".into(), faces.collect());
     let mut bytes = Vec::new();

@@ -1,6 +1,8 @@
-//! Polygon meshes as read from PLY, STL and OFF files.
+//! Polygon meshes as read from and written to PLY, STL and OFF files.
 
+use cagework_core::deform::vertex_normals;
 use cagework_core::words::counted;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -158,6 +160,39 @@ impl Polygons {
         document.triangulate(&self.positions);
         Ok(document)
     }
+}
+
+/// A model with new positions.
+pub(crate) struct Shape<'a> {
+    /// In the file's axes, relative to `origin`. `[n_vertices]`
+    pub(crate) positions: Cow<'a, [Vec3]>,
+    pub(crate) origin: DVec3,
+    pub(crate) triangles: &'a [[u32; 3]],
+    /// Polygons, colours and groups; without them, a glTF's triangles are the faces.
+    pub(crate) document: Option<&'a ObjDocument>,
+    pub(crate) has_normals: bool,
+    pub(crate) encoding: Encoding,
+}
+
+impl Shape<'_> {
+    pub(crate) fn faces(&self) -> Vec<Vec<u32>> {
+        self.document.map_or_else(|| self.triangles.iter().map(Vec::from).collect(), ObjDocument::faces)
+    }
+
+    /// Colours of vertices, sRGB from 0 to 1, if there are any.
+    pub(crate) fn colors(&self) -> Option<&HashMap<u32, [f32; 3]>> {
+        self.document.map(|document| &document.colors).filter(|colors| !colors.is_empty())
+    }
+
+    /// Normals of vertices, or none. `[n_vertices]`
+    pub(crate) fn normals(&self) -> Vec<Vec3> {
+        if self.has_normals { vertex_normals(&self.positions, self.triangles) } else { Vec::new() }
+    }
+}
+
+/// An 8-bit colour, white by default.
+pub(crate) fn color_bytes(color: Option<&[f32; 3]>) -> [u8; 3] {
+    color.map_or([255; 3], |color| color.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8))
 }
 
 /// A syntax error in a line.

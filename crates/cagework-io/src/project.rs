@@ -12,9 +12,8 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::format::ModelFormat;
 use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
-use crate::model::{Document, Model, ReadError};
+use crate::model::{Document, Model, ModelFormat, ReadError};
 use crate::origin::translation;
 use crate::shown::shown;
 use crate::up::UpAxis;

@@ -8,9 +8,10 @@ use cagework_core::words::counted;
 use glam::{DVec3, Vec3};
 use stl_io::{Normal, Triangle, Vertex};
 
+use crate::error::WriteError;
 use crate::obj::{Group, lines, rest_of, shown_token, tokens};
 use crate::origin::Coordinate;
-use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
+use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, fault, numbers};
 
 /// Sizes in a binary file, bytes: header with triangle count, and one triangle.
 const HEADER_BYTES: usize = 84;
@@ -180,21 +181,36 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
     Ok((corners, solids))
 }
 
-/// Writes triangles with flat normals. `solids`: names and first triangles, for text files.
-pub(crate) fn write(
-    positions: &[Vec3],
-    origin: DVec3,
-    triangles: &[[u32; 3]],
-    encoding: Encoding,
-    solids: &[(&str, usize)],
-) -> Vec<u8> {
+/// Names and first triangles of the solids of a text file.
+fn solids<'a>(shape: &Shape<'a>) -> Vec<(&'a str, usize)> {
+    let Some(document) = shape.document else { return Vec::new() };
+    // Triangles are in the order of faces.
+    let mut t = 0;
+    let solid = |group: &'a Group| {
+        let first = document.face_starts.get(group.first_face as usize).copied().unwrap_or(u32::MAX);
+        t += document.triangles[t..].iter().take_while(|triangle| triangle[0] < first).count();
+        (group.name.as_str(), t)
+    };
+    document.groups.iter().map(solid).collect()
+}
+
+/// Writes triangles with flat normals: as text if the source was text, binary otherwise.
+///
+/// # Errors
+/// [`WriteError::NoFaces`].
+pub(crate) fn write(shape: &Shape<'_>) -> Result<Vec<u8>, WriteError> {
+    let Shape { positions, origin, triangles, encoding, .. } = shape;
+    if triangles.is_empty() {
+        return Err(WriteError::NoFaces);
+    }
     let all = triangles.iter().map(|t| {
         let corners = t.map(|v| positions[v as usize]);
         let [a, b, c] = corners.map(Vec3::as_dvec3);
         ((b - a).cross(c - a).normalize_or_zero().as_vec3(), corners)
     });
-    if encoding == Encoding::Text {
+    if *encoding == Encoding::Text {
         let mut text = String::new();
+        let solids = solids(shape);
         let mut solids = solids.iter().peekable();
         let mut name = "cagework";
         for (t, (n, corners)) in all.enumerate() {
@@ -212,12 +228,12 @@ pub(crate) fn write(
             }
             text += &format!("facet normal {} {} {}\nouter loop\n", n[0], n[1], n[2]);
             for corner in corners {
-                let [x, y, z] = Coordinate::of(origin, corner);
+                let [x, y, z] = Coordinate::of(*origin, corner);
                 text += &format!("vertex {x} {y} {z}\n");
             }
             text += "endloop\nendfacet\n";
         }
-        return (text + &format!("endsolid {name}\n")).into_bytes();
+        return Ok((text + &format!("endsolid {name}\n")).into_bytes());
     }
     let mut bytes = Vec::with_capacity(HEADER_BYTES + TRIANGLE_BYTES * triangles.len());
     let all = all.map(|(normal, corners)| Triangle {
@@ -225,5 +241,5 @@ pub(crate) fn write(
         vertices: corners.map(|p| Vertex::new((origin + p.as_dvec3()).as_vec3().to_array())),
     });
     stl_io::write_stl(&mut bytes, all).expect("a Vec takes all bytes");
-    bytes
+    Ok(bytes)
 }

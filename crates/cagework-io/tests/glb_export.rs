@@ -332,7 +332,8 @@ fn obj_and_ply_become_a_glb_with_materials_and_colours() {
         .lines()
         .map(|line| if line.starts_with("v ") { format!("{line} 1 0.5 0\n") } else { format!("{line}\n") });
     let model = read("box.obj", colored.collect::<String>().as_bytes()).unwrap();
-    for model in [read("box.ply", &model.write_ply(&model.positions).unwrap()).unwrap(), model] {
+    for model in [read("box.ply", &model.write(ModelFormat::Ply, &model.positions).unwrap()).unwrap(), model]
+    {
         let glb = model.write_glb(&model.positions).unwrap();
         // A byte of the PLY stores 128 / 255.
         let close = |c: &Vec<f32>| (c[0], c[2]) == (1.0, 0.0) && (c[1] - 0.214).abs() < 2e-3;

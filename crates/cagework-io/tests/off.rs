@@ -65,7 +65,7 @@ fn off_files_are_read_with_polygons_and_colours() {
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
         // Exports can be read again, with colours, normals and order.
         let moved: Vec<_> = cube().into_iter().map(twist).collect();
-        let written = model.write_off(&moved).unwrap();
+        let written = model.write(ModelFormat::Off, &moved).unwrap();
         let first = if header.contains('C') {
             "COFF"
         } else if header.starts_with('N') {
@@ -77,7 +77,7 @@ fn off_files_are_read_with_polygons_and_colours() {
         let again = read("again", &written).unwrap();
         assert_eq!((&again.positions, again.cage_mesh().faces), (&moved, faces.clone()));
         assert_eq!(again.look().vertices, model.look().vertices);
-        assert!(again.write_off(&again.positions).unwrap() == written);
+        assert!(again.write(ModelFormat::Off, &again.positions).unwrap() == written);
         assert_eq!(model.lost_in(ModelFormat::Stl).is_some(), color.is_some());
     }
 }

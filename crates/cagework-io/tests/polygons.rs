@@ -55,7 +55,7 @@ fn ply_is_read_with_polygons_and_colours_and_lists_ignored_data() {
 fn written_ply_and_stl_can_be_read() {
     let moved: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let from_text = read("cube.ply", ply_text().as_bytes()).unwrap();
-    let written = from_text.write_ply(&moved).unwrap();
+    let written = from_text.write(ModelFormat::Ply, &moved).unwrap();
     assert!(written.starts_with(b"ply\nformat ascii 1.0\n"), "text stays text");
     let again = read("again.ply", &written).unwrap();
     assert_eq!((&again.positions, again.cage_mesh().faces), (&moved, from_text.cage_mesh().faces));
@@ -84,7 +84,7 @@ fn written_ply_and_stl_can_be_read() {
 
 #[test]
 fn both_byte_orders_of_a_ply_are_read_and_kept() {
-    let little = obj().write_ply(&cube()).unwrap();
+    let little = obj().write(ModelFormat::Ply, &cube()).unwrap();
     let end = little.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let header = String::from_utf8(little[..end].to_vec()).unwrap();
     assert!(
@@ -102,7 +102,7 @@ fn both_byte_orders_of_a_ply_are_read_and_kept() {
     assert_eq!(read("x.ply", &[&commented, &little[end..]].concat()).unwrap().positions, cube());
     let model = read("big.ply", &big).unwrap();
     assert_eq!(model.positions, cube());
-    assert!(model.write_ply(&cube()).unwrap() == big);
+    assert!(model.write(ModelFormat::Ply, &cube()).unwrap() == big);
 }
 
 #[test]
@@ -124,14 +124,14 @@ fn text_stl_can_have_several_solids_in_any_case() {
     // The first corner of the second triangle is the second corner of the first one.
     assert_eq!(model.positions.len(), 8);
     assert_eq!(model.triangles[1], [1, 3, 4]);
-    let again = model.write_stl(&model.positions).unwrap();
+    let again = model.write(ModelFormat::Stl, &model.positions).unwrap();
     assert!(again.starts_with(b"solid cagework\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"));
     assert_eq!(read("again.stl", &again).unwrap().positions, model.positions);
 }
 
 #[test]
 fn binary_stl_can_begin_with_solid_and_has_flat_normals() {
-    let mut bytes = obj().write_stl(&cube()).unwrap();
+    let mut bytes = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert_eq!(bytes.len(), 84 + 12 * 50);
     let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     for t in 0..12 {
@@ -156,11 +156,11 @@ fn solids_keep_their_names_and_ignored_data_is_listed() {
     let text = format!("solid left wing\n{first}{second}endsolid left wing\nsolid b\n{third}endsolid b\n");
     let model = read("x.stl", text.as_bytes()).unwrap();
     assert_eq!(model.counts.nodes, 2);
-    assert_eq!(String::from_utf8(model.write_stl(&model.positions).unwrap()).unwrap(), text);
+    assert_eq!(String::from_utf8(model.write(ModelFormat::Stl, &model.positions).unwrap()).unwrap(), text);
     assert_eq!(model.lost_in(ModelFormat::Ply).unwrap(), "the ply file does not keep: names of parts");
     assert_eq!((model.notices.len(), model.lost_in(ModelFormat::Stl)), (0, None));
 
-    let mut bytes = obj().write_stl(&cube()).unwrap();
+    let mut bytes = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert_eq!(read("x.stl", &bytes).unwrap().notices, [""; 0]);
     // Blue in 15 bits, as in VisCAM and Materialise Magics.
     bytes[84 + 48] = 0x1f;
@@ -244,7 +244,7 @@ fn damaged_ply_and_stl_files_are_errors() {
     (0..2000).for_each(|k| idle += &format!("element a{k} 20000\n"));
     let message = fault("x.ply", (idle + "end_header\n").as_bytes());
     assert!(message.contains("its header counts 20000 of 'a"), "{message}");
-    let mut stl = obj().write_stl(&cube()).unwrap();
+    let mut stl = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert!(!stl.starts_with(b"solid"), "other programs would read it as text");
     stl.truncate(300);
     let message = fault("x.stl", &stl);
@@ -254,10 +254,11 @@ fn damaged_ply_and_stl_files_are_errors() {
     );
     assert!(fault("x.stl", b"solid x\nfacet normal 0 0\n").contains("damaged"));
     assert!(fault("x.stl", b"solid x\nfacet\nendsolid x\n").contains("damaged"));
-    let mut stl = obj().write_stl(&cube()).unwrap();
+    let mut stl = obj().write(ModelFormat::Stl, &cube()).unwrap();
     stl[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(fault("x.stl", &stl).contains("vertex 0 has a coordinate that is not finite"));
-    let tight = Model::read_within("x.stl", &obj().write_stl(&cube()).unwrap(), &mut |_| None, 1000);
+    let tight =
+        Model::read_within("x.stl", &obj().write(ModelFormat::Stl, &cube()).unwrap(), &mut |_| None, 1000);
     assert!(tight.unwrap_err().to_string().contains("memory"));
 }
 

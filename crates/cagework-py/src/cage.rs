@@ -89,8 +89,8 @@ impl Cage {
         Self::of(py, (&PolygonMesh { positions, faces: arrays::faces(faces)? }, origin), smooth, None)
     }
 
-    /// Reads a cage from a .obj, .ply, .off, .stl, .gltf or .glb file with faces of any size. Vertices of the last three formats are
-    /// merged if their positions are equal.
+    /// Reads a cage from a file in any format of docs/formats.md. Vertices of an STL or a glTF are merged if their positions are
+    /// equal.
     ///
     /// Raises OSError, ModelError if the file cannot be read as a model, CageError if it is not a valid cage.
     #[staticmethod]

@@ -82,7 +82,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 
 /// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off file, or its bytes. A file without faces can be read as well, such as
+/// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such as
 /// the pose of a cage.
 ///
 /// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as in the file. They

@@ -16,7 +16,7 @@ use crate::{arrays, error, work};
 /// Deforms a model with its rig: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off file, or its bytes; posed: [n_cage, 3] float32 or float64, object units;
+/// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object units;
 /// options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and textures; other formats
 /// are kept. The bytes are identical to those that `cagework bind` and `cagework deform` write.
 ///

@@ -151,19 +151,21 @@ fn generated_types_are_up_to_date() {
     text += &constant("SCENE_DEFAULTS", "SceneOptions", &JsSceneOptions::default());
     let kinds: Vec<&str> = Coordinates::ALL.iter().map(|(word, _)| *word).collect();
     text += &constant("COORDINATES", "readonly Coordinates[]", &kinds);
-    let formats = ModelFormat::ALL.into_iter();
-    let endings: Vec<&str> = formats.clone().flat_map(ModelFormat::endings).copied().collect();
-    writeln!(
-        text,
-        "/** File extensions of models, preferred first. */\nexport const MODEL_ENDINGS = {endings:?} as const;"
-    )
-    .unwrap();
-    let shapes: Vec<&str> = formats.filter(|format| !format.holds_poses()).map(ModelFormat::name).collect();
-    writeln!(
-        text,
-        "/** Formats that store only a shape. */\nexport const SHAPE_FORMATS = {shapes:?} as const;"
-    )
-    .unwrap();
+    let all = |of: fn(ModelFormat) -> &'static [&'static str]| ModelFormat::ALL.map(of).concat();
+    let shapes = ModelFormat::ALL.into_iter().filter(|format| !format.holds_poses());
+    for (about, name, values) in [
+        ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(ModelFormat::endings)),
+        ("MIME types of models.", "MODEL_TYPES", all(ModelFormat::mime_types)),
+        (
+            "Extensions of models that refer to other files.",
+            "NAMING_ENDINGS",
+            all(ModelFormat::naming_endings),
+        ),
+        ("Extensions of these other files.", "COMPANION_ENDINGS", all(ModelFormat::companions)),
+        ("Formats that store only a shape.", "SHAPE_FORMATS", shapes.map(ModelFormat::name).collect()),
+    ] {
+        writeln!(text, "/** {about} */\nexport const {name} = {values:?} as const;").unwrap();
+    }
     writeln!(
         text,
         "/** Least and most of each option that is a number. */\nexport const RANGES = {{ grid: [{MIN_GRID}, {MAX_GRID}], \

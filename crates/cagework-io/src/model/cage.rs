@@ -6,9 +6,9 @@ use cagework_core::PolygonMesh;
 use cagework_core::mesh::weld;
 use glam::Vec3;
 
-use super::{Document, Model};
+use super::format::Kept;
+use super::{Document, Model, ModelFormat};
 use crate::error::{PoseError, WriteError};
-use crate::format::ModelFormat;
 use crate::gltf::Clip;
 use crate::memory::MemoryError;
 
@@ -34,12 +34,7 @@ impl Model {
     pub fn cage_mesh(&self) -> PolygonMesh {
         match &self.document {
             Document::Obj(document) => {
-                let face =
-                    |f: &[u32]| document.corners[f[0] as usize..f[1] as usize].iter().map(|c| c.v).collect();
-                PolygonMesh {
-                    positions: self.positions.clone(),
-                    faces: document.face_starts.windows(2).map(face).collect(),
-                }
+                PolygonMesh { positions: self.positions.clone(), faces: document.faces() }
             }
             Document::Gltf(_) => {
                 let welded = weld(&self.positions);
@@ -107,7 +102,7 @@ impl Model {
             return Err(PoseError::Count { pose, given, cage, expected: first.len() });
         }
         let mut posed = match &pose.document {
-            Document::Obj(_) => pose.cage_mesh().faces,
+            Document::Obj(document) => document.faces(),
             Document::Gltf(_) => pose.triangles.iter().map(|t| t.to_vec()).collect(),
         };
         if let Some(welded) = welded.filter(|_| is_unwelded) {
@@ -115,9 +110,10 @@ impl Model {
             posed.iter_mut().flatten().for_each(|v| *v = welded.unique_of[*v as usize]);
         }
         if let Some(edge) = foreign_edge(&self.cage_mesh().faces, &posed, first.len()) {
-            let hint = match pose.format {
-                ModelFormat::Gltf | ModelFormat::Stl => "write it as OBJ, PLY or OFF, which keep the order",
-                _ => "export it from the cage itself, with the settings of the cage's export",
+            let hint = if pose.format.keeps(Kept::Order) {
+                "export it from the cage itself, with the settings of the cage's export".to_owned()
+            } else {
+                format!("write it as {}, which keep the order", ModelFormat::listed(Some(Kept::Order)))
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }
@@ -127,11 +123,8 @@ impl Model {
     /// Whether a pose of this cage, exported as `format` and read again, keeps this cage's vertex order.
     #[must_use]
     pub fn keeps_order_in(&self, format: ModelFormat) -> bool {
-        match format {
-            ModelFormat::Obj | ModelFormat::Ply | ModelFormat::Off => true,
-            // glTF and STL number vertices in the order of faces.
-            ModelFormat::Gltf | ModelFormat::Stl => self.format == format,
-        }
+        // The others number vertices in the order of faces.
+        self.format == format || format.keeps(Kept::Order)
     }
 
     /// Positions of the file's vertices in a cage pose. Inverse of [`Self::pose_positions`]. `pose`: `[n_cage]`.

@@ -1,19 +1,17 @@
 //! Export of a model with new positions.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
-use cagework_core::deform::vertex_normals;
 use glam::{DVec3, Vec3};
 
-use super::{Document, Model};
+use super::format::Kept;
+use super::{Document, Model, ModelFormat};
 use crate::error::WriteError;
-use crate::format::ModelFormat;
 use crate::gltf::{self, Pose, PoseTiming, Rest};
-use crate::polygons::Encoding;
-use crate::{obj, off, ply, stl};
+use crate::obj;
+use crate::polygons::{Encoding, Shape};
 
 impl Model {
     /// Exports the model with new positions as `format`.
@@ -21,45 +19,38 @@ impl Model {
     /// # Errors
     /// Those of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        match format {
-            ModelFormat::Obj => self.write_obj(positions),
-            ModelFormat::Gltf => self.write_glb(positions),
-            ModelFormat::Ply => self.write_ply(positions),
-            ModelFormat::Stl => self.write_stl(positions),
-            ModelFormat::Off => self.write_off(positions),
-        }
+        format.write(self, positions)
     }
 
     /// Sentence listing what an export to `format` loses; `None` if nothing.
     #[must_use]
     pub fn lost_in(&self, format: ModelFormat) -> Option<String> {
         let is_same = self.format == format;
-        let keeps = |formats: &[ModelFormat]| is_same || formats.contains(&format);
-        let (colors, texcoords, materials, names, rig);
-        let is_binary = format == ModelFormat::Stl && self.encoding != Encoding::Text;
-        match &self.document {
-            Document::Obj(document) => {
-                colors = !document.colors.is_empty()
-                    && !keeps(&[ModelFormat::Gltf, ModelFormat::Ply, ModelFormat::Off]);
-                texcoords = !document.texcoords.is_empty() && !keeps(&[ModelFormat::Gltf]);
-                materials = !document.materials.is_empty() && !keeps(&[ModelFormat::Gltf]);
-                names = document.groups.len() > 1 && !is_same;
-                rig = false;
-            }
+        let loses = |what| !is_same && !format.keeps(what);
+        let (colors, texcoords, materials, names, rig) = match &self.document {
+            Document::Obj(document) => (
+                !document.colors.is_empty() && loses(Kept::Colors),
+                !document.texcoords.is_empty() && loses(Kept::Texcoords),
+                !document.materials.is_empty() && loses(Kept::Materials),
+                document.groups.len() > 1 && !is_same,
+                false,
+            ),
             Document::Gltf(document) => {
                 let has = |name: &str| {
                     let all = document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
                     let mut names = all.flat_map(|primitive| primitive.attributes.keys());
                     names.any(|key| matches!(key, Checked::Valid(key) if key.to_string().starts_with(name)))
                 };
-                colors = !is_same && has("COLOR_");
-                texcoords = has("TEXCOORD_") && !keeps(&[ModelFormat::Obj]);
-                // An OBJ export keeps material names.
-                materials = !is_same && self.counts.materials > 0;
-                names = !keeps(&[ModelFormat::Obj]) && self.counts.nodes > 1;
-                rig = !is_same && self.is_rigged();
+                (
+                    has("COLOR_") && !is_same,
+                    has("TEXCOORD_") && loses(Kept::Texcoords),
+                    // An OBJ export keeps material names.
+                    self.counts.materials > 0 && loses(Kept::Materials),
+                    self.counts.nodes > 1 && loses(Kept::Names),
+                    self.is_rigged() && loses(Kept::Rig),
+                )
             }
-        }
+        };
         let all = [
             (colors, "colours"),
             (texcoords, "texture coordinates"),
@@ -67,7 +58,7 @@ impl Model {
             (names, "names of parts"),
             (rig, "skeleton, morph targets and animations"),
             (
-                is_binary && self.origin != DVec3::ZERO,
+                self.origin != DVec3::ZERO && self.encoding != Encoding::Text && !format.keeps(Kept::Digits),
                 "the full precision of positions, as the model is far from the origin",
             ),
         ];
@@ -104,70 +95,24 @@ impl Model {
         }
     }
 
-    /// Exports the model with new positions as a PLY file with polygons, vertex colours and, if the source
-    /// was a PLY with normals, normals. A PLY source keeps its encoding; others become binary little-endian.
+    /// The model with new positions, for formats of polygons.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite position per vertex.
-    pub fn write_ply(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+    pub(super) fn shape<'a>(&'a self, positions: &'a [Vec3]) -> Result<Shape<'a>, WriteError> {
         self.check(positions)?;
-        let (faces, colors) = match &self.document {
-            Document::Obj(document) => (self.cage_mesh().faces, Some(&document.colors)),
-            Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), None),
+        let document = match &self.document {
+            Document::Obj(document) => Some(document.as_ref()),
+            Document::Gltf(_) => None,
         };
-        let positions = self.up.turned_back(positions);
-        Ok(ply::write(ply::PlyContents {
-            positions: &positions,
+        Ok(Shape {
+            positions: self.up.turned_back(positions),
             origin: self.origin,
             triangles: &self.triangles,
-            faces,
-            color: &|v| colors.and_then(|colors| colors.get(&v)).copied(),
-            has_colors: colors.is_some_and(|colors| !colors.is_empty()),
+            document,
             has_normals: self.has_normals,
             encoding: self.encoding,
-        }))
-    }
-
-    /// Exports the model with new positions as an OFF file with polygons and vertex colours, or normals if
-    /// the source was an OFF with normals.
-    ///
-    /// # Errors
-    /// [`WriteError`] unless there is one finite position per vertex.
-    pub fn write_off(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        self.check(positions)?;
-        let positions = self.up.turned_back(positions);
-        let has_normals = self.has_normals && self.format == ModelFormat::Off;
-        let normals = if has_normals { vertex_normals(&positions, &self.triangles) } else { Vec::new() };
-        let none = HashMap::new();
-        let (faces, colors) = match &self.document {
-            Document::Obj(document) => (self.cage_mesh().faces, &document.colors),
-            Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), &none),
-        };
-        Ok(off::write(&positions, self.origin, &faces, colors, &normals))
-    }
-
-    /// Exports the model with new positions as an STL file of triangles with flat normals. Text if the source
-    /// was a text STL, binary otherwise.
-    ///
-    /// # Errors
-    /// [`WriteError`] unless there is one finite position per vertex and at least one triangle.
-    pub fn write_stl(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        self.check(positions)?;
-        if self.triangles.is_empty() {
-            return Err(WriteError::NoFaces);
-        }
-        let mut solids = Vec::new();
-        if let Document::Obj(document) = &self.document {
-            // Triangles are in the order of faces.
-            let mut t = 0;
-            for group in &document.groups {
-                let starts = &document.face_starts;
-                let first = starts.get(group.first_face as usize).copied().unwrap_or(u32::MAX);
-                t += document.triangles[t..].iter().take_while(|triangle| triangle[0] < first).count();
-                solids.push((group.name.as_str(), t));
-            }
-        }
-        Ok(stl::write(&self.up.turned_back(positions), self.origin, &self.triangles, self.encoding, &solids))
+        })
     }
 
     /// Exports the model with new positions as a GLB file.

@@ -72,6 +72,12 @@ pub(crate) struct ObjDocument {
 }
 
 impl ObjDocument {
+    /// Vertices of each face.
+    pub(crate) fn faces(&self) -> Vec<Vec<u32>> {
+        let corners = |ends: &[u32]| &self.corners[ends[0] as usize..ends[1] as usize];
+        self.face_starts.windows(2).map(|ends| corners(ends).iter().map(|c| c.v).collect()).collect()
+    }
+
     /// Normal of a corner; zero where it has none.
     pub(crate) fn normal(&self, corner: &Corner) -> Vec3 {
         self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)

@@ -3,7 +3,7 @@
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
 use cagework_core::{Frames, PolygonMesh, Weights, subdivided_box};
-use cagework_io::{encode_pose, write_cage_obj, write_project, write_weights_npz};
+use cagework_io::{ModelFormat, encode_pose, write_cage_obj, write_project, write_weights_npz};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -86,9 +86,9 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
             .to_vec(),
     );
-    samples.push(model.write_ply(&model.positions).expect("positions are valid"));
-    samples.push(model.write_stl(&model.positions).expect("it has triangles"));
-    samples.push(model.write_off(&model.positions).expect("positions are valid"));
+    samples.push(model.write(ModelFormat::Ply, &model.positions).expect("positions are valid"));
+    samples.push(model.write(ModelFormat::Stl, &model.positions).expect("it has triangles"));
+    samples.push(model.write(ModelFormat::Off, &model.positions).expect("positions are valid"));
     samples.push(
         b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
     );

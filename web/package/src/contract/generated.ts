@@ -491,7 +491,7 @@ message: string, count: number, fix: Fix | null, };
 /**
  * File format of a model.
  */
-export type ModelFormat = "obj" | "gltf" | "ply" | "stl" | "off";
+export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off";
 /**
  * The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
  * read and back when written. Both rotations are exact.
@@ -1026,6 +1026,12 @@ export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_w
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
 export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off"] as const;
+/** MIME types of models. */
+export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json"] as const;
+/** Extensions of models that refer to other files. */
+export const NAMING_ENDINGS = ["gltf", "obj"] as const;
+/** Extensions of these other files. */
+export const COMPANION_ENDINGS = ["bin", "png", "jpg", "jpeg", "webp", "ktx2", "mtl"] as const;
 /** Formats that store only a shape. */
 export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
 /** Least and most of each option that is a number. */

@@ -1,11 +1,9 @@
 /** Reads dropped files: finds the model among them, and its siblings. */
 
 import type { NamedFile } from "../contract";
+import { NAMING_ENDINGS } from "../contract/generated";
 import { extension, isModel } from "../names";
 import { named } from "./client";
-
-/** Formats that refer to other files: buffers, textures, materials. */
-const NAMING: readonly string[] = ["gltf", "obj"];
 
 /** Size limit, bytes. Opening a file takes several times its size in memory. */
 const LARGEST = 1 << 30;
@@ -32,7 +30,7 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   if (!main) throw named("Empty", "there is no file to open");
   const bytes = await read(main);
   const siblings = new Map<string, Uint8Array>();
-  if (NAMING.includes(extension(main.name))) {
+  if ((NAMING_ENDINGS as readonly string[]).includes(extension(main.name))) {
     const folder = main.path.slice(0, main.path.lastIndexOf("/") + 1);
     for (const file of files.filter((file) => file !== main)) {
       const content = await read(file);

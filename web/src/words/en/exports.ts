@@ -7,7 +7,7 @@ export const exports = {
   sentence: "Files for Blender, Unity, Unreal, three.js, Python and this page.",
   items: {
     glb: ["Posed model", "GLB as you see it, with the materials, textures and parts of your file."],
-    shape: ["Shape only", "OBJ, PLY, STL or OFF as you see it, for printing, measuring or other programs."],
+    shape: ["Shape only", "Only the shape as you see it, for printing, measuring or other programs."],
     poses: [
       "Poses as morph targets",
       "GLB with one morph target per pose and an animation through them. Every blend is exact.",

@@ -1,0 +1,343 @@
+//! File formats of models. A new format is a file beside `ply.rs` and a row of [`ModelFormat`].
+
+use glam::Vec3;
+use thiserror::Error;
+
+use super::read::Source;
+use super::{Model, ReadError};
+use crate::error::WriteError;
+use crate::polygons::Shape;
+use crate::shown::shown;
+use crate::siblings::Resolve;
+use crate::{gltf, obj, off, ply, stl};
+
+/// Facts about a format, and its functions.
+struct Row {
+    /// Extensions of readable files, lower case, without the dot. The most complete variant comes first.
+    endings: &'static [&'static str],
+    /// Extensions of written files, the usual one first.
+    written: &'static [&'static str],
+    /// MIME types, for file choosers that know them better than extensions.
+    mime: &'static [&'static str],
+    /// Extensions of files that refer to others, and of those others: buffers, textures, materials.
+    naming: &'static [&'static str],
+    companions: &'static [&'static str],
+    /// Whether a file is of this format beyond doubt.
+    is: fn(&[u8]) -> bool,
+    /// Whether a text is of this format, without byte order mark and leading space.
+    is_text: fn(&[u8]) -> bool,
+    /// Extensions of files that `is` or `is_text` must recognise, with what the others are and how that shows.
+    marked: &'static [[&'static str; 3]],
+    read: fn(Source<'_, '_>) -> Result<Model, ReadError>,
+    /// Names of the files that a file refers to.
+    named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
+    write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
+    /// Approximate memory for writing, bytes; given the part that depends on vertices and triangles.
+    bytes_to_write: fn(&Model, u64) -> u64,
+    /// What written files keep of a model of another format.
+    keeps: &'static [Kept],
+}
+
+/// Something that files of a format keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kept {
+    /// Vertices and their order.
+    Order,
+    /// All digits of positions far from the origin.
+    Digits,
+    Colors,
+    Texcoords,
+    Materials,
+    /// Names of the parts of a glTF.
+    Names,
+    /// Skeleton, morph targets and animations.
+    Rig,
+    /// Several poses.
+    Poses,
+}
+
+/// Of a format that has no other files, and that only its extension tells.
+const PLAIN: Row = Row {
+    endings: &[],
+    written: &[],
+    mime: &[],
+    naming: &[],
+    companions: &[],
+    is: |_| false,
+    is_text: |_| false,
+    marked: &[],
+    read: |source| source.obj(),
+    named_files: |_, _, _| Vec::new(),
+    write: Model::write_obj,
+    bytes_to_write: |_, shape| shape,
+    keeps: &[],
+};
+
+/// Defines [`ModelFormat`] and the row of each format.
+macro_rules! formats {
+    ($($(#[$about:meta])* $format:ident = $name:literal: $row:expr;)+) => {
+        /// File format of a model.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+        #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+        pub enum ModelFormat {
+            $($(#[$about])* #[serde(rename = $name)] $format,)+
+        }
+
+        impl ModelFormat {
+            /// All formats, in the order of listings.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$format),+];
+
+            /// Short name, lower case.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$format => $name,)+ }
+            }
+
+            fn row(self) -> &'static Row {
+                match self { $(Self::$format => const { &$row },)+ }
+            }
+        }
+    };
+}
+
+formats! {
+    /// glTF 2.0: JSON or GLB to read, GLB to write.
+    Gltf = "gltf": Row {
+        endings: &["glb", "vrm", "gltf"],
+        // A VRM is a GLB.
+        written: &["glb", "vrm"],
+        mime: &["model/gltf-binary", "model/gltf+json"],
+        naming: &["gltf"],
+        companions: &["bin", "png", "jpg", "jpeg", "webp", "ktx2"],
+        is: |bytes| bytes.starts_with(b"glTF"),
+        is_text: |text| text.starts_with(b"{"),
+        marked: &[
+            ["glb", "not a GLB", "its first four bytes are not 'glTF'"],
+            ["vrm", "not a VRM", "its first four bytes are not 'glTF'"],
+            ["gltf", "not a glTF", "it does not begin with '{'"],
+        ],
+        read: |source| source.gltf(),
+        named_files: |bytes, _, memory_limit| gltf::named_files(bytes, memory_limit),
+        write: Model::write_glb,
+        // JSON of new accessors and buffer views.
+        bytes_to_write: |model, shape| shape + 6000 * model.counts.primitives as u64 + model.bytes,
+        keeps: &[Kept::Digits, Kept::Colors, Kept::Texcoords, Kept::Materials, Kept::Rig, Kept::Poses],
+    };
+    /// Wavefront OBJ.
+    Obj = "obj": Row {
+        endings: &["obj"],
+        written: &["obj"],
+        naming: &["obj"],
+        companions: &["mtl"],
+        named_files: obj::named_files,
+        // Without normals it needs a third.
+        bytes_to_write: |model, shape| shape / 3 + model.bytes,
+        keeps: &[Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
+        ..PLAIN
+    };
+    /// Stanford PLY, text or binary.
+    Ply = "ply": Row {
+        endings: &["ply"],
+        written: &["ply"],
+        is: ply::is_ply,
+        marked: &[["ply", "not a PLY", "its first line is not 'ply'"]],
+        read: |source| source.polygons(ModelFormat::Ply, ply::read),
+        write: |model, positions| model.shape(positions).map(|shape| ply::write(&shape)),
+        keeps: &[Kept::Order, Kept::Digits, Kept::Colors],
+        ..PLAIN
+    };
+    /// STL, text or binary.
+    Stl = "stl": Row {
+        endings: &["stl"],
+        written: &["stl"],
+        is: stl::is_stl,
+        read: |source| source.polygons(ModelFormat::Stl, stl::read),
+        write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),
+        ..PLAIN
+    };
+    /// Geomview OFF, text: OFF, COFF, NOFF.
+    Off = "off": Row {
+        endings: &["off"],
+        written: &["off"],
+        is_text: off::is_off,
+        read: |source| source.polygons(ModelFormat::Off, off::read),
+        write: |model, positions| {
+            let has_normals = model.has_normals && model.format == ModelFormat::Off;
+            model.shape(positions).map(|shape| off::write(&Shape { has_normals, ..shape }))
+        },
+        keeps: &[Kept::Order, Kept::Digits, Kept::Colors],
+        ..PLAIN
+    };
+}
+
+/// A file is not in a supported format.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{} is {found}: {hint}", shown(name))]
+pub struct FormatError {
+    /// Name given by the caller.
+    pub name: String,
+    /// What the content looks like.
+    pub found: &'static str,
+    /// What to do.
+    pub hint: String,
+}
+
+impl ModelFormat {
+    /// Extensions of readable files, lower case, without the dot. The most complete variant comes first.
+    #[must_use]
+    pub fn endings(self) -> &'static [&'static str] {
+        self.row().endings
+    }
+
+    /// Extension of exported files, lower case, without the dot.
+    #[must_use]
+    pub fn export_extension(self) -> &'static str {
+        self.row().written[0]
+    }
+
+    /// MIME types, for file choosers that know them better than extensions.
+    #[must_use]
+    pub fn mime_types(self) -> &'static [&'static str] {
+        self.row().mime
+    }
+
+    /// Extensions of files that refer to others: buffers, textures, materials.
+    #[must_use]
+    pub fn naming_endings(self) -> &'static [&'static str] {
+        self.row().naming
+    }
+
+    /// Extensions of files that these refer to.
+    #[must_use]
+    pub fn companions(self) -> &'static [&'static str] {
+        self.row().companions
+    }
+
+    /// Whether a file can store several poses.
+    #[must_use]
+    pub fn holds_poses(self) -> bool {
+        self.keeps(Kept::Poses)
+    }
+
+    pub(crate) fn keeps(self, what: Kept) -> bool {
+        self.row().keeps.contains(&what)
+    }
+
+    /// Extensions of the written files that keep `what`: "OBJ, PLY or OFF".
+    pub(crate) fn listed(what: Option<Kept>) -> String {
+        let all = Self::ALL.into_iter().filter(|format| what.is_none_or(|what| format.keeps(what)));
+        let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();
+        names.split_last().map_or(String::new(), |(last, others)| format!("{} or {last}", others.join(", ")))
+    }
+
+    /// Format for exporting to a file of this name, by its extension.
+    #[must_use]
+    pub fn of_export(name: &str) -> Option<Self> {
+        let extension = extension(name);
+        Self::ALL.into_iter().find(|format| format.row().written.contains(&extension.as_str()))
+    }
+
+    /// Detects the format of a file from its content.
+    ///
+    /// # Errors
+    /// [`FormatError`] if the content contradicts the file's extension or is known to be something else.
+    pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
+        let fault = |found, hint: &str| Err(FormatError { name: name.into(), found, hint: hint.into() });
+        let export = format!("export it as {}", Self::listed(None));
+        let unmarked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let text = unmarked.trim_ascii_start();
+        if let Some(found) = Self::ALL.into_iter().find(|format| (format.row().is)(bytes)) {
+            return Ok(found);
+        }
+        match bytes {
+            [] => return fault("empty", "the file has no bytes"),
+            [b'P', b'K', 3, 4, ..] => return fault("a zip archive", "unpack it first"),
+            [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", &export),
+            [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", &export),
+            [0xff, 0xfe, ..]
+            | [0xfe, 0xff, ..]
+            | [b'#' | b'v' | b'o' | b'g' | b's' | b'm' | b'p' | b'{', 0, ..] => {
+                return fault("a UTF-16 text", "save it as UTF-8");
+            }
+            _ if text.starts_with(b"version https://git-lfs.github.com/spec/") => {
+                return fault("a Git LFS pointer, not the file itself", "fetch the file with `git lfs pull`");
+            }
+            [b'<', ..] => return fault("an XML or HTML file", &export),
+            _ => {}
+        }
+        if let Some(found) = Self::ALL.into_iter().find(|format| (format.row().is_text)(text)) {
+            return Ok(found);
+        }
+        let extension = extension(name);
+        if ["fbx", "dae", "usdz", "usd", "3ds", "blend"].contains(&extension.as_str()) {
+            return fault("in an unsupported format", &export);
+        }
+        let by_name = Self::ALL.into_iter().find(|format| format.endings().contains(&extension.as_str()));
+        let format = by_name.unwrap_or(Self::Obj);
+        match format.row().marked.iter().find(|[ending, ..]| *ending == extension) {
+            Some([_, found, sign]) => fault(found, &format!("{sign}: it is damaged or has the wrong name")),
+            None => Ok(format),
+        }
+    }
+
+    /// Names of the files that a file refers to. Empty if it cannot be read.
+    pub(super) fn named_files(
+        self,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Vec<String> {
+        (self.row().named_files)(bytes, resolve, memory_limit)
+    }
+
+    pub(super) fn read(self, source: Source<'_, '_>) -> Result<Model, ReadError> {
+        (self.row().read)(source)
+    }
+
+    pub(super) fn write(self, model: &Model, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        (self.row().write)(model, positions)
+    }
+
+    /// Approximate memory for writing `model`, bytes.
+    pub(super) fn bytes_to_write(self, model: &Model) -> u64 {
+        /// Old and new normals, new positions and the output.
+        const VERTEX_BYTES: u64 = 300;
+        const TRIANGLE_BYTES: u64 = 60;
+        let shape =
+            VERTEX_BYTES * model.positions.len() as u64 + TRIANGLE_BYTES * model.triangles.len() as u64;
+        (self.row().bytes_to_write)(model, shape)
+    }
+}
+
+fn extension(name: &str) -> String {
+    name.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_ascii_lowercase())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The tables of what is read and written, and of what is kept and lost.
+    #[test]
+    fn page_about_formats_has_every_format_and_extension() {
+        let page = include_str!("../../../../docs/formats.md");
+        let tables: Vec<&str> = page.split("\n## ").collect();
+        for format in ModelFormat::ALL {
+            let starts = |row: &&str| {
+                let name = row.trim_start_matches("| ").split([' ', ':']).next().unwrap_or_default();
+                row.starts_with("| ") && name.to_lowercase() == format.name()
+            };
+            let row = tables[0].lines().find(starts).unwrap_or_default();
+            let says = |ending: &&str| *ending == format.name() || row.contains(&format!("`.{ending}`"));
+            assert!(!row.is_empty() && format.endings().iter().all(says), "{format:?}: {row}");
+            assert!(format.row().written.iter().all(says), "{format:?}: {row}");
+            assert!(tables[1].lines().any(|row| starts(&row)), "{format:?}");
+        }
+    }
+
+    #[test]
+    fn lists_name_the_formats_that_keep_something() {
+        assert_eq!(ModelFormat::listed(None), "GLB, OBJ, PLY, STL or OFF");
+        assert_eq!(ModelFormat::listed(Some(Kept::Order)), "OBJ, PLY or OFF");
+    }
+}
