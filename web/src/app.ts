@@ -18,7 +18,7 @@ import { createTour, type TourActions } from "./actions/tour";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
 import type { NamedFile, Session } from "./contract";
-import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, RANGES } from "./defaults";
+import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
 import { type DocumentMirror, followDocument } from "./document";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
@@ -127,7 +127,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       const { cage: found, cageOptions } = store.get();
       const vertices = Math.min(cageOptions.vertices, found?.info.vertices ?? cageOptions.vertices);
       store.set({
-        cageOptions: { ...cageOptions, vertices: Math.max(RANGES.vertices[0], Math.floor(vertices / 2)) },
+        cageOptions: { ...cageOptions, vertices: Math.max(SLIDERS.vertices.min, Math.floor(vertices / 2)) },
       });
       void cage.regenerate().then((made) => made && bind.start());
     },

@@ -13,10 +13,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
-use cagework_core::options::{self, Choice, Number};
+use cagework_core::options::{self, BindOptions, Choice, Number};
 use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use many::RefitArgs;
@@ -102,7 +102,7 @@ pub(crate) struct BindArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
     /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     /// Write the rest pose as reconstructed from the weights; the file extension selects the format.
     #[arg(short, long, value_name = "FILE")]
@@ -130,8 +130,8 @@ pub(crate) struct BindArgs {
 pub(crate) struct ReadArgs {
     /// Up axis of the files. With z, models, cages and poses are rotated to y up when they are read, and rotated back when
     /// they are written.
-    #[arg(long, value_enum, default_value_t = UpArg::Y, value_name = "AXIS")]
-    up: UpArg,
+    #[arg(long, default_value_t, value_name = "AXIS", value_parser = words::<UpAxis>())]
+    up: UpAxis,
     #[command(flatten)]
     pub(crate) memory: MemoryArgs,
 }
@@ -139,10 +139,7 @@ pub(crate) struct ReadArgs {
 impl ReadArgs {
     /// The up axis of the files.
     pub(crate) fn axis(self) -> UpAxis {
-        match self.up {
-            UpArg::Y => UpAxis::Y,
-            UpArg::Z => UpAxis::Z,
-        }
+        self.up
     }
 }
 
@@ -276,16 +273,9 @@ impl FromStr for ModelOutput {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-/// Up axis of the files.
-enum UpArg {
-    Y,
-    Z,
-}
-
 /// Help for a model argument: `what`, then the supported file extensions.
 fn model_help(what: &str) -> String {
-    let endings = ModelFormat::ALL.map(ModelFormat::endings).concat().join(", .");
+    let endings = ModelFormat::ALL.map(|format| format.facts().endings).concat().join(", .");
     format!("{what} (.{endings})")
 }
 
@@ -310,13 +300,6 @@ fn positive(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("not a positive number".into()),
-    }
-}
-
-fn fraction(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err("not a number from 0 to below 1".into()),
     }
 }
 

@@ -169,7 +169,7 @@ fn scene_of(args: &RenderArgs) -> SceneOptions {
     let chosen =
         if matches!(args.show, ShowArg::Weights | ShowArg::Slice) { vec![column] } else { Vec::new() };
     SceneOptions {
-        theme: args.theme.into(),
+        theme: args.theme,
         mesh,
         mesh_edges: args.show == ShowArg::Edges,
         base_wireframe: args.show == ShowArg::Wireframe,

@@ -184,6 +184,19 @@ pub struct Number {
     pub allowed: &'static str,
     /// Whether a value is valid.
     pub is_allowed: fn(f64) -> bool,
+    /// Values that a slider offers.
+    pub slider: Option<Slider>,
+}
+
+/// Range and step of a slider; may be narrower than the valid range.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Slider {
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+    /// Distance of two values.
+    pub step: f64,
 }
 
 /// Cells along the longest side.
@@ -191,21 +204,29 @@ pub const GRID: Number = Number {
     name: "grid",
     allowed: "a whole number from 8 to 512",
     is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
+    slider: None,
 };
 /// Convergence threshold for delta.
-pub const TAU: Number =
-    Number { name: "tau", allowed: "a number above 0", is_allowed: |tau| tau.is_finite() && tau > 0.0 };
+pub const TAU: Number = Number {
+    name: "tau",
+    allowed: "a number above 0",
+    is_allowed: |tau| tau.is_finite() && tau > 0.0,
+    // Exponents of ten.
+    slider: Some(Slider { min: -8.0, max: -2.0, step: 1.0 }),
+};
 /// Limit on iterations.
 pub const MAX_ITERATIONS: Number = Number {
     name: "max_iterations",
     allowed: "a whole number from 1 on",
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
+    slider: Some(Slider { min: 1.0, max: 1e6, step: 1.0 }),
 };
 /// Total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
     allowed: "0 (keep all weights) or a threshold below 0.1",
     is_allowed: |w| (0.0..0.1).contains(&w),
+    slider: None,
 };
 
 /// Subdivision steps of a smooth cage.
@@ -213,6 +234,7 @@ pub const SMOOTH: Number = Number {
     name: "smooth",
     allowed: "a whole number from 0 to 3",
     is_allowed: |n| n.fract() == 0.0 && (0.0..=3.0).contains(&n),
+    slider: None,
 };
 
 impl Number {

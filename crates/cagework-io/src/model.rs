@@ -6,7 +6,7 @@ mod read;
 mod write;
 
 pub use cage::PoseState;
-pub use format::{FormatError, ModelFormat};
+pub use format::{FormatError, FormatFacts, ModelFormat};
 
 use std::borrow::Cow;
 
@@ -118,7 +118,7 @@ impl Model {
         memory_limit: u64,
     ) -> Vec<String> {
         ModelFormat::of_file(name, bytes)
-            .map_or(Vec::new(), |format| format.named_files(bytes, resolve, memory_limit))
+            .map_or(Vec::new(), |format| (format.facts().named_files)(bytes, resolve, memory_limit))
     }
 
     /// Reads a file of any [`ModelFormat`], detected from the content; `name` is used in messages. Models far from the world origin are stored relative to [`Self::origin`], without loss.
@@ -166,7 +166,7 @@ impl Model {
         near: bool,
     ) -> Result<Self, ReadError> {
         let format = ModelFormat::of_file(name, bytes)?;
-        format.read(Source { name, bytes, resolve, memory_limit, near })
+        (format.facts().read)(Source { name, bytes, resolve, memory_limit, near })
     }
 
     /// Approximate memory of the model and its document, bytes.
@@ -178,7 +178,12 @@ impl Model {
     /// Approximate additional memory while exporting to `format`, bytes.
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
-        format.bytes_to_write(self)
+        /// Old and new normals, new positions and the output.
+        const VERTEX_BYTES: u64 = 300;
+        const TRIANGLE_BYTES: u64 = 60;
+        let n = |count: usize| count as u64;
+        let shape = VERTEX_BYTES * n(self.positions.len()) + TRIANGLE_BYTES * n(self.triangles.len());
+        (format.facts().bytes_to_write)(self, shape)
     }
 
     /// Additional memory for `n_poses` morph targets on top of [`Self::bytes_to_write`], bytes.

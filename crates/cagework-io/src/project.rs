@@ -16,7 +16,6 @@ use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
 use crate::model::{Document, Model, ModelFormat, ReadError};
 use crate::origin::translation;
 use crate::shown::shown;
-use crate::up::UpAxis;
 
 /// Format version of projects with one model near the origin. Older readers reject the other two: projects
 /// with several models, and with models far from the origin.
@@ -101,7 +100,7 @@ pub fn write_project(
     let version = if more.is_empty() { VERSION } else { VERSION_MULTIPLE_MODELS };
     let version = if model.origin == DVec3::ZERO { version } else { VERSION_FAR_ORIGIN };
     let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
-    project["up"] = up.name().into();
+    project["up"] = up.to_string().into();
     if version == VERSION_FAR_ORIGIN {
         project["origin"] = json!(model.origin.to_array());
     }
@@ -163,7 +162,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     };
     let model_name = project["name"].as_str().unwrap_or(name);
     // The first projects have no up axis.
-    let up = project["up"].as_str().and_then(UpAxis::named).unwrap_or_default();
+    let up = project["up"].as_str().and_then(|up| up.parse().ok()).unwrap_or_default();
     // Only projects far from the origin store it.
     let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
         .map_err(|_| damaged("its origin is not three numbers"))?;

@@ -2,38 +2,22 @@
 
 use std::borrow::Cow;
 
-use cagework_core::PolygonMesh;
+use cagework_core::{PolygonMesh, choice};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
-/// The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
-/// read and back when written. Both rotations are exact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub enum UpAxis {
-    /// Y, as glTF prescribes.
-    #[default]
-    Y,
-    /// Z, as CAD programs and some OBJ files have it.
-    Z,
+choice! {
+    /// The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
+    /// read and back when written. Both rotations are exact.
+    UpAxis {
+        /// Y, as glTF prescribes.
+        #[default]
+        Y = "y",
+        /// Z, as CAD programs and some OBJ files have it.
+        Z = "z",
+    }
 }
 
 impl UpAxis {
-    /// Name in files and on the page.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Y => "y",
-            Self::Z => "z",
-        }
-    }
-
-    /// Parses [`Self::name`].
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Y, Self::Z].into_iter().find(|up| up.name() == name)
-    }
-
     /// Converts positions from the file's axes to Y up.
     #[must_use]
     pub fn turned(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {

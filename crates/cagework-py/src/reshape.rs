@@ -40,12 +40,7 @@ pub(crate) fn reshape<'py>(
     r#static: bool,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let joints = match joints {
-        "follow" => Joints::Follow,
-        "stay" => Joints::Stay,
-        "turn" => Joints::Turn,
-        other => return Err(error::option(format!("joints is {other:?}; it must be follow, stay or turn"))),
-    };
+    let joints: Joints = joints.parse().map_err(|wrong| error::option(format!("joints: {wrong}")))?;
     let mask: Vec<(String, f32)> = mask.into_iter().flatten().collect();
     if let Some((name, amount)) = mask.iter().find(|(_, amount)| !(0.0..=1.0).contains(amount)) {
         return Err(error::option(format!("the mask of {name:?} is {amount}; it must be from 0 to 1")));

@@ -46,7 +46,7 @@ def test_invalid_cage_gives_the_error_message_of_the_command(tmp_path):
         (lambda: pull([[0, 1, 2]]), cw.PullError, "there is no vertex 1: indices run from 0 to 0"),
         (lambda: cw.reshape(b"no model", CUBE, CUBE.vertices), cw.ModelError, "model"),
         (lambda: cw.reshape("missing.glb", CUBE, CUBE.vertices), FileNotFoundError, "missing.glb"),
-        (lambda: cw.reshape(b"", CUBE, CUBE.vertices, joints="run"), cw.OptionError, "joints is .run"),
+        (lambda: cw.reshape(b"", CUBE, CUBE.vertices, joints="run"), cw.OptionError, "joints: .run"),
     ],
 )
 def test_errors_have_their_class_and_the_message_of_the_core(call, kind, message):

@@ -25,7 +25,7 @@ use cagework_editor::CageControls;
 
 use crate::controls::{control_set, from_js};
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{JsBindOptions, JsCageOptions, READ_LIMIT, decode};
+use crate::options::{JsBindOptions, READ_LIMIT, decode};
 use crate::problems::{self, Check};
 use crate::views::object;
 
@@ -134,7 +134,7 @@ impl Binder {
     ) -> Result<Option<Bound>, JsValue> {
         let request: JsBindOptions = decode(options)?;
         let set = control_set(&cage, &corners, controls)?;
-        let centers = Slice::new(&set, &request.into(), axis.min(2), fraction).centers();
+        let centers = Slice::new(&set, &request.options, axis.min(2), fraction).centers();
         if centers.is_empty() {
             return Ok(None);
         }
@@ -183,8 +183,7 @@ impl Binder {
         smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Polygons, JsValue> {
-        let request: JsCageOptions = decode(options)?;
-        let options = CageOptions { smooth, ..request.into() };
+        let options = CageOptions { smooth, ..decode(options)? };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &options, &listener);
@@ -298,11 +297,10 @@ impl Binder {
         request: JsBindOptions,
         progress: Function,
     ) -> Answer<Binding> {
-        let options = BindOptions::from(request);
         let listener = Listener::new(progress);
         if request.is_on_cpu() {
-            return Ok(cagework_core::bind(positions, set, &options, &listener)?);
+            return Ok(cagework_core::bind(positions, set, &request.options, &listener)?);
         }
-        Ok(bind_on(positions, set, &options, &listener, self.open()?).await?)
+        Ok(bind_on(positions, set, &request.options, &listener, self.open()?).await?)
     }
 }

@@ -5,12 +5,10 @@ use std::fmt::Write as _;
 use std::fs;
 
 use cagework_cage::check::{Code, Repair, Severity};
-use cagework_cage::generate::{
-    CageOptions, DETAILS, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
-};
+use cagework_cage::generate::{CageOptions, Shape};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::options::{
-    Backend, CellShape, Choice, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
+    Backend, CellShape, Choice, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
 };
 use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
@@ -21,7 +19,8 @@ use cagework_editor::{
     CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
     SelectionView, SurfacePoint,
 };
-use cagework_io::{ModelFormat, UpAxis};
+use cagework_gpu::render::Theme;
+use cagework_io::{FormatFacts, Joints, ModelFormat, UpAxis};
 use serde::Serialize;
 use ts_rs::{Config, TS};
 
@@ -30,10 +29,9 @@ use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::opening::{CageContents, OpenContents, PoseContents};
 use crate::options::{
-    Colour, GizmoHandle, JsBindOptions, JsCageOptions, JsGizmo, JsJoints, JsPullOptions, JsRigOptions,
-    JsSceneOptions, JsSymmetry, JsTheme, SliceShown,
+    Colour, GizmoHandle, JsBindOptions, JsGizmo, JsPullOptions, JsRigOptions, JsSceneOptions, SliceShown,
 };
-use crate::settings::Settings;
+use crate::settings::{NUMBERS, Settings};
 use crate::views::{
     BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, MemberInfo,
     Mend, ModelInfo, Problem, TargetView, View,
@@ -55,7 +53,15 @@ macro_rules! declarations {
 
 /// A TypeScript constant. `serde_json::to_string` keeps `f32` decimals; `json!` would widen them to `f64`.
 fn constant(name: &str, r#type: &str, value: &impl Serialize) -> String {
-    let json = serde_json::to_string(value).unwrap().replace("\"threads\":0,", "");
+    let mut json = serde_json::to_string(value).unwrap();
+    for (name, in_page) in [
+        ("\"threads\":0,", ""),
+        (",\"smooth\":0", ""),
+        ("\"target\"", "\"vertices\""),
+        ("\"clearance\"", "\"margin\""),
+    ] {
+        json = json.replace(name, in_page);
+    }
     format!("export const {name}: {type} = {json};\n")
 }
 
@@ -88,8 +94,7 @@ fn generated_types_are_up_to_date() {
         MeanMax,
         WeightStats,
         Shape,
-        JsSymmetry,
-        JsCageOptions,
+        CageOptions,
         BoundsView,
         InnerElement,
         InnerKind,
@@ -117,7 +122,7 @@ fn generated_types_are_up_to_date() {
         PoseContents,
         OpenContents,
         Settings,
-        JsTheme,
+        Theme,
         Colour,
         Coordinates,
         SliceShown,
@@ -127,7 +132,7 @@ fn generated_types_are_up_to_date() {
         SurfacePoint,
         Grip,
         JsPullOptions,
-        JsJoints,
+        Joints,
         JsRigOptions,
         ClipView,
         TargetView,
@@ -146,34 +151,29 @@ fn generated_types_are_up_to_date() {
     }
     let options = BindOptions { memory_limit: PAGE_MEMORY, ..BindOptions::default() };
     text += &constant("BIND_DEFAULTS", "BindOptions", &JsBindOptions { backend: Backend::Gpu, options });
-    text += &constant("CAGE_DEFAULTS", "CageOptions", &JsCageOptions::from(CageOptions::default()));
+    text += &constant("CAGE_DEFAULTS", "CageOptions", &CageOptions::default());
     text += &constant("RIG_DEFAULTS", "RigOptions", &JsRigOptions::default());
     text += &constant("SCENE_DEFAULTS", "SceneOptions", &JsSceneOptions::default());
     let kinds: Vec<&str> = Coordinates::ALL.iter().map(|(word, _)| *word).collect();
     text += &constant("COORDINATES", "readonly Coordinates[]", &kinds);
-    let all = |of: fn(ModelFormat) -> &'static [&'static str]| ModelFormat::ALL.map(of).concat();
+    let all =
+        |of: fn(&FormatFacts) -> &'static [&'static str]| ModelFormat::ALL.map(|f| of(f.facts())).concat();
     let shapes = ModelFormat::ALL.into_iter().filter(|format| !format.holds_poses());
     for (about, name, values) in [
-        ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(ModelFormat::endings)),
-        ("MIME types of models.", "MODEL_TYPES", all(ModelFormat::mime_types)),
-        (
-            "Extensions of models that refer to other files.",
-            "NAMING_ENDINGS",
-            all(ModelFormat::naming_endings),
-        ),
-        ("Extensions of these other files.", "COMPANION_ENDINGS", all(ModelFormat::companions)),
+        ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(|facts| facts.endings)),
+        ("MIME types of models.", "MODEL_TYPES", all(|facts| facts.mime_types)),
+        ("Extensions of models that refer to other files.", "NAMING_ENDINGS", all(|facts| facts.naming)),
+        ("Extensions of these other files.", "COMPANION_ENDINGS", all(|facts| facts.companions)),
         ("Formats that store only a shape.", "SHAPE_FORMATS", shapes.map(ModelFormat::name).collect()),
     ] {
         writeln!(text, "/** {about} */\nexport const {name} = {values:?} as const;").unwrap();
     }
-    writeln!(
-        text,
-        "/** Least and most of each option that is a number. */\nexport const RANGES = {{ grid: [{MIN_GRID}, {MAX_GRID}], \
-         vertices: [{MIN_TARGET}, {MAX_TARGET}], detail: [{}, {}], margin: [0, {MAX_CLEARANCE}], voxels: [{MIN_VOXELS}, {MAX_VOXELS}] }} \
-         as const;",
-        DETAILS[0], DETAILS[1]
-    )
-    .unwrap();
+    text += "/** Sliders of options, by name. */\nexport const SLIDERS = {";
+    for (name, number) in NUMBERS {
+        let Some(slider) = number.slider else { continue };
+        write!(text, " {name}: {},", serde_json::to_string(&slider).unwrap()).unwrap();
+    }
+    text += " } as const;\n";
     if fs::read_to_string(FILE).unwrap_or_default() != text {
         fs::write(FILE, text).unwrap();
         panic!(

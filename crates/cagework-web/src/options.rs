@@ -1,6 +1,5 @@
 //! Option types as JavaScript passes them; contract.ts has their declarations.
 
-use cagework_cage::generate::{CageOptions, Shape, Symmetry};
 use cagework_core::options::{Backend, Solver};
 use cagework_core::{BindOptions, Coordinates};
 use cagework_gpu::render::Theme;
@@ -24,12 +23,6 @@ pub(crate) struct JsBindOptions {
     pub(crate) options: BindOptions,
 }
 
-impl From<JsBindOptions> for BindOptions {
-    fn from(request: JsBindOptions) -> Self {
-        request.options
-    }
-}
-
 impl JsBindOptions {
     /// Whether the bind runs on the CPU: as set, without WebGPU, or because the solver has no GPU version.
     pub(crate) fn is_on_cpu(&self) -> bool {
@@ -39,82 +32,12 @@ impl JsBindOptions {
     }
 }
 
-/// Options of a generated cage.
-#[derive(Clone, Copy, Deserialize)]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "CageOptions"))]
-pub(crate) struct JsCageOptions {
-    vertices: u32,
-    detail: f32,
-    quads: bool,
-    margin: f32,
-    symmetry: JsSymmetry,
-    voxels: u32,
-    #[serde(default)]
-    shape: Shape,
-    #[serde(default)]
-    per_component: bool,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "CageSymmetry"))]
-pub(crate) enum JsSymmetry {
-    Auto,
-    On,
-    Off,
-}
-
-#[cfg(test)]
-impl From<CageOptions> for JsCageOptions {
-    fn from(options: CageOptions) -> Self {
-        let CageOptions {
-            target: vertices,
-            detail,
-            quads,
-            clearance: margin,
-            voxels,
-            shape,
-            per_component,
-            symmetry,
-            smooth: _,
-        } = options;
-        let symmetry = match symmetry {
-            Symmetry::Auto => JsSymmetry::Auto,
-            Symmetry::None => JsSymmetry::Off,
-            _ => JsSymmetry::On,
-        };
-        Self { vertices, detail, quads, margin, symmetry, voxels, shape, per_component }
-    }
-}
-
-impl From<JsCageOptions> for CageOptions {
-    fn from(request: JsCageOptions) -> Self {
-        Self {
-            target: request.vertices,
-            detail: request.detail,
-            quads: request.quads,
-            clearance: request.margin,
-            symmetry: match request.symmetry {
-                JsSymmetry::Auto => Symmetry::Auto,
-                JsSymmetry::On => Symmetry::X,
-                JsSymmetry::Off => Symmetry::None,
-            },
-            shape: request.shape,
-            per_component: request.per_component,
-            voxels: request.voxels,
-            smooth: 0,
-        }
-    }
-}
-
 /// Options of the scene.
 #[derive(Clone, Deserialize, PartialEq, Eq)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
 pub(crate) struct JsSceneOptions {
-    theme: JsTheme,
+    pub(crate) theme: Theme,
     pub(crate) model: bool,
     pub(crate) base_wireframe: bool,
     pub(crate) cage: bool,
@@ -131,13 +54,13 @@ pub(crate) struct JsSceneOptions {
     pub(crate) compare: Vec<Coordinates>,
     pub(crate) problems: bool,
     /// How joints are shown: as they will be exported. Null hides them.
-    pub(crate) joints: Option<JsJoints>,
+    pub(crate) joints: Option<Joints>,
 }
 
 impl Default for JsSceneOptions {
     fn default() -> Self {
         Self {
-            theme: JsTheme::Dark,
+            theme: Theme::Dark,
             model: true,
             base_wireframe: false,
             cage: true,
@@ -153,24 +76,6 @@ impl Default for JsSceneOptions {
             joints: None,
         }
     }
-}
-
-impl JsSceneOptions {
-    pub(crate) fn theme(&self) -> Theme {
-        match self.theme {
-            JsTheme::Light => Theme::Light,
-            JsTheme::Dark => Theme::Dark,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "Theme"))]
-pub(crate) enum JsTheme {
-    Light,
-    Dark,
 }
 
 /// Quantity that the colours of the mesh show.
@@ -235,10 +140,10 @@ pub(crate) struct JsPullOptions {
 
 /// Options of exporting a rig.
 #[derive(Clone, Deserialize)]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(Default, serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "RigOptions"))]
 pub(crate) struct JsRigOptions {
-    joints: JsJoints,
+    joints: Joints,
     /// Whether translations of clips keep their length; otherwise they scale with the height of the hips.
     keep_travel: bool,
     /// Names of parts that keep their shape.
@@ -250,32 +155,10 @@ pub(crate) struct JsRigOptions {
     pub(crate) dynamic: bool,
 }
 
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "Joints"))]
-pub(crate) enum JsJoints {
-    Follow,
-    Stay,
-    Turn,
-}
-
 impl JsRigOptions {
     pub(crate) fn options(&self) -> ReshapeOptions {
-        let joints = match self.joints {
-            JsJoints::Follow => Joints::Follow,
-            JsJoints::Stay => Joints::Stay,
-            JsJoints::Turn => Joints::Turn,
-        };
-        let (keep_travel, rigid) = (self.keep_travel, self.rigid.clone());
+        let (joints, keep_travel, rigid) = (self.joints, self.keep_travel, self.rigid.clone());
         ReshapeOptions { joints, keep_travel, rigid, ..ReshapeOptions::default() }
-    }
-}
-
-#[cfg(test)]
-impl Default for JsRigOptions {
-    fn default() -> Self {
-        Self { joints: JsJoints::Follow, keep_travel: false, rigid: Vec::new(), plain: false, dynamic: false }
     }
 }
 

@@ -6,9 +6,10 @@ use cagework_core::Weights;
 use cagework_core::field::bend_vertices;
 use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
+use cagework_io::Joints;
 use glam::{Quat, Vec3};
 
-use crate::options::{Colour, JsGizmo, JsJoints, SliceShown};
+use crate::options::{Colour, JsGizmo, SliceShown};
 use crate::state::State;
 
 impl State {
@@ -31,7 +32,7 @@ impl State {
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view();
         SceneOptions {
-            theme: self.view.theme(),
+            theme: self.view.theme,
             backdrop: true,
             mesh: self.mesh_style(),
             weights_to_one: self.view.weights_to_one,
@@ -79,7 +80,7 @@ impl State {
             return self.scene(weights);
         }
         SceneOptions {
-            theme: self.view.theme(),
+            theme: self.view.theme,
             backdrop: false,
             mesh: self.mesh_style(),
             weights_to_one: self.view.weights_to_one,
@@ -154,7 +155,7 @@ impl State {
                 }
                 at
             }
-            None if mode == JsJoints::Stay || self.view.original || self.editor.is_editing_rest() => {
+            None if mode == Joints::Stay || self.view.original || self.editor.is_editing_rest() => {
                 dots.at.clone()
             }
             None => dots.posed(&self.rest().positions, self.pose()),

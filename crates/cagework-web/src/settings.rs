@@ -2,8 +2,7 @@
 
 use std::mem::discriminant;
 
-use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
-use cagework_core::BindOptions;
+use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, DIVISIONS, TARGET, VOXELS};
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
 use cagework_io::value_fault;
 use serde::Serialize;
@@ -12,14 +11,14 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::error::{ErrorName, Fault};
-use crate::options::{JsBindOptions, JsCageOptions, JsRigOptions};
+use crate::options::{JsBindOptions, JsRigOptions};
 use crate::views::object;
 
 /// Maximum length of a value in a notice, characters.
 const MAX_VALUE_CHARS: usize = 40;
 
 /// Ranges of numeric options, by their names in the page.
-const NUMBERS: [(&str, Number); 8] = [
+pub(crate) const NUMBERS: [(&str, Number); 9] = [
     ("grid", GRID),
     ("tau", TAU),
     ("max_iterations", MAX_ITERATIONS),
@@ -28,6 +27,7 @@ const NUMBERS: [(&str, Number); 8] = [
     ("detail", DETAIL),
     ("margin", CLEARANCE),
     ("voxels", VOXELS),
+    ("divisions", DIVISIONS),
 ];
 
 /// Valid settings of a project.
@@ -38,7 +38,7 @@ pub(crate) struct Settings {
     #[cfg_attr(test, ts(optional, as = "Option<JsBindOptions>"))]
     bind: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, ts(optional, as = "Option<JsCageOptions>"))]
+    #[cfg_attr(test, ts(optional, as = "Option<CageOptions>"))]
     cage: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional, as = "Option<JsRigOptions>"))]
@@ -72,10 +72,10 @@ impl Settings {
             return settings;
         };
         settings.bind = settings.group("bind", &mut given, defaults, |request: JsBindOptions| {
-            BindOptions::from(request).check().map_err(|wrong| wrong.allowed)
+            request.options.check().map_err(|wrong| wrong.allowed)
         });
-        settings.cage = settings.group("cage", &mut given, defaults, |request: JsCageOptions| {
-            CageOptions::from(request).check().map_err(|wrong| wrong.allowed)
+        settings.cage = settings.group("cage", &mut given, defaults, |request: CageOptions| {
+            request.check().map_err(|wrong| wrong.allowed)
         });
         settings.rig = settings.group("rig", &mut given, defaults, |_: JsRigOptions| Ok(()));
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);

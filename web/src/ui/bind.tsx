@@ -2,7 +2,7 @@
 
 import type { App } from "../app";
 import type { BindOptions } from "../contract";
-import { BIND_DEFAULTS, PAPER_DEFAULTS } from "../defaults";
+import { BIND_DEFAULTS, PAPER_DEFAULTS, SLIDERS } from "../defaults";
 import { cageBroken, hasUnappliedOptions } from "../derived";
 import { timeLeft } from "../eta";
 import { percent } from "../format";
@@ -190,17 +190,15 @@ function Advanced({ app }: { app: App }) {
     <Fold title={T.bind.advanced}>
       <Slider
         label={T.bind.tau}
-        min={-8}
-        max={-2}
-        step={1}
+        {...SLIDERS.tau}
         format={(power) => `1e${power}`}
         value={Math.round(Math.log10(options.tau))}
         onInput={(power) => set({ tau: 10 ** power })}
       />
       <NumberField
         label={T.bind.limit}
-        min={1}
-        max={1_000_000}
+        min={SLIDERS.max_iterations.min}
+        max={SLIDERS.max_iterations.max}
         step="1"
         value={options.max_iterations}
         onCommit={(value) => set({ max_iterations: value })}

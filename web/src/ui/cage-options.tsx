@@ -2,19 +2,19 @@
 
 import type { App } from "../app";
 import type { CageOptions } from "../contract";
-import { FINEST_DETAIL, RANGES } from "../defaults";
+import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
 import { Segments, Slider, Toggle } from "./controls";
 
 /** Lowest position of the voxel slider. It stands for 0: the vertex count determines the resolution. */
-const COARSEST = 16;
+const COARSEST = SLIDERS.voxels.min;
 /** Gaps narrower than this many voxels are closed. */
 const GAP_VOXELS = 3;
 
-/** The slider of closeness is logarithmic: 0 is four times the default distance, 1 a quarter of it. */
-const FINER = 16;
-const COARSEST_DETAIL = FINEST_DETAIL * FINER;
+/** The slider of closeness is logarithmic: 0 is the coarsest, 1 the finest. */
+const { min: FINEST_DETAIL, max: COARSEST_DETAIL } = SLIDERS.detail;
+const FINER = COARSEST_DETAIL / FINEST_DETAIL;
 const detailOf = (closeness: number) => COARSEST_DETAIL * FINER ** -closeness;
 const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Math.log(FINER);
 
@@ -27,9 +27,7 @@ export function Automatic({ app }: { app: App }) {
     <div class="stack">
       <Slider
         label={T.cage.wanted}
-        min={RANGES.vertices[0]}
-        max={RANGES.vertices[1]}
-        step={2}
+        {...SLIDERS.vertices}
         format={count}
         value={options.vertices}
         onInput={(vertices) => change({ vertices })}
@@ -38,7 +36,7 @@ export function Automatic({ app }: { app: App }) {
         label={T.cage.closeness}
         min={0}
         max={1}
-        step={0.05}
+        step={SLIDERS.detail.step}
         format={() => T.cage.within(percent(options.detail, 1))}
         value={closenessOf(options.detail)}
         onInput={(closeness) => change({ detail: detailOf(closeness) })}
@@ -60,18 +58,14 @@ export function Automatic({ app }: { app: App }) {
       />
       <Slider
         label={T.cage.margin}
-        min={0}
-        max={0.15}
-        step={0.005}
+        {...SLIDERS.margin}
         format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
         value={options.margin}
         onInput={(margin) => change({ margin })}
       />
       <Slider
         label={T.cage.gaps}
-        min={COARSEST}
-        max={RANGES.voxels[1]}
-        step={8}
+        {...SLIDERS.voxels}
         format={(value) =>
           value === COARSEST ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
         }

@@ -10,7 +10,7 @@ import type {
   Problem,
   RestEdit,
 } from "../contract";
-import { FINEST_DETAIL } from "../defaults";
+import { SLIDERS } from "../defaults";
 import { isCageSparse } from "../derived";
 import { count, percent } from "../format";
 import type { CageSource } from "../state";
@@ -42,9 +42,7 @@ export function CagePanel({ app }: { app: App }) {
         {cageSource === "box" && (
           <Slider
             label={T.cage.divisions}
-            min={1}
-            max={8}
-            step={1}
+            {...SLIDERS.divisions}
             value={boxDivisions}
             onInput={(value) => set({ boxDivisions: value })}
           />
@@ -78,7 +76,7 @@ export function CagePanel({ app }: { app: App }) {
 /** Why a cage has fewer vertices than requested, and the option that would change it. */
 function sparse({ vertices, detail }: CageOptions): string {
   const share = percent(detail, 1);
-  return detail > 1.01 * FINEST_DETAIL ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
+  return detail > 1.01 * SLIDERS.detail.min ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
 }
 
 const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "extrude" | "remove"])[] = [

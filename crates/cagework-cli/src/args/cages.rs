@@ -4,19 +4,17 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use cagework_cage::check::Repair;
-use cagework_cage::generate::{CageOptions, DETAIL, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
+use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, DIVISIONS, Shape, Symmetry, TARGET, VOXELS};
+use cagework_core::BindOptions;
+use cagework_core::options::{GRID, OutOfRange};
 use clap::{Args, ValueEnum};
 
-use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, fraction, positive};
+use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
 
 /// Default number of quads along each edge of a box cage.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
 /// Default distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
 pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
-/// Largest number of quads along each edge of a box cage: 16 give 1,538 vertices, which are solved in minutes.
-const MAX_DIVISIONS: u32 = 16;
-/// Default number of vertices of a generated cage: enough for a body, a head and four limbs.
-const DEFAULT_VERTICES: u32 = 80;
 /// Default number of vertices of a hull.
 const DEFAULT_HULL_VERTICES: u32 = 24;
 
@@ -40,7 +38,7 @@ pub(crate) struct CageArgs {
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
     /// Maximum number of vertices of the cage, 8 to 400; simple shapes get fewer [default: 80; 24 for a hull].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_TARGET)..=i64::from(MAX_TARGET)))]
+    #[arg(long, value_name = "N", value_parser = super::number::<u32>(TARGET))]
     pub(crate) vertices: Option<u32>,
     /// Root mean square distance of the cage from the model's shape that is tolerated to save vertices, as a fraction of its longest side,
     /// 0.005 to 0.2.
@@ -57,10 +55,10 @@ pub(crate) struct CageArgs {
     pub(crate) per_component: bool,
     /// Minimum distance from the model, as a fraction of the diagonal of its bounding box [default: half a voxel].
     /// Gaps up to twice as wide are closed.
-    #[arg(long, default_value_t = 0.0, value_name = "FRACTION", value_parser = fraction)]
+    #[arg(long, default_value_t = CageOptions::default().clearance, value_name = "FRACTION", value_parser = super::number::<f32>(CLEARANCE))]
     pub(crate) clearance: f32,
     /// Voxels along the model's longest side, 8 to 128; gaps narrower than three voxels are closed. 0: derived from --vertices.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = CageOptions::default().voxels, value_name = "N", value_parser = super::number::<u32>(VOXELS))]
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
@@ -68,7 +66,7 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
     /// Quads along each edge of a box cage.
-    #[arg(long, value_name = "N", value_parser = divisions)]
+    #[arg(long, value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
     pub(crate) divisions: Option<u32>,
     /// Distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
     #[arg(long, default_value_t = DEFAULT_MARGIN, value_name = "FRACTION", value_parser = positive)]
@@ -86,7 +84,11 @@ impl CageArgs {
     pub(crate) fn options(&self) -> CageOptions {
         let hull = self.kind() == KindArg::Hull;
         CageOptions {
-            target: self.vertices.unwrap_or(if hull { DEFAULT_HULL_VERTICES } else { DEFAULT_VERTICES }),
+            target: self.vertices.unwrap_or(if hull {
+                DEFAULT_HULL_VERTICES
+            } else {
+                CageOptions::default().target
+            }),
             detail: self.detail,
             quads: !self.triangles,
             shape: if hull { Shape::Hull } else { Shape::Follow },
@@ -115,7 +117,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
     /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = super::number::<u32>(cagework_core::options::GRID))]
+    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
     /// Repairs to apply before the check; several, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT", requires = "output")]
@@ -143,17 +145,19 @@ pub(crate) enum CageSource {
 }
 
 impl FromStr for CageSource {
-    type Err = String;
+    type Err = OutOfRange;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, OutOfRange> {
         let (kind, number) = text.split_once(':').map_or((text, None), |(kind, n)| (kind, Some(n)));
         let generated = |shape, default| {
-            let target = number.map_or(Ok(default), target)?;
+            let target = number.map_or(Ok(default), |n| TARGET.parse(n))?;
             Ok(Self::Auto(CageOptions { target, shape, ..CageOptions::default() }))
         };
         match kind {
-            "box" => Ok(Self::Box { divisions: number.map_or(Ok(DEFAULT_DIVISIONS), divisions)? }),
-            "auto" => generated(Shape::Follow, DEFAULT_VERTICES),
+            "box" => {
+                Ok(Self::Box { divisions: number.map_or(Ok(DEFAULT_DIVISIONS), |n| DIVISIONS.parse(n))? })
+            }
+            "auto" => generated(Shape::Follow, CageOptions::default().target),
             "hull" => generated(Shape::Hull, DEFAULT_HULL_VERTICES),
             _ => Ok(Self::File(PathBuf::from(text))),
         }
@@ -195,21 +199,5 @@ impl From<RepairArg> for Repair {
             RepairArg::Flip => Self::Flip,
             RepairArg::Grow => Self::Grow,
         }
-    }
-}
-
-fn divisions(text: &str) -> Result<u32, String> {
-    match text.parse() {
-        Ok(n) if (1..=MAX_DIVISIONS).contains(&n) => Ok(n),
-        _ => Err(format!("divisions of a box cage: expected a whole number from 1 to {MAX_DIVISIONS}")),
-    }
-}
-
-fn target(text: &str) -> Result<u32, String> {
-    match text.parse() {
-        Ok(n) if (MIN_TARGET..=MAX_TARGET).contains(&n) => Ok(n),
-        _ => Err(format!(
-            "vertices of a generated cage: expected a whole number from {MIN_TARGET} to {MAX_TARGET}"
-        )),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cagework_core::options;
+use cagework_core::options::{self, BindOptions};
 use clap::Args;
 
 use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
@@ -41,7 +41,7 @@ pub(crate) struct RefitArgs {
     #[arg(long)]
     pub(crate) resume: bool,
     /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,

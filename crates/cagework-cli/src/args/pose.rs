@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cagework_core::options;
+use cagework_core::options::{self, BindOptions};
 use clap::Args;
 
 use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, model_help, number, obj_output};
@@ -25,7 +25,7 @@ pub(crate) struct PoseArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
     /// Cells along the longest side of the cage; the solver samples the gradients of the weights on this grid.
-    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use cagework_core::Coordinates;
-use cagework_core::options::Choice;
+use cagework_core::options::{Choice, GRID};
+use cagework_core::{BindOptions, Coordinates};
 use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -68,8 +68,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, default_value_t = 1.0, value_parser = super::positive)]
     pub(crate) scale: f32,
     /// Colours of background and floor.
-    #[arg(long, value_enum, default_value_t = ThemeArg::Dark)]
-    pub(crate) theme: ThemeArg,
+    #[arg(long, default_value_t, value_parser = super::words::<Theme>())]
+    pub(crate) theme: Theme,
     /// Camera direction: default, front, back, left, right, top, bottom, or YAW,PITCH in degrees (0,0 is the front; positive pitch looks down).
     #[arg(long, default_value = "default", allow_hyphen_values = true)]
     pub(crate) view: View,
@@ -89,7 +89,7 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "FILE", value_parser = png_output)]
     pub(crate) output: PathBuf,
     /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = super::number::<u32>(cagework_core::options::GRID))]
+    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
@@ -139,22 +139,6 @@ pub(crate) enum AxisArg {
     X,
     Y,
     Z,
-}
-
-/// Colours of background and floor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ThemeArg {
-    Dark,
-    Light,
-}
-
-impl From<ThemeArg> for Theme {
-    fn from(theme: ThemeArg) -> Self {
-        match theme {
-            ThemeArg::Dark => Self::Dark,
-            ThemeArg::Light => Self::Light,
-        }
-    }
 }
 
 /// Width and height of a picture, pixels.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cagework_io::{Joints, Model, ReshapeOptions, SelectError};
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use crate::error::CliError;
 
@@ -36,8 +36,8 @@ fn mask(text: &str) -> Result<(String, f32), String> {
 pub(crate) struct RigArgs {
     /// Joints, and other nodes that clips animate or that carry meshes: follow moves them with the cage and keeps their rotations; stay leaves
     /// them, for skeletons that several files share; turn also rotates them with the shape.
-    #[arg(long, value_enum, default_value_t = JointsArg::Follow)]
-    joints: JointsArg,
+    #[arg(long, default_value_t, value_parser = super::words::<Joints>())]
+    joints: Joints,
     /// Keep the travel distance of clips; by default it is scaled with the height of the hips.
     #[arg(long)]
     keep_travel: bool,
@@ -46,14 +46,6 @@ pub(crate) struct RigArgs {
     /// Write the mesh only, without skin and clips; several poses still become morph targets.
     #[arg(long = "static")]
     pub(crate) shape_only: bool,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-/// Treatment of joints.
-enum JointsArg {
-    Follow,
-    Stay,
-    Turn,
 }
 
 impl RigArgs {
@@ -100,15 +92,11 @@ impl RigArgs {
     }
 
     fn options_with(&self, model: &Model, path: &Path, parts: &PartArgs) -> Result<ReshapeOptions, CliError> {
-        let joints = match self.joints {
-            JointsArg::Follow => Joints::Follow,
-            JointsArg::Stay => Joints::Stay,
-            JointsArg::Turn => Joints::Turn,
-        };
         let props = self.props(model, path)?;
         let (rigid, others): (Vec<_>, Vec<_>) =
             parts.rigid.iter().cloned().partition(|name| props.contains(name));
         let parts = model.parts(&parts.mask, &others).map_err(|e| CliError::file(path, e))?;
-        Ok(ReshapeOptions { joints, keep_travel: self.keep_travel, rigid, parts, pose_seconds: Vec::new() })
+        let (joints, keep_travel) = (self.joints, self.keep_travel);
+        Ok(ReshapeOptions { joints, keep_travel, rigid, parts, pose_seconds: Vec::new() })
     }
 }

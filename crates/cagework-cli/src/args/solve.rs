@@ -11,16 +11,13 @@ use super::{number, words};
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct MemoryArgs {
     /// Memory limit for reading models, binding and writing, in MiB. Work that would need more is refused before it starts.
-    #[arg(long, default_value_t = DEFAULT_MEMORY_MIB, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    #[arg(long, default_value_t = Self::default().memory_limit, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     memory_limit: u64,
 }
 
-/// Default memory limit, MiB.
-const DEFAULT_MEMORY_MIB: u64 = 4096;
-
 impl Default for MemoryArgs {
     fn default() -> Self {
-        Self { memory_limit: DEFAULT_MEMORY_MIB }
+        Self { memory_limit: BindOptions::default().memory_limit >> 20 }
     }
 }
 
@@ -50,11 +47,11 @@ pub(crate) struct SolveArgs {
     #[arg(long, default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
     tau: f32,
     /// Stop after this many Jacobi sweeps or cg steps, and after at most 60 V-cycles.
-    #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
+    #[arg(long, default_value_t = BindOptions::default().max_iterations, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
     max_iterations: u32,
     /// In each row, drop the smallest weights up to this total, then restore the row's sum and rest position; 0 keeps all
     /// weights.
-    #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
+    #[arg(long, default_value_t = BindOptions::default().sparsify, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
     sparsify: f32,
     /// Cells of the classic method: fractions of the cage's box along each axis (as published), or cubic.
     #[arg(long, default_value_t, value_parser = words::<CellShape>())]

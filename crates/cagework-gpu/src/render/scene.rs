@@ -6,14 +6,15 @@ use std::sync::Arc;
 use cagework_core::slice::Slice;
 use glam::{Quat, Vec3};
 
-/// Colours of background and overlays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Theme {
-    /// For dark pages.
-    #[default]
-    Dark,
-    /// For light pages and print.
-    Light,
+cagework_core::choice! {
+    /// Colours of background and overlays.
+    Theme {
+        /// For dark pages.
+        #[default]
+        Dark = "dark",
+        /// For light pages and print.
+        Light = "light",
+    }
 }
 
 /// Display of the mesh.

@@ -12,28 +12,30 @@ use crate::siblings::Resolve;
 use crate::{gltf, obj, off, ply, stl};
 
 /// Facts about a format, and its functions.
-struct Row {
-    /// Extensions of readable files, lower case, without the dot. The most complete variant comes first.
-    endings: &'static [&'static str],
-    /// Extensions of written files, the usual one first.
-    written: &'static [&'static str],
+#[derive(Debug)]
+pub struct FormatFacts {
+    /// Extensions of readable files, lower case, without the dot. The usual one of written files comes first.
+    pub endings: &'static [&'static str],
+    /// Those that are not written.
+    read_only: &'static [&'static str],
     /// MIME types, for file choosers that know them better than extensions.
-    mime: &'static [&'static str],
-    /// Extensions of files that refer to others, and of those others: buffers, textures, materials.
-    naming: &'static [&'static str],
-    companions: &'static [&'static str],
+    pub mime_types: &'static [&'static str],
+    /// Extensions of files that refer to others: buffers, textures, materials.
+    pub naming: &'static [&'static str],
+    /// Extensions of the files that these refer to.
+    pub companions: &'static [&'static str],
     /// Whether a file is of this format beyond doubt.
     is: fn(&[u8]) -> bool,
     /// Whether a text is of this format, without byte order mark and leading space.
     is_text: fn(&[u8]) -> bool,
-    /// Extensions of files that `is` or `is_text` must recognise, with what the others are and how that shows.
+    /// Extensions that require `is` or `is_text`: otherwise the file is `[_, this, because of this]`.
     marked: &'static [[&'static str; 3]],
-    read: fn(Source<'_, '_>) -> Result<Model, ReadError>,
+    pub(super) read: fn(Source<'_, '_>) -> Result<Model, ReadError>,
+    pub(super) write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
     /// Names of the files that a file refers to.
-    named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
-    write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
+    pub(super) named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
     /// Approximate memory for writing, bytes; given the part that depends on vertices and triangles.
-    bytes_to_write: fn(&Model, u64) -> u64,
+    pub(super) bytes_to_write: fn(&Model, u64) -> u64,
     /// What written files keep of a model of another format.
     keeps: &'static [Kept],
 }
@@ -56,11 +58,11 @@ pub(crate) enum Kept {
     Poses,
 }
 
-/// Of a format that has no other files, and that only its extension tells.
-const PLAIN: Row = Row {
+/// Defaults of a row: a format without companions, recognised by its extension only.
+const PLAIN: FormatFacts = FormatFacts {
     endings: &[],
-    written: &[],
-    mime: &[],
+    read_only: &[],
+    mime_types: &[],
     naming: &[],
     companions: &[],
     is: |_| false,
@@ -93,7 +95,9 @@ macro_rules! formats {
                 match self { $(Self::$format => $name,)+ }
             }
 
-            fn row(self) -> &'static Row {
+            /// Facts about the format.
+            #[must_use]
+            pub fn facts(self) -> &'static FormatFacts {
                 match self { $(Self::$format => const { &$row },)+ }
             }
         }
@@ -102,11 +106,10 @@ macro_rules! formats {
 
 formats! {
     /// glTF 2.0: JSON or GLB to read, GLB to write.
-    Gltf = "gltf": Row {
+    Gltf = "gltf": FormatFacts {
         endings: &["glb", "vrm", "gltf"],
-        // A VRM is a GLB.
-        written: &["glb", "vrm"],
-        mime: &["model/gltf-binary", "model/gltf+json"],
+        read_only: &["gltf"],
+        mime_types: &["model/gltf-binary", "model/gltf+json"],
         naming: &["gltf"],
         companions: &["bin", "png", "jpg", "jpeg", "webp", "ktx2"],
         is: |bytes| bytes.starts_with(b"glTF"),
@@ -124,9 +127,8 @@ formats! {
         keeps: &[Kept::Digits, Kept::Colors, Kept::Texcoords, Kept::Materials, Kept::Rig, Kept::Poses],
     };
     /// Wavefront OBJ.
-    Obj = "obj": Row {
+    Obj = "obj": FormatFacts {
         endings: &["obj"],
-        written: &["obj"],
         naming: &["obj"],
         companions: &["mtl"],
         named_files: obj::named_files,
@@ -136,9 +138,8 @@ formats! {
         ..PLAIN
     };
     /// Stanford PLY, text or binary.
-    Ply = "ply": Row {
+    Ply = "ply": FormatFacts {
         endings: &["ply"],
-        written: &["ply"],
         is: ply::is_ply,
         marked: &[["ply", "not a PLY", "its first line is not 'ply'"]],
         read: |source| source.polygons(ModelFormat::Ply, ply::read),
@@ -147,18 +148,16 @@ formats! {
         ..PLAIN
     };
     /// STL, text or binary.
-    Stl = "stl": Row {
+    Stl = "stl": FormatFacts {
         endings: &["stl"],
-        written: &["stl"],
         is: stl::is_stl,
         read: |source| source.polygons(ModelFormat::Stl, stl::read),
         write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),
         ..PLAIN
     };
     /// Geomview OFF, text: OFF, COFF, NOFF.
-    Off = "off": Row {
+    Off = "off": FormatFacts {
         endings: &["off"],
-        written: &["off"],
         is_text: off::is_off,
         read: |source| source.polygons(ModelFormat::Off, off::read),
         write: |model, positions| {
@@ -183,34 +182,10 @@ pub struct FormatError {
 }
 
 impl ModelFormat {
-    /// Extensions of readable files, lower case, without the dot. The most complete variant comes first.
-    #[must_use]
-    pub fn endings(self) -> &'static [&'static str] {
-        self.row().endings
-    }
-
     /// Extension of exported files, lower case, without the dot.
     #[must_use]
     pub fn export_extension(self) -> &'static str {
-        self.row().written[0]
-    }
-
-    /// MIME types, for file choosers that know them better than extensions.
-    #[must_use]
-    pub fn mime_types(self) -> &'static [&'static str] {
-        self.row().mime
-    }
-
-    /// Extensions of files that refer to others: buffers, textures, materials.
-    #[must_use]
-    pub fn naming_endings(self) -> &'static [&'static str] {
-        self.row().naming
-    }
-
-    /// Extensions of files that these refer to.
-    #[must_use]
-    pub fn companions(self) -> &'static [&'static str] {
-        self.row().companions
+        self.facts().endings[0]
     }
 
     /// Whether a file can store several poses.
@@ -220,7 +195,7 @@ impl ModelFormat {
     }
 
     pub(crate) fn keeps(self, what: Kept) -> bool {
-        self.row().keeps.contains(&what)
+        self.facts().keeps.contains(&what)
     }
 
     /// Extensions of the written files that keep `what`: "OBJ, PLY or OFF".
@@ -234,7 +209,11 @@ impl ModelFormat {
     #[must_use]
     pub fn of_export(name: &str) -> Option<Self> {
         let extension = extension(name);
-        Self::ALL.into_iter().find(|format| format.row().written.contains(&extension.as_str()))
+        Self::of_ending(&extension).filter(|format| !format.facts().read_only.contains(&extension.as_str()))
+    }
+
+    fn of_ending(extension: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.facts().endings.contains(&extension))
     }
 
     /// Detects the format of a file from its content.
@@ -246,7 +225,7 @@ impl ModelFormat {
         let export = format!("export it as {}", Self::listed(None));
         let unmarked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let text = unmarked.trim_ascii_start();
-        if let Some(found) = Self::ALL.into_iter().find(|format| (format.row().is)(bytes)) {
+        if let Some(found) = Self::ALL.into_iter().find(|format| (format.facts().is)(bytes)) {
             return Ok(found);
         }
         match bytes {
@@ -265,47 +244,18 @@ impl ModelFormat {
             [b'<', ..] => return fault("an XML or HTML file", &export),
             _ => {}
         }
-        if let Some(found) = Self::ALL.into_iter().find(|format| (format.row().is_text)(text)) {
+        if let Some(found) = Self::ALL.into_iter().find(|format| (format.facts().is_text)(text)) {
             return Ok(found);
         }
         let extension = extension(name);
         if ["fbx", "dae", "usdz", "usd", "3ds", "blend"].contains(&extension.as_str()) {
             return fault("in an unsupported format", &export);
         }
-        let by_name = Self::ALL.into_iter().find(|format| format.endings().contains(&extension.as_str()));
-        let format = by_name.unwrap_or(Self::Obj);
-        match format.row().marked.iter().find(|[ending, ..]| *ending == extension) {
+        let format = Self::of_ending(&extension).unwrap_or(Self::Obj);
+        match format.facts().marked.iter().find(|[ending, ..]| *ending == extension) {
             Some([_, found, sign]) => fault(found, &format!("{sign}: it is damaged or has the wrong name")),
             None => Ok(format),
         }
-    }
-
-    /// Names of the files that a file refers to. Empty if it cannot be read.
-    pub(super) fn named_files(
-        self,
-        bytes: &[u8],
-        resolve: &mut Resolve<'_>,
-        memory_limit: u64,
-    ) -> Vec<String> {
-        (self.row().named_files)(bytes, resolve, memory_limit)
-    }
-
-    pub(super) fn read(self, source: Source<'_, '_>) -> Result<Model, ReadError> {
-        (self.row().read)(source)
-    }
-
-    pub(super) fn write(self, model: &Model, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        (self.row().write)(model, positions)
-    }
-
-    /// Approximate memory for writing `model`, bytes.
-    pub(super) fn bytes_to_write(self, model: &Model) -> u64 {
-        /// Old and new normals, new positions and the output.
-        const VERTEX_BYTES: u64 = 300;
-        const TRIANGLE_BYTES: u64 = 60;
-        let shape =
-            VERTEX_BYTES * model.positions.len() as u64 + TRIANGLE_BYTES * model.triangles.len() as u64;
-        (self.row().bytes_to_write)(model, shape)
     }
 }
 
@@ -317,7 +267,7 @@ fn extension(name: &str) -> String {
 mod tests {
     use super::*;
 
-    /// The tables of what is read and written, and of what is kept and lost.
+    /// The first two tables have a row for each format.
     #[test]
     fn page_about_formats_has_every_format_and_extension() {
         let page = include_str!("../../../../docs/formats.md");
@@ -329,8 +279,7 @@ mod tests {
             };
             let row = tables[0].lines().find(starts).unwrap_or_default();
             let says = |ending: &&str| *ending == format.name() || row.contains(&format!("`.{ending}`"));
-            assert!(!row.is_empty() && format.endings().iter().all(says), "{format:?}: {row}");
-            assert!(format.row().written.iter().all(says), "{format:?}: {row}");
+            assert!(!row.is_empty() && format.facts().endings.iter().all(says), "{format:?}: {row}");
             assert!(tables[1].lines().any(|row| starts(&row)), "{format:?}");
         }
     }

@@ -19,7 +19,7 @@ impl Model {
     /// # Errors
     /// Those of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        format.write(self, positions)
+        (format.facts().write)(self, positions)
     }
 
     /// Sentence listing what an export to `format` loses; `None` if nothing.

@@ -186,7 +186,7 @@ impl Engine {
         let bytes = self.read(|state| {
             let set = state.require_set()?;
             let n = state.models().positions().len() + state.n_rig.unwrap_or(0);
-            Answer::Ok(estimate_memory(set, n, &request.into())?)
+            Answer::Ok(estimate_memory(set, n, &request.options)?)
         })?;
         Ok(bytes as f64)
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Controls, Weights};
+use cagework_core::{Controls, Weights};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -31,7 +31,7 @@ impl Engine {
         let request: JsBindOptions = decode(options)?;
         let slice = self.read(|state| {
             let set = state.require_set()?;
-            let mut slice = Slice::new(set, &BindOptions::from(request), axis.min(2), fraction);
+            let mut slice = Slice::new(set, &request.options, axis.min(2), fraction);
             if !data.is_empty() {
                 slice.set_weights(Weights::new(
                     Controls::from(set).n_controls() as u32,

@@ -407,11 +407,46 @@ nonzeros: number, };
  * Shape that the cage follows.
  */
 export type Shape = "follow" | "hull";
-export type CageSymmetry = "auto" | "on" | "off";
 /**
- * Options of a generated cage.
+ * Options of [`super::generate`]. Aliases are their names on the page, in projects and in JavaScript.
  */
-export type CageOptions = { vertices: number, detail: number, quads: boolean, margin: number, symmetry: CageSymmetry, voxels: number, shape: Shape, per_component: boolean, };
+export type CageOptions = {
+/**
+ * Target number of vertices, 8 to 400. Default 80.
+ */
+vertices: number,
+/**
+ * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
+ * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, a voxel of 36.
+ */
+detail: number,
+/**
+ * Whether to pair triangles into quads. Default true.
+ */
+quads: boolean,
+/**
+ * Shape that the cage follows. Default follow.
+ */
+shape: Shape,
+/**
+ * Mirror symmetry. Default auto.
+ */
+symmetry: "auto" | "on" | "off",
+/**
+ * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
+ * Otherwise thin bridges join them to one cage. Default false.
+ */
+per_component: boolean,
+/**
+ * Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
+ * half a voxel. Default 0.
+ */
+margin: number,
+/**
+ * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
+ * voxels are closed, detail thinner than one is lost. Default 0.
+ */
+voxels: number, };
 /**
  * Corners of a box.
  */
@@ -853,7 +888,10 @@ export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOption
  * Values that were replaced, a sentence each.
  */
 notices: Array<string>, };
-export type Theme = "light" | "dark";
+/**
+ * Colours of background and overlays.
+ */
+export type Theme = "dark" | "light";
 /**
  * Quantity that the colours of the mesh show.
  */
@@ -946,6 +984,9 @@ whole: boolean,
  * Whether the pull is symmetric.
  */
 mirrored: boolean, };
+/**
+ * How the skeleton follows the cage.
+ */
 export type Joints = "follow" | "stay" | "turn";
 /**
  * Options of exporting a rig.
@@ -1020,7 +1061,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
-export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
+export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"margin":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
@@ -1034,5 +1075,5 @@ export const NAMING_ENDINGS = ["gltf", "obj"] as const;
 export const COMPANION_ENDINGS = ["bin", "png", "jpg", "jpeg", "webp", "ktx2", "mtl"] as const;
 /** Formats that store only a shape. */
 export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
-/** Least and most of each option that is a number. */
-export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;
+/** Sliders of options, by name. */
+export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, vertices: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, margin: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, } as const;

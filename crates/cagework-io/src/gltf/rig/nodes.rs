@@ -14,16 +14,17 @@ use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
 use crate::gltf::scene::{Worlds, local, name_of};
 
-/// How the skeleton follows the cage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Joints {
-    /// Joints move with the cage and keep their orientation. Rotation and scale tracks stay unchanged.
-    #[default]
-    Follow,
-    /// The skeleton stays unchanged, for skeletons shared between files.
-    Stay,
-    /// Joints move and rotate with the shape.
-    Turn,
+cagework_core::choice! {
+    /// How the skeleton follows the cage.
+    Joints {
+        /// Joints move with the cage and keep their orientation. Rotation and scale tracks stay unchanged.
+        #[default]
+        Follow = "follow",
+        /// The skeleton stays unchanged, for skeletons shared between files.
+        Stay = "stay",
+        /// Joints move and rotate with the shape.
+        Turn = "turn",
+    }
 }
 
 /// Smaller displacements are ignored, over the model's diagonal.
