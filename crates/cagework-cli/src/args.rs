@@ -2,6 +2,7 @@
 
 mod cages;
 mod controls;
+mod field;
 mod many;
 mod pose;
 mod render;
@@ -13,12 +14,14 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
+use cagework_core::field as field_options;
 use cagework_core::options::{self, BindOptions, Choice, Number};
 use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
+pub(crate) use field::MapArgs;
 pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{RenderArgs, ShowArg};
@@ -52,6 +55,8 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and deform the mesh with it.
     Deform(DeformArgs),
+    /// Map points by the deformation of a moved cage, or back.
+    Map(MapArgs),
     /// Deform many models with one cage and one pose. The cage is solved once; each model gets its own output file.
     Refit(RefitArgs),
     /// Move points of the model to given positions by solving for the pose of the cage.
@@ -161,8 +166,8 @@ pub(crate) struct DeformArgs {
     /// Cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// Weights that `cagework bind --weights` wrote; not needed with --dynamic.
-    #[arg(long, value_name = "FILE", required_unless_present = "dynamic")]
+    /// Weights that `cagework bind --weights` wrote; not needed with --dynamic or for --lattice alone.
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["dynamic", "lattice"])]
     pub(crate) weights: Option<PathBuf>,
     /// Moved cage: the same vertices in the same order. May be given several times. Each keyframe of a clip and each shape
     /// key in the file is a pose.
@@ -172,16 +177,23 @@ pub(crate) struct DeformArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) pose_controls: Vec<PathBuf>,
     /// File to write; the extension selects the format.
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: ModelOutput,
+    #[arg(short, long, value_name = "FILE", required_unless_present = "lattice")]
+    pub(crate) output: Option<ModelOutput>,
+    /// Write the deformation of the space around the cage (.npz): displacements `u` and gradients `F` at the nodes of a
+    /// lattice. Takes one pose.
+    #[arg(long, value_name = "FILE", value_parser = npz_output, conflicts_with = "dynamic")]
+    pub(crate) lattice: Option<PathBuf>,
+    /// Cells of the lattice along the longest side of the cage, 8 to 256.
+    #[arg(long, default_value_t = field_options::CELLS, value_name = "N", requires = "lattice", value_parser = number::<u32>(field_options::CELLS_RANGE))]
+    pub(crate) lattice_cells: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
     /// Experimental: apply the clip to the model first, then bend every frame with the cage. Writes the frames as morph
     /// targets, without a skeleton.
     #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only"])]
     pub(crate) dynamic: Option<String>,
-    /// With --dynamic: steps of Catmull-Clark subdivision of the cage, as for `bind`.
-    #[arg(long, default_value_t = 0, value_name = "STEPS", requires = "dynamic", value_parser = number::<u32>(options::SMOOTH))]
+    /// With --dynamic or --lattice: steps of Catmull-Clark subdivision of the cage, as for `bind`.
+    #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = number::<u32>(options::SMOOTH))]
     pub(crate) smooth: u32,
 }
 

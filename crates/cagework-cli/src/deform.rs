@@ -15,6 +15,7 @@ use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput};
 use crate::bind::export;
 use crate::controls::{inner_controls_text, rest_of, with_inner};
 use crate::error::CliError;
+use crate::field::{self, LatticeSummary};
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
 use crate::{dynamic, rig};
@@ -35,6 +36,8 @@ struct DeformSummary {
     rig: Option<ReshapeReport>,
     /// Time to compute all poses, without file input and output.
     deform_ms: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lattice: Option<LatticeSummary>,
     notices: Vec<String>,
 }
 
@@ -43,20 +46,45 @@ struct DeformSummary {
 /// # Errors
 /// If a file cannot be read or written, or files do not match.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
-    let weights = match (&args.weights, &args.dynamic) {
-        (_, Some(clip)) => return dynamic::run(args, clip, as_json),
-        (Some(weights), None) => weights,
-        // Excluded by clap: --weights is required without --dynamic.
-        (None, None) => return Ok(()),
-    };
-    let mut inputs = vec![args.mesh.as_path(), weights.as_path()];
+    if let (Some(clip), Some(output)) = (&args.dynamic, &args.output) {
+        return dynamic::run(args, clip, output, as_json);
+    }
+    if args.smooth > 0 && args.lattice.is_none() {
+        return Err(CliError::Mismatch {
+            message: "--smooth applies to --dynamic and --lattice only: weights contain their steps".into(),
+            hint: "leave out --smooth",
+        });
+    }
+    let mut inputs = vec![args.mesh.as_path()];
+    inputs.extend(args.weights.as_deref());
     inputs.extend(args.pose.iter().chain(&args.pose_controls).map(AsRef::<Path>::as_ref));
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
-    let output = &args.output.path;
-    check_outputs(&[output], &inputs)?;
-    let format = args.output.format;
+    let outputs = args.output.iter().map(|output| output.path.as_path()).chain(args.lattice.as_deref());
+    check_outputs(&outputs.collect::<Vec<_>>(), &inputs)?;
+    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
+    let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;
+    match (&args.output, &args.weights, &lattice) {
+        (Some(output), Some(weights), _) => deform(args, &model, weights, output, lattice, as_json),
+        (None, _, Some(lattice)) => print(&if as_json { json(lattice) } else { lattice.text() }),
+        _ => Err(CliError::Mismatch {
+            message: "the mesh can only be deformed with its weights".into(),
+            hint: "give --weights, or leave out --output",
+        }),
+    }
+}
+
+/// Deforms the mesh.
+fn deform(
+    args: &DeformArgs,
+    model: &Model,
+    weights: &Path,
+    output_file: &ModelOutput,
+    lattice: Option<LatticeSummary>,
+    as_json: bool,
+) -> Result<(), CliError> {
+    let (output, format) = (&output_file.path, output_file.format);
     let require_room = |n_poses: usize| {
         if format.holds_poses() || n_poses <= 1 {
             return Ok(());
@@ -72,9 +100,8 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     };
     require_room(args.pose.len())?;
 
-    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory, &ControlArgs::default())?;
-    let saved = load_weights(weights, &model, &cage.cage, args.read.memory)?;
+    let cage = load_cage(&args.cage, model, args.read.memory, &ControlArgs::default())?;
+    let saved = load_weights(weights, model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
     let (n_cage, n_inner) = (cage.cage.n_vertices(), saved.inner_controls.len());
     let (mut names, mut poses, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
@@ -97,7 +124,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         args.read.memory,
     )?;
     let rest = rest_of(&cage.cage, &saved);
-    let mut options = args.rig.options(&model, &args.mesh)?;
+    let mut options = args.rig.options(model, &args.mesh)?;
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
@@ -109,9 +136,9 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
     let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
-    let deformation = Deformation::new(&model, saved, &poses, format, (&options, args.rig.shape_only));
+    let deformation = Deformation::new(model, saved, &poses, format, (&options, args.rig.shape_only));
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let (bytes, rig) = deformation.into_file(&model, &poses.names, &args.output, &options)?;
+    let (bytes, rig) = deformation.into_file(model, &poses.names, output_file, &options)?;
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
     write(output, &bytes)?;
@@ -126,6 +153,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         poses: poses.names,
         rig,
         deform_ms,
+        lattice,
         notices,
     };
     print(&if as_json { json(&summary) } else { text(&summary) })
@@ -254,6 +282,7 @@ fn text(summary: &DeformSummary) -> String {
         summary.deform_ms,
         shown(&summary.output)
     );
+    out += &summary.lattice.as_ref().map_or_else(String::new, LatticeSummary::text);
     for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }

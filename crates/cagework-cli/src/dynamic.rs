@@ -5,7 +5,7 @@ use cagework_core::field::{self, FieldWeights, Lattice, bend_vertices};
 use cagework_io::{Clip, ModelFormat, shown};
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, SmoothArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, ModelOutput, SmoothArgs};
 use crate::bind::bind_positions;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, shown_path, write};
@@ -26,8 +26,13 @@ struct DynamicSummary {
 ///
 /// # Errors
 /// If a file cannot be read or written, the model has no such clip, or files do not match.
-pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), CliError> {
-    let output = &args.output.path;
+pub(crate) fn run(
+    args: &DeformArgs,
+    clip: &str,
+    output: &ModelOutput,
+    as_json: bool,
+) -> Result<(), CliError> {
+    let (output, format) = (&output.path, output.format);
     let [pose] = args.pose.as_slice() else {
         return Err(CliError::Mismatch {
             message: format!("--dynamic takes one pose, but {} were given", args.pose.len()),
@@ -39,13 +44,9 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
         inputs.push(path);
     }
     check_outputs(&[output], &inputs)?;
-    if args.output.format != ModelFormat::Gltf {
+    if format != ModelFormat::Gltf {
         return Err(CliError::Mismatch {
-            message: format!(
-                "{}: format {} cannot store a clip",
-                shown_path(output),
-                args.output.format.name()
-            ),
+            message: format!("{}: format {} cannot store a clip", shown_path(output), format.name()),
             hint: "write a .glb",
         });
     }

@@ -52,7 +52,10 @@ pub(crate) fn cage_mesh(model: &Model) -> Result<PolygonMesh, CageError> {
 }
 
 /// Reads a model, or a point cloud without faces.
-fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
+///
+/// # Errors
+/// If the file cannot be read, or needs more than the memory limit.
+pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let name = path.display().to_string();
     let mut beside = |relative: &str| read_beside(path, relative);

@@ -14,6 +14,7 @@ mod demo;
 mod dynamic;
 mod error;
 mod evaluate;
+mod field;
 mod files;
 mod fit;
 mod gpu;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Map(args) => field::run(args, cli.json),
         Command::Refit(args) => refit::run(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
         Command::Fit(args) => fit::run(args, cli.json),

@@ -13,7 +13,7 @@ use crate::controls::Controls;
 use crate::deform::displacements;
 use crate::frames::Frames;
 use crate::geometry::closest_point_on_triangle;
-use crate::options::{BindOptions, OutsidePolicy};
+use crate::options::{BindOptions, Number, OutsidePolicy};
 use crate::progress::Progress;
 use crate::weights::Weights;
 
@@ -21,6 +21,13 @@ use crate::weights::Weights;
 pub const CELLS: u32 = 64;
 /// Cells of the lattice that bends clips: coarser, because a page computes it when a clip starts.
 pub const CLIP_CELLS: u32 = 48;
+/// Allowed numbers of cells. At 256, a lattice may have 57 million nodes; the bind's memory limit applies before.
+pub const CELLS_RANGE: Number = Number {
+    name: "cells",
+    allowed: "a whole number from 8 to 256",
+    is_allowed: |n| n.fract() == 0.0 && (8.0..=256.0).contains(&n),
+    slider: None,
+};
 /// Lattice cells on each side of the box, over the cells along its longest side.
 const MARGIN: f32 = 0.25;
 /// Distance from the cage, in cells, up to which nodes are bound.

@@ -16,15 +16,16 @@
 mod arrays;
 
 use cagework_core::deform::OutsideVertex;
+use cagework_core::field::Field;
 use cagework_core::weights::WeightsError;
 use cagework_core::{Frames, Weights};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 use zip::result::ZipError;
 
 use crate::memory::MemoryError;
 use crate::shown::shown;
-use arrays::{Archive, NpzWriter, array, required};
+use arrays::{Archive, NpyArray, NpzWriter, array, npy_header, required};
 
 /// Error of reading a weights file.
 #[derive(Debug, Error)]
@@ -146,6 +147,52 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
     zip.put(indptr, "<i4", &[rows.indptr().len()], rows.indptr().iter().map(|x| x.to_le_bytes()));
     zip.put(indices, "<i4", &[rows.indices().len()], rows.indices().iter().map(|x| x.to_le_bytes()));
     zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
+}
+
+/// Writes a field as an `.npz` file: `origin` (float64, `[3]`) of the first node, `spacing` (float64) of the nodes, `u` (float32,
+/// `[nx, ny, nz, 3]`), the displacements, `F` (float32, `[nx, ny, nz, 3, 3]`), the deformation gradients (`F @ d` maps a small
+/// vector), and `bound` (bool, `[nx, ny, nz]`), whether a node is inside the cage or within two cells of it. `origin`:
+/// added to all positions.
+#[must_use]
+pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
+    let lattice = &field.lattice;
+    let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
+    let gradients: Vec<_> = field.gradients().collect();
+    // z is the fastest axis of the arrays, x that of the field.
+    let nodes =
+        || (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| x + nx * (y + ny * z))));
+    let mut zip = NpzWriter::new(13 * 4 * field.values.len(), 9 * 4 * field.values.len());
+    let first = origin + lattice.origin.as_dvec3();
+    zip.put("origin", "<f8", &[3], first.to_array().map(f64::to_le_bytes));
+    zip.put("spacing", "<f8", &[], [f64::from(lattice.cell).to_le_bytes()]);
+    let of_node = |k: usize| field.values[k].truncate().to_array();
+    zip.put("u", "<f4", &[nx, ny, nz, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
+    let of_node = |k: usize| gradients[k].transpose().to_cols_array();
+    zip.put("F", "<f4", &[nx, ny, nz, 3, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
+    zip.put("bound", "|b1", &[nx, ny, nz], nodes().map(|k| [u8::from(field.values[k].w > 0.0)]));
+    zip.finish()
+}
+
+/// Reads points from an `.npy` file, `[n, 3]`, and whether they have 64 bits.
+///
+/// # Errors
+/// [`NpzError`] if it is not such an array.
+pub(crate) fn npy_points(mut bytes: &[u8]) -> Result<(Vec<DVec3>, bool), NpzError> {
+    let mut unpacked = 0;
+    NpyArray::read("points", &mut bytes, (&mut unpacked, u64::MAX))?.wide_points()
+}
+
+/// Writes points as an `.npy` file, `[n, 3]`.
+pub(crate) fn write_npy_points(points: &[DVec3], is_wide: bool) -> Vec<u8> {
+    let mut out = npy_header(if is_wide { "<f8" } else { "<f4" }, &[points.len(), 3]);
+    for x in points.iter().flat_map(DVec3::to_array) {
+        if is_wide {
+            out.extend(x.to_le_bytes());
+        } else {
+            out.extend((x as f32).to_le_bytes());
+        }
+    }
+    out
 }
 
 /// Reads a weights file, using at most `memory_limit` bytes in addition to `bytes`.

@@ -46,7 +46,8 @@ impl UpAxis {
     }
 
     /// Converts a vector from Y up to the file's axes.
-    pub(crate) fn vector_turned_back(self, v: DVec3) -> DVec3 {
+    #[must_use]
+    pub fn vector_turned_back(self, v: DVec3) -> DVec3 {
         match self {
             Self::Y => v,
             Self::Z => DVec3::new(v.x, -v.z, v.y),

@@ -5,9 +5,10 @@
 use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_core::deform::OutsideVertex;
-use cagework_core::{Frames, Weights};
-use cagework_io::{SavedWeights, read_weights_npz, write_weights_npz};
-use glam::Vec3;
+use cagework_core::field::{Field, Lattice};
+use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
+use cagework_io::{SavedWeights, read_weights_npz, write_field_npz, write_weights_npz};
+use glam::{DVec3, Vec3};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -44,6 +45,51 @@ fn points_of_a_rig_are_the_last_rows() {
         .unwrap_err()
         .to_string();
     assert_eq!(message, "array 'extra_points': has 4 points, but the matrix has 3 rows");
+}
+
+#[test]
+fn field_is_written_with_z_as_the_fastest_axis() {
+    // u = (0.1 y, 0.2 z, 0.3 x) at every node.
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 4.0, 8.0) };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    let lattice = Lattice::new(&cage, 32);
+    let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
+    assert!(nx < ny && ny < nz);
+    let place = |x: usize, y: usize, z: usize| {
+        lattice.origin + lattice.cell * Vec3::new(x as f32, y as f32, z as f32)
+    };
+    let by = |p: Vec3| Vec3::new(0.1 * p.y, 0.2 * p.z, 0.3 * p.x);
+    let mut values = Vec::new();
+    for z in 0..nz {
+        for y in 0..ny {
+            values.extend((0..nx).map(|x| by(place(x, y, z)).extend(1.0)));
+        }
+    }
+    let bytes = write_field_npz(&Field::of_values(lattice.clone(), values), DVec3::new(100.0, 0.0, 0.0));
+    let array = |name: &str, shape: &str| {
+        let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
+        let mut bytes = Vec::new();
+        zip.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
+        let (header, data) = bytes.split_at(128);
+        assert!(std::str::from_utf8(&header[10..]).unwrap().contains(shape), "{name}");
+        data.to_vec()
+    };
+    let floats =
+        |data: Vec<u8>| -> Vec<f32> { data.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect() };
+    let shape = format!("({nx}, {ny}, {nz}, 3");
+    let (u, gradients) = (floats(array("u.npy", &shape)), floats(array("F.npy", &format!("{shape}, 3)"))));
+    let (x, y, z) = (1, 2, 3);
+    let node = z + nz * (y + ny * x);
+    assert_eq!(u[3 * node..3 * node + 3], by(place(x, y, z)).to_array());
+    // F[i][j]: change of component i along axis j.
+    let expected = [1.0, 0.1, 0.0, 0.0, 1.0, 0.2, 0.3, 0.0, 1.0];
+    let close =
+        gradients[9 * node..][..9].iter().zip(expected).all(|(a, b): (&f32, f32)| (a - b).abs() < 1e-5);
+    assert!(close, "{:?}", &gradients[9 * node..][..9]);
+    let origin: Vec<f64> =
+        array("origin.npy", "(3,)").as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    assert_eq!(origin[0], 100.0 + f64::from(lattice.origin.x));
+    assert!(array("bound.npy", &format!("({nx}, {ny}, {nz})")).iter().all(|&b| b == 1));
 }
 
 /// The file with `change` applied to each array; deflated, as SciPy writes it.

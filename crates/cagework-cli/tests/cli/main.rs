@@ -11,6 +11,7 @@ mod controls;
 mod deform;
 mod documents;
 mod evaluate;
+mod field;
 mod fit;
 #[cfg(unix)]
 mod outputs;

@@ -5,7 +5,7 @@
 
 use std::io::{Cursor, Read as _, Write as _};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
@@ -77,7 +77,7 @@ impl NpzWriter {
     }
 }
 
-fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
+pub(super) fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     let shape = match shape {
         [n] => format!("({n},)"),
         _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
@@ -125,43 +125,13 @@ pub(super) fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyA
     array(zip, name)?.ok_or(NpzError::Missing(name))
 }
 
-/// Unpacks an array, up to the size of its shape: the sizes in the archive's directory are not trusted.
 pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
-    let mut entry = match archive.zip.by_name(&format!("{name}.npy")) {
+    let Archive { zip, unpacked, memory_limit } = archive;
+    let mut entry = match zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
         other => other?,
     };
-    let fault = |problem: String| NpzError::Array { array: name, problem };
-    let bad = || fault("is not in NumPy's .npy format".into());
-    let mut unpack = |most: u64, into: &mut Vec<u8>| {
-        let unpacked = entry.by_ref().take(most).read_to_end(into);
-        unpacked.map_err(|_| fault("cannot be unpacked: the file is damaged".into()))
-    };
-    let mut bytes = Vec::new();
-    unpack(PREAMBLE_BYTES, &mut bytes)?;
-    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER_BYTES).ok_or_else(bad)?;
-    unpack(end.saturating_sub(PREAMBLE_BYTES), &mut bytes)?;
-    let text = bytes.get(HEADER_TEXT_OFFSET..end as usize).ok_or_else(bad)?;
-    let text = std::str::from_utf8(text).map_err(|_| bad())?;
-    let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
-    if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
-        return Err(fault("is in Fortran order; save it in C order".into()));
-    }
-    let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
-    // The element size; unknown types are rejected when their values are converted.
-    let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
-    let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
-    let needed = needed
-        .ok_or_else(|| fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}")))))?;
-    archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
-    MemoryError::check(archive.unpacked, archive.memory_limit)?;
-    let mut data = Vec::new();
-    // One byte more than needed detects overlong streams.
-    unpack(needed.saturating_add(1), &mut data)?;
-    if data.len() as u64 > needed {
-        return Err(fault(format!("is longer than the {needed} bytes of its shape {shape:?}")));
-    }
-    Ok(Some(NpyArray { name, dtype, shape, data }))
+    NpyArray::read(name, &mut entry, (unpacked, *memory_limit)).map(Some)
 }
 
 /// Bytes that determine the header's length: magic, version, and a length of 2 or 4 bytes.
@@ -193,6 +163,59 @@ fn lengths(text: &str) -> Option<Vec<usize>> {
 }
 
 impl NpyArray {
+    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `unpacked`: bytes
+    /// of memory so far, and their limit.
+    pub(super) fn read(
+        name: &'static str,
+        from: &mut impl std::io::Read,
+        (unpacked, memory_limit): (&mut u64, u64),
+    ) -> Result<Self, NpzError> {
+        let fault = |problem: String| NpzError::Array { array: name, problem };
+        let bad = || fault("is not in NumPy's .npy format".into());
+        let mut unpack = |most: u64, into: &mut Vec<u8>| {
+            let unpacked = from.by_ref().take(most).read_to_end(into);
+            unpacked.map_err(|_| fault("cannot be unpacked: the file is damaged".into()))
+        };
+        let mut bytes = Vec::new();
+        unpack(PREAMBLE_BYTES, &mut bytes)?;
+        let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER_BYTES).ok_or_else(bad)?;
+        unpack(end.saturating_sub(PREAMBLE_BYTES), &mut bytes)?;
+        let text = bytes.get(HEADER_TEXT_OFFSET..end as usize).ok_or_else(bad)?;
+        let text = std::str::from_utf8(text).map_err(|_| bad())?;
+        let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
+        if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
+            return Err(fault("is in Fortran order; save it in C order".into()));
+        }
+        let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
+        // The element size; unknown types are rejected when their values are converted.
+        let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
+        let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
+        let needed = needed.ok_or_else(|| {
+            fault(format!("has shape {}, which is too large", shown(&format!("{shape:?}"))))
+        })?;
+        *unpacked = unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
+        MemoryError::check(*unpacked, memory_limit)?;
+        let mut data = Vec::new();
+        // One byte more than needed detects overlong streams.
+        unpack(needed.saturating_add(1), &mut data)?;
+        if data.len() as u64 > needed {
+            return Err(fault(format!("is longer than the {needed} bytes of its shape {shape:?}")));
+        }
+        Ok(Self { name, dtype, shape, data })
+    }
+
+    /// Rows of three floats, and whether these have 64 bits.
+    pub(super) fn wide_points(self) -> Result<(Vec<DVec3>, bool), NpzError> {
+        let is_wide = self.dtype == "<f8";
+        let rows = self.rows_of(&[3])?;
+        let values: Vec<f64> = if is_wide {
+            rows.chunks()?.map(f64::from_le_bytes).collect()
+        } else {
+            rows.floats()?.into_iter().map(f64::from).collect()
+        };
+        Ok((values.chunks_exact(3).map(DVec3::from_slice).collect(), is_wide))
+    }
+
     pub(super) fn fault(&self, problem: &str) -> NpzError {
         NpzError::Array { array: self.name, problem: problem.to_owned() }
     }

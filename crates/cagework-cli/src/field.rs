@@ -1,0 +1,190 @@
+//! The deformation as a field: `cagework map`, and the lattice of `cagework deform --lattice`.
+
+use std::path::Path;
+
+use cagework_core::BindOptions;
+use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
+use cagework_core::team::Team;
+use cagework_io::{Model, PointFile, UpAxis, shown, write_field_npz};
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use crate::args::{CageSource, ControlArgs, DeformArgs, MapArgs, MemoryArgs, ModelOutput, SmoothArgs};
+use crate::bind::{bind_positions, export};
+use crate::controls::with_inner;
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print, read, shown_path, write};
+use crate::load::{LoadedCage, load_any, load_cage, load_cage_file};
+
+/// Points that one thread maps at a time.
+const POINTS_PER_RUN: usize = 4096;
+
+/// Output of `--json`.
+#[derive(Debug, Serialize)]
+struct MapSummary {
+    output: String,
+    points: usize,
+    /// Numbers of the points without an inverse, from 0. They are unchanged.
+    not_found: Vec<usize>,
+    lattice: [u32; 3],
+    notices: Vec<String>,
+}
+
+/// Runs `cagework map`.
+///
+/// # Errors
+/// If a file cannot be read or written, files do not match, or the bind fails.
+pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
+    let mut inputs = vec![args.points.as_path(), args.cage.as_path(), args.pose.as_path()];
+    inputs.extend(args.controls.controls.as_deref());
+    inputs.extend(args.pose_controls.as_deref());
+    check_outputs(&[&args.output], &inputs)?;
+    let (up, memory) = (args.read.axis(), args.read.memory);
+    let wrong = |e| CliError::file(&args.output, e);
+    let name = args.points.display().to_string();
+    let (bytes, mapped, lattice, mut notices) = if PointFile::is_named(&name) {
+        if ending(&args.points) != ending(&args.output) {
+            return Err(CliError::Mismatch {
+                message: format!("{}: points keep their format", shown_path(&args.output)),
+                hint: "give the output the extension of the input",
+            });
+        }
+        let file = PointFile::read(&read(&args.points)?, memory.bytes())
+            .map_err(|e| CliError::file(&args.points, e))?;
+        let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
+        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), args.cells)?;
+        let origin = cage.origin();
+        let local = |p: &DVec3| up.vector_turned(*p - origin).as_vec3();
+        let points: Vec<Vec3> = file.positions.iter().map(local).collect();
+        let mapped = map(&field, &points, args.inverse);
+        // Displacements are added in f64, so that points that stay keep all digits.
+        let moved = file.positions.iter().zip(points.iter().zip(&mapped.points));
+        let moved: Vec<DVec3> = moved
+            .map(|(p, (from, to))| *p + up.vector_turned_back(to.as_dvec3() - from.as_dvec3()))
+            .collect();
+        (file.write(&moved), mapped, field.lattice, Vec::new())
+    } else {
+        let output: ModelOutput = args.output.display().to_string().parse().map_err(wrong)?;
+        let model = load_any(&args.points, up, memory)?;
+        let cage = load_cage(&CageSource::File(args.cage.clone()), &model, memory, &args.controls)?;
+        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), args.cells)?;
+        let mapped = map(&field, &model.positions, args.inverse);
+        let bytes = export(&model, &mapped.points, &output)?;
+        let mut notices = model.notices.clone();
+        notices.extend(model.lost_in(output.format));
+        (bytes, mapped, field.lattice, notices)
+    };
+    if let [first, ..] = mapped.not_found[..] {
+        notices.push(format!(
+            "{} of {} points have no inverse within 1e-6 of the cage's size and are unchanged: the deformation folds \
+             there, or they are not reached. The first is point {}.",
+            mapped.not_found.len(),
+            mapped.points.len(),
+            first + 1
+        ));
+    }
+    write(&args.output, &bytes)?;
+    let summary = MapSummary {
+        output: args.output.display().to_string(),
+        points: mapped.points.len(),
+        not_found: mapped.not_found,
+        lattice: lattice.dims.to_array(),
+        notices,
+    };
+    print(&if as_json { json(&summary) } else { text(&summary) })
+}
+
+/// A lattice that was written.
+#[derive(Debug, Serialize)]
+pub(crate) struct LatticeSummary {
+    output: String,
+    nodes: [u32; 3],
+    spacing: f32,
+}
+
+impl LatticeSummary {
+    pub(crate) fn text(&self) -> String {
+        let [x, y, z] = self.nodes;
+        format!("wrote {}: {x} x {y} x {z} nodes, {} apart\n", shown(&self.output), self.spacing)
+    }
+}
+
+/// Writes the lattice of `--lattice`.
+///
+/// # Errors
+/// If a file cannot be read or written, files do not match, or the bind fails.
+pub(crate) fn write_lattice(
+    args: &DeformArgs,
+    output: &Path,
+    model: &Model,
+) -> Result<LatticeSummary, CliError> {
+    let [pose] = args.pose.as_slice() else {
+        return Err(CliError::Mismatch {
+            message: format!("--lattice takes one pose, but {} were given", args.pose.len()),
+            hint: "run the command once per pose",
+        });
+    };
+    if !args.pose_controls.is_empty() {
+        return Err(CliError::Mismatch {
+            message: "--lattice does not take --pose-controls".into(),
+            hint: "`cagework map` takes inner controls",
+        });
+    }
+    let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
+    let cage = load_cage(&args.cage, model, args.read.memory, &controls)?;
+    let field = field_of(&cage, pose, None, (model.up(), args.read.memory), args.lattice_cells)?;
+    write(output, &write_field_npz(&field, model.origin()))?;
+    let Lattice { dims, cell, .. } = field.lattice;
+    Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
+}
+
+/// The field of a pose of a cage.
+fn field_of(
+    cage: &LoadedCage,
+    pose: &Path,
+    pose_controls: Option<&Path>,
+    (up, memory): (UpAxis, MemoryArgs),
+    cells: u32,
+) -> Result<Field, CliError> {
+    let rest = cage.controls().rest();
+    let inner = &rest[cage.cage.n_vertices()..];
+    let files: Vec<_> = pose_controls.map(Path::to_path_buf).into_iter().collect();
+    let poses = with_inner(vec![cage.load_pose(pose)?], &files, inner, (up, cage.origin()), memory)?;
+    let lattice = Lattice::new(cage.controls().surface(), cells);
+    let options = BindOptions { memory_limit: memory.bytes(), ..BindOptions::default() };
+    let binding = bind_positions(&lattice.points(), cage.controls(), false, &options)?;
+    Ok(FieldWeights::new(lattice, binding.weights, binding.frames).pose(rest, &poses[0]))
+}
+
+/// Mapped points, and the numbers of those without an inverse.
+struct MappedPoints {
+    points: Vec<Vec3>,
+    not_found: Vec<usize>,
+}
+
+fn map(field: &Field, points: &[Vec3], backwards: bool) -> MappedPoints {
+    let inverse = backwards.then(|| InverseField::new(field));
+    let runs: Vec<&[Vec3]> = points.chunks(POINTS_PER_RUN).collect();
+    let of_run = |(): &mut (), run: usize| -> Vec<Option<Vec3>> {
+        let map = |&p: &Vec3| inverse.as_ref().map_or_else(|| Some(field.map(p)), |inverse| inverse.find(p));
+        runs[run].iter().map(map).collect()
+    };
+    let found = Team::new(0).share(runs.len(), || (), of_run).concat();
+    let not_found = (0..points.len()).filter(|&k| found[k].is_none()).collect();
+    MappedPoints {
+        points: found.iter().zip(points).map(|(found, p)| found.unwrap_or(*p)).collect(),
+        not_found,
+    }
+}
+
+fn ending(path: &Path) -> Option<String> {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+}
+
+fn text(summary: &MapSummary) -> String {
+    let mut out = format!("mapped {} points\nwrote {}\n", summary.points, shown(&summary.output));
+    for notice in &summary.notices {
+        out += &format!("note: {notice}\n");
+    }
+    out
+}

@@ -1,0 +1,202 @@
+//! Files of points: text with one point per line, and NumPy arrays.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use thiserror::Error;
+
+use crate::memory::MemoryError;
+use crate::npz::{NpzError, npy_points, write_npy_points};
+
+/// Bytes of memory per byte of a text file: its text, positions, and the places of its numbers.
+const MEMORY_PER_BYTE: u64 = 6;
+
+/// Error of reading a file of points.
+#[derive(Debug, Error)]
+pub enum PointFileError {
+    /// The file is not UTF-8.
+    #[error("not a text file: its bytes are not UTF-8")]
+    Encoding,
+    /// A line that does not begin with three numbers, after lines that do.
+    #[error("line {line} has no three numbers x, y and z")]
+    Line {
+        /// Line number, from 1.
+        line: usize,
+    },
+    /// A number that is not finite.
+    #[error("point {point} is not finite")]
+    NotFinite {
+        /// Number of the point, from 1.
+        point: usize,
+    },
+    /// The file has no points.
+    #[error("the file has no points: one per line is expected, x y z first or in columns with these names")]
+    Empty,
+    /// Error in an array.
+    #[error(transparent)]
+    Array(#[from] NpzError),
+    /// More memory than is allowed.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+}
+
+/// Points of a text file or a NumPy array.
+#[derive(Clone, Debug)]
+pub struct PointFile {
+    /// Positions in the axes of the file. `[n_points]`
+    pub positions: Vec<DVec3>,
+    source: Source,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// The text, and where the three numbers of each point are in it.
+    Text { text: String, places: Vec<[Range<usize>; 3]> },
+    /// Whether the values have 64 bits.
+    Array { is_wide: bool },
+}
+
+impl PointFile {
+    /// Whether a file of this name is read as points: `.csv`, `.txt`, `.xyz` or `.npy`.
+    #[must_use]
+    pub fn is_named(name: &str) -> bool {
+        let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
+        matches!(ending.as_deref(), Some("csv" | "txt" | "xyz" | "npy"))
+    }
+
+    /// Reads a NumPy array `[n, 3]` of 32- or 64-bit floats, or a text file with one point per line. Numbers are separated
+    /// by commas, semicolons or blanks. x, y and z are the first three, or the columns with these names in a header.
+    /// Lines before the first point, lines that begin with `#` and empty lines are kept.
+    ///
+    /// # Errors
+    /// [`PointFileError`]
+    pub fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PointFileError> {
+        MemoryError::check(MEMORY_PER_BYTE * bytes.len() as u64, memory_limit)?;
+        let file = if bytes.starts_with(b"\x93NUMPY") {
+            let (positions, is_wide) = npy_points(bytes)?;
+            Self { positions, source: Source::Array { is_wide } }
+        } else {
+            Self::read_text(std::str::from_utf8(bytes).map_err(|_| PointFileError::Encoding)?)?
+        };
+        match file.positions.iter().position(|p| !p.is_finite()) {
+            Some(point) => Err(PointFileError::NotFinite { point: point + 1 }),
+            None if file.positions.is_empty() => Err(PointFileError::Empty),
+            None => Ok(file),
+        }
+    }
+
+    fn read_text(text: &str) -> Result<Self, PointFileError> {
+        let (mut positions, mut places) = (Vec::new(), Vec::new());
+        let mut columns = [0, 1, 2];
+        let mut start = 0;
+        for (number, line) in text.split_inclusive('\n').enumerate() {
+            let found = words(line);
+            let word = |column: usize| found.get(column).map(|range| &line[range.clone()]);
+            let numbers = columns.map(|c| word(c).and_then(|word| word.parse::<f64>().ok()));
+            if let [Some(x), Some(y), Some(z)] = numbers {
+                positions.push(DVec3::new(x, y, z));
+                places.push(columns.map(|c| start + found[c].start..start + found[c].end));
+            } else if positions.is_empty() {
+                let named = ["x", "y", "z"].map(|name| {
+                    found.iter().position(|r| line[r.clone()].trim_matches('"').eq_ignore_ascii_case(name))
+                });
+                if let [Some(x), Some(y), Some(z)] = named {
+                    columns = [x, y, z];
+                }
+            } else if !found.is_empty() && !line.starts_with('#') {
+                return Err(PointFileError::Line { line: number + 1 });
+            }
+            start += line.len();
+        }
+        Ok(Self { positions, source: Source::Text { text: text.to_owned(), places } })
+    }
+
+    /// The file with other positions; everything else is unchanged, and so is the text of positions that are equal.
+    ///
+    /// # Panics
+    /// If there are fewer positions than points.
+    #[must_use]
+    pub fn write(&self, positions: &[DVec3]) -> Vec<u8> {
+        let (text, places) = match &self.source {
+            Source::Array { is_wide } => return write_npy_points(positions, *is_wide),
+            Source::Text { text, places } => (text, places),
+        };
+        let mut out = String::with_capacity(text.len());
+        let mut end = 0;
+        for (point, places) in places.iter().enumerate() {
+            // In the order of the line.
+            let mut axes = [0, 1, 2];
+            axes.sort_by_key(|&axis| places[axis].start);
+            for axis in axes.into_iter().filter(|&axis| positions[point][axis] != self.positions[point][axis])
+            {
+                out += &text[end..places[axis].start];
+                out += &positions[point][axis].to_string();
+                end = places[axis].end;
+            }
+        }
+        out += &text[end..];
+        out.into_bytes()
+    }
+}
+
+/// Words of a line. A comma or semicolon separates two words, which may be empty; blanks are trimmed.
+fn words(line: &str) -> Vec<Range<usize>> {
+    let is_separated = line.contains([',', ';']);
+    let is_separator = |c: char| if is_separated { matches!(c, ',' | ';') } else { c.is_ascii_whitespace() };
+    let mut start = 0;
+    let mut found = Vec::new();
+    for word in line.split(is_separator) {
+        let trimmed = word.trim();
+        let first = start + (word.len() - word.trim_start().len());
+        if is_separated || !trimmed.is_empty() {
+            found.push(first..first + trimmed.len());
+        }
+        start += word.len() + 1;
+    }
+    if line.trim().is_empty() { Vec::new() } else { found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(text: &str) -> String {
+        let file = PointFile::read(text.as_bytes(), u64::MAX).unwrap();
+        let positions: Vec<DVec3> = file.positions.iter().map(|p| DVec3::new(p.x + 0.5, p.y, p.z)).collect();
+        String::from_utf8(file.write(&positions)).unwrap()
+    }
+
+    #[test]
+    fn everything_but_the_moved_numbers_is_kept() {
+        assert_eq!(moved("1 2 3\n"), "1.5 2 3\n");
+        assert_eq!(
+            moved("# probes\nid,Z,X,Y,t\na,3.0,1e0,2,9\r\n\nb, -3 ,1,2,\n"),
+            "# probes\nid,Z,X,Y,t\na,3.0,1.5,2,9\r\n\nb, -3 ,1.5,2,\n"
+        );
+        assert_eq!(moved("1;2;3;red\n# end"), "1.5;2;3;red\n# end");
+        assert_eq!(moved("\t1\t 2  3 255 0\n"), "\t1.5\t 2  3 255 0\n");
+    }
+
+    #[test]
+    fn arrays_keep_their_precision() {
+        for is_wide in [false, true] {
+            let bytes = write_npy_points(&[DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.1, 0.0, 0.0)], is_wide);
+            let file = PointFile::read(&bytes, u64::MAX).unwrap();
+            assert_eq!(file.positions[0], DVec3::new(1.0, 2.0, 3.0));
+            assert_eq!(file.positions[1].x == 0.1, is_wide);
+            assert_eq!(file.write(&file.positions), bytes);
+        }
+    }
+
+    #[test]
+    fn damaged_files_are_refused() {
+        let fault = |bytes: &[u8]| PointFile::read(bytes, 1 << 20).unwrap_err().to_string();
+        assert!(fault(b"").contains("no points"));
+        assert!(fault(b"only words\n").contains("no points"));
+        assert!(fault(b"1 2 3\n4 5\n").contains("line 2"));
+        assert!(fault(b"1 2 3\nnan 0 0\n").contains("point 2 is not finite"));
+        assert!(fault(b"\xff\xfe1").contains("UTF-8"));
+        assert!(fault(b"\x93NUMPY\x01\x00").contains(".npy"));
+        assert!(PointFile::read(&[b' '; 100], 10).is_err());
+    }
+}
