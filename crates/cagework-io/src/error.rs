@@ -25,7 +25,7 @@ pub enum WriteError {
     /// GLB export of a model without triangles.
     #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
     NoFaces,
-    /// Only glTF models have rigs.
+    /// The operation needs a rig, but the model is not a glTF.
     #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,
     /// Clip index out of range.
@@ -66,7 +66,7 @@ pub enum PoseError {
     States {
         /// Name of the pose's file.
         pose: String,
-        /// Cause.
+        /// Why it cannot be read.
         source: WriteError,
     },
     /// An edge of the pose joins vertices that share no face in the cage, so the vertices are in another order.

@@ -1,8 +1,8 @@
 //! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF), weights (NPZ) and projects, as bytes.
 //!
-//! No file system and no clock; compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the document it was
-//! read from, and an export is that document with new vertex positions: materials, texture coordinates, names
-//! and the node tree are preserved.
+//! The crate uses no file system and no clock, so it compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the
+//! document it was read from, and an export is that document with new vertex positions: materials, texture coordinates,
+//! names and the node tree are preserved.
 //!
 //! Weights files rely on the vertex order. OBJ: `v` lines in file order. glTF: unwelded, ordered by mesh,
 //! then by ascending index of the nodes that show the mesh, then by triangle primitive of the mesh. If each

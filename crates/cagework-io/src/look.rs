@@ -10,8 +10,8 @@ use std::ops::Range;
 pub struct Look {
     /// Corners of the triangles. `[n_corners]`
     pub vertices: Vec<LookVertex>,
-    /// Duplicates of OBJ vertices at hard edges: the model vertex that each one follows. Duplicate `k` has
-    /// index `n_vertices + k`. Empty for glTF, which stores split vertices.
+    /// Duplicates of OBJ vertices at hard edges. Each entry is the model vertex whose position the duplicate takes.
+    /// Duplicate `k` has index `n_vertices + k`. Empty for glTF, which stores split vertices.
     pub copies: Vec<u32>,
     /// Indices into `vertices`: the model's triangles, grouped by material. `[n_triangles, 3]`
     pub triangles: Vec<[u32; 3]>,
@@ -24,8 +24,9 @@ pub struct Look {
 /// A triangle corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LookVertex {
-    /// Model vertex that the corner follows, or a duplicate in [`Look::copies`]. Corners on both sides of a UV seam
-    /// share one source, so recomputed normals stay smooth there; corners across a hard edge have different sources.
+    /// Model vertex whose position the corner takes, or a duplicate in [`Look::copies`]. Corners on both sides of a UV
+    /// seam share one source, so recomputed normals stay smooth there; corners across a hard edge have different
+    /// sources.
     pub source: u32,
     /// Texture coordinates, v downwards, with the material's texture transform applied.
     pub uv: [f32; 2],

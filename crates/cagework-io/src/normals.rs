@@ -68,7 +68,7 @@ impl Shading {
                 *n = shading.rest[c as usize];
             }
             if *n == Vec3::ZERO {
-                // Neither face nor normal: formats require a unit vector, so use any.
+                // The vertex has neither a normal nor a face with area. Formats require a unit vector, so use any.
                 *n = Vec3::Z;
             }
         }
@@ -96,8 +96,8 @@ impl Shading {
         rotations.iter().zip(&self.normal).map(|(&q, &n)| (q * n).normalize_or(n)).collect()
     }
 
-    /// Unit normal of each cluster, zero without area. Sums in f64: areas of
-    /// kilometre-sized models in millimetres exceed the precision of f32.
+    /// Unit normal of each cluster, zero for clusters without area. Sums in f64: areas of kilometre-sized models in
+    /// millimetres exceed the precision of f32.
     fn area_weighted(&self, positions: &[Vec3], n_clusters: usize) -> Vec<Vec3> {
         let mut sum = vec![DVec3::ZERO; n_clusters];
         for t in &self.triangles {

@@ -49,7 +49,7 @@ pub enum NpzError {
         /// Problem, as a predicate: "has 3 values, not 2".
         problem: String,
     },
-    /// More memory than is allowed.
+    /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
     /// The arrays do not form a CSR matrix.
@@ -70,7 +70,7 @@ pub struct SavedWeights {
     pub weights: Weights,
     /// Meaning of the columns after those of the controls.
     pub frames: Frames,
-    /// Rows of points outside the cage.
+    /// Points outside the cage, by row.
     pub outside: Vec<OutsideVertex>,
     /// Rig points that were bound with the model, object units.
     pub extra_points: Vec<Vec3>,
@@ -140,7 +140,7 @@ pub fn write_weights_npz(
     zip.finish()
 }
 
-/// CSR arrays of the offset columns.
+/// Names of the CSR arrays of the offset columns.
 const OFFSETS: [&str; 3] = ["offset_indptr", "offset_indices", "offset_data"];
 
 fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weights) {

@@ -32,7 +32,7 @@ pub(crate) fn relative(position: DVec3, origin: DVec3) -> Vec3 {
     (position - origin).as_vec3()
 }
 
-/// Limit on f32 rounding steps / extent. Above it, the user gets a notice.
+/// Limit on the step between f32 coordinates, as a fraction of the model's extent. Above it, the user gets a notice.
 const MAX_STEP_TO_EXTENT: f32 = 1e-5;
 
 /// Notice that positions lose precision in f32, if they do.
@@ -61,7 +61,7 @@ impl Coordinate {
             .map(|(origin, from_origin)| Self { origin, from_origin })
     }
 
-    /// Whether this text parses to the same number.
+    /// Whether `word` parses to this coordinate.
     pub(crate) fn is(&self, word: &[u8]) -> bool {
         let word = std::str::from_utf8(word).unwrap_or_default();
         if self.origin == 0.0 {

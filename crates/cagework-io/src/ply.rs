@@ -16,9 +16,9 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOR: [&str; 3] = ["red", "green", "blue"];
-/// Ends a strip; also marks values that are not valid vertex indices.
+/// Vertex index that ends a triangle strip. The reader also stores it for values that are not valid indices.
 const NO_VERTEX: u32 = u32::MAX;
-/// Both names of the list of a face's vertices are in use.
+/// Names of the property that lists the vertices of a face. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// An element of any kind, with the supported properties.
@@ -145,9 +145,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let count = |name: &str| header.elements.get(name).map_or(0, |e| e.count as u64);
     let mut claimed = 0_u64;
     for element in header.elements.values() {
-        // Elements take at least one byte, faces four (corner count and three corners). Binary elements
-        // without properties take none, so huge counts of them would stall the reader: limit the sum of all
-        // counts by the file size.
+        // Every element takes at least one byte, and a face at least four (its corner count and three corners), so the
+        // file size limits the sum of all counts. The limit also covers binary elements without properties, which take
+        // no bytes: a huge count of them would stall the reader.
         let least = if element.name == "face" { 4 } else { 1 };
         claimed = claimed.saturating_add(least * element.count as u64);
         if claimed > n_bytes {
@@ -155,7 +155,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
             return Err(PolygonsError::Count { name, count: element.count as u64, bytes: n_bytes });
         }
     }
-    // A corner takes at least one byte. The elements of one kind are in memory together.
+    // All elements of one kind are in memory at the same time. A corner takes at least one byte.
     let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
     let corners = if count("face") + count("tristrips") > 0 { n_bytes } else { 0 };
     let elements = others * size_of::<Element>() as u64;

@@ -130,7 +130,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     out
 }
 
-/// Offset of the body.
+/// Offset of the first byte after the header; `None` if the header has no end.
 fn end_of_header(bytes: &[u8], line_end: u8) -> Option<usize> {
     const END: &[u8] = b"end_header";
     let is_end = |word: &[u8]| word[0] == line_end && word[1..] == *END;

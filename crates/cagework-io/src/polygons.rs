@@ -13,7 +13,7 @@ use crate::memory::MemoryError;
 use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
 use crate::origin::{origin_near, relative};
 
-/// Bytes per vertex in the weld table.
+/// Memory of the table for welding coincident vertices, bytes per vertex.
 const WELD_BYTES: u64 = 36;
 
 /// Error of reading a PLY, STL or OFF file.
@@ -88,7 +88,7 @@ pub(crate) struct Polygons {
 }
 
 impl Polygons {
-    /// Approximate memory of a mesh of triangles, plus the `bytes` of its file.
+    /// Approximate memory of a triangle mesh with these counts, plus the `bytes` of its file.
     ///
     /// # Errors
     /// [`MemoryError`] if it exceeds `limit`.
@@ -162,13 +162,13 @@ impl Polygons {
     }
 }
 
-/// A model with new positions.
+/// A model with new positions, as the writers of polygon formats need it.
 pub(crate) struct Shape<'a> {
-    /// In the file's axes, relative to `origin`. `[n_vertices]`
+    /// Positions in the file's axes, relative to `origin`. `[n_vertices]`
     pub(crate) positions: Cow<'a, [Vec3]>,
     pub(crate) origin: DVec3,
     pub(crate) triangles: &'a [[u32; 3]],
-    /// Polygons, colours and groups; without them, a glTF's triangles are the faces.
+    /// Source of polygons, colours and groups. `None` for a glTF, whose triangles become the faces.
     pub(crate) document: Option<&'a ObjDocument>,
     pub(crate) has_normals: bool,
     pub(crate) encoding: Encoding,
@@ -184,7 +184,7 @@ impl Shape<'_> {
         self.document.map(|document| &document.colors).filter(|colors| !colors.is_empty())
     }
 
-    /// Normals of vertices, or none. `[n_vertices]`
+    /// Vertex normals, recomputed from the triangles; empty if the source file had no normals. `[n_vertices]`
     pub(crate) fn normals(&self) -> Vec<Vec3> {
         if self.has_normals { vertex_normals(&self.positions, self.triangles) } else { Vec::new() }
     }

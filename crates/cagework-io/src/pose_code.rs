@@ -101,7 +101,7 @@ mod tests {
         let bytes = encode_pose(&rest, &pose);
         assert_eq!(bytes.len(), 8 + 6 * 50);
         let again = decode_pose(&rest, &bytes).unwrap();
-        // Half a quantisation step, 3 / 32,767, plus the rounding of f32 at 100.
+        // Half a quantisation step of 3 / 32,767, plus the f32 rounding of coordinates near 100.
         let step = 0.5 * 3.0 / 32_767.0 + 100.0 * f32::EPSILON;
         for (a, b) in again.iter().zip(&pose) {
             assert!((*a - *b).abs().max_element() <= step);

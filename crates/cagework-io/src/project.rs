@@ -1,10 +1,10 @@
 //! Projects: model, cage, poses and settings in one GLB that any viewer opens.
 //!
-//! Viewers show the model at rest, its document unchanged, and the cage as lines. The rest is in the document
-//! extension [`EXTENSION`]: the up axis, and buffer views with cage positions, cage faces (for each the
-//! number of corners, then the corners) and poses, all little-endian and in the model's axes. A model that is
-//! not a glTF is stored as its file, and the visible mesh is built from it. Further models of the same cage
-//! are stored as files and not visible. Weights are not stored; they are recomputed from the settings.
+//! Viewers show the model at rest, its document unchanged, and the cage as lines. All other data is in the document
+//! extension [`EXTENSION`]: the up axis, and buffer views with cage positions, cage faces (for each face the number of
+//! corners, then the corners) and poses, all little-endian and in the model's axes. A model that is not a glTF is
+//! stored as its original file, and the visible mesh is built from this file. Further models of the same cage are
+//! stored as files and are not visible. Weights are not stored; they are recomputed from the settings.
 
 use cagework_core::PolygonMesh;
 use glam::{DVec3, Vec3};
@@ -17,8 +17,8 @@ use crate::model::{Document, Model, ModelFormat, ReadError};
 use crate::origin::translation;
 use crate::shown::shown;
 
-/// Format version of projects with one model near the origin. Older readers reject the other two: projects
-/// with several models, and with models far from the origin.
+/// Format version of projects with one model near the origin, with several models, and with models far from the origin.
+/// Readers that know only the first version reject the other two.
 const VERSION: u64 = 1;
 const VERSION_MULTIPLE_MODELS: u64 = 2;
 const VERSION_FAR_ORIGIN: u64 = 3;
@@ -79,7 +79,7 @@ pub fn write_project(
     let (model, more) =
         models.split_first().ok_or_else(|| WriteError::Document("there is no model".into()))?;
     let built;
-    // Other formats get a GLB of the model for viewers.
+    // For a model in another format, build a GLB that viewers can show.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
@@ -161,7 +161,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
     };
     let model_name = project["name"].as_str().unwrap_or(name);
-    // The first projects have no up axis.
+    // Projects of early versions do not store an up axis.
     let up = project["up"].as_str().and_then(|up| up.parse().ok()).unwrap_or_default();
     // Only projects far from the origin store it.
     let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
@@ -237,7 +237,7 @@ fn take_project(json: &mut Value) -> Option<Value> {
     Some(project)
 }
 
-/// Adds the cage as lines in a new node; returns the node.
+/// Adds the cage as lines in a new node; returns the node's index.
 fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: DVec3) -> Option<usize> {
     /// glTF primitive mode.
     const LINES: u32 = 1;

@@ -12,11 +12,13 @@ use crate::model::{Document, Model};
 use crate::origin::relative;
 use crate::shown::shown;
 
-/// Limits on the frames of a clip that a generated cage encloses: frames, and vertices of all frames together.
+/// Limits on the frames of a clip that a generated cage encloses: number of frames, and number of vertices of all
+/// frames.
 const MAX_CLIP_FRAMES: usize = 32;
 const MAX_FRAME_VERTICES: usize = 1 << 24;
 
-/// Sampling rate of baked clips, and limit on their frames: game engines struggle with more morph targets.
+/// Sampling rate of baked clips, and limit on their number of frames. Each frame becomes a morph target, and game
+/// engines support only a limited number of them.
 const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
 const MAX_BAKED_FRAMES: f32 = 60.0;
 /// Limit on positions and normals of all baked frames, bytes.
@@ -175,7 +177,7 @@ impl Model {
     /// weights 0 and 1, and frames of a clip.
     ///
     /// # Errors
-    /// [`UnknownClip`] if there is no such clip. A faulty rig is no error; the result is then the rest shape.
+    /// [`UnknownClip`] if there is no such clip. If the rig cannot be read, the result contains the rest shape only.
     pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), UnknownClip> {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         if let Ok(Some(rig)) = self.rig() {
@@ -241,7 +243,8 @@ impl Model {
     /// Exports a clip without skeleton, as one morph target per frame. Used for motion that skinning cannot
     /// represent. `rest` and each frame: `[n_vertices]`.
     ///
-    /// As [`Self::write_glb`], and [`WriteError::NoClip`].
+    /// # Errors
+    /// As [`Self::write_glb`], and [`WriteError::NoClip`] if there is no such clip.
     pub fn write_baked(
         &self,
         clip: usize,

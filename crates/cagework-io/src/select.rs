@@ -94,7 +94,7 @@ impl Model {
             found.push((kind, self.vertices_of(kind, name)?));
         }
         if found.iter().all(|(_, vertices)| vertices.is_empty()) {
-            // Names may contain colons.
+            // Names may contain colons, so also search all kinds for the whole text.
             for kind in kinds {
                 found.push((kind, self.vertices_of(kind, name)?));
             }

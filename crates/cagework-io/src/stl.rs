@@ -130,7 +130,7 @@ type Solids = Vec<(String, usize)>;
 fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Solids), PolygonsError> {
     let (mut corners, mut solids, mut has_ended) = (Vec::new(), Solids::new(), true);
     let mut unknown = None;
-    // First corner of the current facet.
+    // Index of the first corner of the current facet.
     let mut open: Option<usize> = None;
     let mut end =
         |line: usize, corners: &[DVec3], next: Option<usize>| match std::mem::replace(&mut open, next) {

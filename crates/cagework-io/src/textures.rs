@@ -33,9 +33,9 @@ enum TextureError {
 pub struct TexturePlan {
     /// Longer side of a drawn texture, pixels; larger images are scaled down.
     pub side: u32,
-    /// Whether an image is decoded. `[n_models][n_images]`
+    /// Whether each image is decoded. `[n_models][n_images]`
     pub admitted: Vec<Vec<bool>>,
-    /// Reasons why images are not decoded, each with the name of the first one.
+    /// Reasons why images are not decoded, each with the name of the first affected image.
     pub notices: Vec<String>,
 }
 
@@ -104,12 +104,12 @@ impl LookImage {
         Ok([width, height])
     }
 
-    /// Width and height in the header, pixels; `None` if it is damaged.
+    /// Width and height in the image's header, pixels; `None` if the header is damaged.
     #[must_use]
     pub fn size(&self) -> Option<[u32; 2]> {
         let bytes = &self.bytes;
         let size = match self.mime.as_str() {
-            // PNG (third edition), 11.2.1; KTX 2.0, 3.
+            // The offsets follow PNG (third edition), section 11.2.1, and KTX 2.0, section 3.
             "image/png" if part::<4>(bytes, 12)? == *b"IHDR" => [16, 20].map(|at| u32_be(bytes, at)),
             "image/ktx2" => [20, 24].map(|at| part(bytes, at).map(u32::from_le_bytes)),
             "image/jpeg" => return jpeg_size(bytes),
@@ -129,7 +129,7 @@ fn u32_be(bytes: &[u8], at: usize) -> Option<u32> {
     part(bytes, at).map(u32::from_be_bytes)
 }
 
-/// ITU-T T.81, B.1 and B.2.2: segments start with a marker; a start of frame has the size.
+/// Size of a JPEG from its start-of-frame segment (ITU-T T.81, B.1 and B.2.2).
 fn jpeg_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut at = 2;
     loop {
@@ -148,7 +148,7 @@ fn jpeg_size(bytes: &[u8]) -> Option<[u32; 2]> {
     }
 }
 
-/// RFC 9649, 2.5 to 2.7, and RFC 6386, 9.1: the chunk `VP8X`, or the frame.
+/// Size of a WebP from its `VP8X` chunk or from its frame (RFC 9649, 2.5 to 2.7, and RFC 6386, 9.1).
 fn webp_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let u16_at = |at| part(bytes, at).map(|b| u32::from(u16::from_le_bytes(b)) & 0x3fff);
     match &part::<4>(bytes, 12)? {

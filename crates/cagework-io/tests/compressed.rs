@@ -48,7 +48,7 @@ fn stream_of(mesh: Mesh) -> Vec<u8> {
     out.data().to_vec()
 }
 
-/// The cube with accessors that have no buffer views.
+/// The cube with its geometry in a Draco stream; its accessors have no buffer views.
 fn draco(stream: &[u8]) -> Builder {
     let mut b = plain_cube();
     let view = b.view(stream);
@@ -190,7 +190,7 @@ fn bounds_and_weights_match_the_decoded_values() {
     let weights: Vec<f32> = weights.as_chunks().0.iter().map(|&w| f32::from_le_bytes(w)).collect();
     for (weights, joints) in weights.chunks(4).zip(data(names[1]).chunks(8)) {
         assert!((weights.iter().sum::<f32>() - 1.0).abs() <= f32::EPSILON, "{weights:?}");
-        // 16 bits per joint index.
+        // Each joint index takes two bytes.
         let is_free = |k: usize| weights[k] > 0.0 || joints[2 * k] == 0;
         assert!((0..4).all(is_free), "{weights:?} of {joints:?}");
     }

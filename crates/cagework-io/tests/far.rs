@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 /// Position of a unit cube in map coordinates, where f32 has steps of 0.5.
 const PLACE: DVec3 = DVec3::new(500_000.25, 0.125, 4_500_000.5);
 
-/// Half an f32 step below 1.
+/// Tolerance for rounding to f32, which changes coordinates below 2 by at most 6e-8.
 const TOLERANCE: f64 = 1e-7;
 
 /// Cube corners with six decimals, as exporters write them.

@@ -61,7 +61,7 @@ fn materials_textures_names_and_nodes_survive() {
     assert_eq!((&image["mimeType"], &image["uri"]), (&json!("image/png"), &Value::Null));
     let view = &after["bufferViews"][image["bufferView"].as_u64().unwrap() as usize];
     assert_eq!(view["byteLength"], PNG.len());
-    // Four attributes and an image. Replaced data is dropped.
+    // The export has four accessors, and a fifth buffer view for the image. Replaced data is dropped.
     assert_eq!(after["accessors"].as_array().unwrap().len(), 4);
     assert_eq!(after["bufferViews"].as_array().unwrap().len(), 5);
 }
@@ -335,7 +335,7 @@ fn obj_and_ply_become_a_glb_with_materials_and_colours() {
     for model in [read("box.ply", &model.write(ModelFormat::Ply, &model.positions).unwrap()).unwrap(), model]
     {
         let glb = model.write_glb(&model.positions).unwrap();
-        // A byte of the PLY stores 128 / 255.
+        // The PLY stores 0.5 as the byte 128 of 255.
         let close = |c: &Vec<f32>| (c[0], c[2]) == (1.0, 0.0) && (c[1] - 0.214).abs() < 2e-3;
         let colors = attribute(&glb, "COLOR_0", 3);
         assert!(colors.len() >= 8 && colors.iter().all(close), "{colors:?}");

@@ -188,7 +188,7 @@ fn memory_is_checked_before_allocation() {
     let text = serde_json::to_vec(&embedded).unwrap();
     let message = Model::read_within("x.gltf", &text, &mut |_| None, 14 << 20).unwrap_err().to_string();
     assert!(message.contains("needs about 16 MiB of memory"), "{message}");
-    // A thousand primitives at each of 100,000 nodes.
+    // The mesh has a thousand primitives and is shown by 100,000 nodes.
     let primitive = b.primitive(0).clone();
     b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
     let message = within(&b, u64::MAX).unwrap_err().to_string();

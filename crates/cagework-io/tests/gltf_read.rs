@@ -122,7 +122,7 @@ fn interleaved_attributes_are_read() {
         b.push("accessors", json!({ "bufferView": view, "componentType": 5126, "count": 8, "type": "VEC3" }));
     b.primitive(0)["attributes"]["POSITION"] = accessor.into();
     assert_cube(&read_glb(&b), &cube());
-    // Starting at the second column, positions are (y, z, 7).
+    // With an offset of one component, positions are read as (y, z, 7).
     b.json["accessors"][accessor]["byteOffset"] = 4.into();
     let expected: Vec<Vec3> = CUBE.iter().map(|p| Vec3::new(p[1], p[2], 7.0)).collect();
     assert_eq!(read_glb(&b).positions, expected);

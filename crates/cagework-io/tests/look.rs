@@ -98,7 +98,7 @@ fn seams_share_a_vertex_and_hard_edges_do_not() {
     assert_eq!(sources(&look(&b)), [0, 1, 2, 3, 4, 5]);
 }
 
-/// KHR_texture_transform: offset * rotation * scale.
+/// KHR_texture_transform applies the scale first, then the rotation, then the offset.
 #[test]
 fn texture_transform_is_applied() {
     let mut b = textured_square();
@@ -210,7 +210,7 @@ fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
     smoothed_cube(normals, |_| "")
 }
 
-/// The same, with lines from `before` preceding each face.
+/// Like [`shared_cube`], with the lines `before(f)` in front of face `f`.
 fn smoothed_cube(normals: impl Fn(usize, usize) -> usize, before: impl Fn(usize) -> &'static str) -> Look {
     let mut text = String::new();
     for k in 0..8 {
@@ -291,7 +291,7 @@ fn faces_without_smoothing_are_flat() {
 fn smoothing_groups_share_no_normal() {
     let smooth = shared_cube(|_, _| 0);
     assert_eq!(smoothed_cube(|_, _| 0, |_| "s 1\n"), smooth);
-    // Face 3 has its own group: its four vertices are duplicated.
+    // Face 3 has its own smoothing group: its four vertices are duplicated.
     let lid = smoothed_cube(|_, _| 0, |face| if face == 3 { "s 2\n" } else { "s 1\n" });
     let mut twice = lid.copies.clone();
     twice.sort_unstable();

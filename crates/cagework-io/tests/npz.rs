@@ -15,8 +15,8 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 /// Memory limit, bytes.
 const LIMIT: u64 = 1 << 20;
 
-/// Two rows of five controls; offsets in three columns that do not rotate, three of the cage and six of bone
-/// ends; one row outside.
+/// Three rows, the second of them empty, and the last outside the cage. The columns are five controls and offsets:
+/// three columns that do not rotate, three of the cage, and six of bone ends.
 fn sample() -> (Weights, Frames, Vec<OutsideVertex>) {
     let indices = vec![0, 6, 1, 2, 3, 16];
     let weights =
@@ -199,7 +199,7 @@ fn shapes_that_do_not_match_the_data_are_rejected() {
         ("shape.npy", "(2,), }", "(), }  "),
         ("frame_bones.npy", "(1, 2), }", "(2, 1), }"),
         ("frame_plain.npy", "(2, 4), }", "(8,), }  "),
-        // The product overflows to 4 in 64 bits.
+        // The product of the lengths overflows 64 bits and becomes 4.
         ("indptr.npy", "(4,), }                               ", "(4611686018427387905, 4), }           "),
     ] {
         let wrong = rewritten(|n, d| {
@@ -220,7 +220,7 @@ fn entries_are_unpacked_up_to_the_size_of_their_shapes() {
     let endless = rewritten(|n, d| Some(if n == "format.npy" { [d, vec![0; 9 << 20]].concat() } else { d }));
     let message = read_weights_npz(&endless, LIMIT).unwrap_err().to_string();
     assert!(message.contains("'format': is longer than the 3 bytes"), "{message}");
-    // 40 MB with a matching shape.
+    // An array of 40 MB with a matching shape exceeds the memory limit.
     let honest = rewritten(|n, d| {
         let header =
             String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("(4,), }       ", "(10000000,), }");

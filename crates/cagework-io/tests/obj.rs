@@ -110,7 +110,7 @@ fn pose_may_cut_polygons_along_other_diagonals_but_not_swap_vertices() {
     for pose in [prism(&down, &zigzag, &same), prism(&down, &corner, &same), prism(&up, &corner, &same)] {
         assert_eq!(cage.pose_positions(&pose).unwrap(), pose.positions);
     }
-    // With two vertices swapped, the order differs for each triangulation.
+    // If two vertices are swapped, the wrong order is found for each triangulation.
     for (a, b) in [(0, 9), (2, 11), (4, 8)] {
         let names = |v: usize| {
             if v == a {
@@ -180,7 +180,7 @@ fn forward_references_and_dangling_attributes_are_tolerated() {
     assert_eq!(model.notices.len(), 1);
 }
 
-/// Exporters write such faces after merging edges.
+/// Exporters write faces with one or two corners after merging edges.
 #[test]
 fn faces_with_fewer_than_three_corners_are_kept_unchanged() {
     let short = "f 3//3 1//2\n";
@@ -202,13 +202,13 @@ fn concave_polygon_keeps_its_area() {
     let p = |i: u32| model.positions[i as usize];
     let area: f32 = model.triangles.iter().map(|&[a, b, c]| (p(b) - p(a)).cross(p(c) - p(a)).z / 2.0).sum();
     let both_up = model.triangles.iter().all(|&[a, b, c]| (p(b) - p(a)).cross(p(c) - p(a)).z > 0.0);
-    // Shoelace formula of the four corners.
+    // The shoelace formula of the four corners gives an area of 1.
     assert!(both_up && (area - 1.0).abs() < 1e-6);
 }
 
 #[test]
 fn patched_file_at_rest_is_the_same_text() {
-    // Numbers are formatted as Rust formats them.
+    // The numbers in this file are written as Rust formats them.
     let text = "# c\r\nmtllib a.mtl\no x\nv  0.5 0 0 0.1 0.2 0.3 # red\n\tv 1 0 0\nv 0 1 0\nvt 0.25 1\nusemtl m\ns 1\nf 1/1 2/1 3/1\nl 1 2\n";
     let model = read("x.obj", text.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), text);
@@ -311,7 +311,7 @@ proptest! {
     }
 }
 
-/// Each material becomes a primitive; a million of them would take a gigabyte.
+/// Each material becomes a primitive, and a million primitives would take a gigabyte.
 #[test]
 fn materials_have_a_limit() {
     let text: String = (0..20_000).map(|i| format!("usemtl m{i}\n")).collect();

@@ -61,7 +61,7 @@ fn written_ply_and_stl_can_be_read() {
     assert_eq!((&again.positions, again.cage_mesh().faces), (&moved, from_text.cage_mesh().faces));
     assert_eq!(again.look().vertices, from_text.look().vertices, "colours stay");
 
-    // Exports of an OBJ are binary.
+    // Exports of an OBJ as PLY or STL are binary.
     for format in [ModelFormat::Ply, ModelFormat::Stl] {
         let bytes = obj().write(format, &moved).unwrap();
         let again = read("again", &bytes).unwrap();
@@ -97,7 +97,7 @@ fn both_byte_orders_of_a_ply_are_read_and_kept() {
         big.push(face[0]);
         face[1..].chunks(4).for_each(|v| big.extend(v.iter().rev()));
     }
-    // The word ascii in a comment does not make it a text file.
+    // The word "ascii" in a comment does not make the file a text file.
     let commented = header.replacen("element", "comment converted from ascii\nelement", 1).into_bytes();
     assert_eq!(read("x.ply", &[&commented, &little[end..]].concat()).unwrap().positions, cube());
     let model = read("big.ply", &big).unwrap();
@@ -121,7 +121,7 @@ fn text_stl_can_have_several_solids_in_any_case() {
     );
     let model = read("x.stl", text.as_bytes()).unwrap();
     assert_eq!((model.format(), model.triangles.len()), (ModelFormat::Stl, 3));
-    // The first corner of the second triangle is the second corner of the first one.
+    // The first corner of the second triangle coincides with the second corner of the first triangle.
     assert_eq!(model.positions.len(), 8);
     assert_eq!(model.triangles[1], [1, 3, 4]);
     let again = model.write(ModelFormat::Stl, &model.positions).unwrap();
@@ -162,7 +162,7 @@ fn solids_keep_their_names_and_ignored_data_is_listed() {
 
     let mut bytes = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert_eq!(read("x.stl", &bytes).unwrap().notices, [""; 0]);
-    // Blue in 15 bits, as in VisCAM and Materialise Magics.
+    // The attribute bytes of the first facet are blue in 15-bit colour, as VisCAM and Materialise Magics write it.
     bytes[84 + 48] = 0x1f;
     let colors = "STL colours (attributes of facets, COLOR= in the header) are not supported: ignored";
     assert_eq!(read("x.stl", &bytes).unwrap().notices, [colors]);
@@ -177,7 +177,7 @@ fn solids_keep_their_names_and_ignored_data_is_listed() {
     assert!(fault("x.stl", &bytes).ends_with("its header counts 0 facets, but 600 bytes follow"));
 }
 
-/// Errors give line and word, and do not quote the parser library.
+/// Errors name the line and the word, and do not quote the messages of the parser library.
 #[test]
 fn errors_in_text_files_name_the_line() {
     let stl = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n";
@@ -309,7 +309,7 @@ fn variants_of_text_ply_are_read() {
         with("comment by hand", b"comment M\xf6bel"),
         with("end_header\n", b"end_header\n\n"),
         with("element edge", b"\nelement edge"),
-        // Written by CloudCompare.
+        // CloudCompare writes property names with parentheses.
         with("float quality", b"float scalar_Illuminance_(PCV)"),
         plain.replace("0.5\n", ".5\n").into_bytes(),
         plain.replace("0.5\n", "-.5e1\n\n").into_bytes(),
@@ -347,7 +347,7 @@ fn variants_of_text_ply_are_read() {
     assert_eq!(model.triangles, [[0, 1, 2], [1, 3, 2], [4, 6, 5], [5, 6, 7]]);
 }
 
-/// Colours in 8 bits, 16 bits, and from 0 to 1.
+/// Colour channels can be 8-bit integers, 16-bit integers, or floats from 0 to 1.
 #[test]
 fn ply_colours_can_have_any_numeric_type() {
     let of = |kind: &str, red: &str| {

@@ -49,7 +49,7 @@ fn reopened(bytes: &[u8]) -> Project {
     read_project("saved.glb", bytes, u64::MAX).unwrap().unwrap()
 }
 
-/// An embedded texture gets the name of the image.
+/// Removes the names of images, because projects store names of textures differently.
 fn without_names(mut look: Look) -> Look {
     look.images.iter_mut().for_each(|image| image.name.clear());
     look

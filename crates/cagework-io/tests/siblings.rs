@@ -10,7 +10,6 @@ use cagework_io::Model;
 use common::{PNG, json_of, read, textured_square};
 use serde_json::json;
 
-/// Files with many references are requested and stored once.
 #[test]
 fn file_with_many_references_is_requested_and_stored_once() {
     const TIMES: usize = 1000;
@@ -48,7 +47,7 @@ fn file_with_many_references_is_requested_and_stored_once() {
     let obj = "mtllib paint.mtl\n".repeat(TIMES) + "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
     let obj = Model::read("x.obj", obj.as_bytes(), &mut files).unwrap();
     assert_eq!(obj.look().images.len(), 1);
-    // Once per model.
+    // Each of the two models requests dot.png once.
     assert_eq!(requests, HashMap::from([("dot.png".to_owned(), 2), ("paint.mtl".to_owned(), 1)]));
 }
 

@@ -1,7 +1,7 @@
 //! Accessors: typed, bounds-checked views into buffers.
 //!
-//! Not read with the accessors of the crate `gltf`, which assume `f32` positions, panic on
-//! KHR_mesh_quantization and slice unchecked. No count is trusted before the bytes behind it are found.
+//! The accessors of the crate `gltf` are not used: they assume `f32` positions, panic on KHR_mesh_quantization and
+//! slice unchecked. A count is trusted only after its bytes were found in a buffer.
 
 use std::sync::Arc;
 
@@ -169,7 +169,7 @@ impl<'a> Source<'a> {
             element
         };
         let mut values = match a.buffer_view {
-            // Zeros, overridden by sparse values.
+            // Without a buffer view, all values are zero until sparse values replace some of them.
             None => vec![[zero; N]; count],
             Some(view) => {
                 let offset = a.byte_offset.map_or(0, |o| o.0);

@@ -21,11 +21,11 @@ pub(crate) struct Pose<'a> {
 pub(crate) struct MeshPlacement {
     pub(super) mesh: usize,
     pub(super) node: usize,
-    /// Node in the original, if any.
+    /// Node of the instance in the original document; `None` in a file without nodes.
     pub(super) original: Option<usize>,
     /// Whether the mesh has a new root node.
     pub(super) detached: bool,
-    /// Mesh from world space, relative to the origin.
+    /// Transform from world space, relative to the origin, to mesh space.
     pub(super) mesh_from_world: DMat4,
 }
 

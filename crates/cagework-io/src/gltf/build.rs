@@ -18,9 +18,9 @@ use crate::siblings::Image;
 
 /// Builds a GLB of an OBJ at rest, placed at `origin` by its node. Also returns the OBJ vertex of each GLB vertex.
 ///
-/// One node and mesh, one primitive per `usemtl`, one vertex per distinct corner (position, texture
-/// coordinate, normal). Without `vn` lines, normals are area-weighted within smoothing groups. Keeps names,
-/// base colours and textures of materials, and vertex colours.
+/// The GLB has one node, one mesh, one primitive per `usemtl` name, and one vertex per distinct corner (position,
+/// texture coordinate, normal). Without `vn` lines, normals are area-weighted within smoothing groups. Names, base
+/// colours and textures of materials, and vertex colours are preserved.
 pub(crate) fn build_from_obj(
     name: &str,
     document: &ObjDocument,
@@ -227,7 +227,8 @@ fn plain(name: &str) -> Value {
     json!({ "name": name, "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 } })
 }
 
-/// Vertices of a primitive as (pair, texture coordinate), and its indices.
+/// Vertices of a primitive as (index of the (vertex, normal) pair, index of the texture coordinate), and the indices of
+/// the primitive.
 #[derive(Default)]
 struct PrimitiveBuilder {
     numbers: HashMap<(u32, u32), u32>,

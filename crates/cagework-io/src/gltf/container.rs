@@ -20,9 +20,9 @@ use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
 use crate::siblings::{Image, NOT_AN_IMAGE, Resolve, SiblingError, Siblings};
 
-/// Limit on the items of each of [`LISTS`]. One takes up to 1 KB while a file is written.
+/// Limit on the items of each of [`LISTS`]. An item takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
-/// Lists of a document whose items take no bytes elsewhere in the file.
+/// Lists of a document whose lengths are not limited by the size of the buffers.
 const LISTS: [&str; 9] =
     ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
 /// Size of the GLB header, bytes.
@@ -138,7 +138,7 @@ fn bytes_of_json(text: &[u8]) -> u64 {
     2 * text.len() as u64 + VALUE_BYTES * values
 }
 
-/// Size of the document's base64 after decoding, bytes.
+/// Total size of the document's base64 data URIs after decoding, bytes.
 fn decoded_bytes(text: &[u8]) -> u64 {
     let strings = text.split(|&b| b == b'"').filter(|string| string.starts_with(b"data:"));
     strings.map(|uri| uri.len() as u64 / 4 * 3).sum()
@@ -391,7 +391,7 @@ fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, SiblingError>> {
     if !is_data(uri) {
         return None;
     }
-    // Size of base64 data. Growing by doubling could take twice the memory.
+    // Reserve the size of the decoded base64 data, because growing by doubling could take twice the memory.
     let mut bytes = Vec::with_capacity(uri.len() / 4 * 3);
     let append = |part: &[u8]| {
         bytes.extend_from_slice(part);

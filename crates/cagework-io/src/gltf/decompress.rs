@@ -28,7 +28,7 @@ type Buffers = Vec<Arc<Vec<u8>>>;
 /// Decodes all compressed geometry, appending buffers to `buffers` and the document.
 ///
 /// # Errors
-/// Name of the extension and problem of its stream.
+/// Returns the name of the extension and what is wrong with its stream.
 pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
     let (mut left, n_in_file) = (MAX_DECOMPRESSED_BYTES, buffers.len());
     for extension in MESHOPT {
@@ -101,7 +101,8 @@ fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize
     }
 }
 
-/// Normalises joint weights to sum 1 and resets joints of weight 0, after rounding by the encoder.
+/// Scales joint weights to a sum of 1 and sets joints with weight 0 to joint 0, because the encoder's rounding can
+/// change both.
 fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first: usize) {
     let decoded: Vec<usize> = decoded(root, first).map(|(number, _)| number).collect();
     let mut done = Vec::new();

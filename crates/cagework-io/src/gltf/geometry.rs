@@ -168,7 +168,7 @@ pub(super) enum Frame {
 }
 
 impl Frame {
-    /// Transform of a primitive, and its number of vertices without weights.
+    /// Transform of a primitive, and its number of vertices without joint weights.
     pub(super) fn of(
         document: &GltfDocument,
         instance: &Instance,
@@ -231,7 +231,7 @@ fn add_morphs(
     Ok(())
 }
 
-/// Triangles with the primitive's own vertex indices; empty for points and lines.
+/// Triangles of a primitive, with indices of the primitive's own vertices; empty for points and lines.
 pub(super) fn triangles_of(
     document: &GltfDocument,
     primitive: &Primitive,
@@ -244,7 +244,7 @@ pub(super) fn triangles_of(
     Ok(all)
 }
 
-/// Appends the triangles of a primitive. Returns the number of leftover indices.
+/// Appends the triangles of a primitive. Returns the number of indices after the last whole triangle.
 fn triangles(
     document: &GltfDocument,
     primitive: &Primitive,
@@ -284,7 +284,7 @@ fn triangles(
         }
         .map(|i| start + indices[i]);
         if a == b || b == c || c == a {
-            // Degenerate triangles join strips.
+            // Skip degenerate triangles, which join strips.
             continue;
         }
         all.push(if flip { [a, c, b] } else { [a, b, c] });

@@ -19,7 +19,7 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 /// Images used by materials, without duplicates.
 struct Images<'a> {
     document: &'a GltfDocument,
-    /// By address and length of the bytes.
+    /// Index of each image in `found`, by address and length of the image's bytes.
     numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
     /// Bytes of buffers that are not yet copied to `found`. Views of images can overlap.

@@ -50,7 +50,7 @@ pub(crate) use patch::{Rest, embed_images, patch};
 pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape};
 
-/// Formats "30 of 236 kB" with the largest unit in which the sizes differ.
+/// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
 fn size_of_total(found: u64, declared: u64) -> String {
     let (unit, name) = [(1_000_000, "MB"), (1000, "kB")]
         .into_iter()
@@ -116,7 +116,7 @@ pub enum GltfError {
     /// An index is out of range.
     #[error("{from} refers to {what} {index}, but there are {count}")]
     Index {
-        /// Object with the index.
+        /// Object that contains the index.
         from: String,
         /// Kind of the referenced object.
         what: &'static str,
@@ -140,7 +140,7 @@ pub enum GltfError {
     Count {
         /// Accessor index.
         accessor: u32,
-        /// Attribute.
+        /// What the accessor stores, such as the name of an attribute.
         what: String,
         /// Number of elements.
         count: u64,
@@ -186,27 +186,27 @@ pub enum GltfError {
 /// A parsed glTF file.
 #[derive(Clone, Debug)]
 pub(crate) struct GltfDocument {
-    /// JSON without buffer URIs.
+    /// The document as JSON, with the URIs of the buffers removed.
     pub(crate) json: Value,
-    /// Typed members needed by geometry.
+    /// The members of the JSON that reading the geometry needs, as typed values.
     pub(crate) root: Root,
     /// Contents of each buffer.
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
-    /// Images with URIs that could be loaded.
+    /// External images, by index; `None` for images in buffer views and for images that could not be loaded.
     pub(crate) images: Vec<Option<Image>>,
     /// Original JSON chunk of a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
-    /// Compressed GLB that the caller decoded this document from, if self-contained.
+    /// The compressed file that the caller decoded to get this document, if that file is a self-contained GLB.
     pub(crate) packed: Option<Vec<u8>>,
-    /// Whether compressed geometry was decoded. The first buffer is still that of the file.
+    /// Whether the document contains decoded geometry, in further buffers. The first buffer is still that of the file.
     pub(crate) is_decoded: bool,
     /// Meshes of the default scene, in vertex order.
     instances: Vec<Instance>,
     /// Meshes outside the default scene, such as levels of detail.
     elsewhere: Vec<Instance>,
-    /// World from bind space per joint of the skins in use. `[n_skins][n_joints]`
+    /// Transform from bind space to world space of each joint of the skins in use. `[n_skins][n_joints]`
     joints: Vec<Vec<DMat4>>,
-    /// Approximate memory with geometry, bytes.
+    /// Approximate memory of the document and its geometry, bytes.
     pub(crate) bytes: u64,
     /// Vertex and triangle ranges of the primitives.
     slots: Vec<Slot>,
@@ -224,7 +224,7 @@ struct Slot {
 
 /// Result of reading a glTF file.
 pub(crate) struct GltfModel {
-    /// Origin of the positions.
+    /// Point in world space to which `positions` are relative.
     pub(crate) origin: DVec3,
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -260,7 +260,7 @@ pub(crate) fn read(
         bytes: loaded.bytes,
         slots: Vec::new(),
     };
-    // The caller frees the file after reading.
+    // The caller frees the file after reading, so the document's memory does not include it.
     let model = size::check(&document, loaded.bytes, memory_limit)?;
     document.bytes = loaded.bytes - bytes.len() as u64 + model;
     document.joints = skin::shown_joints(&document, &worlds)?;
@@ -286,7 +286,7 @@ pub(crate) fn read(
     })
 }
 
-/// `list[index]`, or an error naming the object with the index.
+/// Returns `list[index]`, or an error that names the object that contains the index.
 fn get<'a, T>(
     list: &'a [T],
     index: usize,

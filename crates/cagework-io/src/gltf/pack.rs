@@ -43,7 +43,7 @@ pub(crate) struct Pack<'a> {
 }
 
 impl<'a> Pack<'a> {
-    /// No views yet.
+    /// A pack without buffer views, for a new document.
     pub(crate) fn empty() -> Self {
         Self { views: Vec::new() }
     }
@@ -103,7 +103,7 @@ impl<'a> Pack<'a> {
         push(json, "accessors", accessor)
     }
 
-    /// Adds a vertex attribute of vectors.
+    /// Adds an accessor of f32 vectors as a vertex attribute; `bounds` adds min and max.
     pub(crate) fn push_vec3(&mut self, json: &mut Value, values: &[Vec3], bounds: bool) -> usize {
         let flat: Vec<f32> = values.iter().flat_map(Vec3::to_array).collect();
         self.push_floats(json, &flat, 3, true, bounds)
@@ -188,7 +188,7 @@ pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
     [fold(f32::min, f32::INFINITY), fold(f32::max, f32::NEG_INFINITY)].map(|all| all.to_vec().into())
 }
 
-/// GLB of a document whose only buffer is `bin`.
+/// Writes a GLB of a document whose only buffer is `bin`.
 pub(super) fn write_glb(json: &Value, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
     let text = serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))?;
     write_chunks(&text, bin)

@@ -307,7 +307,7 @@ pub(crate) fn embed_images_by(
     json: &mut Value,
     push_view: &mut dyn FnMut(&mut Value, Vec<u8>) -> usize,
 ) {
-    // Images from one file share its bytes.
+    // Images from the same file share one buffer view.
     let mut views = HashMap::new();
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };

@@ -26,7 +26,7 @@ pub(crate) struct Instance {
     pub(crate) node: Option<u32>,
     pub(crate) mesh: u32,
     pub(crate) skin: Option<u32>,
-    /// World from mesh space.
+    /// Transform from mesh space to world space.
     pub(crate) world: DMat4,
 }
 
@@ -104,7 +104,7 @@ pub(super) fn local(node: &Node) -> DMat4 {
 /// Mesh instances inside and outside the default scene, each ordered by mesh, then node. If the scene has no
 /// mesh, all instances are used.
 ///
-/// Mesh order equals primitive order for files that show each mesh once, as other programs number them.
+/// For files that show each mesh once, this is the order of the primitives in the file, which other programs also use.
 pub(crate) fn instances(
     root: &Root,
     worlds: &Worlds,

@@ -41,7 +41,7 @@ const TRIANGLE_READ_BYTES: u64 = 12;
 const RIG_VERTEX_BYTES: u64 = 100;
 const SKIN_VERTEX_BYTES: u64 = 300;
 
-/// Memory per vertex moved by a morph target: in a player, and both ends while reshaping, bytes.
+/// Memory per vertex moved by a morph target, in a player and, for both ends, while reshaping, bytes.
 const MORPHED_VERTEX_BYTES: u64 = 96;
 
 /// Memory of the matrices of a joint, bytes.

@@ -11,8 +11,8 @@ use super::{GltfDocument, GltfError, get};
 /// Limit on sets `JOINTS_n`: 32 joints per vertex.
 const MAX_SETS: u32 = 8;
 
-/// World from bind space per joint, `world_j * inverse_bind_j`; empty for unused skins. Joints are at their
-/// positions in the node hierarchy, as in viewers without animation.
+/// Transform from bind space to world space of each joint, `world_j * inverse_bind_j`; empty for unused skins. Joints
+/// are at their positions in the node hierarchy, as in viewers without animation.
 pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<Vec<Vec<DMat4>>, GltfError> {
     let skins = &document.root.skins;
     let mut all = vec![Vec::new(); skins.len()];
@@ -24,7 +24,7 @@ pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<V
     Ok(all)
 }
 
-/// World from bind space per joint of one skin.
+/// Transform from bind space to world space of each joint of one skin.
 pub(crate) fn joints(
     document: &GltfDocument,
     skin: u32,
@@ -92,8 +92,8 @@ pub(crate) fn each_influence(
     Ok(())
 }
 
-/// World from mesh space per vertex of a skinned primitive, `sum_j w_j * joint_j`; `world` for vertices
-/// without positive weight, and the number of those.
+/// Transform from mesh space to world space of each vertex of a skinned primitive, `sum_j w_j * joint_j`, and the
+/// number of vertices without positive weight, whose transform is `world`.
 ///
 /// The transform of the mesh's node is ignored (glTF 2.0, section 3.7.3.3).
 pub(crate) fn matrices(

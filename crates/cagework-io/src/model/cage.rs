@@ -91,7 +91,7 @@ impl Model {
         Ok((0..n).map(alone).collect())
     }
 
-    /// Vertex of the pose for each vertex of this cage.
+    /// Index of the pose's vertex that corresponds to each vertex of this cage.
     fn order_of(&self, pose: &Self) -> Result<Vec<u32>, PoseError> {
         let welded = matches!(self.document, Document::Gltf(_)).then(|| weld(&self.positions));
         let (n, given) = (self.positions.len(), pose.positions.len());
@@ -123,7 +123,7 @@ impl Model {
     /// Whether a pose of this cage, exported as `format` and read again, keeps this cage's vertex order.
     #[must_use]
     pub fn keeps_order_in(&self, format: ModelFormat) -> bool {
-        // The others number vertices in the order of faces.
+        // Formats that do not keep the order number vertices by their first use in a face.
         self.format == format || format.keeps(Kept::Order)
     }
 

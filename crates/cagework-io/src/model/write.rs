@@ -126,8 +126,8 @@ impl Model {
         self.glb(positions, &[], PoseTiming::EverySecond)
     }
 
-    /// Exports `rest` with one morph target per pose and an animation from rest through all poses and back,
-    /// one second per step.
+    /// Exports `rest` with one morph target per pose and an animation from rest through all poses and back, with one
+    /// second between successive shapes.
     ///
     /// # Errors
     /// As [`Self::write_glb`].

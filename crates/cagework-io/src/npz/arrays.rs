@@ -23,7 +23,7 @@ const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Preallocated bytes for all headers of an archive.
 const HEADERS_BYTES: usize = 4096;
 
-/// Arrays above this size get zip64 headers, bytes. Half of the 32-bit limit.
+/// Arrays larger than this number of bytes, half of the 32-bit limit, get zip64 headers.
 const MAX_ZIP32_ARRAY_BYTES: usize = (u32::MAX / 2) as usize;
 
 /// Archive writer.
@@ -229,7 +229,7 @@ impl NpyArray {
         Err(self.fault(&format!("has shape {:?}; it must have {wanted}", self.shape)))
     }
 
-    /// Rows of three as points.
+    /// Returns the rows of an array of shape `[n, 3]` as points.
     pub(super) fn points(self) -> Result<Vec<Vec3>, NpzError> {
         Ok(self.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect())
     }

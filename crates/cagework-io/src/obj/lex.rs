@@ -7,9 +7,9 @@ use crate::shown::shown_start;
 /// A logical line: one physical line, or several joined by backslashes.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
-    /// Number of its first physical line, from 1.
+    /// Number of the first physical line, from 1.
     pub(crate) number: usize,
-    /// Its bytes, line end included.
+    /// Bytes of the logical line, including the line end.
     pub(crate) range: Range<usize>,
 }
 
@@ -39,7 +39,7 @@ fn physical_end(bytes: &[u8], at: usize) -> (usize, usize) {
     }
 }
 
-/// Only these lines may continue after a backslash. Comments and Windows paths in `mtllib` may end in one.
+/// Whether a line may continue after a backslash: not comments and `mtllib` lines, whose paths may end in a backslash.
 fn may_continue(line: &[u8]) -> bool {
     let start = line.iter().position(|&b| !is_blank(b)).unwrap_or(line.len());
     let word = line[start..].split(|&b| is_blank(b) || b == b'\\').next().unwrap_or(&[]);

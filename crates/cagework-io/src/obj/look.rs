@@ -16,7 +16,7 @@ use crate::siblings::{Image, Resolve, Siblings};
 pub(crate) struct Material {
     /// `Kd` and, as alpha, `d`; sRGB as written.
     pub(crate) color: [f32; 4],
-    /// `map_Kd`.
+    /// Texture of `map_Kd`, if any.
     pub(crate) image: Option<Image>,
 }
 

@@ -15,7 +15,7 @@ use crate::origin::relative;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 use crate::siblings::{Resolve, SiblingError, Siblings};
 
-/// Missing index.
+/// Value of a missing index, such as the normal of a corner without a normal.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Corner of a face. Indices from 0; `vt` and `vn` may be [`NONE`].
@@ -26,7 +26,7 @@ pub(crate) struct Corner {
     pub(crate) vn: u32,
 }
 
-/// An `o` or `g` line. An `o` line is valid until the next `o` line, a `g` line until the next `g` line.
+/// An `o` or `g` line. An `o` line applies to all faces up to the next `o` line, a `g` line up to the next `g` line.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
     pub(crate) is_object: bool,
@@ -151,7 +151,7 @@ struct Reader<'a> {
     document: ObjDocument,
     material_numbers: HashMap<&'a [u8], u32>,
     material: u32,
-    /// Current smoothing group; 0, off, is the format's default.
+    /// Current smoothing group. 0 means off, which is the format's default.
     smoothing: u32,
     has_smoothing: bool,
     /// Forward references: line and vertex index, checked at the end.
@@ -167,13 +167,13 @@ struct Reader<'a> {
     notices: Vec<String>,
 }
 
-/// Bytes per vertex in the weld table.
+/// Memory of the table for welding coincident vertices, bytes per vertex.
 const WELD_BYTES: u64 = 36;
 
-/// Limit on `usemtl` names. Each becomes a draw call and a GLB primitive.
+/// Limit on `usemtl` names. Each name becomes a draw call and a GLB primitive.
 const MAX_MATERIALS: usize = 1 << 14;
 
-/// Faces with fewer corners are ignored, like lines and points.
+/// Minimum number of corners of a face. Faces with fewer corners are ignored, as are lines and points.
 pub(super) const MIN_CORNERS: usize = 3;
 
 /// Lines or corners between checks of the memory limit.
@@ -208,7 +208,7 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -
     reader.finish()
 }
 
-/// Reads the `v` lines of a valid file again, relative to `origin`, without rounding in between.
+/// Reads the `v` lines of a valid file again. Subtracts `origin` in double precision before rounding to f32.
 pub(crate) fn positions_near(bytes: &[u8], origin: DVec3) -> Vec<Vec3> {
     let vertices = lines(bytes).filter_map(|line| {
         let mut words = tokens(bytes, line.range);
@@ -235,7 +235,7 @@ impl<'a> Reader<'a> {
                     })?;
                 }
                 let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).take(4).collect();
-                // One number is a weight, three are a colour.
+                // One number after the coordinates is a weight, three numbers are a colour.
                 if let [r, g, b] = after[..] {
                     self.document.colors.insert(self.positions.len() as u32, [r, g, b]);
                 }
@@ -270,8 +270,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Memory of the data read so far, including its triangles and the weld table. Counts twice the size of
-    /// lists, which grow by doubling.
+    /// Memory of the data read so far, including its triangles and the weld table. Lists count twice, because their
+    /// capacity grows by doubling.
     fn check_memory(&self) -> Result<u64, MemoryError> {
         let document = &self.document;
         let lists = [
@@ -286,7 +286,7 @@ impl<'a> Reader<'a> {
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
-        // The caller holds the file, and the document a copy.
+        // The file counts twice: the caller's bytes and the document's copy.
         let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + self.group_bytes + lists;
         MemoryError::check(needed, self.memory_limit).map(|()| needed)
     }
@@ -437,7 +437,7 @@ impl<'a> Reader<'a> {
         );
         self.document.bytes = self.bytes.to_vec();
         let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
-        // The caller frees the file after reading; the weld table is temporary.
+        // Subtract what is freed after reading: the caller's bytes of the file, and the weld table.
         let bytes = reading - bytes - welding;
         Ok(ObjModel {
             positions: self.positions,

@@ -25,8 +25,8 @@ impl Triangulator {
 
     /// Appends the n - 2 triangles of `polygon` as `base` + corner numbers. `polygon`: corner positions in order.
     ///
-    /// A fan if all its triangles face along the polygon's normal, otherwise ear clipping in the mean plane.
-    /// Degenerate and self-intersecting polygons, and those beyond the work limit, become fans.
+    /// The triangles form a fan if all triangles of the fan face along the polygon's normal; otherwise ears are clipped
+    /// in the mean plane. Degenerate and self-intersecting polygons, and those beyond the work limit, become fans.
     pub(crate) fn triangulate(&mut self, polygon: &[Vec3], base: u32, out: &mut Vec<[u32; 3]>) {
         let n = polygon.len() as u32;
         if n < 3 {
@@ -46,7 +46,7 @@ impl Triangulator {
         out.extend((2..n).map(|k| [base, base + k - 1, base + k]));
     }
 
-    /// Reserves the work of clipping a polygon of `n` corners; false if it exceeds the rest.
+    /// Reserves the work of clipping a polygon of `n` corners. Returns false if less work than that is left.
     fn may_clip(&mut self, n: u64) -> bool {
         let left = self.left.checked_sub(n * n);
         self.fans += usize::from(left.is_none());

@@ -133,7 +133,7 @@ impl PatchedNormals {
         }
     }
 
-    /// Writes the replacement of a `vn` line; false if the line stays.
+    /// Writes the replacement of a `vn` line. Returns false if the line has no replacement and stays as it is.
     fn write_line(&self, vn: usize, end: &[u8], out: &mut Vec<u8>) -> bool {
         for n in &self.lines[vn] {
             out.extend_from_slice(format!("vn {} {} {}", n.x, n.y, n.z).as_bytes());

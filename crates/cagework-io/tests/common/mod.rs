@@ -106,7 +106,7 @@ impl Builder {
         self.accessor(&bytes, U16, indices.len(), "SCALAR")
     }
 
-    /// A mesh of one cube.
+    /// Adds a mesh of one cube; returns the mesh's index.
     pub(crate) fn cube_mesh(&mut self, name: &str) -> usize {
         let (position, indices) = (self.vec3(&CUBE), self.indices(CUBE_TRIANGLES.as_flattened()));
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
@@ -291,7 +291,7 @@ pub(crate) fn twist(p: Vec3) -> Vec3 {
     Vec3::new(c * p.x - s * p.y + 0.5, s * p.x + c * p.y, 1.5 * p.z - 0.25)
 }
 
-/// Largest distance between corresponding points, over the size of the first list.
+/// Largest distance between corresponding points, divided by the largest distance of a point of `a` from the origin.
 pub(crate) fn relative_error(a: &[Vec3], b: &[Vec3]) -> f32 {
     assert_eq!(a.len(), b.len());
     let size = a.iter().map(|p| p.length()).fold(f32::MIN_POSITIVE, f32::max);
@@ -320,7 +320,7 @@ pub(crate) fn rigged() -> Builder {
         }
     }
     triangles.extend([0, 1, 2, 0, 2, 3, 16, 18, 17, 16, 19, 18]);
-    // In mesh space, scaled by half and moved by four units.
+    // Positions in mesh space: scaled by half and moved by four units.
     let local: Vec<[f32; 3]> =
         at.iter().map(|p: &[f32; 3]| [4.0 + 0.5 * p[0], 0.5 * p[1], 0.5 * p[2]]).collect();
     let delta = |d: [f32; 3], from: f32| -> Vec<[f32; 3]> {
@@ -359,7 +359,8 @@ pub(crate) fn rigged() -> Builder {
         { "name": "bar", "mesh": 0, "skin": 0, "translation": [7.0, 7.0, 7.0] },
     ]);
     rig.json["scenes"] = json!([{ "nodes": [0, 4] }]);
-    // World from bind space scales by two and moves back by eight units, as the joints' world transforms scale by two.
+    // The joints' world transforms scale by two, so the transform from bind space to world space scales by two and
+    // moves by -8.
     let binds: Vec<u8> = [0.0_f32, 0.5, 1.0]
         .iter()
         .flat_map(|y| Mat4::from_translation(Vec3::new(-4.0, -y, 0.0)).to_cols_array())

@@ -16,10 +16,10 @@ use crate::common::{
     textured_square, twist,
 };
 
-/// GLB samples come first.
+/// Number of GLB samples, which precede all other samples.
 const N_GLB: usize = 7;
 
-/// All inputs of a seed.
+/// Generator of the inputs of a seed.
 pub(crate) struct Inputs {
     seed: u64,
     files: BoxedStrategy<Vec<u8>>,
@@ -166,7 +166,7 @@ enum Damage {
     Repeat(Index, Index),
 }
 
-/// Bytes with a meaning in file formats.
+/// Bytes that have a meaning in text formats.
 const SYNTAX: &[u8] = b"0123456789-.,/e \\\n{}[]\"";
 
 fn damage() -> impl Strategy<Value = Damage> {
@@ -344,7 +344,7 @@ fn bin_of(glb: &[u8]) -> &[u8] {
     &glb[28 + json..]
 }
 
-/// The external buffer of a glTF.
+/// The external buffer with this name; `None` if no GLB sample has this name.
 pub(crate) fn beside(samples: &[Vec<u8>], name: &str) -> Option<Vec<u8>> {
     samples[..N_GLB].iter().find(|s| sample_name(s) == name).map(|s| bin_of(s).to_vec())
 }

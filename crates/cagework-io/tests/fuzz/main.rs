@@ -1,5 +1,5 @@
-//! Runs damaged files through all readers and their consumers. Each must end in a result or an error, within
-//! seconds and without a panic.
+//! Runs damaged files through all readers and the code that uses their results. Each file must lead to a result or an
+//! error, within seconds and without a panic.
 //!
 //! `cargo xtask fuzz --minutes 60` takes the seed from the clock and prints it; `--seed 1` makes runs
 //! repeatable. Failing inputs are written to `target/fuzz`, and `cargo xtask fuzz FILE` repeats one. Inputs
@@ -120,7 +120,8 @@ impl Trial {
         Self { process, numbers, since: (Instant::now(), Duration::ZERO) }
     }
 
-    /// Number of the next input, and CPU time of the previous one. An error if the process ended or exceeded a limit.
+    /// Number of the next input, and CPU time of the previous one. Returns an error if the process ended or exceeded a
+    /// limit.
     fn next(&mut self) -> Result<(u64, Duration), RecvTimeoutError> {
         loop {
             let number = self.numbers.recv_timeout(Duration::from_secs(1));
@@ -149,7 +150,7 @@ impl Trial {
     /// How the process ended; `None` on success.
     fn end(mut self, timed_out: bool) -> Option<String> {
         if timed_out {
-            // It may have exited by itself in the meantime.
+            // Ignore the error: the process may have exited in the meantime.
             let _ = self.process.kill();
         }
         match self.process.wait() {
@@ -161,7 +162,7 @@ impl Trial {
     }
 }
 
-/// Runs given files.
+/// Runs the given files, each in its own child process.
 fn try_files(files: &[impl AsRef<Path> + std::fmt::Display]) -> ExitCode {
     let mut outcome = ExitCode::SUCCESS;
     for file in files {

@@ -1,4 +1,4 @@
-//! Operations on each input: those of the command and the page.
+//! Runs the operations of the command line and of the page on each input.
 
 use std::sync::LazyLock;
 
@@ -21,7 +21,7 @@ use crate::inputs;
 
 const GRID: u32 = 8;
 
-/// Fixtures.
+/// Valid samples, cages and points that inputs are combined with.
 struct Rest {
     samples: Vec<Vec<u8>>,
     /// Reference cage for poses.
@@ -88,7 +88,7 @@ pub(crate) fn survive(bytes: &[u8]) {
     }
 }
 
-/// Binds points to the cube with controls inside; they must stay in place at rest.
+/// Binds points to the cube with controls inside it. At rest, the points must not move.
 fn as_controls(inner: InnerControls, choice: u32) {
     let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
     let options = BindOptions { grid: GRID, tau: 1e-3, ..BindOptions::default() };
@@ -99,7 +99,7 @@ fn as_controls(inner: InnerControls, choice: u32) {
     }
 }
 
-/// Exports must be readable.
+/// Exports the model. Exports must be readable.
 fn as_file(model: &Model) {
     assert!(model.positions.iter().all(|p| p.is_finite()));
     assert!(model.triangles.iter().flatten().all(|&v| (v as usize) < model.positions.len()));
@@ -118,7 +118,7 @@ fn as_file(model: &Model) {
     }
 }
 
-/// Reshaped exports must be readable and playable.
+/// Reshapes a rigged model. Reshaped exports must be readable and playable.
 fn as_rig(model: &Model, choice: u32) {
     if let Ok(Some(player)) = model.player() {
         for clip in 0..player.clips().len().min(2) {
@@ -161,7 +161,7 @@ fn as_model(model: &Model, choice: u32) {
         symmetry: [Symmetry::Auto, Symmetry::None, Symmetry::X, Symmetry::Z][choice as usize >> 9 & 3],
         per_component: flags(11),
         clearance: if flags(12) { 0.25 } else { 0.0 },
-        // Mostly coarse, for speed.
+        // Three of four inputs use a coarse grid, for speed.
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
         smooth: choice >> 9 & 1,
     };

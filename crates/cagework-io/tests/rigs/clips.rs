@@ -58,7 +58,7 @@ fn clips_do_not_change_what_becomes_of_the_shape() {
     assert_eq!(with, without);
 }
 
-/// Between keys, cubic splines obey the same rule; tangents take the linear part.
+/// Cubic splines follow the rule for translations also between keys, because their tangents take its linear part.
 #[test]
 fn splines_follow_the_rule_between_their_keys() {
     let mut rig = rigged();

@@ -42,7 +42,8 @@ fn props_on_bones_bend_or_stay_rigid() {
         assert!((before - moved[a].distance(moved[b])).abs() > 1e-3, "otherwise it is stretched");
     }
 
-    // Same result with a skeleton that stays, as one of several poses, with another mesh origin, and mirrored.
+    // The result is the same with an unchanged skeleton, as one of several poses, with another mesh origin, and
+    // mirrored.
     let stays = ReshapeOptions { joints: Joints::Stay, ..options.clone() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &stays).unwrap();
     assert_near(&last(&read(&bytes), 8), &rigid, ROUNDED, "the skeleton stays");
@@ -96,7 +97,7 @@ fn props_on_bones_bend_or_stay_rigid() {
     assert_eq!(last(&read(&bytes), 8), rigid);
 }
 
-/// UniVRM exports meshes of several materials this way.
+/// UniVRM exports a mesh of several materials as primitives that share one set of vertex attributes.
 #[test]
 fn vertices_shared_between_primitives_stay_shared() {
     let mut rig = rigged();
@@ -145,7 +146,7 @@ fn a_rigid_piece_of_a_skin_keeps_its_lengths_with_every_target() {
     }
 }
 
-/// The second influence of each vertex in a second set.
+/// The second joint influence of each vertex is stored in a second set of attributes, `JOINTS_1` and `WEIGHTS_1`.
 #[test]
 fn several_sets_of_joints_add_up() {
     let mut rig = rigged();
@@ -209,7 +210,7 @@ fn meshes_outside_the_scene_are_deformed() {
     assert_near(&shown.positions, &moved, ROUNDED, "the level of detail");
 }
 
-/// A joint without vertices, outside the cage: the end of a chain.
+/// The end of a chain is a joint without vertices, here outside the cage.
 #[test]
 fn joints_without_vertices_outside_the_cage_follow_their_parents() {
     let mut rig = rigged();

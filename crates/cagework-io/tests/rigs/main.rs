@@ -258,7 +258,7 @@ fn cage_of_a_model_encloses_targets_and_a_clip() {
     assert!(positions.len() > rest && triangles == model.triangles);
     let widest = positions.iter().map(|p| p.x).fold(0.0, f32::max);
     assert!(widest > model.positions.iter().map(|p| p.x).fold(0.0, f32::max), "the target 'wide' is at 1");
-    // The default weight is 0.25; the column itself is as narrow as that target leaves it.
+    // At its default weight 0.25, the target widens the column; only the state with the target at 0 is 0.2 wide.
     let narrow = |p: &&Vec3| p.y > 1.9 && (p.x - 0.2).abs() < 1e-5;
     assert_eq!([&model.positions, &positions].map(|at| at.iter().filter(narrow).count()), [0, 2]);
     let (frames, of_frames) = model.states(Some("walk")).unwrap();
@@ -342,8 +342,8 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     assert_eq!(person["firstPersonBoneOffset"], serde_json::json!({ "x": 0.1, "y": 0.2, "z": -0.05 }));
 }
 
-/// A sheet of 4,000 vertices with morph targets. `added`: displacement by a target of a vertex along z, half
-/// of it along y.
+/// A sheet of 4,000 vertices with morph targets. `added(target, vertex)`: displacement of the vertex along z by the
+/// target; its displacement along y is half of that.
 fn sheet(n_targets: usize, added: impl Fn(usize, usize) -> f32) -> common::Builder {
     let n = 4_000;
     let mut rig = common::Builder::new();
@@ -373,7 +373,8 @@ fn sheet(n_targets: usize, added: impl Fn(usize, usize) -> f32) -> common::Build
     rig
 }
 
-/// Compares single targets of a reshaped model with `f` applied to the original states.
+/// Compares the states of single targets of a reshaped model with `f` applied to the original states. `numbers`:
+/// indices of the targets.
 fn assert_targets(model: &Model, bytes: &[u8], numbers: &[usize], within: f32) {
     let (before, after) = (player(model), player(&read(bytes)));
     for (&k, share) in numbers.iter().flat_map(|k| [(k, 0.0), (k, 1.0)]) {
@@ -384,7 +385,7 @@ fn assert_targets(model: &Model, bytes: &[u8], numbers: &[usize], within: f32) {
     }
 }
 
-/// As many targets as detailed face rigs have.
+/// The model has 93 morph targets, as many as detailed face rigs have.
 #[test]
 fn ninety_three_targets_are_exported() {
     let model = read(&sheet(93, |k, v| if v % 93 == k { 0.1 } else { 0.0 }).glb());
@@ -395,7 +396,7 @@ fn ninety_three_targets_are_exported() {
     assert_targets(&model, &bytes, &[0, 46, 92], ROUNDED);
 }
 
-/// 216,000 ends, as in a baked clip.
+/// The 54 targets move all 4,000 vertices and so have 216,000 ends, as in a baked clip.
 #[test]
 fn many_morph_ends_are_interpolated_in_a_lattice() {
     let mut rig = sheet(54, |k, v| 0.02 + 0.4 * (k as f32 + (v % 63) as f32 / 20.0).sin().abs());
@@ -441,7 +442,7 @@ fn floats(rig: &common::Builder, accessor: u64) -> Vec<f32> {
     numbers.iter().map(|&b| f32::from_le_bytes(b)).collect()
 }
 
-/// KHR_mesh_quantization with the scale in the inverse bind matrices, and a sparse target.
+/// Positions use KHR_mesh_quantization with the scale in the inverse bind matrices, and a morph target is sparse.
 #[test]
 fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
     const UNIT: f32 = 1.0 / 1024.0;

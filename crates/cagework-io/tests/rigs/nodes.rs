@@ -98,7 +98,7 @@ fn pivots_follow_the_cage_unless_they_are_at_the_origin() {
     assert_eq!(model.props().unwrap(), Vec::<String>::new(), "there is no skeleton");
     let plain = read(&common::plain_cube().glb());
     assert!(!plain.is_rigged() && plain.extra_points().unwrap().is_empty());
-    // Singular transforms cannot be inverted.
+    // A singular transform cannot be inverted, so the model does not count as rigged.
     still.json["nodes"][0]["scale"] = json!([1.0, 0.0, 1.0]);
     assert!(!read(&still.glb()).is_rigged());
 }
@@ -130,8 +130,8 @@ fn vrm_bones_follow_the_cage_with_their_meshes() {
     }
 }
 
-/// A robot of rigid parts: the foot is a child of the root, next to the hips, and the shin is a child of the
-/// hips and ends at the foot. A skinned hand. Two clips: a jump, and a translation to another position.
+/// A robot of rigid parts with a skinned hand. The foot is a child of the root, next to the hips; the shin is a child
+/// of the hips and ends at the foot. The two clips are a jump and a translation to another position.
 fn robot() -> Builder {
     let mut b = Builder::new();
     let mesh = centred_cube(&mut b);
@@ -162,7 +162,7 @@ fn robot() -> Builder {
 #[test]
 fn feet_stay_attached_to_legs_in_clips() {
     let model = read(&robot().glb());
-    // Longer legs. The floor at 0 is the lower side of the foot's cube; the hips are at 1.
+    // The deformation lengthens the legs. The floor at 0 is the lower side of the foot's cube; the hips are at 1.
     let taller = |p: Vec3| vec3(p.x, if p.y < 1.0 { 1.35 * p.y } else { p.y + 0.35 }, p.z);
     let bytes = moved_by(&model, Joints::Follow, taller);
     let [before, after] = [player(&model), player(&read(&bytes))];

@@ -23,7 +23,7 @@ fn shaped(moved: impl Fn(Vec3) -> Vec3, joints: Joints) -> (Model, Model, Reshap
     (model, shaped, report)
 }
 
-/// A model with displaced cage vertices.
+/// Reshapes a model by displaced cage vertices and reads the export.
 fn by_cage(
     model: &Model,
     cage: &Cage,
@@ -75,7 +75,7 @@ fn joints_of_lengthened_arms_follow_the_arms() {
     let (model, longer, _) = shaped(arms, Joints::Follow);
     for name in ["forearm.L", "hand.R"] {
         let (before, after) = (origin(&model, name), origin(&longer, name));
-        // 2 % of the limb's length of 0.8.
+        // The tolerance is 2 % of the limb's length, 0.8.
         assert!(after.distance(arms(before)) <= 0.016, "{name}: {after} instead of {}", arms(before));
     }
     let knee = origin(&model, "shin.L");
@@ -85,7 +85,7 @@ fn joints_of_lengthened_arms_follow_the_arms() {
     assert_eq!((report.joints_moved, report.tracks), (0, 0));
 }
 
-/// Whether each triangle is flipped relative to the rotation of its skin, in each frame.
+/// Whether each triangle is flipped relative to its normal after skinning, in each of eight frames of the first clip.
 fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
     let at_rest = player.at(None, 0.0, &[]).palette;
     let rest = cagework_core::skin::skin_vertices(&player.skin, &at_rest, &[]);
@@ -121,11 +121,11 @@ fn joints_that_follow_flip_fewer_triangles_than_joints_that_stay() {
         (before.len(), before.iter().zip(&after).filter(|(before, after)| !**before && **after).count())
     };
     let ((n, follow), (_, stay)) = (new(Joints::Follow), new(Joints::Stay));
-    // Measured: 43 and 378.
+    // Measured: 43 triangles flip if joints follow, 378 if joints stay.
     assert!(follow * 5 < stay && follow * 1000 < n, "of {n}: {follow} follow, {stay} stay");
 }
 
-/// A bumpy target leaves every tight cage of the rest shape, so the cage must enclose both.
+/// A bumpy target leaves every tight cage of the rest shape, so the cage must enclose the rest shape and the target.
 #[test]
 fn targets_inside_the_cage_flip_no_triangles() {
     let n = 40;

@@ -13,7 +13,7 @@ const N: u32 = 24;
 /// Positions, normals and triangles.
 type Sheet = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>);
 
-/// Height and slope of two profiles: a wave, and a roof with a smooth normal at its ridge.
+/// Height and slope of a profile at `u`: here of a wave, below of a roof with a smooth normal at its ridge.
 fn wave(u: f32) -> [f32; 2] {
     [0.2 * (3.0 * u).sin(), 0.6 * (3.0 * u).cos()]
 }

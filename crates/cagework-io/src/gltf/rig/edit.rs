@@ -45,7 +45,7 @@ impl<'a> Edit<'a> {
         edit
     }
 
-    /// The instance's mesh in the edited document.
+    /// Index of the instance's mesh in the edited document.
     pub(super) fn mesh_of(&self, instance: &Instance) -> usize {
         let of_node = |node: u32| self.json["nodes"][node as usize]["mesh"].as_u64();
         instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
@@ -170,7 +170,7 @@ impl<'a> Edit<'a> {
         }
         embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
         if document.is_decoded {
-            // Drops the compressed streams.
+            // The pack drops the compressed streams, to which nothing refers.
             return Pack::of_bytes(&json, &bin).finish(json);
         }
         // An unchanged buffer keeps its declared length; the chunk can include padding.

@@ -39,7 +39,7 @@ impl Lattice {
     fn new(points: &(impl Iterator<Item = DVec3> + Clone), size: f64) -> Self {
         let box_of = |[low, high]: [DVec3; 2], p| [low.min(p), high.max(p)];
         let [origin, high] = points.clone().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], box_of);
-        // Cell coordinates must fit into their bits, also for outliers.
+        // Outliers must not push cell coordinates beyond their number of bits.
         let finest = (size / MAX_CELLS_PER_SIDE)
             .max((high - origin).max_element() / f64::from(1 << (CELL_INDEX_BITS - 2)));
         let finest = finest.max(f64::MIN_POSITIVE);
@@ -95,7 +95,7 @@ impl Lattice {
     }
 }
 
-/// Cell of a point, and position in it, 0 to 1.
+/// Lattice cell that contains a point, and the position of the point in this cell, 0 to 1 along each axis.
 fn place(origin: DVec3, cell: f64, point: DVec3) -> (U64Vec3, DVec3) {
     let at = ((point - origin) / cell).max(DVec3::ZERO);
     (at.as_u64vec3(), at.fract())
@@ -161,7 +161,7 @@ impl Rig<'_> {
         self.spread(by, Lattice::at, |own, at_rest, at_end| own + (at_end - at_rest))
     }
 
-    /// Whether each point is outside the cage. An end is outside if all nodes of its cell are.
+    /// Whether each point is outside the cage. An end is outside if all nodes of its lattice cell are outside.
     pub(crate) fn all_outside(&self, is_outside: Vec<bool>) -> Vec<bool> {
         let read = |lattice: &Lattice, point, nodes: &[bool]| {
             lattice.around(point).0.iter().all(|&node| nodes[node as usize])
@@ -202,7 +202,7 @@ pub(super) fn ends(part: &RigPrimitive) -> impl Iterator<Item = (&Target, usize)
     part.targets.iter().flat_map(|target| target.ends.iter().flatten().map(move |&first| (target, first)))
 }
 
-/// Rest positions of a primitive, with non-finite ones replaced by the origin, as in `extras`.
+/// Rest positions of a primitive. Non-finite positions, which cannot be bound, are replaced by the world origin.
 fn bindable_rest(part: &RigPrimitive) -> Vec<DVec3> {
     let finite = |p: DVec3| if p.as_vec3().is_finite() { p } else { DVec3::ZERO };
     part.rest().into_iter().map(finite).collect()

@@ -50,33 +50,33 @@ use vrm::VrmPoint;
 /// Step of the central differences for the deformation gradient at a node, over the model's diagonal.
 const GRADIENT_STEP: f64 = 0.02;
 
-/// Directions of the six points around an anchor.
+/// Directions from a node's origin to the six points that measure the deformation gradient.
 const PROBE_DIRECTIONS: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
 
-/// Points of a document. Point indices count the model's vertices, then `extras`.
+/// Points of a rigged document that the cage deforms. Point indices count the model's vertices first, then `extras`.
 pub(crate) struct Rig<'a> {
     document: &'a GltfDocument,
     worlds: Worlds,
     /// Inverse bind matrices of the skins in use.
     binds: HashMap<u32, Vec<DMat4>>,
     parts: Vec<RigPrimitive>,
-    /// Nodes that follow the cage, parents first, with the first of their seven points: origin, then the
-    /// points around it.
+    /// Nodes that follow the cage, parents first, each with the index of the first of its seven points: its origin,
+    /// then the six points around the origin.
     follows: Vec<(u32, usize)>,
     /// Sum of joint weights of each node, plus the vertices of unskinned meshes attached to it. `[n_nodes]`
     held: Vec<f64>,
-    /// Joints, nodes animated by clips, VRM bones, and their descendants. `[n_nodes]`
+    /// Whether each node is a joint, a node animated by clips, a VRM bone, or a descendant of one of these. `[n_nodes]`
     on_skeleton: Vec<bool>,
     vrm_points: Vec<VrmPoint>,
     n_vertices: usize,
-    /// Origin of the model's positions, in world space. All other members are absolute.
+    /// Origin of the model's positions, in world space. All other positions in this struct are absolute.
     origin: DVec3,
     /// Diagonal of the bounding box of all states, object units.
     diagonal: f64,
-    /// World space, as in the file.
+    /// Points after the vertices, in the world space of the file.
     extras: Vec<DVec3>,
     n_ends: usize,
-    /// Replaces the ends, if there are many.
+    /// Lattice whose nodes are bound instead of the ends, if there are many ends.
     lattice: Option<Lattice>,
 }
 
@@ -97,11 +97,11 @@ struct RigPrimitive {
 /// A morph target of a primitive.
 struct Target {
     default: f64,
-    /// Vertices that it moves, ascending, and their deltas in mesh space.
+    /// Vertices that the target moves, ascending, and their deltas in mesh space.
     moved: Vec<u32>,
     deltas: Vec<DVec3>,
-    /// First point index of these vertices with the target at 0 and at 1, other targets at their defaults.
-    /// `None` if that is the rest shape.
+    /// Index of the first point of the moved vertices with this target at weight 0 and at weight 1, and all other
+    /// targets at their default weights. `None` if that is the rest shape.
     ends: [Option<usize>; 2],
 }
 
@@ -206,7 +206,8 @@ impl<'a> Rig<'a> {
         ends.map(|&end| relative(end, self.origin))
     }
 
-    /// Displacements of all points with held and rigid parts. `by`: displacements without them. `rest`: `[n_vertices]`.
+    /// Displacements of all points after holding parts in place or rigid. `by`: displacements by the cage alone.
+    /// `rest`: `[n_vertices]`.
     pub(crate) fn held(&self, parts: &HeldParts, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
             return by;
@@ -227,7 +228,8 @@ impl<'a> Rig<'a> {
         by
     }
 
-    /// `slot`: index of the document's slot of a primitive, if visible.
+    /// Adds the primitives of an instance. `slot`: returns the index of the document's slot of a primitive, if it is
+    /// visible.
     fn add_instance(
         &mut self,
         slot: impl Fn(u32) -> Option<usize>,
@@ -384,7 +386,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// Whether a node's origin differs from the world origin. Otherwise it is not an intended pivot.
+/// Whether a node's origin differs from the world origin. A node at the world origin has no intended pivot.
 fn has_pivot(world: &DMat4) -> bool {
     world.w_axis.truncate() != DVec3::ZERO
 }

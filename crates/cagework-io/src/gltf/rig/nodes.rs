@@ -27,11 +27,11 @@ cagework_core::choice! {
     }
 }
 
-/// Smaller displacements are ignored, over the model's diagonal.
+/// Displacements below this fraction of the model's diagonal are ignored.
 const MIN_DISPLACEMENT: f64 = 1e-6;
-/// Shorter bones have no defined direction, over the model's diagonal.
+/// Bones shorter than this fraction of the model's diagonal have no defined direction.
 const MIN_BONE_LENGTH: f64 = 1e-4;
-/// Lower joints are not hips: minimum height above the floor, over the height of the skeleton's vertices.
+/// Minimum height of hips above the floor, as a fraction of the height of the skeleton's vertices.
 const MIN_HIP_HEIGHT: f64 = 0.1;
 /// Minimum number of enclosed vertices for fitting a rigid motion.
 const MIN_RIGID_VERTICES: usize = 3;
@@ -40,15 +40,15 @@ const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
 /// All nodes after the deformation.
 pub(super) struct NodeUpdate {
-    /// `[n_nodes]`
+    /// Change of each node; `None` for unchanged nodes. `[n_nodes]`
     pub(super) changes: Vec<Option<NodeChange>>,
     pub(super) nodes: Vec<Node>,
-    /// World transforms with local transforms rounded to f32, as written.
+    /// World transforms, computed from the local transforms after rounding them to f32, as they are written.
     pub(super) world: Vec<DMat4>,
     pub(super) n_moved: usize,
-    /// Joints outside the cage that have vertices.
+    /// Number of joints outside the cage that carry vertices.
     pub(super) n_outside: usize,
-    /// Joints outside the cage that have no vertices; they follow their parent.
+    /// Number of joints outside the cage that carry no vertices. These joints follow their parent.
     pub(super) n_loose: usize,
 }
 
@@ -64,7 +64,7 @@ pub(super) struct Deformation<'a> {
     pub(super) up: DVec3,
 }
 
-/// Deformation gradient at an anchor, by central differences.
+/// Deformation gradient at a node, by central differences. `anchor`: index of the node's first point in `by`.
 pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
     let column = |axis: usize| {
         let [plus, minus] = [1 + axis, 1 + axis + PROBE_DIRECTIONS.len() / 2].map(|k| by[anchor + k]);
@@ -73,7 +73,7 @@ pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
     DMat3::from_cols(column(0), column(1), column(2))
 }
 
-/// Nodes that carry vertices: joints, nodes animated by clips, and VRM bones.
+/// Nodes that can carry vertices: joints, nodes animated by clips, and VRM bones.
 pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
     let json = &document.json;
     let animations = json["animations"].as_array().into_iter().flatten();
@@ -97,11 +97,11 @@ pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
 pub struct JointPoint {
     /// Node index in the file.
     pub node: u32,
-    /// Index of its origin among the extra points.
+    /// Index of the node's origin among the extra points.
     pub point: usize,
-    /// Index of its parent among the joints, which precedes it; `None` for roots.
+    /// Index of the parent in the list of joints, which lists parents first; `None` for roots.
     pub parent: Option<usize>,
-    /// Whether it carries vertices. A joint outside the cage without vertices follows its parent.
+    /// Whether the node carries vertices. A joint outside the cage without vertices follows its parent.
     pub holds: bool,
 }
 
@@ -117,7 +117,8 @@ impl Rig<'_> {
             let above = parents.get(&node).copied().flatten();
             joints.push(JointPoint {
                 node,
-                // Anchors are stored after all ends.
+                // With a lattice, the ends of morph targets, which precede the points of nodes, are not among the extra
+                // points.
                 point: at - self.n_vertices - of_ends,
                 parent: above.and_then(|above| numbers[above as usize]),
                 holds: self.held[node as usize] > 0.0,
@@ -299,7 +300,7 @@ impl Rig<'_> {
                 carried[parent as usize] += carried[node as usize];
             }
         }
-        // Lowest and highest vertex at rest, and lowest vertex after the deformation.
+        // Heights of the lowest and highest vertex at rest, and of the lowest vertex after the deformation.
         let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY]; n_skeletons];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {
             let joint =
@@ -338,7 +339,7 @@ impl Rig<'_> {
             }
             node
         };
-        // Index `n` stands for roots.
+        // Entry `n` stands for the missing parent of root nodes.
         let mut above: Vec<usize> = (0..=n).collect();
         let mut follows = vec![false; n];
         self.follows.iter().for_each(|(node, _)| follows[*node as usize] = true);

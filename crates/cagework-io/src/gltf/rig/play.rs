@@ -21,7 +21,7 @@ pub struct Player {
     pub skin: Skin,
     clips: Vec<Clip>,
     nodes: Vec<Node>,
-    /// Nodes, parents first.
+    /// Nodes with their parents, parents first.
     order: Vec<(u32, Option<u32>)>,
     /// Node and bind matrix of each palette entry.
     palette: Vec<(Option<u32>, DMat4)>,
@@ -37,7 +37,7 @@ pub struct Player {
 /// Skinning input at a time of a clip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posed {
-    /// World (relative to the model's origin) from mesh space. `[n_palette]`
+    /// Transforms from mesh space to world space relative to the model's origin. `[n_palette]`
     pub palette: Vec<Mat4>,
     /// Weights of the morph targets. `[n_targets]`
     pub targets: Vec<f32>,
@@ -46,7 +46,8 @@ pub struct Posed {
 }
 
 impl Player {
-    /// `like`: document that defines the vertex order; `document` itself, or the original of which it is an export.
+    /// `like`: document that defines the vertex order: either `document` itself, or the original from which it was
+    /// exported.
     pub(crate) fn new(
         document: &GltfDocument,
         like: &GltfDocument,
@@ -89,7 +90,8 @@ impl Player {
         let places: HashMap<(u32, u32), &Slot> =
             document.slots.iter().filter_map(|slot| Some((place(document, slot)?, slot))).collect();
         for (number, wanted) in like.slots.iter().enumerate() {
-            // Exports keep nodes and primitives. Without nodes, meshes are in order.
+            // Slots are matched by node and primitive number, which exports preserve. Slots without a match, such as
+            // those of meshes without nodes, are matched by their order in the file.
             let same = place(like, wanted).and_then(|place| places.get(&place).copied());
             let Some(slot) = same.or_else(|| document.slots.get(number)) else { continue };
             let (instance, primitive) = document.primitive(slot);
@@ -159,8 +161,8 @@ impl Player {
         (&self.names, &self.defaults)
     }
 
-    /// Evaluates a clip at a time in seconds; `None` is the rest pose. `targets`: morph weights without a
-    /// track, `[n_targets]`, or empty for the file's defaults.
+    /// Evaluates a clip at a time in seconds; `None` is the rest pose. `targets`: weights of the morph targets that the
+    /// clip does not animate, `[n_targets]`; empty for the file's defaults.
     #[must_use]
     pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
         let mut nodes = self.nodes.clone();

@@ -101,7 +101,7 @@ pub(super) fn append(
         if weights.is_array() {
             pad(weights, n_before, poses.len());
         } else if let Some(node) = edit.json["nodes"][node].as_object_mut() {
-            // Indexing created a null member.
+            // Remove the null member that indexing the JSON has created.
             node.shift_remove("weights");
         }
     }

@@ -22,7 +22,7 @@ pub struct ReshapeReport {
     pub morph_ends_outside: usize,
     /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
     pub lattice_points: usize,
-    /// Cell size of the lattice, over the model's diagonal.
+    /// Cell size of the lattice, as a fraction of the model's diagonal.
     pub lattice_cell: f64,
     /// Animation tracks that changed.
     pub tracks: usize,

@@ -23,7 +23,7 @@ use crate::shown::shown;
 pub struct ReshapeOptions {
     /// How the skeleton follows the cage.
     pub joints: Joints,
-    /// Keeps the translations of clips; otherwise they scale with the height of the hips.
+    /// Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
     pub keep_travel: bool,
     /// Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
     pub rigid: Vec<String>,
@@ -122,10 +122,10 @@ impl Rig<'_> {
         ends.map(|points| is_outside[points].iter().filter(|outside| **outside).count()).sum()
     }
 
-    /// Triangles with a primitive's own vertex indices; empty for points and lines.
+    /// Triangles of a primitive, with indices of the primitive's own vertices; empty for points and lines.
     pub(super) fn triangles(&self, part: &RigPrimitive, all: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let Some(slot) = part.slot.map(|slot| &self.document.slots[slot]) else {
-            // Meshes outside the scene are not in the model's triangles. Unreadable ones have none.
+            // Meshes outside the scene are not among the model's triangles. Unreadable meshes get no triangles.
             let own = triangles_of(self.document, part.primitive(self.document), part.local.len());
             return own.unwrap_or_default();
         };
@@ -151,7 +151,7 @@ impl Rig<'_> {
     }
 }
 
-/// Duplicates meshes that several nodes show with different deformations. The first user keeps the original.
+/// Duplicates meshes that several nodes show with different deformations. The first node keeps the original mesh.
 fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     let mut first = HashMap::new();
     let mut copies = HashMap::new();

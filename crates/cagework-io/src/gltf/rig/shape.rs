@@ -17,7 +17,7 @@ const MAX_CONDITION: f64 = 1e4;
 pub(super) struct Shape {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Option<Vec<DVec3>>,
-    /// With handedness.
+    /// Tangents with their handedness, 1 or -1.
     pub(super) tangents: Option<Vec<(DVec3, f32)>>,
     pub(super) targets: Vec<Deltas>,
     pub(super) condition: f64,
@@ -76,7 +76,7 @@ struct Directions {
     normals: Option<Vec<DVec3>>,
     tangents: Option<Vec<DVec3>>,
     handedness: Vec<f32>,
-    /// Deltas of each morph target.
+    /// Deltas of the normals and tangents of each morph target.
     of_targets: Vec<[Option<Vec<DVec3>>; 2]>,
 }
 
@@ -251,8 +251,9 @@ impl Directions {
         self.of_targets.get(target).and_then(|of| of[kind].as_ref()).map_or(DVec3::ZERO, |all| all[v])
     }
 
-    /// Computes normals and tangents of a shape. `turn`: directions of a state: the default one (`None`), or
-    /// (target, end, weight of the target's deltas added to the default).
+    /// Computes normals and tangents of a shape. `turn`: returns the normal and the tangent of each vertex in the
+    /// default state (`None`), or in the state (target, end, weight of the target's deltas that is added to the default
+    /// state).
     fn turned(
         &self,
         part: &RigPrimitive,

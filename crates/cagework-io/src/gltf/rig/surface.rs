@@ -16,8 +16,8 @@ const MIN_FACING_COS: f64 = -0.5;
 /// Triangles for estimating gradients by least squares over the edges at each vertex.
 pub(super) struct Surface {
     triangles: Vec<[u32; 3]>,
-    /// Merged index of each vertex. Coincident vertices merge if they move alike and are not on opposite
-    /// sides of a sheet. `[n]`
+    /// Merged index of each vertex. Coincident vertices merge if their positions after the deformation also coincide
+    /// and they are not on opposite sides of a sheet. `[n]`
     unique_of: Vec<u32>,
     n_unique: usize,
 }
@@ -60,8 +60,8 @@ impl Surface {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
 
-    /// Like [`Self::gradients`], for a state that differs only at the vertices `changed` from one with
-    /// gradients `others`.
+    /// Like [`Self::gradients`], for a state that differs only at the vertices `changed` from a state whose gradients
+    /// are `others`.
     pub(super) fn gradients_near(
         &self,
         from: &[DVec3],
@@ -159,7 +159,7 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
 
-/// Cofactor matrix, which transforms normals; negated for mirroring maps, so that normals point outside.
+/// Cofactor matrix, which transforms normals; negated for mirroring maps, so that normals point outwards.
 pub(super) fn cofactor(m: DMat3) -> DMat3 {
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     sign * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))

@@ -8,7 +8,7 @@ use super::report::ReshapeReport;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::push;
 
-/// Smaller translation ranges count as constant, over the node's own translation.
+/// A translation track whose range is below this fraction of the node's own translation counts as constant.
 const MIN_TRANSLATION_RANGE: f64 = 1e-3;
 
 /// Property animated by a channel.
@@ -26,7 +26,7 @@ pub(super) enum ChannelTarget {
 pub(super) struct NodeChange {
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// Linear map for deviations from `from` in tracks of constant translation, and in tracks that move.
+    /// Linear maps for deviations from `from`: in tracks of constant translation, and in tracks that move the node.
     pub(super) still: DMat3,
     pub(super) moving: DMat3,
     /// Rotation to apply to rotation keys from the left.
@@ -106,7 +106,7 @@ fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Ve
     (values.len() == per_key * output.n_keys).then_some(values)
 }
 
-/// Whether a clip moves each changed node. Otherwise constant translations are bone lengths.
+/// Whether the clips move each changed node. If no clip moves a node, its constant translations are bone lengths.
 fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<NodeChange>]) -> Vec<bool> {
     let mut moving = vec![false; changes.len()];
     for animation in edit.json["animations"].as_array().into_iter().flatten() {
@@ -176,7 +176,7 @@ pub(super) fn rescale(
     }
 }
 
-/// Applies `t' + S (t(t) - t)` with `linear` as S to values, S alone to tangents.
+/// Applies `to + linear (v - from)` to values v, and `linear` alone to tangents.
 fn moved(values: &[[f32; 3]], change: &NodeChange, linear: DMat3, output: &Output) -> Vec<[f32; 3]> {
     let value = |(k, &v): (usize, &[f32; 3])| {
         let v = Vec3::from_array(v).as_dvec3();

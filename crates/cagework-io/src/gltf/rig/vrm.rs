@@ -15,9 +15,9 @@ use crate::gltf::scene::Worlds;
 /// A point in a node's space, stored in a VRM extension.
 pub(super) struct VrmPoint {
     node: usize,
-    /// World space.
+    /// Position of the point in world space.
     pub(super) at: DVec3,
-    /// Index of the first of its bound points: `at`, then neighbours for the gradient.
+    /// Index of the first of its bound points: the point itself, then its neighbours for the deformation gradient.
     pub(super) bound_index: usize,
     what: VrmField,
 }
@@ -60,7 +60,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
         Some(DVec3::new(of["x"].as_f64()?, of["y"].as_f64()?, -of["z"].as_f64()?))
     };
 
-    // VRM 0.
+    // Offsets of VRM 0.
     let person = "/extensions/VRM/firstPerson";
     let bone = number(&format!("{person}/firstPersonBone"));
     let offset = format!("{person}/firstPersonBoneOffset");
@@ -79,7 +79,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
     for group in items(format!("{springs}/boneGroups")) {
         add(number(&format!("{group}/bones/0")), DVec3::ZERO, VrmField::Radius(format!("{group}/hitRadius")));
     }
-    // VRM 1.
+    // Offsets of VRM 1.
     let head = number("/extensions/VRMC_vrm/humanoid/humanBones/head/node");
     let offset = "/extensions/VRMC_vrm/lookAt/offsetFromHeadBone".to_owned();
     if let Some(at) = array(&offset) {
