@@ -1,24 +1,25 @@
-//! Conversion between JavaScript's flat arrays and points and faces.
+//! Conversion between JavaScript's flat arrays and Rust's points and faces.
 
 use cagework_core::PolygonMesh;
 use glam::Vec3;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Points of a flat `[n, 3]` array.
+/// Points from a flat array `[n, 3]`.
 pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
     flat.chunks_exact(3).map(Vec3::from_slice).collect()
 }
 
-/// Flat `[n, 3]` array of points.
+/// Flat array `[n, 3]` from points.
 pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(Vec3::to_array).collect()
 }
 
-/// Polygon mesh of positions `[n_vertices, 3]` and `corners`: for each face its corner count, then its corners.
+/// Polygon mesh from positions `[n_vertices, 3]` and `corners`, which lists for each face its corner count and then the
+/// vertex indices of its corners.
 ///
 /// # Errors
-/// If `corners` ends within a face.
+/// If `corners` ends in the middle of a face.
 pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<PolygonMesh> {
     let mut faces = Vec::new();
     let mut rest = corners;
@@ -32,7 +33,7 @@ pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<Polygon
     Ok(PolygonMesh { positions: points(positions), faces })
 }
 
-/// For each face its corner count, then its corners.
+/// Flat list of faces: for each face its corner count, then the vertex indices of its corners.
 pub(crate) fn corners(faces: &[Vec<u32>]) -> Vec<u32> {
     faces.iter().flat_map(|f| std::iter::once(f.len() as u32).chain(f.iter().copied())).collect()
 }

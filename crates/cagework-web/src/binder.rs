@@ -1,6 +1,6 @@
 //! The worker's entry points: computations that take longer than a frame.
 //!
-//! The worker has its own GPU device. Arguments and results are arrays, which the page passes to `Engine`.
+//! The worker has its own GPU device. Its methods take and return arrays; the page passes the results to `Engine`.
 
 mod results;
 
@@ -32,10 +32,11 @@ use crate::views::object;
 pub(crate) use results::Offsets;
 pub use results::{Bound, BuiltSample, Polygons};
 
-/// Number of model vertices bound along with the new cage's vertices, because a bind needs at least one point inside.
+/// Number of model vertices that are bound along with the new cage's vertices. A bind fails without a point inside the
+/// cage.
 const MODEL_SAMPLES: usize = 256;
 
-/// Binds models and slices, makes, checks and repairs cages, and builds samples.
+/// Binds models and slices, generates, checks and repairs cages, and builds samples.
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
@@ -43,7 +44,7 @@ pub struct Binder {
 
 #[wasm_bindgen]
 impl Binder {
-    /// A binder without a GPU; see `openGpu`.
+    /// Creates a binder without a GPU; see `openGpu`.
     #[wasm_bindgen(constructor)]
     #[must_use]
     #[allow(clippy::new_without_default, reason = "constructed by JavaScript only")]
@@ -51,7 +52,7 @@ impl Binder {
         Self { gpu: None }
     }
 
-    /// Opens a GPU for later binds. Does nothing if one is open, or in builds without WebGPU.
+    /// Opens a GPU for later binds. Does nothing if a working GPU is already open, or in builds without WebGPU.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`.
@@ -63,13 +64,15 @@ impl Binder {
         Ok(())
     }
 
-    /// Harmonic coordinates of `positions`, `[n_points, 3]`; the last `extra_points` of them are not vertices.
+    /// Harmonic coordinates of `positions`, `[n_points, 3]`. The last `extra_points` points are not vertices of the
+    /// model.
     ///
-    /// `cage`: `[n_controls, 3]`. `corners`: for each face its corner count, then its corners. `controls`: as for
-    /// `Engine.setCage`. `progress` is called at every step; if it returns false, the bind is cancelled.
+    /// `cage`: `[n_controls, 3]`. `corners`: for each face its corner count, then its vertex indices. `controls`: as
+    /// for `Engine.setCage`. `progress` is called with each progress event; returning false cancels the bind.
     ///
     /// # Errors
-    /// Those of a bind. If the arrays are not a valid cage. `Missing` if the options select the GPU and it is not open.
+    /// The errors of a bind. If the arrays are not a valid cage. `Missing` if the options select the GPU and no GPU is
+    /// open.
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn bind(
         &self,
@@ -95,7 +98,7 @@ impl Binder {
         })
     }
 
-    /// Coordinates by a closed form in the cage without interior controls. Arrays as for `bind`.
+    /// Closed-form coordinates of the cage, ignoring its interior controls. Arrays as for `bind`.
     ///
     /// # Errors
     /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
@@ -139,7 +142,7 @@ impl Binder {
             return Ok(None);
         }
         let binding = match self.run(&centers, &set, request, progress).await {
-            // If the slice only touches the cage, rounding can put all of its cell centres outside.
+            // Rounding can put all cell centres of a slice outside the cage if the slice only touches the cage.
             Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
             ran => ran?,
         };
@@ -148,7 +151,8 @@ impl Binder {
         Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
-    /// Coordinates at the points of a lattice around a cage, for `Engine.takeLattice`. Arguments as for `bind`.
+    /// Harmonic coordinates at the points of a lattice around a cage, for `Engine.takeLattice`. Arguments as for
+    /// `bind`.
     ///
     /// # Errors
     /// Those of a bind.
@@ -170,7 +174,7 @@ impl Binder {
         Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })
     }
 
-    /// Generates a cage that encloses a model after `smooth` steps of subdivision. `progress` as for `bind`.
+    /// Generates a cage whose surface after `smooth` subdivision steps encloses the model. `progress` as for `bind`.
     ///
     /// # Errors
     /// If the model has no triangles or an option is out of range.
@@ -211,7 +215,7 @@ impl Binder {
     ) -> Result<Vec<f32>, JsValue> {
         let (mut at, set) = (points(new), control_set(old, old_corners, old_controls)?);
         let (n_new, n_old) = (at.len(), Controls::from(&set).n_controls());
-        // A new cage around the old one has no vertices inside it; the model has.
+        // If the new cage surrounds the old one, none of its vertices is inside the old cage, but model vertices are.
         at.extend(points(model).into_iter().take(MODEL_SAMPLES));
         let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
         let poses = points(poses);
@@ -222,7 +226,7 @@ impl Binder {
         Ok(carried.collect())
     }
 
-    /// Finds the faults of a cage for a model, `[n_vertices, 3]`. Cage arrays as for `bind`.
+    /// Finds the faults of a cage around a model with vertices `model`, `[n_vertices, 3]`. Cage arrays as for `bind`.
     ///
     /// # Errors
     /// If the arrays are not a polygon mesh.
@@ -237,10 +241,10 @@ impl Binder {
         Ok(Check { check: problems::find(&mesh, &points(model), smooth) })
     }
 
-    /// Repairs a cage. Arrays as for `checkCage`; the result has no interior controls.
+    /// Repairs a cage. Arrays as for `checkCage`. The repaired cage has no interior controls.
     ///
     /// # Errors
-    /// If the cage still does not enclose the model.
+    /// If the repaired cage does not enclose the model.
     #[wasm_bindgen(js_name = repairCage)]
     pub fn repair_cage(
         #[wasm_bindgen(unchecked_param_type = "Repair")] kind: JsValue,
@@ -255,16 +259,16 @@ impl Binder {
         Ok(repaired.mesh.into())
     }
 
-    /// Identifier, label and description of each sample, concatenated. `[n_samples, 3]`
+    /// Identifier, label and description of each sample, as a flat list. `[n_samples, 3]`
     #[must_use]
     pub fn samples() -> Vec<String> {
         samples::all().iter().flat_map(|s| [s.id, s.label, s.sentence]).map(str::to_owned).collect()
     }
 
-    /// Builds a sample.
+    /// Builds the sample with this identifier.
     ///
     /// # Errors
-    /// If the identifier is unknown.
+    /// If no sample has this identifier.
     #[wasm_bindgen(js_name = buildSample)]
     pub fn build_sample(id: &str) -> Result<BuiltSample, JsValue> {
         let unknown = || Fault::new(ErrorName::Error, format!("there is no sample called {id:?}"));
@@ -277,7 +281,7 @@ impl Binder {
     }
 }
 
-/// Cage mesh without interior controls, and number of subdivision steps.
+/// The cage mesh without interior controls, and its number of subdivision steps.
 fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(PolygonMesh, u32)> {
     let mut mesh = polygon_mesh(positions, corners)?;
     let CageControls { smooth, inner, .. } = from_js(controls)?.unwrap_or_default();

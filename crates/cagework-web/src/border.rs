@@ -1,5 +1,5 @@
-//! Writes TypeScript declarations of the serde types that cross the border between Rust and the page, and the page's
-//! default values and ranges.
+//! Generates TypeScript declarations of the serde types that Rust and the page exchange, and the page's default values
+//! and ranges.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -39,10 +39,10 @@ use crate::views::{
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
-/// Default memory limit of a bind in the page, bytes: half of the 4 GiB of a tab.
+/// Default memory limit of a bind in the page, bytes: half of the 4 GiB that a browser tab can address.
 const PAGE_MEMORY: u64 = 2 << 30;
 
-/// Doc comment and TypeScript declaration of each type.
+/// Doc comment and TypeScript declaration of each listed type.
 macro_rules! declarations {
     ($($type:ty),* $(,)?) => {{
         // 64-bit integers are sent as JavaScript numbers.
@@ -51,7 +51,8 @@ macro_rules! declarations {
     }};
 }
 
-/// A TypeScript constant. `serde_json::to_string` keeps `f32` decimals; `json!` would widen them to `f64`.
+/// Declaration of a TypeScript constant. `serde_json::to_string` prints an `f32` with its own digits; `json!` would
+/// widen it to `f64`.
 fn constant(name: &str, r#type: &str, value: &impl Serialize) -> String {
     let mut json = serde_json::to_string(value).unwrap();
     for (name, in_page) in [

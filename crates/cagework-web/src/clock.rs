@@ -19,8 +19,8 @@ extern "C" {
 }
 
 thread_local! {
-    /// The JavaScript callback. [`Progress`] must be `Sync`, which `Function` is not; a thread-local is enough because each
-    /// worker runs one job at a time on one thread.
+    /// The JavaScript callback. It is thread-local because [`Progress`] must be `Sync` and `Function` is not. One is
+    /// enough: each worker runs one job at a time on one thread.
     static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
 }
 
@@ -40,7 +40,7 @@ impl Drop for Listener {
     }
 }
 
-/// A [`ProgressEvent`].
+/// A [`ProgressEvent`] as JavaScript receives it.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS), ts(rename = "Progress"))]
 pub(crate) struct Event {

@@ -1,4 +1,4 @@
-//! Errors passed to JavaScript. The page branches on the name; the message is for the user.
+//! Errors that JavaScript receives. The page branches on the name and shows the message to the user.
 
 use std::fmt::Display;
 
@@ -21,31 +21,31 @@ use wasm_bindgen::JsValue;
 pub(crate) enum ErrorName {
     /// The job was cancelled, or its result is out of date.
     Cancelled,
-    /// The geometry of a file is compressed; JavaScript has the decoder.
+    /// The geometry of a file is compressed, and the decoder is in JavaScript.
     Compressed,
     /// A file cannot be read.
     Format,
     /// A bind needs more memory than its limit.
     Memory,
-    /// A bind needs more memory than its limit, mostly for weights.
+    /// A bind needs more memory than its limit, and most of it is for weights.
     WeightsMemory,
     /// Some vertices of the model are outside the cage.
     Outside,
     /// All vertices of the model are outside the cage.
     NoneInside,
-    /// There is no GPU.
+    /// The browser offers no GPU adapter.
     NoAdapter,
     /// The GPU adapter provides no device.
     NoDevice,
     /// The GPU device is lost.
     DeviceLost,
-    /// The GPU does not support the computation; the CPU may.
+    /// The GPU does not support a computation that the CPU may support.
     Gpu,
-    /// The canvas does not support drawing by this GPU.
+    /// The GPU cannot draw into the canvas.
     Canvas,
-    /// A precondition is missing, such as a model or weights.
+    /// A required object does not exist yet, such as a model or weights.
     Missing,
-    /// All other errors.
+    /// Any other error.
     Error,
 }
 
@@ -60,7 +60,7 @@ pub(crate) struct Fault {
 pub(crate) type Answer<T> = Result<T, Fault>;
 
 impl Fault {
-    /// An error of this crate.
+    /// Creates an error from a name and a message.
     pub(crate) fn new(name: ErrorName, message: impl Display) -> Self {
         Self { name, message: message.to_string() }
     }
@@ -90,7 +90,7 @@ impl From<Fault> for JsValue {
     }
 }
 
-/// Converts error types that the page shows only as a message.
+/// Converts error types that need no name of their own: the page shows only their message.
 macro_rules! plain {
     ($($error:ty),*) => {$(
         impl From<$error> for Fault {

@@ -1,6 +1,6 @@
-//! GPU sessions, and the upload of the document.
+//! GPU sessions, and uploads of the document to them.
 //!
-//! An upload holds the lock until the GPU has finished the allocation; frames are skipped until then.
+//! An upload holds the lock until the GPU has allocated and filled its buffers; frames are skipped during this time.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,7 +14,7 @@ use crate::error::Answer;
 use crate::state::{GpuKeys, State, Upload};
 use crate::surface::Surface;
 
-/// Sessions and the canvas that they draw into.
+/// GPU sessions, and the canvas that they draw into.
 pub(crate) struct Gpu {
     /// Session of harmonic coordinates.
     pub(crate) main: Session,
@@ -29,7 +29,7 @@ impl Gpu {
         state.write(&mut self.main, self.others.iter_mut().map(|(_, session)| session));
     }
 
-    /// The canvas, and the available sessions of `kinds`, in this order.
+    /// The canvas, and the available sessions of `kinds` in the order of `kinds`.
     pub(crate) fn shown(&mut self, kinds: &[Coordinates]) -> (&mut Surface, Vec<&mut Session>) {
         let Self { main, others, surface } = self;
         let others = others.iter_mut().map(|(kind, session)| (*kind, session));
@@ -42,14 +42,14 @@ impl Gpu {
     }
 }
 
-/// `None` while the device is recreated after a loss, and after this has failed.
+/// GPU state of the engine; `None` while a lost device is being replaced, and after the replacement has failed.
 pub(crate) type SharedGpu = Rc<Mutex<Option<Gpu>>>;
 
-/// Uploads mesh, cage, cached weights, and held and rigid parts of the document. Compares again after each upload, because
-/// the document may have changed while the GPU was busy.
+/// Uploads the parts of the document that the GPU lacks: mesh, cage, cached weights, and held and rigid parts. Compares
+/// document and GPU again after each upload, because the document may have changed meanwhile.
 ///
 /// # Errors
-/// If the GPU runs out of memory. The next change retries.
+/// If the GPU runs out of memory. The next change of the state retries the upload.
 pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
     loop {
         let Some(next) = state.borrow().next_upload() else { return Ok(()) };

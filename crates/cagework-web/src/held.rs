@@ -10,11 +10,11 @@ use glam::{Vec2, Vec3};
 use crate::state::State;
 use crate::views::Grip;
 
-/// Maximum distance of a surface point from the exact mirror image, over the diagonal of model and cage.
+/// Maximum distance of a surface point from the exact mirror image, as a fraction of the diagonal of model and cage.
 const MIRROR_TOLERANCE: f32 = 0.02;
 
 impl State {
-    /// Updates the posed models for the current pose of the cage.
+    /// Recomputes the posed models if the cage's pose has changed.
     pub(crate) fn pose_models(&mut self, session: &Session) {
         if self.held.posed_for != self.pose() {
             self.held.posed = session.deformed(self.pose()).unwrap_or_default();
@@ -22,7 +22,7 @@ impl State {
         }
     }
 
-    /// Surface point of the posed models under the pointer.
+    /// Surface point under the pointer, on the posed models.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
         if self.held.posed.len() != self.models().positions().len() {
             return None;
@@ -37,7 +37,7 @@ impl State {
         point.at(self.models(), &self.held.posed)
     }
 
-    /// Weights and nearest vertex of a surface point.
+    /// Weights of a surface point, and the nearest vertex of the model.
     pub(crate) fn grip_of(
         &self,
         point: SurfacePoint,
@@ -57,7 +57,8 @@ impl State {
         Some(Grip { row, seed: corners[most] })
     }
 
-    /// Mirror image of a surface point at rest; `None` if the surface is not symmetric there, or the point lies on the mirror plane.
+    /// Mirror image of a surface point at rest. `None` if the surface is not symmetric there, or the point lies on the
+    /// mirror plane.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
         let models = self.models();
         let at = point.at(models, models.positions())?;
@@ -75,7 +76,8 @@ impl State {
         Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
-    /// Marks of grabs and pins in the current pose; empty without weights.
+    /// Marks of grabs, pins and of an interior control that is being placed. Without weights, grabs and pins are
+    /// omitted.
     pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
         let place = |point: &SurfacePoint| {
             let corners = self.models().corners(point.triangle)?;

@@ -1,4 +1,4 @@
-//! Copies weights of the worker into the page's module in chunks, so that the page stays responsive.
+//! Copies weights from the worker's arrays into wasm memory in chunks, so that the page stays responsive.
 
 use cagework_core::Weights;
 use js_sys::{Float32Array, Promise, Uint32Array};
@@ -8,7 +8,7 @@ use wasm_bindgen_futures::JsFuture;
 
 use crate::error::Answer;
 
-/// Number of weights that are copied and checked per turn of the event loop: a few milliseconds.
+/// Number of weights that are copied and checked per turn of the event loop. A chunk takes a few milliseconds.
 const CHUNK: u32 = 1 << 18;
 
 #[wasm_bindgen]
@@ -17,14 +17,14 @@ extern "C" {
     fn set_timeout(then: &js_sys::Function, ms: u32);
 }
 
-/// Yields to the event loop, which handles pending events and frames.
+/// Yields to the event loop, so that it handles pending events and frames.
 pub(crate) async fn page_turn() {
     let promise = Promise::new(&mut |resolve, _| set_timeout(&resolve, 0));
-    // A timer never rejects.
+    // `setTimeout` never rejects the promise.
     let _: Result<JsValue, JsValue> = JsFuture::from(promise).await;
 }
 
-/// Weights from the arrays of a `Bound`.
+/// Checked weights from the arrays of a `Bound`.
 pub(crate) async fn weights(
     n_columns: u32,
     indptr: &[u32],

@@ -1,4 +1,4 @@
-//! Joints of bound models at the positions of an export.
+//! Positions of the joints of bound models, as an export would place them.
 
 use cagework_core::Frames;
 use cagework_core::Weights;
@@ -9,12 +9,12 @@ use glam::Vec3;
 use crate::error::Answer;
 use cagework_editor::Models;
 
-/// The joints of bound models.
+/// Joints of all bound models with their weights.
 pub(crate) struct JointDots {
     pub(crate) joints: Vec<JointPoint>,
-    /// Number of each joint's model. `[n_joints]`
+    /// Id of the model that each joint belongs to. `[n_joints]`
     pub(crate) models: Vec<u32>,
-    /// Positions at rest. `[n_joints]`
+    /// Positions of the joints at rest. `[n_joints]`
     pub(crate) at: Vec<Vec3>,
     /// Weights, one row per joint.
     weights: Weights,
@@ -24,7 +24,8 @@ pub(crate) struct JointDots {
 }
 
 impl JointDots {
-    /// `weights`, `frames`: of all points of the rigs. `outside`: indices of points outside the cage, ascending.
+    /// `weights` and `frames` are those of all points of the rigs. `outside`: indices of points outside the cage,
+    /// ascending.
     ///
     /// # Errors
     /// If a rig cannot be read.
@@ -57,7 +58,7 @@ impl JointDots {
         self.outside.contains(&joint)
     }
 
-    /// Positions in a pose of the cage. `[n_joints]`
+    /// Positions of the joints in a pose of the cage. `[n_joints]`
     pub(crate) fn posed(&self, rest: &[Vec3], posed: &[Vec3]) -> Vec<Vec3> {
         let mut by = displacements(&self.weights, &self.frames, rest, posed);
         for (k, joint) in self.joints.iter().enumerate() {

@@ -1,8 +1,9 @@
-//! JavaScript classes over core, io, editor and gpu for the page and the npm package. No algorithms of its own.
+//! JavaScript classes for the page and the npm package, over the crates core, cage, pose, io, editor and gpu. This
+//! crate implements no algorithms.
 //!
-//! One wasm module, two instances: on the main thread `engine::Engine` draws, picks and deforms; in a worker
-//! `binder::Binder` binds. Arrays are passed as typed arrays, everything else as plain objects. A failing method throws an
-//! `Error` whose name is the variant of `error::ErrorName` and whose message is a sentence.
+//! One wasm module runs in two instances: on the main thread `engine::Engine` draws, picks and deforms; in a worker
+//! `binder::Binder` binds. Arrays are passed as typed arrays, everything else as plain objects. A failing method throws
+//! an `Error` whose name is the variant of `error::ErrorName` and whose message is a sentence.
 
 // Only browsers have canvases. Everything else also compiles natively, for tests and lints.
 #![cfg_attr(
@@ -40,7 +41,7 @@ mod views;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// The types of `unchecked_*_type`; `border.rs` writes their declarations.
+/// TypeScript types that the `unchecked_*_type` attributes name; `border.rs` writes their declarations.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, Element, Gesture,
@@ -54,8 +55,8 @@ extern "C" {
     fn report_error(error: &js_sys::Error);
 }
 
-/// Called once by the JavaScript glue. Installs a panic hook that reports an error named `Panic` with location and message
-/// as an uncaught error, which the page's `crash.ts` handles. The module then traps.
+/// Called once by the JavaScript glue. Installs a panic hook that reports location and message as an uncaught error
+/// named `Panic`, which the page's `crash.ts` handles. The wasm module traps after the hook returns.
 #[wasm_bindgen(start)]
 pub fn start() {
     std::panic::set_hook(Box::new(|panic| {

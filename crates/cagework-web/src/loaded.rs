@@ -1,4 +1,4 @@
-//! A file between reading and display; the browser decodes its textures in this state.
+//! A file that has been read but is not displayed yet. In this state, the browser decodes its textures.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ pub struct Loaded {
     cage: Option<PolygonMesh>,
     look: Look,
     textures: Vec<DrawTexture>,
-    /// Longer side to which textures are scaled down, pixels.
+    /// Longest side of a decoded texture, pixels; larger textures are scaled down to it.
     side: u32,
     poses: Vec<(String, Vec<Vec3>)>,
     settings: Option<String>,
@@ -36,8 +36,8 @@ pub struct Loaded {
 
 #[wasm_bindgen]
 impl Loaded {
-    /// Reads a model of any format, or a project. Call [`Self::prepare`] next. `sibling` is called with the path of each file
-    /// that the model refers to, and returns a Uint8Array or undefined.
+    /// Reads a model of any supported format, or a project. Call [`Self::prepare`] next. `sibling` is called with the
+    /// path of each file that the model refers to, and returns a Uint8Array or undefined.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -45,8 +45,8 @@ impl Loaded {
         Ok(Self::from_bytes(name, bytes, sibling)?)
     }
 
-    /// Reads materials and textures of all models of the file, before [`Self::take_next`]. Separate from [`Self::read`], so
-    /// that the page can handle events in between.
+    /// Reads materials and textures of all models of the file; call it before [`Self::take_next`]. It is separate from
+    /// [`Self::read`] so that the page can handle events in between.
     pub fn prepare(&mut self) {
         self.more.iter_mut().for_each(Self::read_look);
         self.read_look();
@@ -60,10 +60,10 @@ impl Loaded {
         }
     }
 
-    /// Sets the up axis of the file, y or z, and rotates model, cage and poses accordingly.
+    /// Sets the up axis of the file to y or z, and rotates model, cage and poses accordingly.
     ///
     /// # Errors
-    /// If the axis is neither.
+    /// If `up` is neither of them.
     #[wasm_bindgen(js_name = setUp)]
     pub fn set_up(
         &mut self,
@@ -73,14 +73,14 @@ impl Loaded {
         Ok(())
     }
 
-    /// Origin of model, cage and poses, in the file's axes: zero unless the model is far from the world origin. `[3]`
+    /// Origin of model, cage and poses, in the file's axes; zero unless the model is far from the world origin. `[3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.model.origin().to_array().to_vec()
     }
 
-    /// Moves a model or a cage to the origin of another file. `[3]`
+    /// Expresses the positions of a model or a cage relative to the origin of another file. `[3]`
     ///
     /// # Errors
     /// If `origin` is not three numbers, or is too far from the model.
@@ -95,7 +95,7 @@ impl Loaded {
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
     }
 
-    /// Keeps the compressed file that the model was decoded from, for the export of an undeformed model.
+    /// Keeps the compressed file that the model was decoded from, so that an undeformed model is exported in that form.
     #[wasm_bindgen(js_name = setPacked)]
     pub fn set_packed(&mut self, file: Vec<u8>) {
         self.model.set_packed(file);
@@ -108,7 +108,7 @@ impl Loaded {
         self.more.pop_front()
     }
 
-    /// The model's vertices. `[n_vertices, 3]`
+    /// Vertices of the model. `[n_vertices, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
@@ -125,7 +125,7 @@ impl Loaded {
         })
     }
 
-    /// The model itself as a cage.
+    /// The mesh of the model, used as a cage.
     #[wasm_bindgen(js_name = asCage)]
     #[must_use]
     pub fn as_cage(&self) -> Polygons {
@@ -139,14 +139,14 @@ impl Loaded {
         self.look.images.len()
     }
 
-    /// Longer side to which textures are scaled down, pixels.
+    /// Longest side of a decoded texture, pixels; larger textures must be scaled down to it.
     #[wasm_bindgen(getter, js_name = textureSide)]
     #[must_use]
     pub fn texture_side(&self) -> u32 {
         self.side
     }
 
-    /// Encoded file of a texture; empty if the texture is not drawn.
+    /// Encoded bytes of a texture; empty if the texture is not drawn.
     #[wasm_bindgen(js_name = textureBytes)]
     #[must_use]
     pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
@@ -160,7 +160,7 @@ impl Loaded {
         self.look.images.get(index).map(|t| t.mime.clone()).unwrap_or_default()
     }
 
-    /// Sets a decoded texture: RGBA, rows from the top. `[height, width, 4]`
+    /// Sets the decoded pixels of a texture: RGBA, rows from the top. `[height, width, 4]`
     #[wasm_bindgen(js_name = setTexture)]
     pub fn set_texture(&mut self, index: usize, width: u32, height: u32, rgba: Vec<u8>) {
         let fits = rgba.len() as u64 == 4 * u64::from(width) * u64::from(height);
@@ -223,14 +223,14 @@ impl Loaded {
         }
     }
 
-    /// Drops the images that are not decoded.
+    /// Sets the longest side of textures, and drops the bytes of images that are not admitted.
     fn keep_images(&mut self, side: u32, admitted: &[bool]) {
         self.side = side;
         let images = self.look.images.iter_mut().zip(admitted);
         images.filter(|(_, is_admitted)| !**is_admitted).for_each(|(image, _)| image.bytes = Vec::new());
     }
 
-    /// Poses of a project.
+    /// Saved poses of a project.
     pub(crate) fn poses(&self) -> &[(String, Vec<Vec3>)] {
         &self.poses
     }
@@ -239,7 +239,7 @@ impl Loaded {
         self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default()
     }
 
-    /// Rotates model, cage and poses to an up axis.
+    /// Rotates model, cage and poses from the current up axis to `up`.
     pub(crate) fn turn_to(&mut self, up: UpAxis) {
         let before = self.model.up();
         let turn = |positions: &mut Vec<Vec3>| {
@@ -256,7 +256,7 @@ impl Loaded {
         self.document_settings().models.into_iter().nth(self.number)
     }
 
-    /// The model for the renderer, without textures that were not decoded.
+    /// Takes the data for the renderer out of this file, without textures that were not decoded.
     pub(crate) fn draw_model(&mut self) -> DrawModel {
         let look = std::mem::take(&mut self.look);
         let textures = std::mem::take(&mut self.textures);

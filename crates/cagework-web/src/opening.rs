@@ -1,4 +1,4 @@
-//! Contents that are opened together with models: cage, poses, and settings of a project.
+//! Contents that the page opens together with models: cage, poses, and settings of a project.
 
 use cagework_cage::samples;
 use cagework_editor::{CageControls, Contents, DocumentSettings, RestCage};
@@ -9,27 +9,27 @@ use crate::arrays::{points, polygon_mesh};
 use crate::error::Answer;
 use crate::loaded::Loaded;
 
-/// Contents that are opened together with models.
+/// Contents that the page opens together with models.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct OpenContents {
-    /// Identifier of the built-in sample, if it is one.
+    /// Identifier of the built-in sample; undefined for other models.
     sample: Option<String>,
     /// JSON of the page's settings in a project.
     settings: Option<String>,
     cage: Option<CageContents>,
-    /// Poses of a sample; those of a project are in its `Loaded`.
+    /// Poses of a sample. The poses of a project are in its `Loaded`.
     poses: Vec<PoseContents>,
 }
 
-/// A cage.
+/// A cage that the page opens.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct CageContents {
     /// `[n_controls, 3]`
     #[cfg_attr(test, ts(type = "Float32Array"))]
     positions: Vec<f32>,
-    /// For each face its corner count, then its corners.
+    /// For each face its corner count, then its vertex indices.
     #[cfg_attr(test, ts(type = "Uint32Array"))]
     corners: Vec<u32>,
     #[cfg_attr(test, ts(optional = nullable))]
@@ -37,7 +37,7 @@ pub(crate) struct CageContents {
     notices: Vec<String>,
 }
 
-/// A pose.
+/// A named pose.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct PoseContents {
@@ -48,7 +48,7 @@ pub(crate) struct PoseContents {
 }
 
 impl OpenContents {
-    /// Contents for the editor, the project's settings, and notices about omitted parts. `first`: the first model.
+    /// Contents for the editor, settings of the project, and notices (none at present). `first`: the first model.
     pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings, Vec<String>)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
         let of_project = self.poses.is_empty();

@@ -1,4 +1,4 @@
-//! Option types as JavaScript passes them; contract.ts has their declarations.
+//! Options as JavaScript passes them; border.rs generates their TypeScript declarations.
 
 use cagework_core::options::{Backend, Solver};
 use cagework_core::{BindOptions, Coordinates};
@@ -10,10 +10,11 @@ use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Memory limit for reading a file, and for closed-form coordinates, bytes. A tab has 4 GiB, also for drawing and binding.
+/// Memory limit for reading a file, and for closed-form coordinates, bytes. The 4 GiB of a tab must also hold drawing
+/// and binding.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
-/// Options of a bind, and where it runs.
+/// Options of a bind, and the processor that it runs on.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "BindOptions"))]
@@ -24,7 +25,8 @@ pub(crate) struct JsBindOptions {
 }
 
 impl JsBindOptions {
-    /// Whether the bind runs on the CPU: as set, without WebGPU, or because the solver has no GPU version.
+    /// Whether the bind runs on the CPU: because the options say so, the build has no WebGPU, or the solver has no GPU
+    /// version.
     pub(crate) fn is_on_cpu(&self) -> bool {
         self.backend == Backend::Cpu
             || self.options.solver == Solver::ConjugateGradient
@@ -32,7 +34,7 @@ impl JsBindOptions {
     }
 }
 
-/// Options of the scene.
+/// What the scene shows.
 #[derive(Clone, Deserialize, PartialEq, Eq)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
@@ -44,16 +46,16 @@ pub(crate) struct JsSceneOptions {
     pub(crate) floor: bool,
     pub(crate) original: bool,
     pub(crate) colour: Colour,
-    /// Whether the colours of weights span 0 to 1 rather than 0 to the largest weight.
+    /// Whether the colour scale of weights ends at 1 rather than at the largest weight.
     pub(crate) weights_to_one: bool,
     pub(crate) slice: SliceShown,
     pub(crate) gizmo: JsGizmo,
-    /// Whether dragging pulls the model; the cage is drawn faintly then.
+    /// Whether dragging pulls the model's surface. The cage is then drawn faintly.
     pub(crate) pull: bool,
-    /// Kinds shown side by side, from the left. Kinds that are not computed yet are skipped.
+    /// Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
     pub(crate) compare: Vec<Coordinates>,
     pub(crate) problems: bool,
-    /// How joints are shown: as they will be exported. Null hides them.
+    /// Treatment of joints by the next export, which the marks of joints show. Null hides the marks.
     pub(crate) joints: Option<Joints>,
 }
 
@@ -78,7 +80,7 @@ impl Default for JsSceneOptions {
     }
 }
 
-/// Quantity that the colours of the mesh show.
+/// Quantity that the colours of the model show.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
@@ -99,7 +101,7 @@ pub(crate) enum SliceShown {
     Value,
 }
 
-/// Mode of the gizmo.
+/// Type of gizmo.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
@@ -111,7 +113,7 @@ pub(crate) enum JsGizmo {
     Scale,
 }
 
-/// Handle of the gizmo: an axis, the plane normal to an axis, or all axes.
+/// Handle of the gizmo: one axis, the plane normal to an axis, or all axes.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -125,33 +127,33 @@ pub(crate) enum GizmoHandle {
     All,
 }
 
-/// Options of pulling the model.
+/// Options for pulling the model's surface.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "PullOptions"))]
 pub(crate) struct JsPullOptions {
-    /// Reach along the surface, over the model's size; null for automatic.
+    /// Distance along the surface that a pull affects, as a fraction of the model's size; null for automatic.
     pub(crate) reach: Option<f64>,
-    /// Whether the whole model follows.
+    /// Whether a pull affects the whole model, without a limit of distance.
     pub(crate) whole: bool,
-    /// Whether the pull is symmetric.
+    /// Whether the mirror image of the grabbed point is pulled symmetrically.
     pub(crate) mirrored: bool,
 }
 
-/// Options of exporting a rig.
+/// Options for exporting a rig.
 #[derive(Clone, Deserialize)]
 #[cfg_attr(test, derive(Default, serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "RigOptions"))]
 pub(crate) struct JsRigOptions {
     joints: Joints,
-    /// Whether translations of clips keep their length; otherwise they scale with the height of the hips.
+    /// Whether translations in clips keep their length; otherwise they scale with the height of the hips.
     keep_travel: bool,
-    /// Names of parts that keep their shape.
+    /// Names of parts that move rigidly, without changing their shape.
     #[serde(default)]
     rigid: Vec<String>,
-    /// Whether to export the shape without the rig.
+    /// Whether to export only the shape, without the rig.
     pub(crate) plain: bool,
-    /// Whether the cage deforms the model after a clip moves it.
+    /// Whether the cage deforms the model after a clip has moved it.
     pub(crate) dynamic: bool,
 }
 
@@ -162,10 +164,10 @@ impl JsRigOptions {
     }
 }
 
-/// Decodes a JavaScript value into a Rust type.
+/// Decodes a JavaScript value to a Rust type.
 ///
 /// # Errors
-/// If the value has another type, for instance because page and wasm file are of different versions.
+/// If the value does not match the type, for instance because the page and the wasm file have different versions.
 pub(crate) fn decode<T: DeserializeOwned>(value: JsValue) -> Answer<T> {
     serde_wasm_bindgen::from_value(value)
         .map_err(|error| Fault::new(ErrorName::Error, value_fault(&error.to_string())))

@@ -1,4 +1,4 @@
-//! Playback of a clip on all models.
+//! Playback of clips on all models.
 
 use std::ops::Range;
 
@@ -9,24 +9,24 @@ use glam::{Mat4, Vec3};
 
 use cagework_editor::Models;
 
-/// The clips of one name, of all models that have it.
+/// Clips with the same name, of all models that have one.
 pub(crate) struct SharedClip {
-    /// The name, or the clip's number if it has none.
+    /// Name of the clip, or its number if it has no name.
     pub(crate) name: String,
-    /// Duration of the longest clip.
+    /// Duration of the longest of these clips, seconds.
     pub(crate) seconds: f32,
-    /// `(model id, clip index)` pairs.
+    /// `(model id, clip index)` pairs, at most one per model.
     of: Vec<(u32, usize)>,
 }
 
 impl SharedClip {
-    /// All clips, in order of the models.
+    /// The clips of all models, grouped by name, in the order of the models.
     pub(crate) fn all(models: &Models) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for member in models.iter() {
             for (number, clip) in member.model.clips().iter().enumerate() {
                 let name = clip.label(number);
-                // A file may have several clips of one name.
+                // A file may contain several clips with the same name; each gets a group of its own.
                 let is_same = |other: &&mut Self| other.name == name && other.of(member.id).is_none();
                 match all.iter_mut().find(is_same) {
                     Some(other) => {
@@ -40,25 +40,25 @@ impl SharedClip {
         all
     }
 
-    /// Index of this clip in a model, if the model has it.
+    /// Index of the clip within a model; `None` if the model has no clip in this group.
     pub(crate) fn of(&self, id: u32) -> Option<usize> {
         self.of.iter().find(|(member, _)| *member == id).map(|(_, clip)| *clip)
     }
 }
 
-/// How one model moves during playback.
+/// Motion of one model during playback.
 pub(crate) enum ModelMotion {
-    /// By skeleton, morph targets and clips.
+    /// The model moves by its skeleton, morph targets and clips.
     Player(Box<Player>),
-    /// Constant positions, in the axes of the file. `[n_vertices]`
+    /// The model does not move. Positions in the axes of the file. `[n_vertices]`
     Still(Vec<Vec3>),
 }
 
-/// One model of a playback.
+/// One of the models of a playback.
 struct PlayedModel {
     id: u32,
     part: ModelMotion,
-    /// Range of its weights among those of all morph targets.
+    /// Range of the model's weights within `Playback::targets`.
     targets: Range<usize>,
 }
 
@@ -66,22 +66,22 @@ struct PlayedModel {
 pub(crate) struct Playback {
     played: Vec<PlayedModel>,
     clips: Vec<SharedClip>,
-    /// Skin of all vertices.
+    /// Vertices of all models with their joints and morph targets.
     pub(crate) skin: Skin,
     /// Rotation from the axes of the files to those of the scene.
     up: Mat4,
-    /// Current joints and targets of each model.
+    /// Current joint matrices and target weights of each model.
     posed: Vec<Posed>,
-    /// Weights of all morph targets. `[n_targets]`
+    /// Current weights of the morph targets of all models. `[n_targets]`
     targets: Vec<f32>,
-    /// Field of the cage that deforms the models, if `dynamic`.
+    /// Displacement field of the cage, if it deforms the models after the clip moves them.
     pub(crate) field: Option<Field>,
-    /// Whether the current time is not on the GPU yet.
+    /// Whether the current time still has to be written to the GPU.
     pub(crate) is_new: bool,
 }
 
 impl Playback {
-    /// Playback at rest. `parts`: id and motion of each model.
+    /// Creates a playback that shows the models at rest. `parts`: id and motion of each model.
     pub(crate) fn new(
         parts: Vec<(u32, ModelMotion)>,
         clips: Vec<SharedClip>,
@@ -106,8 +106,8 @@ impl Playback {
         playing
     }
 
-    /// Sets the time of a clip, seconds; without a clip, the rest pose. `targets`: weights of the morph targets that the clip
-    /// does not drive; empty for those of the files.
+    /// Shows a time of a clip, in seconds; without a clip, the rest pose. `targets`: weights of the morph targets that
+    /// the clip does not animate; if empty, the weights of the files.
     pub(crate) fn show(&mut self, clip: Option<usize>, seconds: f32, targets: &[f32]) {
         let clip = clip.and_then(|clip| self.clips.get(clip));
         let at = |one: &PlayedModel| {
@@ -119,23 +119,23 @@ impl Playback {
         self.is_new = true;
     }
 
-    /// Matrices of the joints, in the axes of the scene.
+    /// Current matrices of the joints, in the axes of the scene.
     pub(crate) fn palette(&self) -> Vec<Mat4> {
         self.posed.iter().flat_map(|posed| &posed.palette).map(|&m| self.up * m).collect()
     }
 
-    /// Weights of the morph targets. `[n_targets]`
+    /// Current weights of the morph targets. `[n_targets]`
     pub(crate) fn targets(&self) -> &[f32] {
         &self.targets
     }
 
-    /// Position of a model's node, in the axes of the scene; `None` if the node does not exist.
+    /// Current position of a node of a model, in the axes of the scene; `None` if the node does not exist.
     pub(crate) fn origin(&self, id: u32, node: u32) -> Option<Vec3> {
         let place = self.played.iter().position(|one| one.id == id)?;
         self.posed[place].origins.get(node as usize).map(|&p| self.up.transform_point3(p))
     }
 
-    /// Vertices computed on the CPU. `[n_vertices]`
+    /// Current vertices, computed on the CPU. `[n_vertices]`
     pub(crate) fn positions(&self) -> Vec<Vec3> {
         let mut positions = skin_vertices(&self.skin, &self.palette(), &self.targets);
         if let Some(field) = &self.field {
@@ -145,7 +145,7 @@ impl Playback {
     }
 }
 
-/// One model at a time of one of its clips.
+/// Joint matrices and target weights of one model at a time of one of its clips.
 fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
     match part {
         ModelMotion::Player(player) => player.at(clip, seconds, targets),
@@ -155,7 +155,7 @@ fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32])
     }
 }
 
-/// Appends the vertices of a model.
+/// Appends the vertices of a model to the skin of all models.
 fn append(skin: &mut Skin, part: &ModelMotion, first_joint: u32, first_target: u32) {
     let still;
     let own = match part {

@@ -1,4 +1,4 @@
-//! Faults of a cage: messages, fixes and marks for the page.
+//! Faults of a cage: their messages, fixes and marks for the page.
 
 use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
 use cagework_core::PolygonMesh;
@@ -9,15 +9,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::views::{self, Mend};
 
-/// Grid resolution that a cage is checked for, cells along the longest side: the default of a bind.
+/// Grid resolution for which cages are checked, cells along the longest side. It is the default of a bind.
 const DEFAULT_GRID: u32 = 64;
 
-/// Finds the faults of a cage for a model, after `smooth` steps of subdivision.
+/// Finds the faults of a cage around a model, after `smooth` subdivision steps.
 pub(crate) fn find(mesh: &PolygonMesh, model: &[Vec3], smooth: u32) -> CageCheck {
     check_smooth(mesh, Some(model), Some(DEFAULT_GRID), smooth)
 }
 
-/// Message and fix of a problem.
+/// Converts a problem to the message and fix that the page shows.
 fn view(problem: &Problem) -> views::Problem {
     let n = problem.count;
     let label = |repair| match repair {
@@ -29,7 +29,7 @@ fn view(problem: &Problem) -> views::Problem {
         Repair::Flip => "Turn them outward".to_owned(),
         Repair::Grow => "Grow the cage".to_owned(),
     };
-    // Fixes are sorted, best first.
+    // Fixes are sorted: the first is the best.
     let fix = problem.fixes.first().map(|fix| match *fix {
         Fix::Repair { repair } => views::Fix { label: label(repair), mend: Mend::Repair { repair } },
         Fix::Grid { cells } => {
@@ -47,7 +47,7 @@ fn view(problem: &Problem) -> views::Problem {
     }
 }
 
-/// Faults of a cage: messages, and the arrays for `Engine.showFaults`.
+/// Faults that a check of a cage found: messages, and the arrays for `Engine.showFaults`.
 #[wasm_bindgen]
 pub struct Check {
     pub(crate) check: CageCheck,
@@ -55,7 +55,7 @@ pub struct Check {
 
 #[wasm_bindgen]
 impl Check {
-    /// Messages and fixes.
+    /// Messages and fixes of the faults.
     ///
     /// # Errors
     /// Never.
@@ -65,35 +65,35 @@ impl Check {
         Ok(views::object(&shown)?)
     }
 
-    /// Faulty vertices of the cage.
+    /// Indices of faulty cage vertices.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn vertices(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.vertices.iter().copied()).collect()
     }
 
-    /// Faulty edges of the cage. `[n, 2]`
+    /// Faulty cage edges as pairs of vertex indices. `[n, 2]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn edges(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.edges.iter().flatten().copied()).collect()
     }
 
-    /// Faulty faces of the cage.
+    /// Indices of faulty cage faces.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn faces(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.faces.iter().copied()).collect()
     }
 
-    /// Positions of other faults. `[n, 3]`
+    /// Positions of faults that are at no vertex, edge or face. `[n, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn points(&self) -> Vec<f32> {
         self.places(false).flat_map(|p| p.points.iter().flatten().copied()).collect()
     }
 
-    /// Vertices of the model outside the cage.
+    /// Indices of model vertices outside the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn outside(&self) -> Vec<u32> {
@@ -102,7 +102,8 @@ impl Check {
 }
 
 impl Check {
-    /// Places in the cage, or of the model's vertices outside it. Notes are not marked.
+    /// Places of the faults in the cage, or with `are_outside` those of model vertices outside the cage. Notes have no
+    /// marks.
     fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
         let shown =
             move |p: &&Problem| p.severity != Severity::Note && (p.code == Code::ModelOutside) == are_outside;
@@ -110,30 +111,30 @@ impl Check {
     }
 }
 
-/// Places of the faults that a [`Check`] found.
+/// Places of the faults that a [`Check`] found, to be marked in the scene.
 #[derive(Default)]
 pub(crate) struct Faults {
     pub(crate) in_cage: Places,
-    /// Vertices of the model outside the cage.
+    /// Indices of model vertices outside the cage.
     pub(crate) outside: Vec<u32>,
 }
 
 impl Faults {
-    /// Marks of the faults. Of a draft, all faces are marked.
+    /// Marks of the faults. If the cage is a draft, the edges of all its faces are marked.
     pub(crate) fn marks(&self, mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
         let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
         let Places { vertices, edges, faces, points } = &self.in_cage;
         let mut marks = Marks { mesh_vertices: self.outside.clone(), ..Marks::default() };
         marks.segments.extend(edges.iter().map(|e| e.map(at)));
         let faces = faces.iter().filter_map(|&f| mesh.faces.get(f as usize));
-        // Drafts are drawn only as marks.
+        // A draft is drawn only as marks.
         let all = is_draft.then_some(&mesh.faces).into_iter().flatten();
         for face in faces.chain(all) {
             marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
         }
         marks.points.extend(vertices.iter().map(|&v| at(v)));
         if positions == mesh.positions {
-            // Points are known only at rest.
+            // Positions of faults are known only for the rest cage.
             marks.points.extend(points.iter().copied().map(Vec3::from_array));
         }
         marks

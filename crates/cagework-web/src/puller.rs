@@ -1,4 +1,5 @@
-//! Pulling the model, in a separate worker: binds and long frames of the page do not block it.
+//! Pulling of the model's surface. It runs in a separate worker, so that binds and long frames of the page do not block
+//! it.
 
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
@@ -13,10 +14,10 @@ use crate::controls::control_set;
 use crate::error::Answer;
 use crate::options::{JsPullOptions, decode};
 
-/// Seed that marks a grip on a cage vertex.
+/// Value in `seeds` that marks a grip on a cage vertex.
 const ON_CAGE: u32 = u32::MAX;
 
-/// Prepared model and cage, and the drag in progress.
+/// A prepared model with its cage, and the drag in progress.
 #[wasm_bindgen]
 pub struct Puller {
     pull: Pull,
@@ -26,7 +27,7 @@ pub struct Puller {
 
 #[wasm_bindgen]
 impl Puller {
-    /// Prepares a model, `[n_vertices, 3]` and `[n_triangles, 3]`, and its cage at rest; cage arrays as for `Binder.bind`.
+    /// Prepares a model, `[n_vertices, 3]` and `[n_triangles, 3]`, and its rest cage. Cage arrays as for `Binder.bind`.
     ///
     /// # Errors
     /// If the arrays are not a valid cage, or the model has no triangles.
@@ -43,12 +44,12 @@ impl Puller {
         Ok(Self::of(&mesh, &set)?)
     }
 
-    /// Starts a drag of grabs, then pins, in the pose `start`, `[n_cage, 3]`. `rows`: weights of the grips,
-    /// `[n_grips, n_cage]`; `seeds`: nearest model vertex of each grip, or 2^32 - 1 for a cage vertex. Returns the positions
-    /// of the grabs, `[n_grabs, 3]`.
+    /// Starts a drag in the pose `start`, `[n_cage, 3]`. The grips are the grabs, then the pins. `rows`: weights of the
+    /// grips, `[n_grips, n_cage]`; `seeds`: nearest model vertex of each grip, or 2^32 - 1 for a cage vertex. Returns
+    /// the positions of the grabs, `[n_grabs, 3]`.
     ///
     /// # Errors
-    /// Those of a drag.
+    /// The errors of starting a drag.
     pub fn grab(
         &mut self,
         start: &[f32],
@@ -65,7 +66,8 @@ impl Puller {
         Ok(flat(&at))
     }
 
-    /// How much each vertex of the model stays in place during the drag, 0 to 1; empty without a drag. `[n_vertices]`
+    /// How much each vertex of the model stays in place during the drag, from 0 to 1; empty without a drag.
+    /// `[n_vertices]`
     #[must_use]
     pub fn stays(&self) -> Vec<f32> {
         self.drag.as_ref().map_or_else(Vec::new, |drag| {
@@ -73,35 +75,36 @@ impl Puller {
         })
     }
 
-    /// Advances the solve by one frame towards `to`, `[n_grabs, 3]`; the target of a mirror image may be omitted. Returns the
-    /// cage, `[n_cage, 3]`, or an empty array without a drag.
+    /// Advances the solve by one frame towards the targets `to` of the grabs, `[n_grabs, 3]`; the target of a grab's
+    /// mirror image may be omitted. Returns the cage's positions, `[n_cage, 3]`, or an empty array without a drag.
     #[must_use]
     pub fn frame(&mut self, to: &[f32]) -> Vec<f32> {
         let Some(drag) = &mut self.drag else { return Vec::new() };
         let mut to: Vec<DVec3> = points(to).into_iter().map(Vec3::as_dvec3).collect();
         if let (&[to_first], &[first, image]) = (&*to, drag.start()) {
-            // The mirror image moves by the mirrored displacement of the grab.
+            // The mirror image moves by the reflected displacement of the grab.
             to.push(image + (to_first - first) * DVec3::new(-1.0, 1.0, 1.0));
         }
         drag.frame(&to);
         flat(&drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>())
     }
 
-    /// Whether the solve has converged: more frames would not change the cage.
+    /// Whether the solve has converged, so that more frames would not change the cage visibly.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn settled(&self) -> bool {
         self.drag.as_ref().is_none_or(Drag::is_settled)
     }
 
-    /// Reach of the drag, over the model's size; infinite for the whole model.
+    /// Distance along the surface that the drag affects, as a fraction of the model's size; infinite for the whole
+    /// model.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.drag.as_ref().map_or(0.0, Drag::reach)
     }
 
-    /// Distance of grabs and pins from their targets, over the model's size.
+    /// Largest distance of a grab or pin from its target, as a fraction of the model's size.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn error(&self) -> f64 {

@@ -1,4 +1,4 @@
-//! Methods for the npm package: deform model files, and apply weights without a GPU.
+//! Methods for the npm package that deform model files and apply weights without a GPU.
 
 use cagework_core::deform::{deform_bound, displacements};
 use cagework_core::{Controls, Frames, Weights};
@@ -18,18 +18,18 @@ use crate::options::{JsBindOptions, JsRigOptions, decode};
 
 #[wasm_bindgen]
 impl Loaded {
-    /// The model's triangles. `[n_triangles, 3]`
+    /// Triangles of the model. `[n_triangles, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn triangles(&self) -> Vec<u32> {
         self.model.triangles.as_flattened().to_vec()
     }
 
-    /// Geometry that a cage should enclose: positions and triangles at rest, with each morph target, and in the frames of
-    /// `clip`, if given. `[n, 3]` each
+    /// Geometry that a cage should enclose: positions and triangles of the model at rest, with each morph target, and
+    /// in the frames of `clip` if it is given. `[n, 3]` each
     ///
     /// # Errors
-    /// If the model has no such clip.
+    /// If the model has no clip with this name.
     #[wasm_bindgen(unchecked_return_type = "[Float32Array, Uint32Array]")]
     #[allow(clippy::needless_pass_by_value, reason = "wasm-bindgen passes optional strings by value")]
     pub fn states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
@@ -43,11 +43,12 @@ impl Loaded {
 
 #[wasm_bindgen]
 impl Binder {
-    /// Binds the model and deforms its file by a posed cage, `[n_controls, 3]`, like `cagework bind` and `cagework deform`.
-    /// A glTF keeps its rig according to `rig` (`RigOptions`; `dynamic` is ignored). Other arguments as for `bind`.
+    /// Binds the model and deforms its file by a posed cage, `[n_controls, 3]`, like `cagework bind` and `cagework
+    /// deform`. A glTF model keeps its rig according to `rig` (`RigOptions`; `dynamic` is ignored). Other arguments as
+    /// for `bind`.
     ///
     /// # Errors
-    /// Those of a bind. If the pose has another number of points, or the file cannot be written.
+    /// The errors of a bind. If the pose does not have `n_controls` points, or the file cannot be written.
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn reshape(
         &self,
@@ -70,7 +71,8 @@ impl Binder {
         let at = [model.positions.as_slice(), &extra].concat();
         let mut request: JsBindOptions = decode(options)?;
         request.options.extra_points = extra.len();
-        // Reserve the memory for writing before the bind, so that a long bind does not fail afterwards.
+        // Count the memory for writing the file against the limit, so that a lack of memory is reported before the
+        // bind.
         request.options.held = model.bytes() + model.bytes_to_write(model.format());
         let bound = self.run(&at, &set, request, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
@@ -84,7 +86,7 @@ impl Binder {
     }
 }
 
-/// Options of a model: splits the names of rigid parts into attachments of the skeleton and other parts.
+/// Export options of a model. Splits the names of rigid parts into attachments of the skeleton and other parts.
 fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
     let options = rig.options();
     let props = if rig.plain { Vec::new() } else { model.props()? };
@@ -97,10 +99,10 @@ fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
     Ok(ReshapeOptions { rigid, parts, ..options })
 }
 
-/// Points of a flat `[n, 3]` array.
+/// Points of the flat array called `name`, `[n, 3]`.
 ///
 /// # Errors
-/// If its length is not `3 n`.
+/// If the array does not have `3 n` numbers.
 fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
     if flat.len() == 3 * n {
         return Ok(points(flat));
@@ -110,7 +112,7 @@ fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
     Err(Fault::new(ErrorName::Error, message))
 }
 
-/// Weights that are applied to many poses.
+/// Weights for deforming points by many poses.
 #[wasm_bindgen]
 pub struct Deformer {
     n_controls: usize,
@@ -120,10 +122,10 @@ pub struct Deformer {
 
 #[wasm_bindgen]
 impl Deformer {
-    /// Deformer of the arrays of a `Bound` with `n_controls` controls.
+    /// Creates a deformer from the arrays of a `Bound` with `n_controls` controls.
     ///
     /// # Errors
-    /// If the arrays do not match.
+    /// If the arrays do not match each other or `n_controls`.
     #[wasm_bindgen(constructor)]
     pub fn new(
         n_controls: u32,
@@ -136,10 +138,10 @@ impl Deformer {
         Ok(Self::of(n_controls, indptr, indices, data, frames)?)
     }
 
-    /// Points in a pose, `[n_controls, 3]`. `[n_points, 3]`
+    /// Positions of the points, `[n_points, 3]`, in a pose of the controls, `[n_controls, 3]`.
     ///
     /// # Errors
-    /// If the pose has another number of points.
+    /// If the pose does not have `n_controls` points.
     pub fn deform(&self, posed: &[f32]) -> Result<Vec<f32>, JsValue> {
         let posed = pose("posed", posed, self.n_controls)?;
         Ok(flat(&deform_bound(&self.weights, &self.frames, &posed)))
@@ -182,7 +184,7 @@ mod tests {
             let frames = Frames { joints, plain, whole: vec![[0.0; 3]; 3], ..Frames::default() };
             Deformer::of(3, vec![0, 1], vec![column], vec![1.0], frames).map(drop)
         };
-        // 3 controls, 3 axes, 3 columns of the whole cage and 3 of the joint.
+        // There are 12 columns: 3 of controls, 3 of axes, 3 of the whole cage and 3 of the joint.
         assert!(of(vec![2], 11).is_ok());
         assert!(of(vec![2], 12).is_err(), "a column");
         assert!(of(vec![3], 2).is_err(), "a joint");

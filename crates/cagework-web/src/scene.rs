@@ -1,4 +1,4 @@
-//! Converts the state to the renderer's options.
+//! Converts the engine's state to options of the renderer.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::options::{Colour, JsGizmo, SliceShown};
 use crate::state::State;
 
 impl State {
-    /// Style of the mesh. Weights and errors need a bind; weights also need a selected vertex.
+    /// Style of the mesh. Colours of weights and errors need a bind; those of weights also need a selected vertex.
     pub(crate) fn mesh_style(&self) -> MeshStyle {
         match self.view.colour {
             _ if !self.view.model => MeshStyle::Hidden,
@@ -28,7 +28,7 @@ impl State {
         }
     }
 
-    /// The scene of the view. `weights`: those on the GPU.
+    /// The scene that the view shows. `weights`: those on the GPU.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view();
         SceneOptions {
@@ -57,24 +57,24 @@ impl State {
         }
     }
 
-    /// Whether the cage matches the visible model: no clip plays, or the cage deforms it.
+    /// Whether the drawn model follows the cage: no clip is played, or the cage deforms the played model.
     pub(crate) fn has_cage_in_view(&self) -> bool {
         self.playing.as_ref().is_none_or(|playing| playing.field.is_some())
     }
 
-    /// Whether dragging pulls the model. Cage vertices behind the model are not picked then.
+    /// Whether dragging pulls the model's surface. Cage vertices behind the model are then not picked.
     pub(crate) fn pulls(&self) -> bool {
         self.view.pull && self.bound.is_some() && !self.editor.is_editing_rest()
     }
 
-    /// Whether no cage element is selected or hovered.
+    /// Whether no cage element is selected, hovered or dragged.
     fn is_nothing_chosen(&self) -> bool {
         self.editor.hovered.is_empty()
             && self.editor.selection.vertices().is_empty()
             && self.editor.gesture().is_none()
     }
 
-    /// The scene of a picture. `alone`: only the model, on a transparent background.
+    /// The scene of an exported picture. `alone`: only the model, on a transparent background.
     pub(crate) fn picture_scene(&self, alone: bool, weights: Option<&Weights>) -> SceneOptions {
         if !alone {
             return self.scene(weights);
@@ -115,7 +115,7 @@ impl State {
         shown
     }
 
-    /// The gizmo, at the centre of rotation and scaling.
+    /// The gizmo, placed at the centre of rotation and scaling.
     pub(crate) fn gizmo(&self) -> Option<Gizmo> {
         let mode = match self.view.gizmo {
             JsGizmo::None => return None,
@@ -133,7 +133,7 @@ impl State {
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
-    /// Marks of faults.
+    /// Marks of the cage's faults.
     fn marks(&self) -> Marks {
         if !self.view.problems {
             return Marks::default();
@@ -141,7 +141,7 @@ impl State {
         self.faults.marks(self.rest(), self.pose(), self.set().is_none())
     }
 
-    /// Marks of joints: dots inside the cage, rings outside; empty before a bind.
+    /// Marks of joints: dots for those inside the cage, rings for those outside; empty before a bind.
     fn joint_marks(&self) -> Marks {
         let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
         let (Some(mode), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };

@@ -1,4 +1,4 @@
-//! The page's settings in a project. Project files are untrusted, so each value is checked.
+//! Reads the page's settings of a project. Project files are untrusted, so each value is checked.
 
 use std::mem::discriminant;
 
@@ -14,10 +14,10 @@ use crate::error::{ErrorName, Fault};
 use crate::options::{JsBindOptions, JsRigOptions};
 use crate::views::object;
 
-/// Maximum length of a value in a notice, characters.
+/// Maximum number of characters that a notice shows of an invalid value.
 const MAX_VALUE_CHARS: usize = 40;
 
-/// Ranges of numeric options, by their names in the page.
+/// Ranges of numeric options, by the names that the page uses.
 pub(crate) const NUMBERS: [(&str, Number); 9] = [
     ("grid", GRID),
     ("tau", TAU),
@@ -30,7 +30,7 @@ pub(crate) const NUMBERS: [(&str, Number); 9] = [
     ("divisions", DIVISIONS),
 ];
 
-/// Valid settings of a project.
+/// Settings of a project, with all values valid.
 #[derive(Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Settings {
@@ -46,13 +46,13 @@ pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     symmetry: Option<bool>,
-    /// Values that were replaced, a sentence each.
+    /// Notices about values that were replaced by defaults, one sentence each.
     notices: Vec<String>,
 }
 
 /// Reads the settings of a project, and replaces missing and invalid values by defaults. `text`: JSON of the settings.
-/// `defaults`: JSON object with `bind`, `cage` and `rig`. The memory limit is always that of `defaults`, because it depends
-/// on the computer.
+/// `defaults`: JSON object with `bind`, `cage` and `rig`. The memory limit is always that of `defaults`, because the
+/// right limit depends on the computer.
 ///
 /// # Errors
 /// If `defaults` is not a JSON object.
@@ -82,7 +82,7 @@ impl Settings {
         settings
     }
 
-    /// Options of a group: valid values replace defaults one by one. `None` if the group is missing.
+    /// Options of one group. Each valid value replaces its default. `None` if the group is missing.
     fn group<T: serde::de::DeserializeOwned>(
         &mut self,
         name: &str,
@@ -98,7 +98,7 @@ impl Settings {
             taken.insert(key.clone(), value.clone());
             let wrong = match is_in_range(key, value) {
                 Err(allowed) => Some(format!("; it must be {allowed}")),
-                // serde also accepts an object with the variant's name as its key: compare the JSON types.
+                // serde also accepts an object whose key is the variant's name, so compare the JSON types first.
                 Ok(()) if discriminant(value) != discriminant(default) => Some(String::new()),
                 Ok(()) => match serde_json::from_value(Value::Object(taken.clone())) {
                     Err(error) => Some(format!(" ({})", value_fault(&error.to_string()))),
@@ -116,7 +116,7 @@ impl Settings {
     }
 }
 
-/// Checks a numeric option; other options pass. The error is the allowed range.
+/// Checks a numeric option against its range; accepts other options. The error is the allowed range.
 fn is_in_range(key: &str, value: &Value) -> Result<(), &'static str> {
     let Some((_, number)) = NUMBERS.iter().find(|(name, _)| *name == key) else { return Ok(()) };
     number.check(value.as_f64().unwrap_or(f64::NAN)).map_err(|wrong| wrong.allowed)
@@ -134,7 +134,7 @@ mod tests {
 
     const GIB: u64 = 1 << 30;
 
-    /// The page's defaults.
+    /// Default settings of the page.
     fn defaults() -> Map<String, Value> {
         let all = json!({
             "bind": {
@@ -186,14 +186,14 @@ mod tests {
         assert_eq!(Settings::read("", &defaults()), Settings::default());
     }
 
-    /// Accepted, such values make every bind and memory estimate fail until the page is reloaded.
+    /// If such values were accepted, every bind and memory estimate would fail until the page is reloaded.
     #[test]
     fn invalid_values_are_replaced_by_defaults() {
         for (group, key, value, allowed) in [
             ("bind", "grid", json!(64.5), "a whole number from 8 to 512"),
             ("bind", "grid", json!(100_000), "a whole number from 8 to 512"),
             ("bind", "tau", json!(0), "a number above 0"),
-            // Positive as f64, but 0 as f32, the solver's type.
+            // This number is positive as f64, but 0 as f32, the type that the solver uses.
             ("bind", "tau", json!(1e-60), "a number above 0"),
             ("bind", "max_iterations", json!(1e300), "has the wrong type"),
             ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),

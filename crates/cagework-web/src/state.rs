@@ -1,5 +1,5 @@
-//! The page's state on the CPU: the editor, state derived from its document, and the view. The next frame writes it to the
-//! GPU.
+//! State of the engine on the CPU: the editor, data derived from its document, and the view. The next frame writes
+//! changes to the GPU.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,28 +26,29 @@ use crate::views::{CageInfo, CageState, View};
 /// Size limit of the cache of weights for undo and redo, bytes.
 const CACHE_BYTES: usize = 256 << 20;
 
-/// Document, camera, and derived state.
+/// The editor's document, the camera, and derived data.
 pub(crate) struct State {
     pub(crate) editor: Editor,
     /// Draw data of each model, by id.
     pub(crate) draws: BTreeMap<u32, Arc<DrawModel>>,
-    /// Number of points of the models' rigs; computed on first use.
+    /// Number of points of all rigs; computed on first use.
     pub(crate) n_rig: Option<usize>,
-    /// The model in paint mode, and how much each vertex of all models stays in place, 0 to 1. `[n_vertices]`
+    /// Id of the model in paint mode, and how much each vertex of all models stays in place, from 0 to 1.
+    /// `[n_vertices]`
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
     /// Faults of the cage that the last check found.
     pub(crate) faults: Faults,
-    /// Subset of the vertices that is counted outside the cage during reshaping; computed on first use.
+    /// Subset of the vertices that is tested against the cage during reshaping; computed on first use.
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
     /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
-    /// Weights of documents in the history.
+    /// Cached weights for documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,
-    /// Notices of the last export.
+    /// Notices of the last export about the rig.
     pub(crate) rig_notices: Vec<String>,
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
-    /// Weights on a lattice, for deforming a model that a clip moves.
+    /// Weights on a lattice around the cage, which deform a model that a clip moves.
     pub(crate) lattice: Option<FieldWeights>,
     /// Kinds of coordinates available for comparison.
     pub(crate) others: Vec<Coordinates>,
@@ -56,41 +57,42 @@ pub(crate) struct State {
     pub(crate) held: GrabState,
     pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
-    /// The viewport, CSS pixels.
+    /// Size of the viewport, CSS pixels.
     pub(crate) size: Vec2,
     /// Device pixels per CSS pixel.
     pub(crate) scale: f32,
-    /// Number of changes of mesh and cage. The result of a job is valid for one revision.
+    /// Number of changes of mesh and cage so far. A job's result is valid only if the revision is still that of its
+    /// start.
     pub(crate) revision: u32,
     /// Keys of the document that the derived state belongs to.
     derived: DerivedKeys,
     /// Keys of the data on the GPU.
     pub(crate) on_gpu: GpuKeys,
-    /// Whether an upload is in progress. It compares again when it finishes.
+    /// Whether an upload is in progress. When it finishes, it compares document and GPU again.
     pub(crate) is_uploading: bool,
-    /// Whether models are being added; the upload may still fail.
+    /// Whether models are being added. Their upload may still fail, which removes them.
     pub(crate) is_adding: bool,
     pub(crate) is_moved: bool,
     pub(crate) is_changed: bool,
-    /// An error of an upload, for the next frame to report.
+    /// Error of an upload, which the next frame reports.
     pub(crate) fault: Option<Fault>,
 }
 
-/// Weights of all models for a cage.
+/// Weights of all models in a cage.
 pub(crate) struct BoundModels {
     pub(crate) weights: Arc<Weights>,
     pub(crate) frames: Arc<Frames>,
     /// Weights of the points of the models' rigs.
     pub(crate) rig: Option<Weights>,
-    /// Vertices outside the cage, then points of rigs outside it; their indices follow those of all vertices.
+    /// Vertices outside the cage, then points of rigs outside it. Indices of the latter start after the last vertex.
     pub(crate) outside: Vec<OutsideVertex>,
-    /// Joints among the points of the rigs.
+    /// Joints of the rigs; `None` if a rig cannot be read.
     pub(crate) joints: Option<JointDots>,
     /// Bind report.
     pub(crate) report: JsValue,
 }
 
-/// Keys and pose of the document that the derived state belongs to.
+/// Keys and pose of the document that the derived data belongs to.
 #[derive(Default)]
 struct DerivedKeys {
     key: Key,
@@ -111,13 +113,13 @@ pub(crate) struct GpuKeys {
 pub(crate) struct GrabState {
     /// Surface points that are grabbed, pinned or hovered.
     pub(crate) points: Vec<SurfacePoint>,
-    /// Position of the pointer, if the grab cannot reach it.
+    /// Position of the pointer, if the grabbed point is not there.
     pub(crate) target: Option<Vec3>,
     /// How much each vertex of the model stays in place during the drag, 0 to 1. `[n_vertices]`
     pub(crate) stays: Option<Arc<Vec<f32>>>,
-    /// Points of an interior control that is being added.
+    /// Points of an interior control that is being placed.
     pub(crate) placed: Vec<Vec3>,
-    /// Vertices of the posed models, and the pose they were computed for. `[n_vertices]`
+    /// Vertices of the posed models, and the cage's pose that they were computed for. `[n_vertices]`
     pub(crate) posed: Vec<Vec3>,
     pub(crate) posed_for: Vec<Vec3>,
 }
@@ -161,22 +163,22 @@ impl State {
         &self.editor.document().models
     }
 
-    /// The cage at rest, or a draft of one.
+    /// The cage at rest, or a draft that is not a valid cage.
     pub(crate) fn cage(&self) -> &RestCage {
         &self.editor.document().cage
     }
 
-    /// Positions of the cage and its interior controls. `[n_controls]`
+    /// Current positions of the cage's vertices and interior controls. `[n_controls]`
     pub(crate) fn pose(&self) -> &[Vec3] {
         &self.editor.document().pose
     }
 
-    /// The controls of a bind; `None` if the cage is a draft.
+    /// The control set for a bind; `None` if the cage is a draft.
     pub(crate) fn set(&self) -> Option<&ControlSet> {
         self.cage().set.as_ref().ok()
     }
 
-    /// The controls of a bind.
+    /// The control set for a bind.
     ///
     /// # Errors
     /// Without a cage, or if it is a draft.
@@ -184,12 +186,12 @@ impl State {
         self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
     }
 
-    /// Positions of cage and interior controls at rest, and faces of the cage or draft.
+    /// Rest positions of the cage's vertices and interior controls, and faces of the cage or draft.
     pub(crate) fn rest(&self) -> &PolygonMesh {
         &self.cage().mesh
     }
 
-    /// Drops derived state of an earlier document. Called after each change.
+    /// Drops data that was derived from an earlier document. Called after each change.
     pub(crate) fn follow_document(&mut self) {
         let document = self.editor.document();
         let (key, models, pose) = (document.key(), self.editor.models_key(), Arc::clone(&document.pose));
@@ -219,7 +221,7 @@ impl State {
             self.playing = None;
         }
         if key != before || !Arc::ptr_eq(&pose, &pose_before) {
-            // The gizmo follows the selection.
+            // Redraw, because the gizmo's position depends on the selection.
             (self.is_moved, self.is_changed) = (true, true);
         }
     }
@@ -227,7 +229,7 @@ impl State {
     /// Checks that the result of a job that was started at `revision` is still valid.
     ///
     /// # Errors
-    /// `Cancelled` if mesh or cage have changed since.
+    /// `Cancelled` if mesh or cage have changed since that revision.
     pub(crate) fn require(&self, revision: u32) -> Answer<()> {
         let is_current = self.revision == revision;
         is_current
@@ -240,7 +242,7 @@ impl State {
         self.models().up()
     }
 
-    /// Sets the bounds that the camera fits.
+    /// Passes the bounds of model and cage to the camera.
     pub(crate) fn fit_camera(&mut self) {
         self.place_viewport();
         if let Some(bounds) = self.editor.bounds() {
@@ -248,12 +250,13 @@ impl State {
         }
     }
 
-    /// Sets the camera's viewport: the whole view, or one of several pictures side by side.
+    /// Sets the camera's viewport: the whole view, or one of several pictures that are shown side by side.
     pub(crate) fn place_viewport(&mut self) {
         self.camera.set_viewport(Vec2::new(self.part_width(), self.size.y));
     }
 
-    /// Kinds of coordinates that are shown side by side.
+    /// Kinds of coordinates that are shown side by side; harmonic coordinates alone if none of the chosen kinds is
+    /// available.
     pub(crate) fn shown(&self) -> Vec<Coordinates> {
         let is_there = |one: &Coordinates| *one == Coordinates::Harmonic || self.others.contains(one);
         let shown: Vec<_> = self.view.compare.iter().copied().filter(is_there).collect();
@@ -269,12 +272,12 @@ impl State {
         self.pointers().at(x, y)
     }
 
-    /// Mapping of pointer positions to pictures.
+    /// The mapping of pointer positions to the pictures side by side.
     pub(crate) fn pointers(&self) -> Pointers {
         Pointers { width: self.part_width(), last: self.shown().len() as f32 - 1.0 }
     }
 
-    /// Camera that frames positions, and the picture's size, pixels.
+    /// A camera that frames these positions, and the picture's size in pixels.
     pub(crate) fn view_of(&self, positions: &[Vec3]) -> (Camera, [u32; 2]) {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
@@ -292,7 +295,7 @@ impl State {
         }
     }
 
-    /// Updates the grey of the model in paint mode.
+    /// Recomputes the grey shading of the model in paint mode.
     pub(crate) fn show_painting(&mut self) {
         let Some((id, _)) = self.painting else { return };
         let mut stays = vec![0.0; self.models().positions().len()];
@@ -314,35 +317,35 @@ impl State {
         })
     }
 
-    /// The view that panels show.
+    /// Document and bind state for the page's panels.
     pub(crate) fn document_view(&self) -> View {
         View { document: self.editor.view(), bound: self.bound.is_some() }
     }
 
-    /// Sets the weights of the current document.
+    /// Takes `bound` as the weights of the current document.
     pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
         self.bound = Some(bound);
         self.playing = None;
         (self.is_moved, self.is_changed) = (true, true);
     }
 
-    /// Draw data of all models, joined.
+    /// Draw data of all models, joined into one.
     pub(crate) fn draw_model(&self) -> Arc<DrawModel> {
         joined(&self.models().iter().filter_map(|member| self.draws.get(&member.id)).collect::<Vec<_>>())
     }
 
-    /// Whether the GPU holds mesh and cage of the document.
+    /// Whether the GPU has the mesh and the cage of the current document.
     pub(crate) fn is_on_gpu(&self) -> bool {
         let key = self.editor.key();
         self.set().is_some() && self.on_gpu.cage == Some(key.cage) && self.on_gpu.mesh == Some(key.mesh)
     }
 
-    /// Whether the GPU lacks something that the document has.
+    /// Whether the GPU lacks data of the current document.
     pub(crate) fn needs_upload(&self) -> bool {
         self.next_upload().is_some()
     }
 
-    /// The next upload. An upload may invalidate those after it in this order.
+    /// The next data to upload. An upload may drop data that comes later in this order.
     pub(crate) fn next_upload(&self) -> Option<Upload> {
         if self.models().is_empty() {
             return None;
@@ -361,19 +364,19 @@ impl State {
         }
     }
 
-    /// Marks all data as not uploaded; the sessions drop their weights with the mesh.
+    /// Marks all data as not uploaded. Called when the sessions drop the mesh, which also drops their weights.
     pub(crate) fn forget_gpu(&mut self) {
         self.on_gpu = GpuKeys::default();
         self.bound = None;
     }
 
-    /// Marks only the mesh of the document as uploaded.
+    /// Marks the mesh of the current document as uploaded, and its weights and parts as not uploaded.
     pub(crate) fn has_uploaded_mesh(&mut self) {
         let cage = self.on_gpu.cage;
         self.on_gpu = GpuKeys { mesh: Some(self.editor.key().mesh), cage, ..GpuKeys::default() };
     }
 
-    /// Writes cage, camera and scene to the GPU sessions if they have changed.
+    /// Writes cage, camera and scene to the GPU sessions if these have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
@@ -389,7 +392,7 @@ impl State {
             if self.is_moved && self.is_on_gpu() {
                 let editing = self.editor.is_editing_rest();
                 let at_rest = self.view.original || editing;
-                // Closed-form coordinates have no interior controls.
+                // A session of closed-form coordinates has no interior controls.
                 let n = session.cage_positions().len();
                 session.pose(if at_rest { &self.rest().positions[..n] } else { &self.pose()[..n] });
                 if editing && !self.view.original {
@@ -405,7 +408,7 @@ impl State {
     }
 }
 
-/// Pictures side by side: width of one, CSS pixels, and index of the last.
+/// Pictures shown side by side: width of each, CSS pixels, and index of the last.
 pub(crate) struct Pointers {
     width: f32,
     last: f32,
@@ -426,7 +429,7 @@ pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
     }
 }
 
-/// A unit of upload.
+/// Data that is uploaded in one step.
 #[derive(Clone, Copy)]
 pub(crate) enum Upload {
     Mesh,
@@ -443,7 +446,7 @@ mod tests {
 
     use super::*;
 
-    /// A model in a box; mesh and cage are marked as uploaded, weights are not.
+    /// A state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
     fn uploaded() -> State {
         let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
         let model = Model::read("a.obj", text, &mut |_| None).unwrap();
@@ -461,7 +464,7 @@ mod tests {
         state.editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
     }
 
-    /// The sequence of uploads.
+    /// Performs all uploads and returns their sequence.
     fn upload_all(state: &mut State) -> String {
         let mut order = String::new();
         while let Some(next) = state.next_upload() {

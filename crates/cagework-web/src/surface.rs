@@ -1,4 +1,4 @@
-//! The canvas as a wgpu surface.
+//! The page's canvas as a wgpu surface.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -13,56 +13,56 @@ use crate::error::{Answer, ErrorName, Fault};
 /// Maximum number of unfinished frames. With 1, the GPU idles between frames; with more than 2, a slow GPU lags.
 const MAX_IN_FLIGHT: u32 = 2;
 
-/// Frame time above which a GPU counts as slow, ms. A slow GPU gets one frame at a time, because queued frames delay other
-/// work such as binds.
+/// Frame time above which a GPU counts as slow, ms. A slow GPU gets one frame at a time, because queued frames delay
+/// other GPU work such as binds.
 const SLOW_MS: f64 = 50.0;
 
-/// A rough frame has the canvas's width and height divided by this: a quarter of the pixels.
+/// Divisor of width and height of a frame at reduced resolution, which then has a quarter of the pixels.
 const ROUGH_DIVISOR: u32 = 2;
 
-/// Assumed lower bound of the time ratio of sharp to rough frames. A slow GPU stays slow until a rough frame takes less
-/// than [`SLOW_MS`] over this ratio, or a sharp frame takes less than [`SLOW_MS`].
+/// Assumed time of a full-resolution frame over that of a reduced one. On a slow GPU, reduced frames must take less
+/// than [`SLOW_MS`] over this ratio before it counts as fast again.
 const SHARP_COST_RATIO: f64 = 2.0;
 
-/// Side of the offscreen target for warming up, pixels.
+/// Side of the offscreen texture that is drawn to compile pipelines, pixels.
 pub(crate) const SMALL_SIDE: u32 = 16;
 
-/// A canvas, and the textures that are drawn before they are copied to it.
+/// A canvas, and the textures that sessions draw into before they are copied to the canvas.
 pub(crate) struct Surface {
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     /// Render format: that of the canvas, with sRGB encoding.
     format: wgpu::TextureFormat,
-    /// Render targets that are copied to the canvas: the whole picture, or parts side by side.
+    /// Textures that sessions draw into: one of the whole picture, or several side by side.
     ///
     /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves into
     /// such a view: a clear of 0.2 gives 51 instead of 124.
     parts: Vec<wgpu::Texture>,
     /// Draws the parts if the canvas does not support copies.
     painter: Option<PartPainter>,
-    /// Number of submitted frames that are not finished.
+    /// Number of submitted frames that the GPU has not finished.
     in_flight: Arc<AtomicU32>,
     /// Whether a sharp frame takes longer than [`SLOW_MS`].
     is_slow: Arc<AtomicBool>,
 }
 
-/// Resolution of a requested frame.
+/// Requested resolution of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameQuality {
-    /// Reduced on a slow GPU; the browser scales the canvas up.
+    /// Reduced resolution on a slow GPU; the browser scales the canvas up.
     Soon,
-    /// Full, also on a slow GPU.
+    /// Full resolution, also on a slow GPU.
     Sharp,
 }
 
-/// Result of drawing a frame.
+/// Outcome of drawing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameOutcome {
-    /// Skipped: the canvas is unavailable, or too many frames are unfinished.
+    /// Nothing was drawn: the canvas is unavailable, or too many frames are unfinished.
     NotNow,
-    /// Drawn at reduced resolution.
+    /// The frame was drawn at reduced resolution.
     Roughly,
-    /// Drawn at full resolution.
+    /// The frame was drawn at full resolution.
     Sharply,
 }
 
@@ -92,7 +92,7 @@ impl Surface {
             .ok_or_else(|| Fault::new(ErrorName::Canvas, "this GPU cannot draw into a canvas"))?;
         let format = config.format.add_srgb_suffix();
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
-        // A WebGL2 canvas does not support copies, but encodes sRGB correctly.
+        // A WebGL2 canvas does not support copies, but encodes sRGB correctly. The painter draws the textures into it.
         let painter = context.draws_only().then(|| PartPainter::new(&context, format));
         if painter.is_some() {
             config.format = format;
@@ -105,7 +105,7 @@ impl Surface {
         Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
     }
 
-    /// Resizes the canvas, pixels.
+    /// Resizes the canvas to a size in pixels.
     fn resize(&mut self, context: &GpuContext, [width, height]: [u32; 2]) {
         let most = context.device.limits().max_texture_dimension_2d;
         let size = [width.clamp(1, most), height.clamp(1, most)];
@@ -117,8 +117,8 @@ impl Surface {
         self.surface.configure(&context.device, &self.config);
     }
 
-    /// Draws sessions side by side and presents the frame. `size`: pixels; `scale`: pixels per CSS pixel. A slow GPU may use
-    /// fewer pixels.
+    /// Draws sessions side by side and presents the frame. `size`: pixels; `scale`: device pixels per CSS pixel. With
+    /// [`FrameQuality::Soon`], a slow GPU draws fewer pixels.
     ///
     /// # Errors
     /// If the GPU device is lost or returned an error.
@@ -181,13 +181,13 @@ impl Surface {
         Ok(if is_rough { FrameOutcome::Roughly } else { FrameOutcome::Sharply })
     }
 
-    /// Copies the parts to the canvas. Columns between them stay transparent, as dividers.
+    /// Copies the sessions' textures to the canvas. Columns between them stay transparent and act as dividers.
     fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
         let between = (self.parts.len() as u32 - 1).max(1);
         let left = |k: u32, part: &wgpu::Texture| k * (self.config.width - part.width()) / between;
         let parts: Vec<_> = (0u32..).zip(&self.parts).map(|(k, part)| (left(k, part), part)).collect();
         let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        // `draws_only` is constant per build, so that the WebGPU build does not contain the painter.
+        // `draws_only` is constant in each build, so the compiler removes the painter from the WebGPU build.
         if let Some(painter) = self.painter.as_ref().filter(|_| context.draws_only()) {
             let view = canvas.create_view(&wgpu::TextureViewDescriptor::default());
             painter.paint(context, &mut encoder, &view, &parts);
@@ -201,14 +201,14 @@ impl Surface {
         context.queue.submit([encoder.finish()]);
     }
 
-    /// Frees the textures immediately instead of at the next garbage collection, because sizes change often.
+    /// Frees the textures immediately rather than at the next garbage collection, because their size changes often.
     fn drop_parts(&mut self) {
         for part in self.parts.drain(..) {
             part.destroy();
         }
     }
 
-    /// A small render target, and its format.
+    /// A small texture to draw into, and its format.
     pub(crate) fn small_target(&self, context: &GpuContext) -> (wgpu::Texture, wgpu::TextureFormat) {
         (self.make_part(context, [SMALL_SIDE; 2]), self.format)
     }

@@ -1,4 +1,4 @@
-//! Plain objects passed to JavaScript: the types of contract.ts.
+//! Plain objects that JavaScript receives; border.rs generates their TypeScript declarations.
 
 use cagework_cage::check::{Code, Repair, Severity};
 use cagework_core::cage::CageNotice;
@@ -12,7 +12,7 @@ use wasm_bindgen::JsValue;
 use crate::error::Answer;
 use crate::playing::SharedClip;
 
-/// Corners of a box.
+/// Lower and upper corner of an axis-aligned box.
 #[derive(Clone, Copy, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "Bounds"))]
@@ -22,7 +22,7 @@ pub(crate) struct BoundsView {
 }
 
 impl BoundsView {
-    /// Converts bounds; `None` becomes zero.
+    /// Converts bounds. `None` becomes a box of size zero at the origin.
     pub(crate) fn of(bounds: Option<Bounds>) -> Self {
         let zero = [0.0; 3];
         bounds
@@ -34,9 +34,9 @@ impl BoundsView {
 #[derive(Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CameraView {
-    /// Centre of orbiting, object units.
+    /// Point that the camera orbits, object units.
     pub(crate) target: [f32; 3],
-    /// Rotation about y, and elevation above the horizon, radians.
+    /// Rotation of the camera about y, radians; `pitch` is its elevation above the horizon.
     pub(crate) yaw: f32,
     pub(crate) pitch: f32,
     /// Distance from the eye to the target, object units.
@@ -44,13 +44,13 @@ pub(crate) struct CameraView {
     pub(crate) parallel: bool,
 }
 
-/// Weights and nearest vertex of a surface point.
+/// Weights of a surface point, and the nearest vertex of the model.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Grip {
-    /// Weights of the point. `[n_cage]`
+    /// Weights of the cage's vertices at the point. `[n_cage]`
     pub(crate) row: Vec<f64>,
-    /// The nearest vertex of the model.
+    /// Index of the nearest vertex of the model.
     pub(crate) seed: u32,
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct View {
     pub(crate) bound: bool,
 }
 
-/// Properties of the models in the cage.
+/// Properties of all models in the cage.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -82,13 +82,13 @@ pub(crate) struct ModelInfo {
     clips: Vec<ClipView>,
     /// Morph targets of all models, and their weights at rest.
     targets: Vec<TargetView>,
-    /// Names of unskinned parts attached to joints or animated nodes; they can be kept rigid.
+    /// Names of unskinned parts attached to joints or animated nodes, which an export can keep rigid.
     props: Vec<String>,
-    /// Whether exports keep a rig.
+    /// Whether a model has a rig that an export keeps.
     rigged: bool,
     bounds: BoundsView,
     notices: Vec<String>,
-    /// Properties of each model.
+    /// Properties of each single model.
     members: Vec<MemberInfo>,
 }
 
@@ -113,7 +113,7 @@ impl ModelInfo {
             joints: sum(|model| model.counts.joints),
             clips: SharedClip::all(models).into_iter().map(ClipView::of).collect(),
             targets: TargetView::all(models),
-            // Errors of a rig are reported when it is used.
+            // Errors of a rig are reported when the rig is used.
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
             bounds: BoundsView::of(Bounds::of(models.positions())),
@@ -127,17 +127,17 @@ impl ModelInfo {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct MemberInfo {
-    /// Identifier; never changes.
+    /// Identifier, which stays the same for the model's lifetime.
     id: u32,
     name: String,
     format: ModelFormat,
     vertices: usize,
     triangles: usize,
     rigged: bool,
-    /// Names of the parts with their kinds, such as `material:Cloth`.
+    /// Names of the parts, prefixed by their kind, such as `material:Cloth`.
     parts: Vec<String>,
     options: PartOptions,
-    /// Whether a part of the model is painted to stay in place.
+    /// Whether some vertices of the model are painted to stay in place.
     painted: bool,
 }
 
@@ -158,11 +158,11 @@ impl MemberInfo {
     }
 }
 
-/// A clip.
+/// An animation clip.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ClipView {
-    /// The name, or the number if it has none.
+    /// Name of the clip, or its number if it has no name.
     name: String,
     seconds: f32,
 }
@@ -173,7 +173,7 @@ impl ClipView {
     }
 }
 
-/// A morph target.
+/// A morph target and its default weight.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct TargetView {
@@ -202,7 +202,7 @@ impl TargetView {
     }
 }
 
-/// Size of the cage.
+/// Counts, bounds and notices of the cage.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageInfo {
@@ -233,30 +233,30 @@ impl CageInfo {
     }
 }
 
-/// The cage, its controls and notices.
+/// The cage's properties, and its interior controls.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageState {
     pub(crate) usable: bool,
     pub(crate) info: CageInfo,
     pub(crate) controls: CageControls,
-    /// Radius of interior points and lines, object units.
+    /// Radius of interior point and line controls, object units.
     pub(crate) radius: f32,
 }
 
-/// A kind of fault of a cage.
+/// Faults of one kind in a cage: their number, and the best fix.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Problem {
     pub(crate) code: Code,
     pub(crate) severity: Severity,
-    /// A complete sentence.
+    /// Message of one or more complete sentences.
     pub(crate) message: String,
     pub(crate) count: usize,
     pub(crate) fix: Option<Fix>,
 }
 
-/// A fix, and the label of its button.
+/// A fix for a fault, with the label of its button.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Fix {
@@ -265,20 +265,20 @@ pub(crate) struct Fix {
     pub(crate) mend: Mend,
 }
 
-/// Action of a fix.
+/// What the button of a fix does.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) enum Mend {
-    /// Repairs the cage.
+    /// Repairs the cage by `repair`.
     Repair { repair: Repair },
     /// Binds with a grid of `cells` along the longest side.
     Grid { cells: u32 },
-    /// Makes another cage.
+    /// Generates a new cage.
     Regenerate,
 }
 
-/// Legend of the colours of model or slice.
+/// Legend of the colours of the slice or the model.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Legend {
@@ -286,11 +286,11 @@ pub(crate) struct Legend {
     pub(crate) high: f32,
     pub(crate) logarithmic: bool,
     pub(crate) map: ColorMap,
-    /// Largest of the displayed weights; `None` for other quantities.
+    /// Largest of the displayed weights; null for other quantities.
     pub(crate) largest: Option<Largest>,
 }
 
-/// The largest displayed value, and the model vertex that has it.
+/// The largest weight, and the index of the model vertex that has it.
 #[derive(Clone, Copy, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Largest {
@@ -298,7 +298,7 @@ pub(crate) struct Largest {
     pub(crate) vertex: u32,
 }
 
-/// Colour map of a legend.
+/// Colour map that a legend shows.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -308,7 +308,7 @@ pub(crate) enum ColorMap {
     Kinds,
 }
 
-/// Converts a value to a plain JavaScript object; `None` becomes null.
+/// Converts a value to a plain JavaScript object. `None` becomes null.
 pub(crate) fn object(value: &impl Serialize) -> Answer<JsValue> {
     let serializer = serde_wasm_bindgen::Serializer::json_compatible();
     Ok(value.serialize(&serializer)?)

@@ -11,17 +11,17 @@ use crate::arrays::{corners, flat};
 use crate::views::object;
 use cagework_editor::CageControls;
 
-/// Offsets of a bind: the frames, whose columns follow those of the controls, and the points outside the cage.
+/// Frames of a bind, and the points outside the cage. The frames' columns of the weights follow those of the controls.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Offsets {
-    /// Frames; their columns follow those of the controls.
+    /// Frames. In the weights, their columns follow those of the controls.
     pub(crate) frames: Frames,
     /// Points outside the cage.
     pub(crate) outside: Vec<OutsideVertex>,
 }
 
-/// Weights as compressed sparse rows, with the frames of the columns after the controls.
+/// Weights as compressed sparse rows, and the frames that the columns after the controls refer to.
 #[wasm_bindgen]
 pub struct Bound {
     pub(super) weights: Weights,
@@ -29,15 +29,15 @@ pub struct Bound {
     pub(super) report: JsValue,
 }
 
-/// A polygon mesh; for generated cages with the generator's report.
+/// A polygon mesh. For a generated cage, also the generator's report.
 #[wasm_bindgen]
 pub struct Polygons {
     pub(crate) mesh: PolygonMesh,
-    /// Number of separate parts of the model that a generated cage joins; 0 if it joins none.
+    /// Number of disconnected parts of the model that a generated cage joins into one; 0 if it joins none.
     pub(crate) bridged: u32,
-    /// Notices of the generator: gaps of the model that the cage closes, and how to keep each open.
+    /// Notices of the generator: gaps of the model that the cage covers, and how to keep each gap open.
     pub(crate) notices: Vec<String>,
-    /// Subdivision and interior controls of a project's cage.
+    /// Subdivision and interior controls; set only for the cage of a project.
     pub(crate) controls: Option<CageControls>,
 }
 
@@ -58,28 +58,28 @@ pub struct BuiltSample {
 
 #[wasm_bindgen]
 impl Bound {
-    /// Row pointers. `[n_vertices + 1]`
+    /// Row pointers of the sparse rows. `[n_vertices + 1]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn indptr(&self) -> Vec<u32> {
         self.weights.indptr().to_vec()
     }
 
-    /// Columns: controls, then frames. `[n_nonzeros]`
+    /// Column indices: controls first, then frames. `[n_nonzeros]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn indices(&self) -> Vec<u32> {
         self.weights.indices().to_vec()
     }
 
-    /// Weights. `[n_nonzeros]`
+    /// Non-zero weights. `[n_nonzeros]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn data(&self) -> Vec<f32> {
         self.weights.data().to_vec()
     }
 
-    /// The frames, whose columns follow those of the controls, and the points outside the cage.
+    /// Frames, and points outside the cage. The frames' columns of the weights follow those of the controls.
     ///
     /// # Errors
     /// Never.
@@ -88,7 +88,7 @@ impl Bound {
         Ok(object(&self.offsets)?)
     }
 
-    /// The bind report; undefined for coordinates by formula and slices.
+    /// Report of the bind; undefined for closed-form coordinates and slices.
     #[wasm_bindgen(getter, unchecked_return_type = "BindReport | undefined")]
     #[must_use]
     pub fn report(&self) -> JsValue {
@@ -98,22 +98,22 @@ impl Bound {
 
 #[wasm_bindgen]
 impl Polygons {
-    /// Vertices. `[n, 3]`
+    /// Vertex positions. `[n, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         flat(&self.mesh.positions)
     }
 
-    /// For each face the number of its corners, then them.
+    /// For each face its corner count, then the vertex indices of its corners.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn corners(&self) -> Vec<u32> {
         corners(&self.mesh.faces)
     }
 
-    /// Subdivision and interior controls of a project's cage, whose positions follow the vertices; undefined for other
-    /// meshes.
+    /// Subdivision and interior controls of a project's cage; undefined for other meshes. In `positions`, the positions
+    /// of interior controls follow the vertices.
     ///
     /// # Errors
     /// Never.
@@ -122,14 +122,15 @@ impl Polygons {
         Ok(self.controls.as_ref().map_or(Ok(JsValue::UNDEFINED), object)?)
     }
 
-    /// Number of separate parts of the model that a generated cage joins; 0 if it joins none.
+    /// Number of disconnected parts of the model that a generated cage joins into one; 0 if it joins none.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn bridged(&self) -> u32 {
         self.bridged
     }
 
-    /// Notices of the generator, a sentence each: gaps of the model that the cage closes, and how to keep each open.
+    /// Notices of the generator, one sentence each: gaps of the model that the cage covers, and how to keep each gap
+    /// open.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
@@ -139,14 +140,14 @@ impl Polygons {
 
 #[wasm_bindgen]
 impl BuiltSample {
-    /// The model as GLB.
+    /// The model as a GLB file.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn glb(&self) -> Vec<u8> {
         self.glb.clone()
     }
 
-    /// The model's vertices. `[n_vertices, 3]`
+    /// Vertices of the model. `[n_vertices, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
@@ -160,7 +161,7 @@ impl BuiltSample {
         self.cage.clone().into()
     }
 
-    /// Names of the prepared poses.
+    /// Names of the sample's poses.
     #[wasm_bindgen(getter, js_name = poseNames)]
     #[must_use]
     pub fn pose_names(&self) -> Vec<String> {

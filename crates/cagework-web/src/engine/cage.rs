@@ -1,4 +1,4 @@
-//! Methods for the cage: create, read, edit at rest, pose.
+//! Methods that create, read, reshape and pose the cage.
 
 use cagework_core::bind::estimate_memory;
 use cagework_core::subdivided_box;
@@ -15,12 +15,13 @@ use crate::error::{Answer, Fault};
 use crate::options::{JsBindOptions, decode};
 use crate::views::object;
 
-/// Distance between the model and a box cage, over the model's diagonal.
+/// Distance between the model and a box cage, as a fraction of the model's diagonal.
 const BOX_MARGIN: f32 = 0.04;
 
 #[wasm_bindgen]
 impl Engine {
-    /// A box around the model. Its longest side has `divisions` segments, the others proportionally many.
+    /// A box around the model. Its longest side has `divisions` segments; the other sides have segments of about this
+    /// length.
     ///
     /// # Errors
     /// If no model is open.
@@ -36,12 +37,12 @@ impl Engine {
         Ok(mesh.into())
     }
 
-    /// Replaces the cage. `corners`: for each face its corner count, then its corners. A mesh that is not a valid cage is
-    /// kept as a draft; `Binder.checkCage` finds its faults. Without `controls`, the current ones that fit are kept. With a
-    /// label, adds a step to the history.
+    /// Replaces the cage. `corners`: for each face its corner count, then its vertex indices. A mesh that is not a
+    /// valid cage is stored as a draft; `Binder.checkCage` finds its faults. Without `controls`, the current interior
+    /// controls that fit into the new cage are kept. With a label, adds a step to the history.
     ///
     /// # Errors
-    /// If the arrays are not a polygon mesh, or the controls do not fit. Nothing changes then.
+    /// If the arrays are not a polygon mesh, or a control does not fit into the cage. The document is then unchanged.
     #[wasm_bindgen(js_name = setCage, unchecked_return_type = "CageState")]
     pub fn set_cage(
         &self,
@@ -60,7 +61,7 @@ impl Engine {
         self.cage_state()
     }
 
-    /// The cage as panels show it; undefined without a cage.
+    /// Properties of the cage for panels; undefined without a cage.
     ///
     /// # Errors
     /// Never.
@@ -69,10 +70,11 @@ impl Engine {
         Ok(self.read(|state| state.cage_state().map_or(Ok(JsValue::UNDEFINED), |shown| object(&shown)))?)
     }
 
-    /// Applies a command to the document. With a label, adds a step to the history; otherwise the next step includes it.
+    /// Applies a command to the document. With a label, adds a step to the history; otherwise the next history step
+    /// includes the change.
     ///
     /// # Errors
-    /// If the command cannot be applied. Nothing changes then.
+    /// If the command cannot be applied. The document is then unchanged.
     pub fn apply(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Command")] command: JsValue,
@@ -81,18 +83,18 @@ impl Engine {
         Ok(self.step(decode(command)?, label)?)
     }
 
-    /// Adds a step to the history with all changes since the last step; false if nothing has changed.
+    /// Adds a step to the history with all changes since the last history step; false if nothing has changed.
     #[must_use]
     pub fn commit(&self, label: &str) -> bool {
         self.change(|state| state.editor.commit(label))
     }
 
-    /// Adds all changes since the last step to that step.
+    /// Adds all changes since the last history step to that step.
     pub fn amend(&self) {
         self.change(|state| state.editor.amend());
     }
 
-    /// Reverts all changes since the last step.
+    /// Reverts all changes since the last history step.
     pub fn revert(&self) {
         self.change(|state| {
             state.editor.revert();
@@ -101,13 +103,13 @@ impl Engine {
         });
     }
 
-    /// Undoes the last step; false if the history is empty, or while models are being added.
+    /// Undoes the last history step; false if the history is empty, or while models are being added.
     #[must_use]
     pub fn undo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.undo())
     }
 
-    /// Redoes the step that was undone last; false if nothing was undone, or while models are being added.
+    /// Redoes the history step that was undone last; false if nothing was undone, or while models are being added.
     #[must_use]
     pub fn redo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.redo())
@@ -119,7 +121,7 @@ impl Engine {
         self.change(|state| state.editor.clear_history());
     }
 
-    /// For each face of the cage its corner count, then its corners.
+    /// For each face of the cage its corner count, then its vertex indices.
     #[wasm_bindgen(js_name = cageCorners)]
     #[must_use]
     pub fn cage_corners(&self) -> Vec<u32> {
@@ -140,14 +142,14 @@ impl Engine {
         self.read(|state| flat(state.pose()))
     }
 
-    /// Sets the pose. Positions of another cage are ignored.
+    /// Sets the pose. Does nothing if `positions` has another number of controls than the cage.
     #[wasm_bindgen(js_name = setCagePositions)]
     pub fn set_cage_positions(&self, positions: &[f32]) {
-        // A job that was started for an earlier cage may finish after a change.
+        // The result of a job for an earlier cage may arrive after the cage has changed.
         let _ = self.change(|state| state.editor.set_pose(points(positions)));
     }
 
-    /// The current pose and each saved pose of this cage, for `Binder.carryPoses`. `[n_poses, n_controls, 3]`
+    /// The current pose and each saved pose that fits this cage, for `Binder.carryPoses`. `[n_poses, n_controls, 3]`
     #[must_use]
     pub fn carriable(&self) -> Vec<f32> {
         self.read(|state| {
@@ -157,7 +159,7 @@ impl Engine {
         })
     }
 
-    /// Starts or ends reshaping the cage. If this resets a pose, it adds a step to the history.
+    /// Starts or ends reshaping the cage. If this resets the pose, it adds a step to the history with this label.
     #[wasm_bindgen(js_name = setEditingRest)]
     pub fn set_editing_rest(&self, editing: bool, label: &str) {
         self.change(|state| {

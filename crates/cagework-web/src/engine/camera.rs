@@ -1,4 +1,4 @@
-//! Methods for the camera.
+//! Methods that read and move the camera.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -13,12 +13,12 @@ use crate::error::{ErrorName, Fault};
 use crate::options::decode;
 use crate::views::{CameraView, object};
 
-/// Drag distance of a whole turn, CSS pixels: half the width of a typical screen is half a turn.
+/// Length of a pointer movement that orbits the camera by 360 degrees, CSS pixels.
 const PIXELS_PER_TURN: f32 = 900.0;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The camera's position and direction.
+    /// Target, direction and distance of the camera.
     ///
     /// # Errors
     /// Never.
@@ -37,7 +37,7 @@ impl Engine {
     /// Sets the camera.
     ///
     /// # Errors
-    /// If a number is not finite or out of range.
+    /// If a number is not finite or is out of range.
     #[wasm_bindgen(js_name = setCamera)]
     pub fn set_camera(
         &self,
@@ -60,17 +60,17 @@ impl Engine {
         Ok(())
     }
 
-    /// Orbits the camera by a pointer movement, CSS pixels.
+    /// Orbits the camera by a pointer movement in CSS pixels.
     pub fn orbit(&self, dx: f32, dy: f32) {
         self.change(|state| state.camera.orbit(Vec2::new(dx, dy) * (TAU / PIXELS_PER_TURN)));
     }
 
-    /// Pans the camera by a pointer movement, CSS pixels.
+    /// Pans the camera by a pointer movement in CSS pixels.
     pub fn pan(&self, dx: f32, dy: f32) {
         self.change(|state| state.camera.pan(Vec2::new(dx, dy)));
     }
 
-    /// Zooms by `factor` about a point of the view, CSS pixels.
+    /// Zooms by `factor` about the view point (`x`, `y`) in CSS pixels.
     #[wasm_bindgen(js_name = zoomAt)]
     pub fn zoom_at(&self, x: f32, y: f32, factor: f32) {
         if factor.is_finite() && factor > 0.0 {
@@ -81,13 +81,13 @@ impl Engine {
         }
     }
 
-    /// Fits model and cage into the view.
+    /// Moves the camera so that model and cage fit into the view.
     #[wasm_bindgen(js_name = frameAll)]
     pub fn frame_all(&self) {
         self.change(super::super::state::State::frame_all);
     }
 
-    /// Fits the selection into the view; model and cage if nothing is selected.
+    /// Moves the camera so that the selected vertices fit into the view; model and cage if nothing is selected.
     #[wasm_bindgen(js_name = frameSelection)]
     pub fn frame_selection(&self) {
         self.change(|state| {
@@ -100,7 +100,7 @@ impl Engine {
         });
     }
 
-    /// Looks along an axis, 0 to 2, from its positive or negative end.
+    /// Looks along an axis, 0 to 2, from its positive end, or from its negative end if `negative` is set.
     #[wasm_bindgen(js_name = axisView)]
     pub fn axis_view(&self, axis: u32, negative: bool) {
         let view = match (axis, negative) {
@@ -114,7 +114,7 @@ impl Engine {
         self.change(|state| state.camera.look_along(view));
     }
 
-    /// Toggles between perspective and parallel projection; true for parallel.
+    /// Toggles between perspective and parallel projection; returns true if the projection is now parallel.
     #[wasm_bindgen(js_name = toggleOrtho)]
     #[must_use]
     pub fn toggle_ortho(&self) -> bool {
@@ -126,7 +126,8 @@ impl Engine {
         })
     }
 
-    /// Projects a point: x and y in CSS pixels, then 1, or 0 if it is behind the camera. `[3]`
+    /// Projects a point to the view. Returns x and y in CSS pixels, then 1; all zero if the point is behind the camera.
+    /// `[3]`
     #[must_use]
     pub fn project(&self, x: f32, y: f32, z: f32) -> Vec<f32> {
         let projected = self.read(|state| state.camera.project(Vec3::new(x, y, z)));

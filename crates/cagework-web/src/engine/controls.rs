@@ -1,4 +1,4 @@
-//! Methods for interior controls.
+//! Methods that read, add and show interior controls.
 
 use cagework_core::{ControlError, InnerControls};
 use cagework_editor::Command;
@@ -16,7 +16,7 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Subdivision and interior controls, as for `setCage`.
+    /// Subdivision and interior controls of the cage, in the form that `setCage` takes.
     ///
     /// # Errors
     /// Never.
@@ -25,10 +25,10 @@ impl Engine {
         Ok(self.read(|state| object(&state.cage().controls))?)
     }
 
-    /// Replaces the interior controls by those of an OBJ file; adds a step to the history.
+    /// Replaces the interior controls by those of an OBJ file, and adds a step to the history.
     ///
     /// # Errors
-    /// If the file cannot be read, or a control does not fit. Nothing changes then.
+    /// If the file cannot be read, or a control does not fit into the cage. The document is then unchanged.
     #[wasm_bindgen(js_name = readControls)]
     pub fn read_controls(&self, bytes: &[u8], label: String) -> Result<(), JsValue> {
         let origin = self.read(|state| state.models().origin());
@@ -41,7 +41,7 @@ impl Engine {
         Ok(self.step(Command::ReplaceControls { positions, elements }, Some(label))?)
     }
 
-    /// The point inside the model under the pointer, at rest, where a new control is placed. `[3]`
+    /// The point of the rest model, halfway through it under the pointer, where a new control is placed. `[3]`
     #[wasm_bindgen(js_name = middleAt)]
     #[must_use]
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {
@@ -58,10 +58,11 @@ impl Engine {
         middle.to_array().to_vec()
     }
 
-    /// Adds the largest sheet that fits around `center`, parallel to the view plane; adds a step to the history.
+    /// Adds the largest sheet around `center` that fits into the cage, parallel to the view plane, and adds a step to
+    /// the history.
     ///
     /// # Errors
-    /// If the smallest sheet does not fit.
+    /// If even the smallest sheet does not fit.
     #[wasm_bindgen(js_name = addSheet)]
     pub fn add_sheet(&self, center: &[f32], label: String) -> Result<(), JsValue> {
         let axes = self.read(|state| {
@@ -73,7 +74,7 @@ impl Engine {
         Ok(self.step(Command::AddSheet { center, axes }, Some(label))?)
     }
 
-    /// Shows the points of a control that is being added. `[n, 3]`
+    /// Shows the points of an interior control that is being placed. `[n, 3]`
     #[wasm_bindgen(js_name = showPlaced)]
     pub fn show_placed(&self, places: &[f32]) {
         self.change(|state| {

@@ -1,4 +1,4 @@
-//! Methods that write files and return the arrays of the models.
+//! Methods that write files and return arrays of the models.
 
 use std::ops::Range;
 
@@ -24,8 +24,8 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The posed model as GLB; a rigged model with skeleton, morph targets and clips. With `options.dynamic`, the frames of
-    /// `clip` as morph targets instead, if the model has this clip.
+    /// The posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With `options.dynamic`, and
+    /// if the model has this clip, the frames of `clip` are exported as morph targets instead.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -46,7 +46,7 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// The posed model in a format that stores only a shape.
+    /// The posed model in a format that stores only its shape, without rig or animation.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -67,7 +67,7 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// Notices of the last export about the rig, a sentence each. Returns each notice once.
+    /// Notices of the last export about the rig, one sentence each. Clears them, so that each notice is returned once.
     #[wasm_bindgen(js_name = rigNotices)]
     #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {
@@ -119,7 +119,7 @@ impl Engine {
         Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
-    /// The posed interior controls as OBJ.
+    /// The posed interior controls as OBJ. They follow the cage's vertices in the pose.
     ///
     /// # Errors
     /// If the cage has no interior controls.
@@ -136,7 +136,7 @@ impl Engine {
         })?)
     }
 
-    /// A model's weights as NPZ, as loaded by `scipy.sparse.load_npz`.
+    /// Weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
     ///
     /// # Errors
     /// If the models are not bound.
@@ -156,7 +156,7 @@ impl Engine {
         })?)
     }
 
-    /// Project file with the document and the page's settings, a JSON object.
+    /// Project file with the document, and with the page's settings as a JSON object.
     ///
     /// # Errors
     /// If no model is open, or the file would be too large.
@@ -174,20 +174,21 @@ impl Engine {
         Ok(self.read(|state| object(&state.up()))?)
     }
 
-    /// Origin of all positions, in the axes of the models' files: zero unless the models are far from the world origin. `[3]`
+    /// Origin of all positions, in the axes of the models' files; zero unless the models are far from the world origin.
+    /// `[3]`
     #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.read(|state| state.models().origin().to_array().to_vec())
     }
 
-    /// Vertices at rest, concatenated over the models. `[n_vertices, 3]`
+    /// Vertices of all models at rest, concatenated. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
     #[must_use]
     pub fn model_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.models().positions()))
     }
 
-    /// Points to bind: vertices of all models, then the points of their rigs. `[n_points, 3]`
+    /// Points to bind: vertices of all models, then points of their rigs. `[n_points, 3]`
     ///
     /// # Errors
     /// If the rig cannot be read.
@@ -200,8 +201,8 @@ impl Engine {
         })?)
     }
 
-    /// Geometry that a cage should enclose: positions and triangles of the models at rest, with each morph target, and in
-    /// the frames of `clip`, if given. `[n, 3]` each
+    /// Geometry that a cage should enclose: positions and triangles of the models at rest, with each morph target, and
+    /// in the frames of `clip` if it is given. `[n, 3]` each
     ///
     /// # Errors
     /// If no model has this clip.
@@ -211,7 +212,7 @@ impl Engine {
         self.read(|state| {
             let is_alone = state.models().iter().nth(1).is_none();
             for member in state.models().iter() {
-                // Models without the clip stay at rest, as in playback.
+                // Models without this clip contribute no frames, because they stay at rest during playback.
                 let has = |name: &&str| is_alone || Clip::named(&member.model.clips(), name).is_ok();
                 let states = member.model.states(clip.as_deref().filter(has));
                 let (own, corners) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
@@ -226,7 +227,7 @@ impl Engine {
         Ok(Array::of2(&positions, &triangles).into())
     }
 
-    /// The models' triangles. `[n_triangles, 3]`
+    /// Triangles of all models. `[n_triangles, 3]`
     #[wasm_bindgen(js_name = modelTriangles)]
     #[must_use]
     pub fn model_triangles(&self) -> Vec<u32> {
@@ -248,7 +249,7 @@ impl Engine {
         })
     }
 
-    /// A model as GLB whose morph targets are the frames of a clip, each deformed by the cage; and notices.
+    /// A model as GLB whose morph targets are the frames of a clip, each frame deformed by the cage; and notices.
     fn baked(&self, id: u32, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
         let field = self.field()?;
         self.read(|state| {
@@ -263,8 +264,8 @@ impl Engine {
         })
     }
 
-    /// A rigged model in a pose of the cage, or at rest with poses as morph targets. `None` if it has no rig, or the rig is
-    /// not exported.
+    /// Bytes and report of a rigged model in a pose of the cage, with `poses` as morph targets. `None` if the model has
+    /// no rig, or the options omit it.
     fn reshaped(
         &self,
         id: u32,
@@ -295,7 +296,7 @@ impl Engine {
                     .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
                     .collect::<Answer<Vec<_>>>()?;
                 let mut options = request.options();
-                // Skip names of other models.
+                // `rigid` may name parts of other models.
                 let props = model.props()?;
                 options.rigid.retain(|name| props.contains(name));
                 options.parts = member.parts()?;
@@ -304,7 +305,7 @@ impl Engine {
         })
     }
 
-    /// All vertices in poses of the cage; at rest before a bind.
+    /// Vertices of all models in each of the cage's `poses`; at rest before a bind.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let (rest, controls) =
             self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
@@ -312,7 +313,7 @@ impl Engine {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
             let n_frames = session.frames().map_or(0, Frames::n_columns);
             let deformed = |pose: &Vec<Vec3>| {
-                // At rest, return the vertices unchanged: the weighted sums would round.
+                // At rest, return the vertices unchanged: weighted sums would add rounding errors.
                 if *pose == controls {
                     return Ok(rest.clone());
                 }
@@ -325,17 +326,18 @@ impl Engine {
     }
 }
 
-/// Weights of one model: rows of its vertices and of its rig's points, with indices relative to the model.
+/// Weights of one model: rows of its vertices, and rows of its rig's points. Indices of points are relative to the
+/// model.
 struct ModelRows {
     weights: Weights,
     frames: Frames,
-    /// Points outside the cage: vertices, then points of the rig.
+    /// Points outside the cage. Indices of the rig's points follow those of the vertices.
     outside: Vec<OutsideVertex>,
     rig: Weights,
 }
 
 impl State {
-    /// Rows of one model; `None` before a bind.
+    /// Weights of one model; `None` before a bind.
     fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<ModelRows>> {
         let Some(all) = session.weights() else { return Ok(None) };
         let n = self.models().positions().len();
@@ -359,7 +361,7 @@ impl State {
     }
 }
 
-/// A range of rows.
+/// The weights of a range of rows.
 fn rows_of(all: &Weights, range: Range<usize>) -> Weights {
     all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
 }

@@ -1,4 +1,4 @@
-//! Methods that move the cage: gestures, typed positions, playback of poses.
+//! Methods that move the cage: gestures, typed positions, and playback of saved poses.
 
 use cagework_core::view::View as _;
 use cagework_editor::edit::{Constraint, Gesture, GestureKind};
@@ -12,12 +12,12 @@ use crate::options::{GizmoHandle, JsGizmo, decode};
 use crate::state::State;
 use crate::views::object;
 
-/// Smallest movement that changes the cage, pixels.
+/// Smallest movement of the selection that changes the cage, pixels.
 const MIN_MOVE: f32 = 1e-3;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Begins a gesture: grab, rotate or scale; false if nothing is selected.
+    /// Begins a gesture that moves, rotates or scales the selection; false if nothing is selected.
     ///
     /// # Errors
     /// If the kind of gesture is unknown.
@@ -35,7 +35,8 @@ impl Engine {
         }))
     }
 
-    /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; otherwise undefined.
+    /// The handle of the gizmo under the pointer, or the nearest handle within `radius` CSS pixels; otherwise
+    /// undefined.
     ///
     /// # Errors
     /// Never.
@@ -54,7 +55,7 @@ impl Engine {
         Ok(part.map_or(Ok(JsValue::UNDEFINED), |part| object(&handle_of(part)))?)
     }
 
-    /// Begins the gesture of a gizmo handle.
+    /// Begins the gesture that dragging a handle of the gizmo performs.
     ///
     /// # Errors
     /// If the handle is unknown.
@@ -81,13 +82,14 @@ impl Engine {
         }))
     }
 
-    /// Moves the pointer of the gesture, CSS pixels.
+    /// Passes a pointer position, CSS pixels, to the gesture in progress.
     #[wasm_bindgen(js_name = dragTransform)]
     pub fn drag_transform(&self, x: f32, y: f32) {
         self.with_gesture(|gesture, pointer| gesture.drag(pointer(x, y)));
     }
 
-    /// Restricts the gesture to an axis, 0 to 2, or to the plane normal to it; any other number removes the restriction.
+    /// Restricts the gesture to an axis, 0 to 2, or with `plane` to the plane normal to it; any other number removes
+    /// the restriction.
     pub fn constrain(&self, axis: i32, plane: bool) {
         self.with_gesture(|gesture, _| {
             gesture.constrain(match (axis, plane) {
@@ -98,26 +100,27 @@ impl Engine {
         });
     }
 
-    /// Sets a typed amount that replaces the pointer; undefined returns to the pointer.
+    /// Sets the amount of the gesture to a typed number instead of the pointer movement; undefined returns to the
+    /// pointer.
     #[wasm_bindgen(js_name = typeTransform)]
     pub fn type_transform(&self, amount: Option<f32>) {
         self.with_gesture(|gesture, _| gesture.type_amount(amount));
     }
 
-    /// Sets the radius of proportional editing, in diagonals of the cage; 0 turns it off.
+    /// Sets the radius of proportional editing, in multiples of the cage's diagonal; 0 turns proportional editing off.
     #[wasm_bindgen(js_name = setProportional)]
     pub fn set_proportional(&self, radius: f32) {
         self.change(|state| state.editor.set_radius(radius, &state.camera));
     }
 
-    /// Status line of the gesture, such as `Move 0.25 along X`.
+    /// Status text of the gesture in progress, such as `Move 0.25 along X`.
     #[wasm_bindgen(js_name = transformLabel)]
     #[must_use]
     pub fn transform_label(&self) -> String {
         self.read(|state| state.editor.gesture().as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
     }
 
-    /// Ends the gesture; true if it moved a vertex and `keep` is set.
+    /// Ends the gesture, and reverts it unless `keep` is set. Returns true if `keep` is set and a vertex has moved.
     #[wasm_bindgen(js_name = endTransform)]
     #[must_use]
     pub fn end_transform(&self, keep: bool) -> bool {
@@ -128,7 +131,7 @@ impl Engine {
         })
     }
 
-    /// Moves the selection's centre to a point.
+    /// Moves the selection so that its centre is at a point; false if nothing is selected or the movement is too small.
     #[wasm_bindgen(js_name = moveSelectionTo)]
     #[must_use]
     pub fn move_selection_to(&self, x: f32, y: f32, z: f32) -> bool {
@@ -138,7 +141,7 @@ impl Engine {
         })
     }
 
-    /// Moves the selection in the view plane, CSS pixels; false if the movement is too small.
+    /// Moves the selection in the view plane by CSS pixels; false if nothing is selected or the movement is too small.
     #[must_use]
     pub fn nudge(&self, right: f32, up: f32) -> bool {
         self.change(|state| {
@@ -148,10 +151,10 @@ impl Engine {
         })
     }
 
-    /// Sets the centre of rotation and scaling.
+    /// Sets the centre about which gestures rotate and scale.
     ///
     /// # Errors
-    /// If the pivot is unknown.
+    /// If the pivot type is unknown.
     #[wasm_bindgen(js_name = setPivot)]
     pub fn set_pivot(
         &self,
@@ -165,14 +168,14 @@ impl Engine {
         Ok(())
     }
 
-    /// Moves the cage to a time of the animation through all saved poses, seconds.
+    /// Moves the cage to its pose at a time, in seconds, of the animation through all saved poses.
     #[wasm_bindgen(js_name = playAt)]
     pub fn play_at(&self, seconds: f32) {
         self.change(|state| state.editor.play_at(seconds));
     }
 }
 
-/// Handle of a part of the gizmo.
+/// The handle that stands for a part of the gizmo.
 fn handle_of(part: GizmoPart) -> GizmoHandle {
     match part {
         GizmoPart::Axis(0) => GizmoHandle::X,
@@ -185,7 +188,7 @@ fn handle_of(part: GizmoPart) -> GizmoHandle {
     }
 }
 
-/// Part of the gizmo of a handle, and the restriction of its gesture.
+/// The gizmo part that a handle stands for, and the constraint on gestures that drag it.
 fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
     match handle {
         GizmoHandle::X => (GizmoPart::Axis(0), Constraint::Axis(0)),

@@ -1,7 +1,7 @@
-//! The engine: the interface of the page's main thread to Rust.
+//! The engine: the Rust methods that the page's main thread calls.
 //!
-//! Each file adds the methods of one topic. Only methods that return promises wait. A change requests a frame from the
-//! page, which draws it.
+//! Each file adds the methods of one topic. Only methods that return promises wait for the GPU. Each change of the
+//! state asks the page for a new frame, which the page draws by calling `drawFrame`.
 
 mod cage;
 mod camera;
@@ -43,17 +43,17 @@ use crate::state::{BoundModels, State, joined};
 use crate::surface::Surface;
 use crate::views::{View, object};
 
-/// Models, cage, camera and picture of one page.
+/// Models, cage, camera and rendering of one page.
 #[wasm_bindgen]
 #[derive(Clone)]
 pub struct Engine {
     state: Rc<RefCell<State>>,
     gpu: SharedGpu,
-    /// Requests a frame from the page.
+    /// JavaScript callback that requests a frame from the page.
     invalidate: Function,
-    /// Passes a changed [`View`] to the page.
+    /// JavaScript callback that receives a changed [`View`].
     changed: Function,
-    /// The last view passed to the page.
+    /// The last view that was passed to `changed`.
     last_view: Rc<RefCell<View>>,
 }
 
@@ -80,12 +80,12 @@ impl Engine {
         })
     }
 
-    /// Replaces the open models, cage and poses, and clears the history. Consumes the handles of the models. Returns
-    /// notices.
+    /// Replaces the open models, cage and poses, and clears the history. Consumes the JavaScript handles of the models.
+    /// Returns notices.
     ///
     /// # Errors
-    /// If the GPU runs out of memory, or cannot draw the models' many transparent layers fast enough. The open models stay
-    /// then.
+    /// If the GPU runs out of memory, or cannot draw the models' transparent layers fast enough. The previous models
+    /// then remain open.
     pub async fn open(
         &self,
         models: Vec<Loaded>,
@@ -126,7 +126,7 @@ impl Engine {
             gpu.others.clear();
             self.state.borrow_mut().forget_gpu();
             if let Err(error) = gpu.main.set_shared_model(draw).await {
-                // Uploads the models that stay open, with their weights.
+                // Upload the previous models again, with their weights.
                 self.change(|_| ());
                 return Err(Fault::from(error).into());
             }
@@ -144,8 +144,8 @@ impl Engine {
         Ok(notices)
     }
 
-    /// Uses the weights of `Binder.bind`: row pointers, columns and weights, the offsets, and the report. Weights of a
-    /// `final` pass are cached for undo.
+    /// Uses the weights that `Binder.bind` computed: row pointers, column indices and values, the offsets, and the
+    /// report. Weights of a `final` pass are cached for undo.
     ///
     /// # Errors
     /// If the arrays do not match models and cage, or the GPU runs out of memory. `Cancelled` if models or cage change
@@ -169,7 +169,7 @@ impl Engine {
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        // Finish pending uploads first: an upload of the cage drops the weights.
+        // Finish pending uploads first: uploading a cage drops the weights on the GPU.
         upload(&self.state, gpu).await?;
         is_current()?;
         let (weights, frames) = (Arc::new(weights), Arc::new(frames));
@@ -179,7 +179,7 @@ impl Engine {
             let joints = rig.as_ref().and_then(|weights| {
                 let of_rig = outside.iter().filter_map(|o| o.vertex.checked_sub(n_vertices as u32));
                 let of_rig: Vec<u32> = of_rig.collect();
-                // The export reports errors of a rig.
+                // A rig with errors gets no joint marks here; the export reports the errors.
                 JointDots::new(state.models(), weights, (*frames).clone(), &of_rig).ok()
             });
             let bytes = weights.bytes() + rig.as_ref().map_or(0, Weights::bytes);
@@ -192,7 +192,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Whether weights of the current models and cage are in use or cached.
+    /// Whether weights of the current models and cage are in use, or cached from an earlier bind.
     #[wasm_bindgen(getter, js_name = hasWeights)]
     #[must_use]
     pub fn has_weights(&self) -> bool {
@@ -206,10 +206,10 @@ impl Engine {
         self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
     }
 
-    /// Adds coordinates by a closed form for comparison. Arrays as for `adopt`.
+    /// Adds closed-form coordinates of a kind, for comparison. Arrays as for `adopt`.
     ///
     /// # Errors
-    /// Those of `adopt`.
+    /// The errors of `adopt`.
     #[wasm_bindgen(js_name = adoptOther)]
     pub async fn adopt_other(
         &self,
@@ -238,7 +238,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Whether coordinates of a kind are available for comparison.
+    /// Whether coordinates of this kind are available for comparison.
     ///
     /// # Errors
     /// If the kind is unknown.
@@ -251,7 +251,7 @@ impl Engine {
         Ok(self.read(|state| state.others.contains(&kind)))
     }
 
-    /// Increases with each change of the models or the rest cage.
+    /// Number that increases with each change of the models or the rest cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn revision(&self) -> u32 {
@@ -261,20 +261,20 @@ impl Engine {
     /// Checks that the result of a job that was started at `revision` is still valid.
     ///
     /// # Errors
-    /// `Cancelled` if models or cage have changed since.
+    /// `Cancelled` if models or cage have changed since that revision.
     #[wasm_bindgen(js_name = requireCurrent)]
     pub fn require_current(&self, revision: u32) -> Result<(), JsValue> {
         Ok(self.read(|state| state.require(revision))?)
     }
 
-    /// Whether the model follows the cage.
+    /// Whether weights are in use, so that the model follows the cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn bound(&self) -> bool {
         self.read(|state| state.bound.is_some())
     }
 
-    /// Resolves with the reason when the GPU device is lost.
+    /// Resolves with the reason when the GPU device is lost. Calls wait until then.
     ///
     /// # Errors
     /// Never while the engine is alive.
@@ -286,17 +286,18 @@ impl Engine {
         Ok(receiver.await.map_err(|_| Fault::new(ErrorName::DeviceLost, "the GPU is gone"))?)
     }
 
-    /// Marks the device as lost. Called when the browser reports a loss, and by tests.
+    /// Marks the GPU device as lost. The page calls this when the browser reports a loss; tests call it to simulate
+    /// one.
     pub fn lose(&self) {
         if let Some(gpu) = self.gpu.try_lock().as_ref().and_then(|gpu| gpu.as_ref()) {
             gpu.main.context().lose("the browser took it away");
         }
     }
 
-    /// Uploads everything to a new device. Can be called again after an error.
+    /// Opens a new GPU device and uploads all data to it. Can be called again after an error.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`: try again later. If the GPU runs out of memory.
+    /// `NoAdapter`, `NoDevice`: try again later. Also if the GPU runs out of memory.
     pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
         let (surface, context) = Surface::open(canvas).await?;
         {
@@ -304,7 +305,7 @@ impl Engine {
             let gpu = shared.as_mut().ok_or_else(lost)?;
             let main = gpu.main.recover(context).await.map_err(Fault::from)?;
             *gpu = Gpu { main, others: Vec::new(), surface };
-            // The document may have changed in the meantime.
+            // The document may have changed while the device was opened.
             upload(&self.state, gpu).await?;
         }
         self.change(|state| {
@@ -321,8 +322,8 @@ impl Engine {
         read(&self.state.borrow())
     }
 
-    /// Changes the state, drops derived state of an earlier document, notifies the page, requests a frame, and starts an
-    /// upload if needed.
+    /// Changes the state, drops derived state that the change made out of date, notifies the page, requests a frame,
+    /// and starts an upload if the GPU lacks data.
     fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
         let changed = {
             let mut state = self.state.borrow_mut();
@@ -341,7 +342,7 @@ impl Engine {
         if *self.last_view.borrow() != view {
             let given = object(&view);
             *self.last_view.borrow_mut() = view;
-            // Ignore exceptions of the page's callback.
+            // Ignore exceptions that the page's callback throws.
             let _ = given.map(|view| self.changed.call1(&JsValue::NULL, &view));
         }
         let _ = self.invalidate.call0(&JsValue::NULL);
@@ -371,10 +372,10 @@ impl Engine {
         });
     }
 
-    /// Reads the GPU session.
+    /// Reads the GPU session of harmonic coordinates.
     ///
     /// # Errors
-    /// If an upload holds the lock, or the device is lost.
+    /// If an upload in progress holds the lock, or the device is lost.
     fn with_session<T>(&self, read: impl FnOnce(&Session) -> Answer<T>) -> Answer<T> {
         let gpu = self
             .gpu
@@ -384,7 +385,8 @@ impl Engine {
     }
 }
 
-/// Splits weights into those of the vertices and those of the rigs' points; `None` if there are no such points.
+/// Splits weights into rows of the vertices and rows of the rigs' points; `None` for the latter if there are no such
+/// points.
 fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     let n = weights.n_rows();
     if n <= n_vertices {

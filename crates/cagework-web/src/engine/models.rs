@@ -1,4 +1,4 @@
-//! Methods for several models in one cage: adding, painting of fixed regions.
+//! Methods for adding models to a cage and for painting regions that stay in place.
 
 use std::sync::Arc;
 
@@ -16,18 +16,19 @@ use crate::loaded::Loaded;
 use crate::state::State;
 use crate::views::{ModelInfo, object};
 
-/// Largest painted amount: the vertex does not move.
+/// Painted amount of a vertex that does not move at all.
 const MAX_AMOUNT: f32 = 255.0;
-/// Share of the brush radius that is painted in full; the amount falls to 0 at the rim.
+/// Fraction of the brush radius within which the full amount is painted; beyond it, the amount falls linearly to 0 at
+/// the rim.
 const FULL_SHARE: f32 = 0.5;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Adds models. Keeps cage and pose, drops the weights. With a label, adds a step to the history. Consumes the handles of
-    /// the models.
+    /// Adds models. Keeps the cage and its pose, and drops the weights. With a label, adds a step to the history.
+    /// Consumes the JavaScript handles of the models.
     ///
     /// # Errors
-    /// Those of `open`. Nothing changes then.
+    /// The errors of `open`. The document is then unchanged.
     pub async fn add(&self, models: Vec<Loaded>, label: Option<String>) -> Result<(), JsValue> {
         let (up, origin) = self.read(|state| (state.up(), state.models().origin()));
         let (mut added, mut draws) = (Vec::new(), Vec::new());
@@ -48,7 +49,8 @@ impl Engine {
         });
         let is_too_much = self.read(|state| {
             let (positions, triangles) = (state.models().positions(), state.models().triangles());
-            // The present camera may frame one of them: all would cover far more of the picture than there is.
+            // The current camera may be close to one model, where all models would cover far more of the picture than
+            // usual.
             let (camera, size) = state.view_of(positions);
             check_layers(gpu.main.context(), &camera, positions, triangles, size)
         });
@@ -85,15 +87,16 @@ impl Engine {
         Ok(self.read(|state| object(&ModelInfo::of(state.models())?))?)
     }
 
-    /// Painted amounts of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty if unpainted
+    /// Painted amount of each vertex of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, empty
+    /// if unpainted
     ///
     /// # Errors
-    /// If there is no such model.
+    /// If no open model has this id.
     pub fn painted(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         Ok(self.read(|state| Answer::Ok(state.models().get(id)?.painted.to_vec()))?)
     }
 
-    /// Shows the painted amounts of a model in grey; undefined hides them.
+    /// Shows the painted amounts of a model in grey, and selects this model for `paint`; undefined hides them.
     #[wasm_bindgen(js_name = showPainting)]
     pub fn show_painting(&self, id: Option<u32>) {
         self.change(|state| {
@@ -102,9 +105,9 @@ impl Engine {
         });
     }
 
-    /// Paints the model of `showPainting` around the surface point under the pointer. `radius`: over the models' diagonal;
-    /// `amount`: 255 keeps vertices in place, 0 lets them move. Returns false if the pointer is not on this model. The
-    /// vertices move after `setPainted` or a commit.
+    /// Paints the model of `showPainting` around the surface point under the pointer. `radius`: fraction of the models'
+    /// diagonal; `amount`: 255 keeps vertices in place, 0 lets them move. Returns false if the pointer is not on this
+    /// model. The posed vertices change only after a `set_painted` command or a commit.
     ///
     /// # Errors
     /// Without weights, or while the GPU is busy.
@@ -112,7 +115,7 @@ impl Engine {
         let Some(id) = self.read(|state| state.painting.as_ref().map(|(id, _)| *id)) else {
             return Ok(false);
         };
-        // Update the posed models, which `dab` reads.
+        // Update the posed models, which `dab` picks from.
         self.posed(|_, _| Ok(()))?;
         Ok(self.change(|state| {
             let is_painted = state.dab(id, [x, y], radius, amount);
@@ -123,7 +126,8 @@ impl Engine {
         }))
     }
 
-    /// Radius of the brush of [`Engine::paint`] at the pointer, CSS pixels; undefined where it would paint nothing.
+    /// Brush radius of [`Engine::paint`] at the pointer, in CSS pixels; undefined if `paint` would have no effect
+    /// there.
     ///
     /// # Errors
     /// Without weights, or while the GPU is busy.
@@ -139,8 +143,8 @@ impl Engine {
 }
 
 impl State {
-    /// The surface point of a model under the pointer, and the brush radius, object units. `None` if the pointer is on
-    /// another model or on no model.
+    /// The surface point of a model under the pointer, and the brush radius in object units. `None` if the pointer is
+    /// on another model or on no model.
     fn touched(&self, id: u32, [x, y]: [f32; 2], radius: f32) -> Option<(Vec3, f32)> {
         let (at, posed) = (self.pointer(x, y), &self.held.posed);
         if posed.len() != self.models().positions().len() {
@@ -168,7 +172,7 @@ impl State {
             for (painted, at) in painted.iter_mut().zip(posed) {
                 let share =
                     1.0 - ((at.distance(center) / reach - FULL_SHARE) / (1.0 - FULL_SHARE)).clamp(0.0, 1.0);
-                // Idempotent: a second dab at the same place changes nothing.
+                // Take the maximum or minimum, so that a second dab at the same place changes nothing.
                 let dab =
                     if amount > 0 { share * f32::from(amount) } else { MAX_AMOUNT * (1.0 - share) } as u8;
                 *painted = if amount > 0 { dab.max(*painted) } else { dab.min(*painted) };

@@ -1,4 +1,4 @@
-//! Methods that draw frames and pictures, and read positions from the GPU.
+//! Methods that draw frames, render pictures, and read positions from the GPU.
 
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
 use cagework_gpu::Session;
@@ -25,7 +25,7 @@ impl Engine {
     }
 
     /// Draws a frame. A slow GPU draws at reduced resolution unless `sharp` is set. Returns whether the frame has full
-    /// resolution; undefined if the GPU is busy, which requests another frame.
+    /// resolution; undefined if the GPU is busy and nothing was drawn, in which case the page has to draw again.
     ///
     /// # Errors
     /// `DeviceLost`, `Refused`, `OutOfMemory`.
@@ -38,8 +38,8 @@ impl Engine {
         })
     }
 
-    /// Draws a bound box into an offscreen target. Drivers finish compiling a pipeline at its first use; this moves the
-    /// delay to the time before the first model opens.
+    /// Draws a bound box into an offscreen texture. Drivers finish compiling a pipeline when it is first used; this
+    /// draw moves that delay to before the first model opens.
     ///
     /// # Errors
     /// `DeviceLost`, `Refused`, `OutOfMemory`.
@@ -63,12 +63,12 @@ impl Engine {
         Ok(session.frame(&view, format, [SMALL_SIDE; 2], 1.0).map_err(Fault::from)?)
     }
 
-    /// Waits for uploads to finish. Until then, methods that read weights return an error.
+    /// Waits until uploads in progress have finished. During an upload, methods that read weights return an error.
     pub async fn ready(&self) {
         drop(self.gpu.lock().await);
     }
 
-    /// Renders the scene, or with `alone` only the model on a transparent background. RGBA, rows from the top.
+    /// Renders the scene, or with `alone` only the model on a transparent background. RGBA pixels, rows from the top.
     /// `[height, width, 4]`
     ///
     /// # Errors
@@ -84,12 +84,12 @@ impl Engine {
             height as f32 / state.size.y
         };
         let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
-        // Restore the scene of the view.
+        // The next frame writes the scene of the view again.
         self.change(|state| state.is_changed = true);
         Ok(picture?)
     }
 
-    /// Reads the deformed vertices of a kind of coordinates from the GPU. `[n_vertices, 3]`
+    /// Reads from the GPU the vertices deformed with one kind of coordinates. `[n_vertices, 3]`
     ///
     /// # Errors
     /// If no model is open. `Missing` if coordinates of this kind are not available.

@@ -1,4 +1,4 @@
-//! Methods that play clips: playback shows the models as they would be exported.
+//! Methods that play clips. Playback shows the models as an export would contain them.
 
 use cagework_core::field::{self, Field, FieldWeights, Lattice};
 use cagework_core::{Controls, Weights};
@@ -15,7 +15,7 @@ use crate::playing::{ModelMotion, Playback, SharedClip};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Prepares playback of the models in the current pose; `showClip` shows a time.
+    /// Prepares playback of the models in the current pose; `showClip` then shows a time of a clip.
     ///
     /// # Errors
     /// If the models are not bound or cannot be exported, or the GPU runs out of memory.
@@ -43,8 +43,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Shows a time of a clip, seconds; without a clip, the rest pose. `targets`: weights of the morph targets that the clip
-    /// does not drive; empty for those of the file. Does nothing before `startClip`.
+    /// Shows the models at a time of a clip, in seconds; without a clip, at rest. `targets`: weights of the morph
+    /// targets that the clip does not animate; if empty, the weights of the file. Does nothing before `startClip`.
     #[wasm_bindgen(js_name = showClip)]
     pub fn show_clip(&self, clip: Option<u32>, seconds: f32, targets: &Float32Array) {
         let is_ready = self.read(|state| state.playing.is_some());
@@ -54,20 +54,20 @@ impl Engine {
         self.change(|state| {
             if let Some(playing) = &mut state.playing {
                 playing.show(clip.map(|clip| clip as usize), seconds, &targets.to_vec());
-                // Joints are part of the scene.
+                // Joint marks are part of the scene, which must be rebuilt.
                 state.is_changed |= state.view.joints.is_some();
             }
         });
     }
 
-    /// Whether a clip is shown instead of the cage's pose. Changing the pose stops the clip.
+    /// Whether playback of a clip is shown instead of the posed model. Changing the pose stops playback.
     #[wasm_bindgen(getter, js_name = showsClip)]
     #[must_use]
     pub fn shows_clip(&self) -> bool {
         self.read(|state| state.playing.is_some())
     }
 
-    /// Stops the clip; the cage controls the model's pose again.
+    /// Stops playback; the model follows the cage's pose again.
     #[wasm_bindgen(js_name = stopClip)]
     pub fn stop_clip(&self) {
         self.change(|state| {
@@ -76,17 +76,17 @@ impl Engine {
         });
     }
 
-    /// Whether the lattice of this cage is available.
+    /// Whether weights on a lattice around the current cage are available.
     #[wasm_bindgen(getter, js_name = hasLattice)]
     #[must_use]
     pub fn has_lattice(&self) -> bool {
         self.read(|state| state.lattice.is_some())
     }
 
-    /// Stores the lattice of `Binder.bindLattice`, which deforms a model that a clip moves. Arrays as for `adopt`.
+    /// Stores the weights of `Binder.bindLattice`, which deform a model that a clip moves. Arrays as for `adopt`.
     ///
     /// # Errors
-    /// Without a cage, or if the arrays belong to another cage.
+    /// Without a cage, or if the arrays do not match a lattice around this cage.
     #[wasm_bindgen(js_name = takeLattice)]
     pub fn take_lattice(
         &self,
@@ -110,7 +110,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Vertices during playback, computed on the CPU; for tests and pictures. `[n_vertices, 3]`
+    /// Vertices during playback, computed on the CPU for tests and pictures. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = clipPositions)]
     #[must_use]
     pub fn clip_positions(&self) -> Vec<f32> {
@@ -122,7 +122,8 @@ impl Engine {
 }
 
 impl Engine {
-    /// Playback of a model: of its export, or with `dynamic` of the original file, which the cage then deforms.
+    /// Motion of one model: that of its export, or with `dynamic` that of the original file, which the cage then
+    /// deforms.
     fn part(&self, id: u32, request: &JsRigOptions) -> Answer<ModelMotion> {
         let is_gltf =
             self.read(|state| Answer::Ok(state.models().get(id)?.model.format() == ModelFormat::Gltf))?;
@@ -134,7 +135,7 @@ impl Engine {
         if let Some(player) = self.read(|state| Answer::Ok(state.models().get(id)?.model.player()?))? {
             return Ok(ModelMotion::Player(Box::new(player)));
         }
-        // Formats without clips move only with the cage.
+        // A model whose format has no clips moves only with the cage.
         let pose =
             self.read(|state| if request.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
@@ -144,7 +145,7 @@ impl Engine {
         })
     }
 
-    /// Displacement field of the posed cage.
+    /// The displacement field of the posed cage.
     ///
     /// # Errors
     /// If the lattice is not available.

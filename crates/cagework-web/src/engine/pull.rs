@@ -1,4 +1,4 @@
-//! Methods for pulling the model while a worker solves for the cage.
+//! Methods for dragging the model's surface while a worker solves for the cage.
 
 use std::sync::Arc;
 
@@ -17,21 +17,22 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Surface point under the pointer; undefined if the pointer is not on a model, without weights, or while the GPU is busy.
+    /// Surface point under the pointer; undefined if the pointer is not on a model, without weights, during playback,
+    /// or while the GPU is busy.
     ///
     /// # Errors
     /// Never.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> Result<JsValue, JsValue> {
         if self.read(|state| state.playing.is_some()) {
-            // During playback, the visible surface differs from the posed one.
+            // During playback, the drawn surface differs from the posed surface that is picked.
             return Ok(JsValue::UNDEFINED);
         }
         let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
         Ok(found.map_or(Ok(JsValue::UNDEFINED), |point| object(&point))?)
     }
 
-    /// Position of a surface point; empty if the point does not exist. `[3]`
+    /// Posed position of a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
     /// Without weights, or while the GPU is busy.
@@ -45,7 +46,7 @@ impl Engine {
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
-    /// Weights and nearest vertex of a surface point; undefined if the point does not exist.
+    /// Weights of a surface point, and the nearest vertex of the model; undefined if the point does not exist.
     ///
     /// # Errors
     /// Without weights.
@@ -61,7 +62,7 @@ impl Engine {
         Ok(grip.map_or(Ok(JsValue::UNDEFINED), |grip| object(&grip))?)
     }
 
-    /// Mirror image of a surface point, or undefined.
+    /// Mirror image of a surface point; undefined if the surface is not symmetric there.
     ///
     /// # Errors
     /// Never.
@@ -85,7 +86,7 @@ impl Engine {
         moved.to_array().to_vec()
     }
 
-    /// Shows grabs and pins; the first point is the grab. `target`: position of the pointer if the grab cannot reach it.
+    /// Marks grabs and pins; the first point is the grab. `target`: position of the pointer, if the grab is not there.
     ///
     /// # Errors
     /// If `points` is not an array of surface points.
@@ -107,7 +108,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Shows in grey how much each vertex stays in place, 0 to 1, `[n_vertices]`; undefined hides it.
+    /// Shades in grey how much each vertex stays in place, 0 to 1, `[n_vertices]`; undefined removes the shading.
     #[wasm_bindgen(js_name = showStays)]
     pub fn show_stays(&self, stays: Option<Vec<f32>>) {
         self.change(|state| {
@@ -118,7 +119,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// Reads the state after updating the posed models.
+    /// Updates the posed models, then reads the state.
     pub(super) fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
         self.with_session(|session| {
             session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;

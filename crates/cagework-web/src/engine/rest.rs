@@ -1,4 +1,4 @@
-//! Methods for faults of the cage, and for vertices outside it during reshaping.
+//! Methods that show faults of the cage, and count vertices outside it while the user reshapes it.
 
 use cagework_cage::check::Places;
 use cagework_core::enclosure::Enclosure;
@@ -9,12 +9,12 @@ use super::Engine;
 use crate::problems::Faults;
 use crate::state::State;
 
-/// Maximum number of vertex–triangle pairs that are tested per frame of a drag.
+/// Maximum number of vertex–triangle pairs that are tested for each frame while the user drags the cage.
 const WATCHED_PAIRS: usize = 250_000;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Marks the faults of the cage that the worker's `Check` found.
+    /// Marks the faults of the cage that a `Check` of the worker found.
     #[wasm_bindgen(js_name = showFaults)]
     pub fn show_faults(
         &self,
@@ -31,11 +31,11 @@ impl Engine {
         });
     }
 
-    /// Number of vertices outside the dragged cage, among a regular subset of the model's vertices. Fast enough for every
-    /// pointer event; the full check runs after the drag.
+    /// Number of vertices outside the dragged cage, among every k-th vertex of the models. Fast enough for every
+    /// pointer event; the check of all vertices runs after the drag.
     #[must_use]
     pub fn strays(&self) -> u32 {
-        // Nothing visible changes, so do not request a frame.
+        // Borrow the state directly: `change` would request a frame, but nothing visible changes.
         let mut state = self.state.borrow_mut();
         let state = &mut *state;
         let State { editor, watched, .. } = state;
@@ -43,7 +43,7 @@ impl Engine {
         let Ok(set) = &document.cage.set else { return 0 };
         let vertices = document.models.positions();
         let (plain, watched) = watched.get_or_insert_with(|| {
-            // Without balls and tubes, which are holes in the surface.
+            // Count against the cage without interior controls: balls and tubes cut holes out of the enclosed volume.
             let plain = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
                 .unwrap_or_else(|_| ControlSet::plain(set.cage()));
             let surface = Controls::from(&plain).surface();

@@ -1,4 +1,4 @@
-//! Methods for the scene and its legend.
+//! Methods that set the scene's options and read its legend.
 
 use cagework_gpu::render::MeshStyle;
 use cagework_gpu::render::colormap::{ERROR_RANGE, MIN_WEIGHT_RANGE};
@@ -12,7 +12,7 @@ use crate::views::{ColorMap, Largest, Legend, object};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Sets the options of the scene.
+    /// Sets what the scene shows.
     ///
     /// # Errors
     /// If the options are invalid.
@@ -31,7 +31,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Legend of the colours of model or slice; undefined if the colours show no quantity.
+    /// Legend of the colours of the slice or the model; undefined if the colours show no quantity.
     ///
     /// # Errors
     /// Never.
@@ -64,7 +64,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// The largest weight of a column. `None` while the GPU uploads weights; the page calls again after that.
+    /// The largest weight in a column. `None` while the GPU uploads weights; the page calls `legend` again afterwards.
     fn largest_weight(&self, column: u32) -> Option<Largest> {
         self.with_session(|session| {
             let weights =

@@ -1,4 +1,4 @@
-//! Methods that pick and select cage elements.
+//! Methods that pick and select vertices, edges and faces of the cage.
 
 use cagework_editor::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
 use wasm_bindgen::JsValue;
@@ -29,7 +29,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Vertices of the element within `radius` CSS pixels of the pointer, or an empty array.
+    /// Vertices of the cage element within `radius` CSS pixels of the pointer; empty if there is none.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {
@@ -52,7 +52,7 @@ impl Engine {
         })
     }
 
-    /// Highlights the element with these vertices.
+    /// Highlights the cage element with these vertices.
     pub fn hover(&self, vertices: Vec<u32>) {
         if self.read(|state| state.editor.hovered != vertices) {
             self.change(|state| {
@@ -62,7 +62,7 @@ impl Engine {
         }
     }
 
-    /// Selects vertices; `mode` is replace, add, remove or toggle.
+    /// Selects cage vertices; `mode` is replace, add, remove or toggle.
     ///
     /// # Errors
     /// If the mode is unknown.
@@ -76,7 +76,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Selects the vertices in a rectangle.
+    /// Selects the cage vertices that are drawn in a rectangle of the view.
     ///
     /// # Errors
     /// If the mode is unknown.
@@ -98,19 +98,19 @@ impl Engine {
         Ok(())
     }
 
-    /// Selects everything.
+    /// Selects all cage vertices and interior controls.
     #[wasm_bindgen(js_name = selectAll)]
     pub fn select_all(&self) {
         self.change_selection(|state| state.editor.selection.all());
     }
 
-    /// Extends the selection to whole connected components.
+    /// Extends the selection to all vertices that edges connect to it.
     #[wasm_bindgen(js_name = selectLinked)]
     pub fn select_linked(&self) {
         self.change_selection(|state| state.editor.select_linked());
     }
 
-    /// Selected vertices, ascending.
+    /// Indices of the selected vertices, ascending.
     #[must_use]
     pub fn selection(&self) -> Vec<u32> {
         self.read(|state| state.editor.selection.vertices())
@@ -123,7 +123,7 @@ impl Engine {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
     }
 
-    /// Turns symmetric editing on or off: mirror images of the selection move with it.
+    /// Turns symmetric editing on or off. With it, mirror images of the selected vertices move too.
     #[wasm_bindgen(js_name = setSymmetry)]
     pub fn set_symmetry(&self, on: bool) {
         self.change(|state| {
@@ -132,7 +132,7 @@ impl Engine {
         });
     }
 
-    /// Vertices without a mirror image.
+    /// Indices of the vertices without a mirror image.
     #[must_use]
     pub fn unmatched(&self) -> Vec<u32> {
         self.read(|state| state.editor.symmetry().unmatched())

@@ -1,4 +1,4 @@
-//! Methods for the slice through the grid.
+//! Methods that show a slice through the grid.
 
 use std::sync::Arc;
 
@@ -13,11 +13,11 @@ use crate::options::{JsBindOptions, decode};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Shows a slice. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; then the bind options and the weights of
-    /// `Binder.bindSlice`, which are undefined if no cell is inside.
+    /// Shows a slice. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1. `options` are those of the bind; the
+    /// arrays are the weights of `Binder.bindSlice`, empty if no cell is inside the cage.
     ///
     /// # Errors
-    /// Without a cage, or if the weights belong to another slice.
+    /// Without a cage, or if the number of weights does not match the slice.
     #[wasm_bindgen(js_name = takeSlice)]
     pub fn take_slice(
         &self,

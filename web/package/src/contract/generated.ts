@@ -33,7 +33,7 @@ export type DeltaNorm = "euclidean" | "literal";
  */
 export type OutsidePolicy = "extend" | "stay" | "refuse";
 /**
- * Options of a bind, and where it runs.
+ * Options of a bind, and the processor that it runs on.
  */
 export type BindOptions = { backend: Backend,
 /**
@@ -85,7 +85,7 @@ outside: OutsidePolicy, };
  */
 export type Stage = "voxelize" | "solve" | "sample" | "simplify";
 /**
- * A [`ProgressEvent`].
+ * A [`ProgressEvent`] as JavaScript receives it.
  */
 export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
 /**
@@ -126,11 +126,11 @@ distance: number,
  */
 share: number, };
 /**
- * Offsets of a bind: the frames, whose columns follow those of the controls, and the points outside the cage.
+ * Frames of a bind, and the points outside the cage. The frames' columns of the weights follow those of the controls.
  */
 export type Offsets = {
 /**
- * Frames; their columns follow those of the controls.
+ * Frames. In the weights, their columns follow those of the controls.
  */
 frames: Frames,
 /**
@@ -448,7 +448,7 @@ margin: number,
  */
 voxels: number, };
 /**
- * Corners of a box.
+ * Lower and upper corner of an axis-aligned box.
  */
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 /**
@@ -480,7 +480,7 @@ elements: Array<InnerElement>,
  */
 radius: number | null, };
 /**
- * Size of the cage.
+ * Counts, bounds and notices of the cage.
  */
 export type CageInfo = { vertices: number, edges: number, faces: number,
 /**
@@ -488,11 +488,11 @@ export type CageInfo = { vertices: number, edges: number, faces: number,
  */
 quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
 /**
- * The cage, its controls and notices.
+ * The cage's properties, and its interior controls.
  */
 export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
 /**
- * Radius of interior points and lines, object units.
+ * Radius of interior point and line controls, object units.
  */
 radius: number, };
 /**
@@ -508,19 +508,19 @@ export type Severity = "error" | "warning" | "note";
  */
 export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
 /**
- * Action of a fix.
+ * What the button of a fix does.
  */
 export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
 /**
- * A fix, and the label of its button.
+ * A fix for a fault, with the label of its button.
  */
 export type Fix = { label: string, } & ({ "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" });
 /**
- * A kind of fault of a cage.
+ * Faults of one kind in a cage: their number, and the best fix.
  */
 export type Problem = { code: Code, severity: Severity,
 /**
- * A complete sentence.
+ * Message of one or more complete sentences.
  */
 message: string, count: number, fix: Fix | null, };
 /**
@@ -553,15 +553,15 @@ stays: Array<string>, };
  */
 export type MemberInfo = {
 /**
- * Identifier; never changes.
+ * Identifier, which stays the same for the model's lifetime.
  */
 id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
 /**
- * Names of the parts with their kinds, such as `material:Cloth`.
+ * Names of the parts, prefixed by their kind, such as `material:Cloth`.
  */
 parts: Array<string>, options: PartOptions,
 /**
- * Whether a part of the model is painted to stay in place.
+ * Whether some vertices of the model are painted to stay in place.
  */
 painted: boolean, };
 /**
@@ -577,7 +577,7 @@ first_triangle: number, options: PartOptions,
  */
 painted: Array<[number, number]>, };
 /**
- * Properties of the models in the cage.
+ * Properties of all models in the cage.
  */
 export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
 /**
@@ -585,15 +585,15 @@ export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertice
  */
 targets: Array<TargetView>,
 /**
- * Names of unskinned parts attached to joints or animated nodes; they can be kept rigid.
+ * Names of unskinned parts attached to joints or animated nodes, which an export can keep rigid.
  */
 props: Array<string>,
 /**
- * Whether exports keep a rig.
+ * Whether a model has a rig that an export keeps.
  */
 rigged: boolean, bounds: Bounds, notices: Array<string>,
 /**
- * Properties of each model.
+ * Properties of each single model.
  */
 members: Array<MemberInfo>, };
 /**
@@ -845,7 +845,7 @@ redo: string | null,
  */
 forgotten: number, };
 /**
- * A cage.
+ * A cage that the page opens.
  */
 export type CageContents = {
 /**
@@ -853,11 +853,11 @@ export type CageContents = {
  */
 positions: Float32Array,
 /**
- * For each face its corner count, then its corners.
+ * For each face its corner count, then its vertex indices.
  */
 corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
 /**
- * A pose.
+ * A named pose.
  */
 export type PoseContents = { name: string,
 /**
@@ -865,11 +865,11 @@ export type PoseContents = { name: string,
  */
 positions: Float32Array, };
 /**
- * Contents that are opened together with models.
+ * Contents that the page opens together with models.
  */
 export type OpenContents = {
 /**
- * Identifier of the built-in sample, if it is one.
+ * Identifier of the built-in sample; undefined for other models.
  */
 sample: string | null,
 /**
@@ -877,15 +877,15 @@ sample: string | null,
  */
 settings: string | null, cage: CageContents | null,
 /**
- * Poses of a sample; those of a project are in its `Loaded`.
+ * Poses of a sample. The poses of a project are in its `Loaded`.
  */
 poses: Array<PoseContents>, };
 /**
- * Valid settings of a project.
+ * Settings of a project, with all values valid.
  */
 export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
 /**
- * Values that were replaced, a sentence each.
+ * Notices about values that were replaced by defaults, one sentence each.
  */
 notices: Array<string>, };
 /**
@@ -893,7 +893,7 @@ notices: Array<string>, };
  */
 export type Theme = "dark" | "light";
 /**
- * Quantity that the colours of the mesh show.
+ * Quantity that the colours of the model show.
  */
 export type Colour = "material" | "clay" | "weight" | "error";
 /**
@@ -905,27 +905,27 @@ export type Coordinates = "harmonic" | "mean_value" | "green";
  */
 export type SliceShown = "off" | "kinds" | "value";
 /**
- * Mode of the gizmo.
+ * Type of gizmo.
  */
 export type Gizmo = "none" | "move" | "rotate" | "scale";
 /**
- * Options of the scene.
+ * What the scene shows.
  */
 export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour,
 /**
- * Whether the colours of weights span 0 to 1 rather than 0 to the largest weight.
+ * Whether the colour scale of weights ends at 1 rather than at the largest weight.
  */
 weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo,
 /**
- * Whether dragging pulls the model; the cage is drawn faintly then.
+ * Whether dragging pulls the model's surface. The cage is then drawn faintly.
  */
 pull: boolean,
 /**
- * Kinds shown side by side, from the left. Kinds that are not computed yet are skipped.
+ * Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
  */
 compare: Array<Coordinates>, problems: boolean,
 /**
- * How joints are shown: as they will be exported. Null hides them.
+ * Treatment of joints by the next export, which the marks of joints show. Null hides the marks.
  */
 joints: Joints | null, };
 /**
@@ -933,11 +933,11 @@ joints: Joints | null, };
  */
 export type CameraView = {
 /**
- * Centre of orbiting, object units.
+ * Point that the camera orbits, object units.
  */
 target: [number, number, number],
 /**
- * Rotation about y, and elevation above the horizon, radians.
+ * Rotation of the camera about y, radians; `pitch` is its elevation above the horizon.
  */
 yaw: number, pitch: number,
 /**
@@ -957,31 +957,31 @@ triangle: number,
  */
 bary: [number, number, number], };
 /**
- * Weights and nearest vertex of a surface point.
+ * Weights of a surface point, and the nearest vertex of the model.
  */
 export type Grip = {
 /**
- * Weights of the point. `[n_cage]`
+ * Weights of the cage's vertices at the point. `[n_cage]`
  */
 row: Array<number>,
 /**
- * The nearest vertex of the model.
+ * Index of the nearest vertex of the model.
  */
 seed: number, };
 /**
- * Options of pulling the model.
+ * Options for pulling the model's surface.
  */
 export type PullOptions = {
 /**
- * Reach along the surface, over the model's size; null for automatic.
+ * Distance along the surface that a pull affects, as a fraction of the model's size; null for automatic.
  */
 reach: number | null,
 /**
- * Whether the whole model follows.
+ * Whether a pull affects the whole model, without a limit of distance.
  */
 whole: boolean,
 /**
- * Whether the pull is symmetric.
+ * Whether the mirror image of the grabbed point is pulled symmetrically.
  */
 mirrored: boolean, };
 /**
@@ -989,51 +989,51 @@ mirrored: boolean, };
  */
 export type Joints = "follow" | "stay" | "turn";
 /**
- * Options of exporting a rig.
+ * Options for exporting a rig.
  */
 export type RigOptions = { joints: Joints,
 /**
- * Whether translations of clips keep their length; otherwise they scale with the height of the hips.
+ * Whether translations in clips keep their length; otherwise they scale with the height of the hips.
  */
 keep_travel: boolean,
 /**
- * Names of parts that keep their shape.
+ * Names of parts that move rigidly, without changing their shape.
  */
 rigid: Array<string>,
 /**
- * Whether to export the shape without the rig.
+ * Whether to export only the shape, without the rig.
  */
 plain: boolean,
 /**
- * Whether the cage deforms the model after a clip moves it.
+ * Whether the cage deforms the model after a clip has moved it.
  */
 dynamic: boolean, };
 /**
- * A clip.
+ * An animation clip.
  */
 export type ClipView = {
 /**
- * The name, or the number if it has none.
+ * Name of the clip, or its number if it has no name.
  */
 name: string, seconds: number, };
 /**
- * A morph target.
+ * A morph target and its default weight.
  */
 export type TargetView = { name: string, default: number, };
 /**
- * Colour map of a legend.
+ * Colour map that a legend shows.
  */
 export type ColorMap = "viridis" | "error" | "kinds";
 /**
- * The largest displayed value, and the model vertex that has it.
+ * The largest weight, and the index of the model vertex that has it.
  */
 export type Largest = { value: number, vertex: number, };
 /**
- * Legend of the colours of model or slice.
+ * Legend of the colours of the slice or the model.
  */
 export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap,
 /**
- * Largest of the displayed weights; `None` for other quantities.
+ * Largest of the displayed weights; null for other quantities.
  */
 largest: Largest | null, };
 /**
@@ -1053,7 +1053,7 @@ export type SelectMode = "replace" | "add" | "remove" | "toggle";
  */
 export type Gesture = "grab" | "rotate" | "scale";
 /**
- * Handle of the gizmo: an axis, the plane normal to an axis, or all axes.
+ * Handle of the gizmo: one axis, the plane normal to an axis, or all axes.
  */
 export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | "all";
 /**
