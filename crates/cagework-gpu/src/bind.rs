@@ -18,10 +18,10 @@ use crate::plan::Plan;
 use crate::sample::Sampler;
 use crate::stream::Stream;
 
-/// Decades from the first delta to tau, roughly. Only for the progress bar.
+/// Approximate number of decades between the first delta and tau, for the progress bar.
 const JACOBI_DECADES: f32 = 4.0;
 
-/// Typical number of V-cycles per batch. Only for the progress bar.
+/// Typical number of V-cycles per batch, for the progress bar.
 const USUAL_CYCLES: f32 = 5.0;
 
 /// Name of the allocation in error messages.

@@ -7,7 +7,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::plan::PlanError;
 
-/// Minimum buffer size: bindings must not be empty.
+/// Minimum buffer size, bytes: bindings must not be empty.
 const MIN_BYTES: u64 = 16;
 
 /// Allocates the buffers and textures of one object and detects failures.
@@ -21,7 +21,7 @@ pub struct Allocator<'a> {
     context: &'a GpuContext,
     what: &'static str,
     allocated: u64,
-    // In reverse order of creation, as required for popping.
+    // The error scopes, in reverse order of creation, in which they must be popped.
     memory: wgpu::ErrorScopeGuard,
     refused: wgpu::ErrorScopeGuard,
 }
@@ -54,7 +54,7 @@ impl<'a> Allocator<'a> {
         Ok(self.allocated)
     }
 
-    /// Counts memory allocated elsewhere.
+    /// Adds memory that was allocated elsewhere to the total, bytes.
     pub(crate) fn count(&mut self, bytes: u64) {
         self.allocated += bytes;
     }
@@ -132,7 +132,7 @@ impl Readback {
     ) -> Result<T, GpuError> {
         let (sender, receiver) = oneshot::channel();
         self.buffer.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
-            // The receiver is gone if the wait timed out.
+            // Ignore the error: the receiver is dropped if the wait timed out.
             let _ = sender.send(result);
         });
         let lost = |reason: String| GpuError::DeviceLost { reason };

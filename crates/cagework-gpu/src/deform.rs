@@ -68,7 +68,7 @@ impl GpuWeights {
             });
             begin = end;
             if begin < n_vertices {
-                // Yields to other tasks, such as events and frames of a browser.
+                // Settling yields to other tasks, such as events and frames of a browser.
                 bytes += allocator.settle().await?;
                 allocator = Allocator::new(context, "the weights");
             }
@@ -89,7 +89,7 @@ impl GpuWeights {
     }
 }
 
-/// Kernel, offset of its parameters, workgroups.
+/// A kernel, the offset of its parameters in bytes, and its numbers of workgroups along x and y.
 type Step = (Launch, u32, [u32; 2]);
 
 /// Deforms one mesh repeatedly.
@@ -98,9 +98,9 @@ pub struct Deformer {
     cage: wgpu::Buffer,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
-    /// In order of execution; normals are last.
+    /// Kernels in order of execution; the last one computes the normals.
     steps: Vec<Step>,
-    /// Runs before the normals.
+    /// Applies held and rigid parts before the normals are computed; `None` without such parts.
     holder: Option<Holder>,
     frames: Frames,
     n_vertices: u32,
@@ -209,7 +209,7 @@ impl Deformer {
         self.encode_steps(encoder, &[], |pass| skinner.encode(pass));
     }
 
-    /// Records `moving`, then `then`, then normals.
+    /// Records the steps `moving`, then the commands of `then`, then the computation of normals.
     fn encode_steps(
         &self,
         encoder: &mut wgpu::CommandEncoder,

@@ -22,15 +22,15 @@ pub struct ContextOptions {
     pub max_binding_bytes: Option<u64>,
     /// Only draw, as in a browser without WebGPU. For tests; needs the feature `webgl`.
     pub draws_only: bool,
-    /// Create pipelines on first use, to start faster. By default all are created immediately, so that
-    /// timings exclude it.
+    /// Create pipelines on first use, to start faster. By default all pipelines are created immediately, so that
+    /// timings exclude their creation.
     pub pipelines_later: bool,
 }
 
 /// Device, queue and kernel pipelines. Clones share the device.
 #[derive(Clone, Debug)]
 pub struct GpuContext {
-    /// For creating surfaces.
+    /// Entry point of wgpu, for creating surfaces.
     pub instance: wgpu::Instance,
     /// The GPU.
     pub adapter: wgpu::Adapter,
@@ -60,7 +60,7 @@ impl Fault {
         let _ = self.lost.set(message.to_owned());
         if let Ok(mut waiting) = self.waiting.lock() {
             for waiting in waiting.drain(..) {
-                // The receiver may be gone.
+                // Ignore the error: the receiver may have been dropped.
                 let _ = waiting.send(message.to_owned());
             }
         }
@@ -145,7 +145,7 @@ impl GpuContext {
     /// textures. Fixed when the device is opened.
     #[must_use]
     pub fn draws_only(&self) -> bool {
-        // Constant in each of the page's two builds, so the compiler drops the other one's code.
+        // The value is constant in each of the page's two builds, so the compiler drops the code of the other build.
         cfg!(feature = "webgl") && (cfg!(target_family = "wasm") || self.draws_only)
     }
 
@@ -176,7 +176,7 @@ impl GpuContext {
     /// Destroys the device, as a driver reset would.
     pub fn lose(&self, reason: &str) {
         self.device.destroy();
-        // WebGPU reports the loss itself, with a better reason.
+        // With WebGPU, the device's own callback reports the loss, with a better reason.
         if self.draws_only() {
             self.fault.lose(reason);
         }
@@ -234,7 +234,7 @@ pub fn instance() -> wgpu::Instance {
     wgpu::Instance::new(descriptor)
 }
 
-/// Baseline limits, except buffer sizes, which are those of the adapter. Plans adapt to them.
+/// Baseline limits, except buffer sizes, which are those of the adapter. Memory plans adapt to these sizes.
 fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
     if draws_only {
         let baseline = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(offered.clone());

@@ -63,7 +63,7 @@ pub enum GpuError {
         /// Time limit.
         seconds: u64,
     },
-    /// Inconsistent input.
+    /// The input is inconsistent.
     #[error("cannot be drawn: {reason}")]
     Model {
         /// What is inconsistent.

@@ -70,16 +70,16 @@ kernels! {
     SUM_ROOTS = "sum_roots" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
     /// Sums partial sums.
     REDUCE_SUM = "reduce_sum" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Weights at mesh vertices.
+    /// Samples weights at mesh vertices.
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Deformed positions.
+    /// Computes deformed positions.
     DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Held and rigid parts.
+    /// Applies held and rigid parts to deformed positions.
     HOLD_PARTS = "hold_parts" + ["work"], 64, 16, &[Uniform, Read, Read, Read, ReadWrite];
-    /// Skinned positions.
+    /// Computes skinned positions.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
     /// Adds the cage's displacement field to skinned positions.
     BEND_VERTICES = "bend_vertices" + ["work"], 64, 12, &[Uniform, Read, ReadWrite];
-    /// Normals of the deformed mesh.
+    /// Computes normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];
 }

@@ -39,7 +39,7 @@ struct LevelWork {
     field: wgpu::Buffer,
     rhs: wgpu::Buffer,
     relax: Launch,
-    /// `None` on the coarsest level.
+    /// Transfers to and from the next coarser level; `None` on the coarsest level.
     coarser: Option<CoarseTransfer>,
 }
 
@@ -86,7 +86,7 @@ impl Multigrid {
             );
             levels.push(LevelWork { level, field, rhs, relax, coarser: None });
         }
-        // Shared by all levels: the kernel writes each level's zero row.
+        // All levels share this buffer for red residuals, because the kernel writes the zero row of each level.
         let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
         let numbers = allocator.storage("numbers", 8)?;
         let squares = if levels.len() == 1 {
@@ -208,7 +208,7 @@ impl Multigrid {
         Ok(())
     }
 
-    /// Sweeps on the coarsest level. Computes delta if it is the only level.
+    /// Sweeps on the coarsest level. Also computes delta if the coarsest level is the only level.
     async fn relax_coarsest(&self, stream: &mut Stream<'_>, only: bool) -> Result<(), GpuError> {
         let coarsest = self.levels.len() - 1;
         let LevelWork { level, field, .. } = &self.levels[coarsest];
@@ -286,7 +286,7 @@ pub(crate) fn n_groups(count: u32) -> u32 {
     count.div_ceil(REDUCE_VALUES as u32)
 }
 
-/// Sums `count` values with the kernel `partial` (squares or roots), into `slot`.
+/// Sums `count` values with the kernel `partial` (squares or roots) and stores the sum in `slot`.
 pub(crate) async fn sum_into(
     stream: &mut Stream<'_>,
     partial: &Launch,

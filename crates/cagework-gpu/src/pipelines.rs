@@ -28,7 +28,7 @@ pub struct Launch {
 impl Launch {
     /// Workgroups for `count` invocations, and invocations per row of workgroups, as the number per axis is limited.
     pub(crate) fn groups(&self, count: u32) -> ([u32; 2], u32) {
-        /// Baseline limit.
+        /// Baseline limit on workgroups per axis.
         const MAX_GROUPS: u32 = 65_535;
         let groups = count.div_ceil(self.workgroup);
         let rows = groups.div_ceil(MAX_GROUPS).max(1);
@@ -45,7 +45,7 @@ impl Pipelines {
         }
     }
 
-    /// Binds a kernel to `works` (the uniform) and `buffers`, in the table's order.
+    /// Binds a kernel to `works` (the uniform) and `buffers`, in the order of the kernel table.
     pub(crate) fn launch(
         &self,
         device: &wgpu::Device,

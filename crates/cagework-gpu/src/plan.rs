@@ -59,7 +59,7 @@ pub enum PlanError {
 struct Sizes {
     /// Names and bytes of the largest tables.
     tables: Vec<(&'static str, u64)>,
-    /// Total rows of all arrays of a batch. Jacobi keeps all batches, multigrid one.
+    /// Total rows of all arrays of a batch. Jacobi keeps the arrays of all batches, multigrid those of one batch.
     rows: u64,
     /// Rows of the largest array.
     largest_rows: u64,

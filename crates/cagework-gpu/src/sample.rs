@@ -1,4 +1,4 @@
-//! Samples weights at mesh vertices from the field of a batch. Only these are read back, not fields.
+//! Samples weights at mesh vertices from the field of a batch. Only the sampled weights are read back, not the fields.
 
 use cagework_core::sample::Stencils;
 use cagework_core::solve::rows::{LANES, Row};

@@ -1,7 +1,7 @@
 //! A model, a cage and their weights on one GPU: loading, binding, posing, drawing, reading back.
 //!
-//! Used by tests, the command and the page. A page has two: one on its main thread draws and deforms, one in
-//! a worker binds and passes weights ([`Session::bind`] there, [`Session::adopt`] here).
+//! Tests, the command line and the page use sessions. A page has two: the session on its main thread draws and deforms
+//! with weights that it gets by [`Session::adopt`]; the session in a worker computes these by [`Session::bind`].
 
 mod again;
 mod columns;
@@ -41,7 +41,7 @@ pub struct Session {
     controls: Option<ControlSet>,
     pose: Vec<Vec3>,
     bound: Option<SessionBind>,
-    /// Held and rigid parts.
+    /// Parts of the model that are held in place or rigid.
     parts: Parts,
     /// Skinning, while a clip plays.
     playing: Option<Skinner>,
@@ -53,7 +53,7 @@ pub struct Session {
 #[derive(Debug)]
 struct SessionBind {
     kind: Coordinates,
-    /// Shared, so that [`Session::recover`] needs no copy.
+    /// The weights, shared so that [`Session::recover`] needs no copy.
     weights: Arc<Weights>,
     frames: Arc<Frames>,
     mover: Mover,
@@ -80,7 +80,7 @@ impl Session {
         }
     }
 
-    /// The GPU.
+    /// The GPU that the session uses.
     #[must_use]
     pub fn context(&self) -> &GpuContext {
         &self.context
@@ -89,12 +89,12 @@ impl Session {
     /// Replaces the model and drops the weights. The camera does not move; see [`Self::frame_all`].
     ///
     /// # Errors
-    /// [`GpuError::Model`] if its lists are inconsistent; otherwise as [`crate::buffers::Allocator::zeros`].
+    /// [`GpuError::Model`] if the model's lists are inconsistent; otherwise as [`crate::buffers::Allocator::zeros`].
     pub async fn set_model(&mut self, model: DrawModel) -> Result<(), GpuError> {
         self.set_shared_model(Arc::new(model)).await
     }
 
-    /// Like [`Self::set_model`], without a copy.
+    /// Like [`Self::set_model`], without copying the model.
     ///
     /// # Errors
     /// As [`Self::set_model`].
@@ -113,7 +113,7 @@ impl Session {
         Ok(())
     }
 
-    /// Replaces the controls, at rest, and drops the weights.
+    /// Replaces the controls, which start in their rest pose, and drops the weights.
     ///
     /// # Errors
     /// As [`crate::buffers::Allocator::zeros`].
@@ -220,7 +220,7 @@ impl Session {
         self.bound.as_ref().map(|b| b.frames.as_ref())
     }
 
-    /// Sets the pose of the controls, for the next frame. Uploads only these.
+    /// Sets the positions of the controls for the next frame. Only these positions are uploaded.
     ///
     /// # Panics
     /// If the number of positions differs from the number of controls.
@@ -273,7 +273,7 @@ impl Session {
         self.renderer.set_scene(&self.context, self.scene.clone(), self.model.as_deref());
     }
 
-    /// Uploads the values of the scene's heat map or greying. Heat maps need weights.
+    /// Uploads the value of each vertex for the scene's heat map or greying. Heat maps need weights.
     fn write_values(&mut self) {
         let is_plain = matches!(self.scene.mesh, MeshStyle::Solid | MeshStyle::Clay);
         if let (true, Some(greyed), Some(model)) = (is_plain, &self.scene.greyed, &self.model) {
@@ -314,7 +314,7 @@ impl Session {
         }
     }
 
-    /// The camera. Its pixels are CSS pixels of the frame drawn last.
+    /// The camera. Its unit of length in the picture is the CSS pixel of the last drawn frame.
     #[must_use]
     pub fn camera(&self) -> &Camera {
         &self.camera
@@ -365,7 +365,7 @@ impl Session {
         scale: f32,
     ) -> Result<(), GpuError> {
         self.context.check()?;
-        // A collapsed canvas has no area.
+        // A collapsed canvas has no area to draw into.
         if size.contains(&0) {
             return Ok(());
         }
@@ -410,7 +410,7 @@ impl Session {
             Some(bound) => {
                 let by_processor = || self.deformed(&self.pose).unwrap_or_default();
                 let mut positions = bound.mover.read_positions(&self.context, by_processor).await?;
-                // Copies come last.
+                // Drop the copies of vertices, which follow the vertices.
                 positions.truncate(model.positions.len());
                 Ok(positions)
             }

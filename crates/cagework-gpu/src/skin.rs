@@ -17,7 +17,7 @@ pub struct Skinner {
     skin: Skin,
     palette: Vec<Mat4>,
     targets: Vec<f32>,
-    /// Added after skinning.
+    /// Displacement field that is added after skinning.
     field: Option<Field>,
     kernel: Option<SkinKernels>,
 }
@@ -26,7 +26,7 @@ pub struct Skinner {
 struct SkinKernels {
     palette: wgpu::Buffer,
     targets: wgpu::Buffer,
-    /// Skinning, then the displacement field.
+    /// Kernels for skinning and then, if there is one, for the displacement field.
     launches: Vec<Launch>,
     groups: [u32; 2],
 }
@@ -34,13 +34,13 @@ struct SkinKernels {
 /// A skin in the layout of the kernel. Floats are stored as bits.
 #[derive(Debug)]
 pub struct SkinTables {
-    /// `[n_vertices]`
+    /// Rest positions, with 1 as fourth component. `[n_vertices]`
     pub rest: Vec<[f32; 4]>,
     /// First influence and first delta of each vertex. `[n_vertices + 1]`
     pub starts: Vec<[u32; 2]>,
-    /// Joint and weight.
+    /// Joint and weight of each influence. `[n_influences]`
     pub influences: Vec<[u32; 2]>,
-    /// Morph target and displacement.
+    /// Morph target and displacement of each delta. `[n_deltas]`
     pub deltas: Vec<[u32; 4]>,
 }
 
@@ -59,8 +59,8 @@ impl SkinTables {
     }
 }
 
-/// A displacement field in the layout of the kernel: the lattice, then values. Floats are stored as bits. `[2
-/// + n_nodes]`
+/// A displacement field in the layout of the kernel: the lattice, then values. Floats are stored as bits. The table has
+/// 2 + n_nodes rows.
 #[must_use]
 pub fn field_table(field: &Field) -> Vec<[u32; 4]> {
     let lattice = &field.lattice;
@@ -70,7 +70,7 @@ pub fn field_table(field: &Field) -> Vec<[u32; 4]> {
 }
 
 impl Skinner {
-    /// `positions`: output vertex buffer of the kernels.
+    /// `positions`: vertex buffer that the kernels write; `None` if the CPU skins.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
@@ -114,7 +114,7 @@ impl Skinner {
         Ok(skinner)
     }
 
-    /// Sets joint matrices and morph weights. Missing ones keep their values.
+    /// Sets joint matrices and morph weights. Entries beyond the ends of the given lists stay unchanged.
     pub(crate) fn pose(&mut self, context: &GpuContext, palette: &[Mat4], targets: &[f32]) {
         self.palette.iter_mut().zip(palette).for_each(|(to, from)| *to = *from);
         self.targets.iter_mut().zip(targets).for_each(|(to, from)| *to = *from);

@@ -21,7 +21,7 @@ use crate::pipelines::Launch;
 /// Target time of a slice, ms: three frames at 60 Hz; watchdogs of drivers allow 2 s.
 const SLICE_MS: f64 = 50.0;
 
-/// Maximum number of pending slices: one running, one queued. More delay cancellation, and crashed iOS 26.
+/// Maximum number of pending slices: one running, one queued. Further slices delay cancellation, and crashed iOS 26.
 const MAX_PENDING_SLICES: usize = 2;
 
 /// Initial budget, memory accesses: 10 to 100 ms on a software adapter with two threads, below 1 ms on a GPU.
@@ -102,7 +102,7 @@ impl<'a> Stream<'a> {
         })
     }
 
-    /// The GPU.
+    /// The GPU that runs the work.
     #[must_use]
     pub fn context(&self) -> &'a GpuContext {
         self.context
@@ -114,7 +114,7 @@ impl<'a> Stream<'a> {
         self.watch.now_ms()
     }
 
-    /// Binds a kernel to buffers, in the table's order after the uniform.
+    /// Binds a kernel to buffers, in the order of the kernel table after the uniform.
     #[must_use]
     pub fn launch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Launch {
         self.context.pipelines.launch(&self.context.device, kernel, &self.works, buffers)
@@ -232,7 +232,7 @@ impl<'a> Stream<'a> {
         let submission = queue.submit([encode(self.context, &self.commands)]);
         let (sender, done) = oneshot::channel();
         queue.on_submitted_work_done(move || {
-            // The receiver is gone after cancelling.
+            // Ignore the error: cancelling drops the receiver.
             let _ = sender.send(());
         });
         self.pending.push_back(PendingSlice {
@@ -253,7 +253,7 @@ impl<'a> Stream<'a> {
         let now = self.now_ms();
         let elapsed = now - self.last_done_ms.max(slice.submitted_ms);
         self.last_done_ms = now;
-        // Only full slices are representative.
+        // Only slices of at least half the budget are representative.
         if elapsed > 0.0 && 2 * slice.cost >= self.budget {
             let wanted = (slice.cost as f64 * SLICE_MS / elapsed) as u64;
             let [least, most] = BUDGET_RANGE;

@@ -5,7 +5,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::plan::PlanError;
 
-/// Entries per texture row: WebGL2's minimum texture width. `ROW_SHIFT` in `shaders/rows.wgsl`.
+/// Entries per texture row: WebGL2's minimum texture width, and two to the power of `ROW_SHIFT` in `shaders/rows.wgsl`.
 pub const ENTRIES_PER_ROW: u32 = 1 << 11;
 
 /// Type of a table's entries.
@@ -61,9 +61,9 @@ impl Entry {
 /// An array on the GPU. Clones share the data.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Table {
-    /// For kernels and draw shaders.
+    /// A buffer, for kernels and draw shaders.
     Buffer(wgpu::Buffer),
-    /// For draw shaders on devices without storage buffers.
+    /// A texture, for draw shaders on devices without storage buffers.
     Texture { texture: wgpu::Texture, view: wgpu::TextureView, entry_bytes: u32 },
 }
 
@@ -71,7 +71,7 @@ impl Table {
     /// A table of `count` zeros. Lack of memory is reported when the allocator is settled.
     ///
     /// # Errors
-    /// [`PlanError::Binding`] if it exceeds the binding limit.
+    /// [`PlanError::Binding`] if the table exceeds the binding limit.
     pub(crate) fn new(
         context: &GpuContext,
         allocator: &mut Allocator<'_>,
@@ -128,7 +128,7 @@ impl Table {
         }
         match self {
             Self::Buffer(buffer) => context.queue.write_buffer(buffer, 0, bytes),
-            // Always true; the condition removes this code from the page's WebGPU build.
+            // `draws_only` is always true here; the condition removes this code from the page's WebGPU build.
             Self::Texture { texture, entry_bytes, .. } if context.draws_only() => {
                 let row_bytes = (ENTRIES_PER_ROW * entry_bytes) as usize;
                 let (rows, rest) = bytes.split_at(bytes.len() / row_bytes * row_bytes);

@@ -17,13 +17,13 @@ use support::{assert_close, cage, egg, flat, gpu, gpu_with, with_prepared};
 /// Tolerance for weights: both solvers stop at tau, a tenth of this.
 const WEIGHT_TOLERANCE: f32 = 1e-4;
 
-/// Tolerance for positions, over the cage diagonal.
+/// Tolerance for positions, as a fraction of the cage diagonal.
 const POSITION_TOLERANCE: f32 = 1e-4;
 
-/// Rounding of f32 sums of dozens of products near 1; the weights are identical.
+/// Tolerance for positions from identical weights: rounding of f32 sums of dozens of products near 1.
 const SAME_WEIGHTS_TOLERANCE: f32 = 2e-6;
 
-/// Rounding of positions, over edges of a few hundredths.
+/// Tolerance for normals: rounding of positions, divided by edge lengths of a few hundredths.
 const NORMAL_TOLERANCE: f32 = 2e-4;
 
 fn options(method: Method, solver: Solver) -> BindOptions {
@@ -105,7 +105,7 @@ fn several_batches_give_the_same_weights() {
     for solver in [Solver::Multigrid, Solver::Jacobi] {
         let options = options(Method::Embedded, solver);
         let one = on_gpu(&whole, &positions, &cage, &options);
-        // At most 21^3 cells and 8 columns: 300 kB.
+        // Values of at most 21^3 cells and 8 columns take 300 kB.
         let rows = one.report.levels[0] + 2;
         let limit = rows * 4 * 8 + 100;
         let split = gpu_with(&ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() });
@@ -226,7 +226,7 @@ fn deformed_mesh_equals_the_cpus() {
         .collect();
     let expected = deform_bound(&binding.weights, &binding.frames, &posed);
     let normals = vertex_normals(&expected, &mesh.triangles);
-    // In one buffer, and in chunks of a few slices.
+    // The weights are in one buffer, then in chunks of a few slices.
     for max_binding_bytes in [None, Some(64 << 10)] {
         let context = gpu_with(&ContextOptions { max_binding_bytes, ..ContextOptions::default() });
         block_on(async {

@@ -27,7 +27,7 @@ fn triangles(faces: usize) -> Vec<[u32; 3]> {
     (0..faces as u32).flat_map(|f| [[4 * f, 4 * f + 1, 4 * f + 2], [4 * f, 4 * f + 2, 4 * f + 3]]).collect()
 }
 
-/// Eight vertices, and copies of them for other faces.
+/// A cube of eight vertices, with a copy of a vertex for each further face that uses it.
 fn with_copies() -> DrawModel {
     let (positions, faces) = corners_of_cube();
     let mut taken = [false; 8];
@@ -44,14 +44,14 @@ fn with_copies() -> DrawModel {
     model
 }
 
-/// 24 vertices: four per face.
+/// A cube of 24 vertices, four per face.
 fn split() -> DrawModel {
     let (positions, faces) = corners_of_cube();
     let positions = faces.iter().flatten().map(|&v| positions[v as usize]).collect();
     DrawModel::plain(positions, triangles(faces.len()))
 }
 
-/// Eight vertices shared by all faces: smooth shading.
+/// A cube of eight vertices that its faces share, for smooth shading.
 fn shared() -> DrawModel {
     let (positions, faces) = corners_of_cube();
     let of = |corner: u32| faces[corner as usize / 4][corner as usize % 4];

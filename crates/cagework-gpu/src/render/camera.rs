@@ -14,19 +14,21 @@ const FOV_Y: f32 = 35.0 * PI / 180.0;
 /// Distance factor of [`Camera::frame`], for a margin around the scene.
 const FRAME_MARGIN: f32 = 1.12;
 
-/// Distance factor of [`Camera::fit`].
+/// Distance factor of [`Camera::fit`], for a margin around the points.
 const FIT_MARGIN: f32 = 1.06;
 
-/// Range of the distance to the target, over the scene's radius.
+/// Range of the distance from the eye to the target, as multiples of the scene's radius.
 const DISTANCE_RANGE: [f32; 2] = [1e-3, 1e3];
 
-/// Distance of the far plane behind the scene, over the scene's radius, so that the floor is visible.
+/// Distance of the far plane behind the scene's centre, as a multiple of the scene's radius, so that the floor is
+/// visible.
 const FAR_REACH: f32 = 24.0;
 
-/// Distance of the near plane, over the distance to the target. A 32-bit float depth buffer is precise enough.
+/// Distance of the near plane from the eye, as a fraction of the distance to the target. A 32-bit float depth buffer is
+/// precise enough.
 const NEAR_FRACTION: f32 = 0.02;
 
-/// Projection of depth.
+/// Kind of projection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
     /// Size decreases with depth.
@@ -82,9 +84,9 @@ pub struct Camera {
     pub pitch: f32,
     /// Distance from eye to target, object units.
     pub distance: f32,
-    /// Vertical field of view, radians. An orthographic picture has the same size at the target.
+    /// Vertical field of view, radians. An orthographic picture has the same height at the target as a perspective one.
     pub fov_y: f32,
-    /// Projection.
+    /// Kind of projection.
     pub projection: Projection,
     viewport: Vec2,
     scene_center: Vec3,
@@ -124,7 +126,7 @@ impl Camera {
     pub fn set_scene(&mut self, bounds: Bounds) {
         self.scene_center = bounds.center();
         let radius = 0.5 * bounds.diagonal();
-        // A single point has no size; use 1.
+        // The bounds of a single point have radius 0; use 1.
         self.scene_radius = if radius > 0.0 { radius } else { 1.0 };
     }
 
@@ -153,7 +155,7 @@ impl Camera {
         self.target + self.distance * self.backward()
     }
 
-    /// View from world: x right, y up, z towards the eye.
+    /// Transform from world space to view space: x right, y up, z towards the eye.
     #[must_use]
     pub fn view_from_world(&self) -> Mat4 {
         let (x, y, z, eye) = (self.right(), self.up(), self.backward(), self.eye());
@@ -165,7 +167,7 @@ impl Camera {
         )
     }
 
-    /// Clip from view, depth 0 (near) to 1 (far).
+    /// Transform from view space to clip space, with depth 0 (near) to 1 (far).
     #[must_use]
     pub fn clip_from_view(&self) -> Mat4 {
         let aspect = self.viewport.x / self.viewport.y;
@@ -188,7 +190,7 @@ impl Camera {
         }
     }
 
-    /// Clip from world.
+    /// Transform from world space to clip space.
     #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
         self.clip_from_view() * self.view_from_world()
@@ -300,7 +302,8 @@ impl Camera {
         };
         let mut needed = 0.0_f32;
         for (tan, across) in tans.into_iter().zip(across) {
-            // Distance from which each side touches the outermost point. Shifting the target sideways equalises both.
+            // Distance from which this side of the picture touches the outermost point. Shifting the target sideways
+            // makes the distances of both sides equal.
             let from_side = |sign: f32| {
                 let from =
                     |p: &Vec3| sign * (*p - self.target).dot(across) / tan + (*p - self.target).dot(depth);

@@ -12,7 +12,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// Lines on the smooth surface and around balls and tubes, which follow the controls.
+/// Lines on the smooth surface and around balls and tubes, at positions computed from the controls.
 #[derive(Debug)]
 pub(super) struct SurfaceView {
     set: ControlSet,

@@ -20,7 +20,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::Table;
 
-/// Radius of the floor, over the scene's radius.
+/// Radius of the floor, as a multiple of the scene's radius.
 const FLOOR_REACH: f32 = 5.0;
 
 /// Depth range of the gizmo: in front of everything, with depth tests within the gizmo.
@@ -68,7 +68,7 @@ pub struct Renderer {
     wires: Option<Wires>,
     cage: Option<CageView>,
     slice: Option<SlicePlane>,
-    /// Problems, grabbed points, joints.
+    /// Marks of problems, grabbed points and joints, topmost last.
     marks: Vec<MarksView>,
     gizmo: GizmoShape,
     scene: SceneOptions,
@@ -163,7 +163,7 @@ impl Renderer {
         mesh.set_style(context, self.scene.mesh, range, self.scene.greyed.is_some());
     }
 
-    /// Sets the rest bounds, which place the floor.
+    /// Sets the bounds of the model at rest, which determine the position and size of the floor.
     pub(crate) fn set_bounds(&mut self, bounds: Bounds) {
         self.floor = bounds;
     }
@@ -174,7 +174,7 @@ impl Renderer {
         self.apply(context, model, Some(&before));
     }
 
-    /// Applies the differences from `before`, or everything.
+    /// Applies the members of the scene that differ from `before`; all members if `before` is `None`.
     fn apply(&mut self, context: &GpuContext, model: Option<&DrawModel>, before: Option<&SceneOptions>) {
         let scene = &self.scene;
         let theme_changed = before.is_none_or(|b| b.theme != scene.theme);

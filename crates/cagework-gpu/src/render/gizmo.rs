@@ -20,16 +20,17 @@ pub const GIZMO_PX: f32 = 84.0;
 /// Pick radius of axes and rings, CSS pixels.
 const PICK_RADIUS_PX: f32 = 8.0;
 
-/// Start of an axis, over its length. The space inside is the centre handle.
+/// Distance from the gizmo's centre to the start of an axis, as a fraction of the axis length. The centre handle is
+/// inside.
 const AXIS_START: f32 = 0.16;
 
-/// Extent of a plane handle along both of its axes, over the axis length.
+/// Extent of a plane handle along both of its axes, as fractions of the axis length.
 const PLANE_RANGE: [f32; 2] = [0.30, 0.50];
 
-/// Radius of the ring that faces the eye, over the axis length: outside the axis rings.
+/// Radius of the ring that faces the eye, as a multiple of the axis length. The ring is outside the axis rings.
 const VIEW_RING_RADIUS: f32 = 1.16;
 
-/// Tube radius of a ring, over the axis length.
+/// Tube radius of a ring, as a fraction of the axis length.
 const TUBE_RADIUS: f32 = 0.014;
 
 /// Segments of a ring.
@@ -92,7 +93,7 @@ fn unit(axis: u8) -> Vec3 {
     [Vec3::X, Vec3::Y, Vec3::Z][usize::from(axis % 3)]
 }
 
-/// Rotates z towards the eye.
+/// Rotation that turns x to the right of the picture, y to its top, and z towards the eye.
 fn facing(camera: &Camera) -> Quat {
     Quat::from_mat3(&Mat3::from_cols(camera.right(), camera.up(), camera.backward()))
 }
@@ -127,7 +128,7 @@ fn is_in_quad(p: Vec2, corners: [Vec2; 4]) -> bool {
 #[derive(Debug)]
 pub(super) struct GizmoShape {
     vertices: wgpu::Buffer,
-    /// Number of vertices in the gizmo's frame, and in the frame that faces the eye, which follow.
+    /// Number of vertices in the gizmo's frame, and of the subsequent vertices in the frame that faces the eye.
     counts: [u32; 2],
     /// Transforms of both frames.
     transforms: [FrameTransform; 2],
@@ -303,7 +304,7 @@ mod tests {
     fn view_ring_is_a_circle_outside_the_axis_rings() {
         let (mut camera, mut gizmo) = scene();
         gizmo.mode = GizmoMode::Rotate;
-        // At the picture's centre, where perspective does not distort circles that face the eye.
+        // Put the gizmo at the picture's centre, where perspective does not distort circles that face the eye.
         camera.target = gizmo.center;
         let center = at(&camera, &gizmo, Vec3::ZERO);
         for k in 0..12 {

@@ -6,8 +6,8 @@ use super::camera::Camera;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. A picture takes 10 s
-/// of one core in llvmpipe; a frame of the page about 1 s in SwiftShader.
+/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. At the limit, a
+/// picture takes 10 s of one core in llvmpipe, and a frame of the page takes about 1 s in SwiftShader.
 const MAX_SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 2.5e7 } else { 1e8 };
 
 /// Cost of a triangle per pixel of its longest side, in addition to its area, because slivers have almost no

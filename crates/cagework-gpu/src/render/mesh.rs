@@ -22,9 +22,9 @@ pub(super) struct Mesh {
     pub(super) rest: Table,
     /// Normals at rest.
     pub(super) rest_normals: Table,
-    /// Per vertex: weight, error or greying.
+    /// Weight, error or greying of each vertex.
     pub(super) values: Table,
-    /// Positions, normals and values of the vertices.
+    /// Bind group of the vertices' positions, normals and values.
     vertices: wgpu::BindGroup,
     /// Positions in use: rest or deformed.
     pub(super) positions: Table,
@@ -91,7 +91,7 @@ impl Mesh {
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }
 
-    /// Draws with these tables of vertices from now on.
+    /// Draws with these tables of positions and normals from now on.
     pub(super) fn set_vertices(
         &mut self,
         context: &GpuContext,
@@ -138,8 +138,8 @@ impl Mesh {
         }
     }
 
-    /// Draws the groups that are blended or those that are not, except groups of `hidden` triangles. Colour
-    /// maps are opaque, so all groups then count as not blended.
+    /// Draws the blended groups or, with `blended` false, all other groups, except groups of `hidden` triangles. Colour
+    /// maps are opaque, so with a colour map no group is blended.
     pub(super) fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,

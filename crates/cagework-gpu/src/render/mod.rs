@@ -1,12 +1,12 @@
 //! Renders the scene into a canvas or a texture.
 //!
-//! Reads the vertex buffers written by `deform_vertices` and `vertex_normals` without copies; a frame uploads
-//! a few hundred bytes. On devices that only draw, the same tables are textures ([`crate::table`]). Colours
-//! are linear, blended premultiplied, with 4x multisampling. Data that rarely changes (selection, styles,
-//! heat map) is uploaded on change.
+//! The renderer reads the vertex buffers written by `deform_vertices` and `vertex_normals` without copies; a frame
+//! uploads a few hundred bytes. On devices that only draw, the same tables are textures ([`crate::table`]). Colours are
+//! linear, blended premultiplied, with 4x multisampling. Data that rarely changes (selection, styles, heat map) is
+//! uploaded on change.
 //!
-//! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
-//! mesh, fainter), controls inside, handles, marks, gizmo.
+//! Drawing order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
+//! mesh, fainter), controls inside the cage, handles, marks, gizmo.
 //!
 //! **Target format.** To sRGB formats (`rgba8unorm-srgb`), shaders write linear colours and the GPU encodes.
 //! Canvases have no sRGB format: configure the preferred format, list its sRGB variant in `view_formats`, and

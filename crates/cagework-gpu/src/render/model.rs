@@ -17,8 +17,8 @@ pub const CLAY: [f32; 4] = [0.52, 0.505, 0.485, 1.0];
 pub struct DrawModel {
     /// Rest positions of the vertices. `[n_vertices]`, object units.
     pub positions: Vec<Vec3>,
-    /// Duplicated vertices with normals of their own, for hard edges of an OBJ: the vertex that each one
-    /// moves with. Numbered after `positions`. `[n_copies]`
+    /// Duplicated vertices with normals of their own, for hard edges of an OBJ. Each entry is the vertex whose position
+    /// the duplicate takes. Duplicates are numbered after `positions`. `[n_copies]`
     pub copies: Vec<u32>,
     /// Corners of triangles. `[n_corners]`
     pub vertices: Vec<DrawVertex>,
@@ -58,7 +58,7 @@ pub struct DrawGroup {
 /// Use of a material's alpha.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Alpha {
-    /// Ignored.
+    /// Alpha is ignored.
     #[default]
     Opaque,
     /// Fragments with less alpha than the cutoff are discarded.
@@ -66,19 +66,19 @@ pub enum Alpha {
         /// The cutoff.
         cutoff: f32,
     },
-    /// Blended with what is behind.
+    /// Fragments are blended with the colour behind them.
     Blend,
 }
 
 /// Texture sampling outside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// Repeated.
+    /// The image is repeated.
     #[default]
     Repeat,
-    /// Repeated, mirrored every other time.
+    /// The image is repeated, mirrored every other time.
     Mirror,
-    /// Clamped to the edge.
+    /// The colour at the image's edge continues outside the image.
     Clamp,
 }
 
@@ -275,7 +275,8 @@ mod tests {
         assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
     }
 
-    /// Two triangles each; the first model has a hard edge (two copies), the second a texture.
+    /// Joins a model of two triangles with a hard edge (two copies) and, twice, a model of one triangle with one copy and a
+    /// texture.
     #[test]
     fn joined_models_keep_their_corners_copies_and_textures() {
         let mut first = DrawModel::plain(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2], [2, 1, 0]]);

@@ -9,10 +9,10 @@ use crate::table::{Entry, Table};
 /// Opacity factor of overlays behind a surface.
 pub(super) const BEHIND_OPACITY: f32 = 0.22;
 
-/// Two words: state and first index; second index.
+/// An item in two words: its state and first position index, then its second position index.
 pub(super) type Item = [u32; 2];
 
-/// Packs an item.
+/// Packs an item from its state and its two position indices.
 pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
     [state << STATE_SHIFT | a, b]
 }
@@ -78,7 +78,7 @@ impl Overlay {
         }
     }
 
-    /// Sets the style in front; behind surfaces it is fainter.
+    /// Sets the style in front of surfaces, and a fainter version of it behind surfaces.
     pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
         self.set_styles(context, with_behind(style));
     }

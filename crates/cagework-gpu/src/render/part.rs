@@ -12,7 +12,7 @@ pub struct PartPainter {
 }
 
 impl PartPainter {
-    /// `format`: of the targets.
+    /// Creates the pipeline. `format`: format of the targets.
     #[must_use]
     pub fn new(context: &GpuContext, format: wgpu::TextureFormat) -> Self {
         let device = &context.device;
@@ -51,7 +51,7 @@ impl PartPainter {
         Self { layout, pipeline }
     }
 
-    /// Records the drawing of textures into `target`, each at a horizontal offset in pixels. The rest is
+    /// Records the drawing of textures into `target`, each at a horizontal offset in pixels. All other pixels are
     /// cleared to black.
     pub fn paint(
         &self,

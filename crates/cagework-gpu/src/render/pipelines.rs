@@ -11,10 +11,10 @@ use crate::device::GpuContext;
 /// Multisampling samples per pixel.
 pub(super) const SAMPLES: u32 = 4;
 
-/// 32-bit float, so that distant handles are still separated from the cage's faces.
+/// Depth format: 32-bit floats, so that distant handles are still separated from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Bind group layouts; independent of the target.
+/// Bind group layouts, which do not depend on the target's format.
 #[derive(Debug)]
 pub(super) struct Layouts {
     pub(super) camera: wgpu::BindGroupLayout,
@@ -42,7 +42,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Shader, depth test, blending.
+    /// Shader, depth test, and whether colours are blended.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
             Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
@@ -85,13 +85,13 @@ struct Depth {
     write: bool,
 }
 
-/// Opaque surfaces.
+/// Depth test of opaque surfaces.
 const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true };
-/// Overlays in front of surfaces.
+/// Depth test of overlays in front of surfaces.
 const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
-/// Overlays behind surfaces.
+/// Depth test of overlays behind surfaces.
 const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
-/// Without depth test.
+/// No depth test.
 const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
@@ -133,7 +133,7 @@ impl Layouts {
         }
     }
 
-    /// Bind groups of a shader, without the camera's.
+    /// Bind group layouts of a shader, except the layout of the camera.
     fn of(&self, shader: &DrawShader) -> Vec<&wgpu::BindGroupLayout> {
         match shader.name {
             "draw_mesh" => vec![&self.vertices, &self.material],

@@ -9,10 +9,10 @@ use glam::{Quat, Vec3};
 cagework_core::choice! {
     /// Colours of background and overlays.
     Theme {
-        /// For dark pages.
+        /// Dark colours, for dark pages.
         #[default]
         Dark = "dark",
-        /// For light pages and print.
+        /// Light colours, for light pages and print.
         Light = "light",
     }
 }
@@ -20,12 +20,12 @@ cagework_core::choice! {
 /// Display of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeshStyle {
-    /// Not drawn.
+    /// The mesh is not drawn.
     Hidden,
-    /// With its materials.
+    /// The mesh is drawn with its materials.
     #[default]
     Solid,
-    /// One colour, without materials.
+    /// The mesh is drawn in one colour, without materials.
     Clay,
     /// Weights of a control in the colours of [`super::colormap`], from 0 to the mesh's maximum or to 1;
     /// negative weights in a warning colour. Legend: [`crate::Session::value_range`].
@@ -72,7 +72,7 @@ pub struct SceneOptions {
     pub gizmo: Option<Gizmo>,
     /// Slice of the grid.
     pub slice: Option<SliceView>,
-    /// Places with a problem.
+    /// Marked places with a problem.
     pub marks: Marks,
     /// Grabbed points, with lines to targets that they cannot reach.
     pub held: Marks,
@@ -139,11 +139,11 @@ pub enum GizmoMode {
 /// A handle of a gizmo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GizmoPart {
-    /// Along or about an axis: 0, 1, 2.
+    /// Moves or scales along an axis of the gizmo, or rotates about it: 0 is x, 1 is y, 2 is z.
     Axis(u8),
-    /// Moving in the plane normal to an axis.
+    /// Moves in the plane normal to an axis.
     Plane(u8),
-    /// Moving in the view plane, rotating about the view direction, or uniform scaling.
+    /// Moves in the view plane, rotates about the view direction, or scales uniformly.
     View,
 }
 

@@ -88,7 +88,7 @@ shaders! {
 }
 
 impl DrawShader {
-    /// Source for a device.
+    /// Source for a device: with tables in textures if the device only draws, otherwise in buffers.
     pub(crate) fn source(&self, context: &GpuContext) -> &'static str {
         #[cfg(feature = "webgl")]
         if context.draws_only() {

@@ -4,7 +4,8 @@ use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 
-/// Size of the table for encoding sRGB. Its step is smaller than one byte at sRGB's steepest slope.
+/// Number of entries of the table for encoding sRGB. Adjacent entries differ by less than one byte, even at sRGB's
+/// steepest slope.
 const ENCODE_STEPS: usize = 8192;
 
 /// Lookup tables for decoding and encoding sRGB bytes.

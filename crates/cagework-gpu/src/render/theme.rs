@@ -46,7 +46,8 @@ pub(super) struct Palette {
 /// sRGB as `0xRRGGBB`, and alpha.
 pub(super) type Color = (u32, f32);
 
-/// Colours of handles: axes x, y, z, view handle, view ring. The ring is thin and must contrast with dark and light.
+/// Colours of the gizmo's handles: axes x, y, z, view handle, view ring. The ring is thin and must contrast with dark
+/// and light backgrounds.
 pub(super) const AXES: [Color; 5] =
     [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0), (0x8a94a6, 1.0)];
 
@@ -134,7 +135,7 @@ pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
 }
 
 impl Palette {
-    /// Colours of all states, with `normal` for the first.
+    /// Colours of all states. `normal`: colour of elements that are neither selected nor hovered.
     fn states(&self, normal: Color) -> [[f32; 4]; 8] {
         let mut colors = [linear(normal); 8];
         colors[state::HOVERED as usize] = linear(self.hovered);
@@ -144,7 +145,7 @@ impl Palette {
         colors
     }
 
-    /// Edges of the cage.
+    /// Style of the cage's edges.
     pub(super) fn cage_lines(&self) -> Style {
         Style {
             colors: self.states(self.cage),
@@ -156,34 +157,34 @@ impl Palette {
         }
     }
 
-    /// Edges of a faint cage.
+    /// Style of the edges of a faint cage.
     pub(super) fn faint_lines(&self) -> Style {
         Style { opacity: 0.35, ..self.cage_lines() }
     }
 
-    /// Edges between cage faces on the smooth surface.
+    /// Style of the edges between cage faces on the smooth surface.
     pub(super) fn curves(&self, is_faint: bool) -> Style {
         let opacity = if is_faint { 0.75 } else { 1.0 };
         Style { colors: [linear(self.curves); 8], widths: [[1.25; 4]; 2], opacity, ..self.cage_lines() }
     }
 
-    /// Outlines of balls and tubes around controls inside.
+    /// Style of the outlines of balls and tubes around controls inside the cage.
     pub(super) fn shells(&self) -> Style {
         Style { colors: self.states(self.inner), widths: [[0.9; 4]; 2], opacity: 0.6, ..self.cage_lines() }
     }
 
-    /// Edges between controls inside.
+    /// Style of the edges between controls inside the cage.
     pub(super) fn bones(&self) -> Style {
         Style { colors: self.states(self.inner), widths: [[2.0; 4]; 2], ..self.cage_lines() }
     }
 
-    /// Controls inside.
+    /// Style of controls inside the cage.
     pub(super) fn inner(&self) -> Style {
-        // White rim: they are in front of the model, not the background.
+        // The rim is white because these controls are drawn over the model, not over the background.
         Style { colors: self.states(self.inner), rim_color: [1.0, 1.0, 1.0, 0.9], ..self.handles() }
     }
 
-    /// Vertices of the cage.
+    /// Style of the cage's vertices.
     pub(super) fn handles(&self) -> Style {
         Style {
             colors: self.states(self.handle),
@@ -196,7 +197,7 @@ impl Palette {
         }
     }
 
-    /// Faces of the cage.
+    /// Style of the cage's faces.
     pub(super) fn faces(&self) -> Style {
         let mut colors = self.states(self.cage);
         for (color, alpha) in colors.iter_mut().zip([0.0, 0.16, 0.30, 0.38, 0.2]) {
@@ -205,7 +206,7 @@ impl Palette {
         Style { colors, opacity: 1.0, size: 1.0, ..Style::default() }
     }
 
-    /// Wireframe of the rest pose, or edges of the mesh.
+    /// Style of the wireframe of the rest pose (`base`), or of the mesh's edges.
     pub(super) fn wire(&self, base: bool) -> Style {
         let color = if base { self.wire } else { self.mesh_edges };
         Style {
@@ -218,7 +219,7 @@ impl Palette {
         }
     }
 
-    /// Places with a problem.
+    /// Style of places with a problem.
     pub(super) fn marks(&self) -> Style {
         Style {
             colors: [linear(self.warning); 8],
@@ -231,12 +232,12 @@ impl Palette {
         }
     }
 
-    /// Grabbed points.
+    /// Style of grabbed points.
     pub(super) fn held(&self) -> Style {
         Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
 
-    /// Joints: dots and rings.
+    /// Style of joints: dots and rings.
     pub(super) fn joints(&self) -> Style {
         let color = linear((self.wire.0, 1.0));
         let mut colors = [color; 8];

@@ -7,8 +7,8 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 impl Session {
-    /// A session on the same GPU with the same model, cage and pose, for comparing other weights. Contains
-    /// only the cage, without controls inside, as closed forms require.
+    /// A session on the same GPU with the same model, cage and pose, for comparing other weights. The new session has
+    /// no controls inside the cage, which closed forms do not support.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
@@ -26,8 +26,8 @@ impl Session {
         Ok(twin)
     }
 
-    /// The same session on another device, after a loss of this one. Keeps `self`, so that it can be repeated
-    /// if the device is out of memory.
+    /// Copies this session to another device after its own device was lost. `self` stays unchanged, so the call can be
+    /// repeated if the new device is out of memory.
     ///
     /// # Errors
     /// As the calls that set them.

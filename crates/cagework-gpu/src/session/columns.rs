@@ -20,13 +20,13 @@ impl Session {
         self.bound(kind, weights.into(), Arc::default(), None).await
     }
 
-    /// [`Coordinates::columns`] of the session's cage.
+    /// Positions for the columns of weights: [`Coordinates::columns`] of the session's cage.
     pub(super) fn columns<'a>(&self, kind: Coordinates, positions: &'a [Vec3]) -> Cow<'a, [Vec3]> {
         self.cage().map_or(positions.into(), |cage| kind.columns(cage, positions))
     }
 }
 
-/// Checks the size of weights.
+/// Checks that weights have `rows` rows and `columns` columns.
 pub(super) fn check_size(weights: &Weights, rows: usize, columns: usize) -> Result<(), GpuError> {
     if (weights.n_rows(), weights.n_columns()) == (rows, columns) {
         return Ok(());

@@ -1,6 +1,6 @@
-//! Deforms the mesh, by kernels, or on the CPU if the device only draws.
+//! Deforms the mesh by kernels, or on the CPU if the device only draws.
 //!
-//! Chosen when the device is opened ([`GpuContext::draws_only`]); both have the same interface.
+//! The variant is chosen when the device is opened ([`GpuContext::draws_only`]); both variants have the same interface.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ pub(super) enum Mover {
 }
 
 impl Mover {
-    /// `on_gpu`: `weights` on the GPU, if available.
+    /// `on_gpu`: the same weights, if they are on the GPU already.
     pub(super) async fn new(
         context: &GpuContext,
         model: &Arc<DrawModel>,
@@ -57,8 +57,8 @@ impl Mover {
         Ok(Self::Kernels { deformer: Box::new(deformer), tables })
     }
 
-    /// Sets held and rigid parts from the next pose on, or none. On the CPU they are passed to each
-    /// deformation instead.
+    /// Sets or removes held and rigid parts, from the next pose on. Does nothing on the CPU, where each deformation
+    /// gets the parts.
     pub(super) async fn hold(
         &mut self,
         context: &GpuContext,
@@ -88,7 +88,7 @@ impl Mover {
         }
     }
 
-    /// Deforms the mesh for the commands recorded next. `positions`: computes them on the CPU.
+    /// Deforms the mesh for the commands recorded next. `positions`: computes the deformed positions on the CPU.
     pub(super) fn encode(
         &self,
         context: &GpuContext,
@@ -97,7 +97,7 @@ impl Mover {
     ) {
         match self {
             Self::Kernels { deformer, .. } => deformer.encode(encoder),
-            // Always true; the condition removes this code from the page's WebGPU build.
+            // `draws_only` is always true here; the condition removes this code from the page's WebGPU build.
             Self::Processor { model, .. } if context.draws_only() => {
                 self.show(context, model.with_copies(&positions()));
             }
@@ -151,7 +151,7 @@ impl Mover {
     ) -> Result<Vec<Vec3>, GpuError> {
         match self {
             Self::Kernels { deformer, .. } => {
-                // Always runs, for 1 ms: the pose may not have been drawn yet.
+                // Always deform again, which takes 1 ms, because the pose may not have been drawn yet.
                 deformer.run(context).await?;
                 deformer.read_positions(context).await
             }

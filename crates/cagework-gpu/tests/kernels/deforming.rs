@@ -113,7 +113,7 @@ fn bend_vertices_matches_cpu() {
     let n = lattice.dims.element_product() as usize;
     let values = (0..n).map(|_| rng.point().extend(0.0)).collect();
     let size = lattice.cell * lattice.dims.as_vec3();
-    // Inside the lattice, on its boundary and outside.
+    // The points are inside the lattice, on its boundary and outside.
     let mut points: Vec<Vec3> = (0..131)
         .map(|_| lattice.origin + 0.5 * size + 0.7 * size * rng.point())
         .chain([lattice.origin, lattice.origin + size])
@@ -147,7 +147,7 @@ fn hold_parts_matches_cpu() {
 #[test]
 fn vertex_normals_matches_cpu() {
     let mut mesh = egg(11, 13);
-    // A vertex without triangles.
+    // Add a vertex without triangles.
     mesh.positions.push(Vec3::ONE);
     let n = mesh.positions.len();
     let table = NormalTable::new(n, &mesh.triangles);

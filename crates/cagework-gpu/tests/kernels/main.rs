@@ -22,14 +22,15 @@ use cagework_gpu::{GpuContext, GpuError};
 use glam::Vec3;
 use support::{Rng, assert_close, cage, egg, gpu, with_prepared};
 
-/// Sums of up to 14 numbers in [0, 1), times at most 6: fused multiply-adds and WGSL's division error of 2.5
-/// ulp give a few ulp of 8.
+/// Tolerance for row sums of up to 14 numbers in [0, 1) with factors of at most 6. Fused multiply-adds and WGSL's
+/// division error of 2.5 ulp change these sums by a few ulp of 8.
 const ROW_TOLERANCE: f32 = 8e-6;
 
-/// Relative, for sums of thousands of positive numbers: the order is the same, products may be fused.
+/// Tolerance relative to the largest value, for sums of thousands of positive numbers. GPU and CPU add them in the same
+/// order, but products may be fused.
 const SUM_TOLERANCE: f32 = 2e-6;
 
-/// Columns. An odd number of quads, so that rows do not align with workgroups.
+/// Columns of a batch: an odd number of quads, so that rows do not align with workgroups.
 const N_LANES: usize = 12;
 const N_QUADS: u32 = 3;
 
@@ -38,7 +39,7 @@ const GRID: u32 = 13;
 
 fn hierarchy_of<T>(use_it: impl FnOnce(&Hierarchy, &Stencils) -> T) -> T {
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    // Large enough to cross the cage.
+    // The points extend beyond the cage.
     let positions: Vec<Vec3> = egg(7, 9).positions.iter().map(|p| 1.3 * p).collect();
     with_prepared(&positions, &cage([2, 2, 3]), &options, |prepared| {
         let hierarchy = prepared.hierarchy();
@@ -47,7 +48,7 @@ fn hierarchy_of<T>(use_it: impl FnOnce(&Hierarchy, &Stencils) -> T) -> T {
     })
 }
 
-/// Uploads `inputs`, runs the kernel once, and reads back the last one.
+/// Uploads `inputs`, runs the kernel once, and reads the last input back.
 fn run(kernel: &Kernel, work: Work, count: u32, inputs: &[&[u8]]) -> Vec<f32> {
     pollster::block_on(step(&gpu(), kernel, work, count, inputs)).expect("the kernel runs")
 }
@@ -296,7 +297,7 @@ fn sample_weights_matches_cpu() {
         let table = SamplingTable::new(stencils);
         assert!(!table.hats.is_empty(), "some vertices are near the cage");
         let u = field(&mut Rng(10), &hierarchy.levels[0]);
-        // The second batch, starting at a later vertex.
+        // Sample the second batch, starting at a later vertex.
         let (first_vertex, first_column) = (5, N_LANES);
         let n = stencils.len() - first_vertex;
         let mut expected = vec![0.5; n * N_LANES];

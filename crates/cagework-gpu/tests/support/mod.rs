@@ -1,4 +1,4 @@
-//! Shared by GPU tests: a device, meshes, random numbers, comparisons.
+//! Helpers of GPU tests: a device, meshes, random numbers, comparisons.
 #![allow(dead_code, reason = "each test binary uses a subset")]
 
 use cagework_core::bind::Watch;
@@ -110,7 +110,7 @@ pub(crate) fn egg(n_rings: u32, n_segments: u32) -> TriMesh {
     TriMesh { positions, triangles }
 }
 
-/// Prepares a bind for `use_it`.
+/// Prepares a bind and passes it to `use_it`.
 pub(crate) fn with_prepared<T>(
     positions: &[Vec3],
     cage: &Cage,

@@ -3,7 +3,7 @@ use super::*;
 /// Rounding of f32 products of numbers up to 10, in pixels of a picture 800 wide.
 const PIXELS: f32 = 0.02;
 
-/// The same, in object units.
+/// Rounding of f32 products of numbers up to 10, in object units.
 const UNITS: f32 = 2e-5;
 
 fn camera(projection: Projection) -> Camera {
@@ -198,7 +198,8 @@ fn depth_is_ordered_and_within_the_clip_volume() {
         };
         let (near, far) = (camera.target + camera.backward(), camera.target - camera.backward());
         assert!(0.0 < z(near) && z(near) < z(far) && z(far) < 1.0);
-        // A point offset by a hundredth of the distance has the depth of a point at that place.
+        // Lifting a point's clip depth by a hundredth of the distance gives the depth of a point nearer by this
+        // distance.
         let clip = camera.clip_from_world() * camera.target.extend(1.0);
         let nearer = camera.target + 0.01 * camera.distance * camera.backward();
         assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);
