@@ -39,13 +39,14 @@ pub const MIN_DIAGONAL: f64 = 1e-12;
 /// Largest diagonal of a cage, object units, for the same reason.
 pub const MAX_DIAGONAL: f64 = 1e12;
 
-/// Most faces of a cage: more would take minutes to check, and usually mean that a model was given as its cage.
+/// Largest number of faces of a cage: more would take minutes to check, and usually mean that a model was given as its
+/// cage.
 pub const MAX_FACES: usize = 100_000;
 
 /// A point within this distance of the cage (over its diagonal) is on the surface: resolution of f32 coordinates.
 pub(crate) const CAGE_TOLERANCE: f64 = 1e-6;
 
-/// Most corners for which hat values need no heap memory.
+/// Largest number of corners for which hat values need no heap memory.
 const STACK_CORNERS: usize = 8;
 
 /// A closed, outward-oriented polygon mesh around the model.
@@ -66,7 +67,7 @@ pub struct Cage {
 }
 
 impl Cage {
-    /// Checks a polygon mesh and makes it a cage.
+    /// Checks a polygon mesh and builds a cage from it.
     ///
     /// Repaired, with a notice: inverted faces, and vertices split at a seam (equal positions along open edges, as in
     /// glTF files; the first one replaces the others).
@@ -87,7 +88,7 @@ impl Cage {
     }
 
     /// This cage with walls inside it: additional faces that are not checked and need not enclose anything. A wall with
-    /// values on both sides has each of its faces twice, back to back.
+    /// values on both sides consists of pairs of opposite faces.
     ///
     /// `positions`, `faces`: additional vertices and faces, whose indices count from the cage's first vertex; `parts`:
     /// number of the connected part of each face.
@@ -118,7 +119,7 @@ impl Cage {
         Ok(Self::assembled(all, faces, polygons, parts, self.bounds, self.notices.clone()))
     }
 
-    /// A cage of checked faces.
+    /// A cage from faces that have been checked.
     fn assembled(
         positions: Vec<Vec3>,
         faces: Vec<Vec<u32>>,
@@ -164,7 +165,7 @@ impl Cage {
         &self.positions
     }
 
-    /// Number of vertices: columns of the weights.
+    /// Number of vertices, including unused ones.
     #[must_use]
     pub fn n_vertices(&self) -> usize {
         self.positions.len()
@@ -253,7 +254,7 @@ impl Cage {
         self.bounds.diagonal()
     }
 
-    /// Repairs and remarks.
+    /// Notices about repairs and about properties that may be unintended.
     #[must_use]
     pub fn notices(&self) -> &[CageNotice] {
         &self.notices
@@ -307,7 +308,7 @@ impl Cage {
     }
 }
 
-/// Triangulation of a face, as indices of its corners. `diagonal`: of the cage.
+/// Triangulation of a face, as indices of its corners. `diagonal`: diagonal of the cage, object units.
 pub fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Polygon::new(corners, diagonal).map(|polygon| polygon.triangles)
 }

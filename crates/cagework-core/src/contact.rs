@@ -1,14 +1,14 @@
 //! Intersection of triangles of one surface, apart from shared vertices and edges.
 //!
-//! Triangles without common vertices must be more than a gap apart (separating axes). With one common vertex they must
-//! not meet elsewhere. With a common edge they must not be folded onto each other.
+//! Triangles without common vertices meet if they are at most a gap apart (separating axes). Triangles with one common
+//! vertex meet if they also touch elsewhere, and triangles with a common edge if they are folded onto each other.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-/// Sine of the angle to a plane below which a direction lies in it: far above f64 rounding, far below the resolution of f32
-/// coordinates.
+/// Sine of the angle between a direction and a plane below which the direction lies in the plane: far above f64
+/// rounding, far below the resolution of f32 coordinates.
 const PLANE_TOLERANCE: f64 = 1e-7;
 
 /// Distance below which triangles touch, over their size: f64 rounding with a margin.
@@ -20,7 +20,8 @@ const MAX_FOLD_COSINE: f64 = 0.9994;
 /// Limit on the pairs that [`meeting`] lists, against memory exhaustion.
 const MAX_PAIRS: usize = 100_000;
 
-/// Limit on comparisons of boxes in a search, some seconds: 40,000 triangles that all meet have 800 million pairs.
+/// Limit on comparisons of boxes in a search, which take some seconds: 40,000 triangles that all meet have 800 million
+/// pairs.
 const MAX_COMPARISONS: u64 = 1 << 29;
 
 /// Cost of an intersection test of triangles, in comparisons of boxes.
@@ -99,8 +100,8 @@ pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     }
 }
 
-/// A sort key by `x` (`f64::total_cmp`), then by `number`, of a type that is sorted elsewhere: another one would add 2
-/// kB to the wasm module.
+/// Sort key by `x` (`f64::total_cmp`), then by `number`. The crate also sorts `[u32; 3]` elsewhere; sorting another
+/// type would add 2 kB to the wasm module.
 fn ascending(x: f64, number: u32) -> [u32; 3] {
     let bits = x.to_bits();
     let key = if bits >> 63 == 1 { !bits } else { bits | 1 << 63 };

@@ -1,9 +1,10 @@
 //! The deformation as a field in space, for points that are not bound: probes and points of other files, Gaussian
 //! splats, and vertices that a skeleton moves before the cage does (dynamic binding, Joshi et al. 2007).
 //!
-//! Weights are bound at the nodes of a regular lattice, inside the cage and within two cells of it. For a pose, each node
-//! has a displacement u = sum_i w_i (c_i' - c_i) and a deformation gradient F = I + du/dx, by central differences. Both
-//! are interpolated trilinearly. Outside, u solves Laplace's equation with zero at the lattice's boundary.
+//! Weights are bound at the nodes of a regular lattice that lie inside the cage or within two cells of it. For a pose,
+//! each of these nodes has a displacement u = sum_i w_i (c_i' - c_i). At the other nodes, u solves Laplace's equation
+//! with u = 0 on the lattice's boundary. Every node also has a deformation gradient F = I + du/dx, by finite
+//! differences. Between nodes, u and F are interpolated trilinearly.
 
 use glam::{DMat3, DVec3, IVec3, Mat3, UVec3, Vec3, Vec4};
 
@@ -19,7 +20,8 @@ use crate::weights::Weights;
 
 /// Default number of lattice cells along the longest side of the cage's box.
 pub const CELLS: u32 = 64;
-/// Cells of the lattice that bends clips: coarser, because a page computes it when a clip starts.
+/// Number of cells along the longest side of the cage's box in the lattice that deforms animation clips. It is smaller
+/// than [`CELLS`] because the page computes this lattice when a clip starts.
 pub const CLIP_CELLS: u32 = 48;
 /// Allowed numbers of cells. At 256, a lattice may have 57 million nodes; the bind's memory limit applies before.
 pub const CELLS_RANGE: Number = Number {
@@ -28,27 +30,29 @@ pub const CELLS_RANGE: Number = Number {
     is_allowed: |n| n.fract() == 0.0 && (8.0..=256.0).contains(&n),
     slider: None,
 };
-/// Lattice cells on each side of the box, over the cells along its longest side.
+/// Margin of the lattice on each side of the cage's box, as a fraction of the box's longest side.
 const MARGIN: f32 = 0.25;
-/// Distance from the cage, in cells, up to which nodes are bound.
+/// Distance from the cage, in lattice cells, up to which nodes outside the cage are bound.
 const BOUND_CELLS: u32 = 2;
-/// Cascade that solves the outer field: strides of successively finer lattices, and Gauss-Seidel sweeps on each.
+/// Cascade that solves for the nodes that are not bound: strides of successively finer lattices, and the number of
+/// Gauss-Seidel sweeps on each.
 const STRIDES: [(u32, usize); 4] = [(8, 40), (4, 12), (2, 8), (1, 8)];
-/// Edge of the cells that sort deformed nodes, in lattice cells.
+/// Edge of the cells into which [`InverseField`] sorts deformed nodes, in lattice cells.
 const INVERSE_CELLS: f32 = 2.0;
-/// Limit on the index of such a cell along an axis.
+/// Limit on the index of a sorting cell along an axis, so that three indices fit into one key.
 const MAX_CELL_INDEX: f32 = 1e6;
-/// Limit on Newton steps of an inverse.
+/// Limit on the Newton steps for one target point.
 const MAX_NEWTON_STEPS: usize = 8;
-/// Distance from the target at which Newton's method stops, over the longest side of the cage's box.
+/// Distance from the target at which Newton's method stops, as a fraction of the longest side of the cage's box.
 const INVERSE_TOLERANCE: f64 = 1e-7;
-/// An inverse fails if the distance from the target is larger, over the longest side of the cage's box.
+/// Largest distance from the target at which an inverse is accepted, as a fraction of the longest side of the cage's
+/// box.
 const MAX_INVERSE_ERROR: f64 = 1e-6;
 
-/// Nodes of a regular lattice around a cage, x fastest.
+/// A regular lattice of nodes around a cage. Nodes are numbered with x fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
-    /// First node, object units.
+    /// Position of the first node, object units.
     pub origin: Vec3,
     /// Edge of a cell, object units.
     pub cell: f32,
@@ -66,7 +70,7 @@ impl Lattice {
         let size = bounds.max - bounds.min;
         let cell = size.max_element() / cells as f32;
         let margin = (MARGIN * cells as f32).ceil();
-        // A multiple of the coarsest stride.
+        // Round up to a multiple of the coarsest stride.
         let inner = (size / cell).ceil().as_uvec3() + 2 * margin as u32;
         let dims = inner.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1;
         let mut lattice = Self { origin: bounds.min - margin * cell, cell, dims, bound: Vec::new() };
@@ -84,14 +88,16 @@ impl Lattice {
         self.origin + self.cell * self.node(index).as_vec3()
     }
 
-    /// Cell that contains a point, clamped to the lattice: its first node, and the point's position in it, 0 to 1.
+    /// Cell that contains a point, clamped to the lattice: its first node, and the point's coordinates in the cell, 0
+    /// to 1.
     fn place(&self, point: Vec3) -> (usize, Vec3) {
         let at = (point - self.origin) / self.cell;
         let first = at.floor().clamp(Vec3::ZERO, (self.dims - 2).as_vec3());
         (self.index(first.as_uvec3()), (at - first).clamp(Vec3::ZERO, Vec3::ONE))
     }
 
-    /// Flood fill from the first node: returns the nodes it does not reach without coming near the cage.
+    /// Nodes inside the cage or near it, ascending. A flood fill from the first node spreads over nodes that are
+    /// farther than `BOUND_CELLS` cells from the cage; the nodes that it does not visit are returned.
     fn around(&self, cage: &Cage) -> Vec<u32> {
         let n = self.dims.element_product();
         let (origin, cell, reach) = (self.origin.as_dvec3(), f64::from(self.cell), f64::from(BOUND_CELLS));
@@ -131,18 +137,18 @@ impl Lattice {
         (0..n).filter(|&index| is_bound[index as usize]).collect()
     }
 
-    /// Index difference of neighbours along an axis.
+    /// Difference between the indices of neighbouring nodes along an axis.
     fn stride_of(&self, axis: usize) -> usize {
         self.dims.to_array()[..axis].iter().product::<u32>() as usize
     }
 
-    /// Nodes of a cell from its first node, x fastest.
+    /// The eight nodes of a cell, given the first one, x fastest.
     fn corners(&self, first: usize) -> [usize; 8] {
         let (y, z) = (self.stride_of(1), self.stride_of(2));
         [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1].map(|step| first + step)
     }
 
-    /// Longest side of the cage's box, object units.
+    /// Longest side of the cage's box, object units. Up to `STRIDES[0].0` cells too large where the lattice was padded.
     fn longest_side(&self) -> f32 {
         let cells = self.dims.max_element() as f32 - 1.0;
         cells / (1.0 + 2.0 * MARGIN) * self.cell
@@ -166,11 +172,11 @@ pub struct FieldWeights {
 }
 
 impl FieldWeights {
-    /// Binds a lattice with `cells` cells along the longest side of the cage's box. The options apply except
-    /// `outside`: weights outside the cage are extended.
+    /// Binds a lattice with `cells` cells along the longest side of the cage's box. The `outside` option is ignored:
+    /// weights outside the cage are always extended.
     ///
     /// # Errors
-    /// Those of a bind.
+    /// As [`bind`].
     pub fn bind<'a>(
         controls: impl Into<Controls<'a>>,
         cells: u32,
@@ -184,17 +190,17 @@ impl FieldWeights {
         Ok(Self::new(lattice, binding.weights, binding.frames))
     }
 
-    /// Weights that were bound at [`Lattice::points`].
+    /// Wraps `weights` and `frames` that were bound at [`Lattice::points`].
     ///
     /// # Panics
-    /// If there is not one row per point.
+    /// If `weights` does not have one row per point.
     #[must_use]
     pub fn new(lattice: Lattice, weights: Weights, frames: Frames) -> Self {
         assert_eq!(weights.n_rows(), lattice.bound.len(), "one row per bound node");
         Self { lattice, weights, frames }
     }
 
-    /// The field of a pose. `rest`, `posed`: `[n_controls]`, object units.
+    /// The field of a pose. `rest`, `posed`: positions of the controls, `[n_controls]`, object units.
     ///
     /// # Panics
     /// If the lengths do not match the columns of the weights.
@@ -223,7 +229,7 @@ impl FieldWeights {
 /// A deformation in space: displacement and gradient at the nodes of a lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// The lattice of its nodes.
+    /// The lattice at whose nodes the field is stored.
     pub lattice: Lattice,
     /// Displacements, object units. The fourth component is 1 at bound nodes, otherwise 0. `[dims.z, dims.y, dims.x]`
     pub values: Vec<Vec4>,
@@ -232,7 +238,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field of given displacements; the fourth component as in [`Self::values`]. `[dims.z, dims.y, dims.x]`
+    /// A field with the given displacements, laid out as in [`Self::values`].
     #[must_use]
     pub fn of_values(lattice: Lattice, values: Vec<Vec4>) -> Self {
         let mut field = Self { lattice, values, gradients: Vec::new() };
@@ -246,7 +252,7 @@ impl Field {
         self.interpolated(point, |node| self.values[node].truncate())
     }
 
-    /// Deformation gradient F at a point: the map of small vectors there. The identity outside the lattice.
+    /// Deformation gradient F at a point, which maps small vectors at the point. The identity outside the lattice.
     #[must_use]
     pub fn gradient(&self, point: Vec3) -> Mat3 {
         let at = (point - self.lattice.origin) / self.lattice.cell;
@@ -287,7 +293,8 @@ impl Field {
         (by, gradient * cell.recip())
     }
 
-    /// Trilinear interpolation of nodal values, with those of the boundary outside the lattice.
+    /// Trilinear interpolation of nodal values. A point outside the lattice gets the value at the nearest boundary
+    /// point.
     fn interpolated<T>(&self, point: Vec3, value: impl Fn(usize) -> T) -> T
     where
         T: std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
@@ -331,7 +338,8 @@ impl Field {
         gradients
     }
 
-    /// Interpolates the free nodes that the lattice of twice the stride lacks, as means of two neighbours, axis by axis.
+    /// Interpolates the nodes that are not bound and that the lattice of twice the stride does not contain: each is the
+    /// mean of two neighbours, axis by axis.
     fn interpolate(&mut self, stride: u32) {
         let at = |axis: usize, from: u32, step: u32| (from..self.lattice.dims[axis]).step_by(step as usize);
         for axis in 0..3 {
@@ -352,7 +360,7 @@ impl Field {
         }
     }
 
-    /// A Gauss-Seidel sweep over the free nodes of a stride; boundary nodes stay 0.
+    /// One Gauss-Seidel sweep over the nodes of a stride that are not bound. Nodes on the lattice's boundary stay 0.
     fn relax(&mut self, stride: u32) {
         let dims = self.lattice.dims;
         let steps = [0, 1, 2].map(|axis| stride as usize * self.lattice.stride_of(axis));
@@ -373,12 +381,12 @@ impl Field {
 
 /// The inverse of a field's map.
 ///
-/// Newton's method starts at the bound node that the field moves closest to the target, because outside the cage a
-/// strongly bent field may move other points there, too.
+/// Newton's method starts at the bound node that the field moves closest to the target. Outside the cage, a strongly
+/// bent field may move further points to the same target; this start selects the one in or near the cage.
 #[derive(Debug)]
 pub struct InverseField<'a> {
     field: &'a Field,
-    /// Bound nodes by the cell of their deformed position, ascending.
+    /// `(key of the cell that contains the node's deformed position, node)` for each bound node, ascending.
     nodes: Vec<(u64, u32)>,
 }
 
@@ -421,7 +429,7 @@ impl<'a> InverseField<'a> {
         (best.0 <= MAX_INVERSE_ERROR * size).then(|| best.1.as_vec3())
     }
 
-    /// The bound node whose deformed position is closest, among those in the 27 cells around the target.
+    /// The bound node whose deformed position is closest to the target, among those in the 27 cells around the target.
     fn closest_node(&self, target: Vec3) -> Option<u32> {
         let cell = self.cell_of(target)?;
         let steps = (0..27).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
@@ -438,7 +446,7 @@ impl<'a> InverseField<'a> {
         self.field.lattice.position(node) + self.field.values[node as usize].truncate()
     }
 
-    /// Cell of a deformed position; `None` far from the lattice.
+    /// Sorting cell that contains a deformed position. `None` if an index of the cell exceeds `MAX_CELL_INDEX`.
     fn cell_of(&self, position: Vec3) -> Option<IVec3> {
         let lattice = &self.field.lattice;
         let cell = ((position - lattice.origin) / (INVERSE_CELLS * lattice.cell)).floor();
@@ -446,7 +454,7 @@ impl<'a> InverseField<'a> {
     }
 }
 
-/// A number for each cell.
+/// Packs the three indices of a cell into one sort key, 21 bits each.
 fn key(cell: IVec3) -> u64 {
     let bits = |x: i32| u64::from((x + (1 << 20)) as u32);
     bits(cell.x) | bits(cell.y) << 21 | bits(cell.z) << 42

@@ -1,15 +1,17 @@
-//! Frames: posed columns that carry offsets, which compensate what weights alone do not reproduce.
+//! Frames: columns of the weights after those of the controls. They carry offsets, the part of each vertex's position
+//! that the weights do not reproduce.
 //!
-//! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`. The columns `e_f'` are computed from the posed controls. The
-//! first three are the unit vectors, whose entries `x` are a constant offset. The next three are the columns of the
-//! affine map nearest to the motion of the whole cage (least squares over its vertices). Three follow for each *hold*.
-//! Entries of a matrix are a share of the vertex's rest vector `d = x - sum_i w_i c_i`.
+//! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`, where `c_i'` are the posed controls and the vectors `e_f'` are
+//! computed from them. The first three `e_f'` are the unit vectors: their entries `x_f` are a constant offset. The next
+//! three are the columns of the affine map nearest to the motion of the whole cage (least squares over its vertices).
+//! For each *hold*, three more are the columns of the hold's matrix. The three entries of a matrix are a share of the
+//! vertex's rest vector `d = p - sum_i w_i c_i` at the rest position `p`.
 //!
-//! A hold is a joint (a point inside the cage, or a corner of a polyline), with one of its bones or alone. Its matrix
-//! is `R F`. `F = sum_j c_j' grad w_j`, from the coordinates of the cage without inner controls, is the Jacobian of the
-//! cage's motion at the joint. `R` belongs to the bone: the smallest rotation of the bone's direction from where the
-//! cage and the previous bone of the line take it to where it is posed, so that the bone does not roll. If one affine
-//! map moves all controls, `F` is its matrix and `R` the identity.
+//! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of its bones, or without one if no
+//! bone ends at it. Its matrix is `R F`. `F = sum_j c_j' grad w_j`, from the coordinates of the cage without inner
+//! controls, is the Jacobian of the cage's motion at the joint. `R` belongs to the bone. The cage and the previous bone
+//! of the line predict a direction of the bone; `R` is the smallest rotation from it to the posed direction, so that
+//! the bone does not roll. If one affine map moves all controls, `F` is the matrix of that map and `R` the identity.
 
 use std::borrow::Cow;
 
@@ -18,12 +20,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::weights::Weights;
 
-/// Shares of a rest vector below this, over the largest one, are dropped.
+/// Shares of a rest vector that are smaller than this times the largest share are dropped.
 const MIN_SHARE: f64 = 1e-3;
 
-/// First column of the whole cage's matrix, counted from the first frame.
+/// First column of the matrix of the whole cage's motion, counted from the first frame column.
 pub(crate) const CAGE_COLUMN: usize = 3;
-/// First column of the first hold, counted from the first frame.
+/// First column of the first hold, counted from the first frame column.
 const HOLD_COLUMN: usize = 6;
 
 /// Columns of a bind's weights that follow those of its controls.
@@ -81,7 +83,7 @@ impl Frames {
         if self.is_used() { HOLD_COLUMN + 3 * self.holds().count() } else { 0 }
     }
 
-    /// Joints, each with each of its bones, or alone without bones.
+    /// All holds: each joint paired with each of its bones, or with `None` if no bone ends at it.
     fn holds(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         (0..self.joints.len()).flat_map(move |joint| {
             let of_joint = move |bone: &usize| self.bones[*bone].contains(&(joint as u32));
@@ -91,7 +93,7 @@ impl Frames {
         })
     }
 
-    /// All columns with the controls at `controls`, `[n_controls]`, object units: the controls, then the frames.
+    /// Vectors of all columns for controls at `controls` (`[n_controls]`, object units): the controls, then the frames.
     ///
     /// # Panics
     /// If there are fewer controls than these frames refer to.
@@ -183,10 +185,12 @@ impl Frames {
         Weights::from_parts(n_controls as u32, indptr, all, data)
     }
 
-    /// Distributes a vertex's rest vector over the holds by its weights at the joints: `each(column, share)` with the hold's
-    /// first column, counted from the first frame. Shares sum to 1; without weight at any joint all goes to the whole cage.
+    /// Distributes a vertex's rest vector over the holds by its `weights` at the joints. Calls `each(column, share)`
+    /// with the hold's first column, counted from the first frame column. Shares sum to 1. Without weight at any joint,
+    /// the matrix of the whole cage gets the share 1.
     ///
-    /// Along a line, the share blends from bone to bone within about a radius of the joint. `lengths`: rest lengths of the bones.
+    /// Along a line, the share blends from bone to bone within about `radius` of the joint. `lengths`: rest lengths of
+    /// the bones.
     pub(crate) fn shares(
         &self,
         weights: &[f64],
@@ -246,7 +250,7 @@ mod tests {
         (frames, controls)
     }
 
-    /// Matrices of the constant offset, of the whole cage, and of the holds.
+    /// Matrices of the constant offset, of the whole cage's motion, and of the holds.
     fn matrices(columns: &[Vec3]) -> Vec<DMat3> {
         let of = |c: &[Vec3]| DMat3::from_cols(c[0].as_dvec3(), c[1].as_dvec3(), c[2].as_dvec3());
         columns[11..].chunks_exact(3).map(of).collect()
@@ -259,7 +263,7 @@ mod tests {
         let posed: Vec<Vec3> = rest.iter().map(|p| (matrix * p.as_dvec3()).as_vec3() + 3.0).collect();
         let columns = frames.columns(&posed);
         assert_eq!((columns.len(), &columns[11..14]), (11 + frames.n_columns(), &Vec3::AXES[..]));
-        // The first matrix is constant; then follow the whole cage and four holds.
+        // The first matrix is the constant offset; the whole cage and four holds follow.
         let holds = &matrices(&columns)[1..];
         assert_eq!(holds.len(), 5);
         for hold in holds {
@@ -267,7 +271,8 @@ mod tests {
         }
     }
 
-    /// A bone bent at the middle joint rotates its holds by the smallest rotation, and leaves the other bone's unchanged.
+    /// A bone bent at the middle joint rotates its own holds by the smallest rotation, and leaves those of the other
+    /// bone unchanged.
     #[test]
     fn a_bent_bone_turns_by_the_smallest_rotation() {
         let (frames, rest) = line();

@@ -5,9 +5,9 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Smallest number of cells along the longest side.
+/// Smallest value of the `grid` option: cells along the longest side of the cage's box.
 pub const MIN_GRID: u32 = 8;
-/// Largest number of cells along the longest side.
+/// Largest value of the `grid` option.
 pub const MAX_GRID: u32 = 512;
 
 /// An option with a fixed set of words as values.
@@ -72,7 +72,7 @@ choice! {
 }
 
 impl Method {
-    /// Default solver of a method: the paper's for the paper's method.
+    /// Default solver of a method: the paper's Jacobi sweeps for the classic method, multigrid for the embedded one.
     #[must_use]
     pub fn usual_solver(self) -> Solver {
         match self {
@@ -140,17 +140,17 @@ choice! {
     }
 }
 
-/// The word is not a value of the option.
+/// Error: the word is not a value of the option.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{word:?} is not one of {known}")]
 pub struct UnknownWord {
-    /// The word.
+    /// The word as given.
     word: String,
     /// Valid words, separated by commas.
     known: String,
 }
 
-/// Parses a word.
+/// Parses the word of an option's value; `-` and `_` are equivalent.
 ///
 /// # Errors
 /// [`UnknownWord`] lists the valid words.
@@ -163,7 +163,7 @@ pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
     })
 }
 
-/// A number out of range.
+/// Error: a number is out of the range of its option.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{option} is {value}; it must be {allowed}")]
 pub struct OutOfRange {
@@ -178,7 +178,7 @@ pub struct OutOfRange {
 /// A numeric option.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    /// Its name.
+    /// Name of the option.
     pub name: &'static str,
     /// The valid range, in words.
     pub allowed: &'static str,
@@ -195,33 +195,33 @@ pub struct Slider {
     pub min: f64,
     /// Greatest value.
     pub max: f64,
-    /// Distance of two values.
+    /// Distance between neighbouring values.
     pub step: f64,
 }
 
-/// Cells along the longest side.
+/// The `grid` option: cells along the longest side of the cage's box.
 pub const GRID: Number = Number {
     name: "grid",
     allowed: "a whole number from 8 to 512",
     is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
     slider: None,
 };
-/// Convergence threshold for delta.
+/// The `tau` option: convergence threshold for delta.
 pub const TAU: Number = Number {
     name: "tau",
     allowed: "a number above 0",
     is_allowed: |tau| tau.is_finite() && tau > 0.0,
-    // Exponents of ten.
+    // The slider's values are exponents of ten.
     slider: Some(Slider { min: -8.0, max: -2.0, step: 1.0 }),
 };
-/// Limit on iterations.
+/// The `max_iterations` option: limit on iterations of the solver.
 pub const MAX_ITERATIONS: Number = Number {
     name: "max_iterations",
     allowed: "a whole number from 1 on",
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
     slider: Some(Slider { min: 1.0, max: 1e6, step: 1.0 }),
 };
-/// Total weight dropped per row.
+/// The `sparsify` option: total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
     allowed: "0 (keep all weights) or a threshold below 0.1",
@@ -229,7 +229,7 @@ pub const SPARSIFY: Number = Number {
     slider: None,
 };
 
-/// Subdivision steps of a smooth cage.
+/// The `smooth` option: number of subdivision steps from the cage to its surface.
 pub const SMOOTH: Number = Number {
     name: "smooth",
     allowed: "a whole number from 0 to 3",
@@ -241,7 +241,7 @@ impl Number {
     /// Checks a value.
     ///
     /// # Errors
-    /// [`OutOfRange`].
+    /// [`OutOfRange`] if the value is not allowed.
     pub fn check(&self, value: impl Into<f64>) -> Result<(), OutOfRange> {
         let value = value.into();
         if (self.is_allowed)(value) { Ok(()) } else { Err(self.refuse(&value.to_string())) }
@@ -250,7 +250,7 @@ impl Number {
     /// Parses and checks a value.
     ///
     /// # Errors
-    /// [`OutOfRange`], also if the text is not a number of this type.
+    /// [`OutOfRange`] if the value is not allowed, or if the text is not a number of type `T`.
     pub fn parse<T: FromStr + Into<f64> + Copy>(&self, text: &str) -> Result<T, OutOfRange> {
         let value: T = text.parse().map_err(|_| self.refuse(text))?;
         self.check(value).map(|()| value)

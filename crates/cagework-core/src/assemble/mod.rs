@@ -20,29 +20,33 @@ use crate::weights::Weights;
 
 use affine::{Columns, Sums};
 
-/// Sums need no further correction below this error (over the cage's diagonal): two units in the last place of an f32 near 1.
+/// A row whose error (over the cage's diagonal) is below this needs no further correction: about two units in the last
+/// place of an f32 near 1.
 const SUM_TOLERANCE: f64 = 2e-7;
 
 /// Limit on repeated corrections of a row. One suffices unless the threshold dropped a large share of the weight.
 const MAX_CORRECTIONS: usize = 3;
 
-/// A row keeps its small weights if its error without them (over the cage's diagonal) stays above this. Next to a face,
-/// the many small weights of vertices off the face keep the vertex at its distance.
+/// A row keeps its small weights if its error without them (over the cage's diagonal) stays above this after
+/// correction. Next to a face, the many small weights of cage vertices off the face determine the vertex's distance
+/// from the face.
 const MAX_ERROR: f64 = 1e-6;
 
-/// A row keeps its small weights if correction would scale a weight by a factor outside this range,
+/// A row keeps its small weights if correction would scale any of its weights by a factor outside this range.
 const FACTOR_RANGE: RangeInclusive<f32> = 0.5..=2.0;
 
-/// or change it by more than this many times the threshold.
+/// A row keeps its small weights if correction would change any of its weights by more than this many times the
+/// threshold.
 const MAX_CHANGE: f32 = 5.0;
 
 /// Options of assembly.
 #[derive(Clone, Copy, Debug)]
 pub struct RowOptions {
     /// Drops the smallest weights of a row while their sum is at most this; 0 keeps all non-zero weights. Correction
-    /// keeps the row's sum and rest position.
+    /// then restores the row's sum and rest position.
     pub threshold: f32,
-    /// Restores sum and rest position of every row. Off for the classic method, whose errors are shown.
+    /// Restores sum and rest position of every row. Off for the classic method, which keeps the errors of the published
+    /// method.
     pub preserve_affine: bool,
 }
 
@@ -81,8 +85,8 @@ pub fn assemble(
         return assemble_alone(controls, &columns, blocks, points, options, &has_offset);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
-    // Without a threshold all positive weights are stored, so rows are corrected while they are written. With one, the
-    // set of stored weights depends on the correction.
+    // Without a threshold all positive weights are stored, so rows are corrected while they are written. With a
+    // threshold, the set of stored weights depends on the correction, so rows are corrected first.
     let corrected_first = options.threshold > 0.0;
     team.each_mut(&mut runs, |run| {
         dispatch(
@@ -213,7 +217,7 @@ impl VertexRun<'_> {
         lows.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
     }
 
-    /// Row lengths if every positive weight is stored.
+    /// Counts the entries of each row if every positive weight is stored.
     #[inline(always)]
     fn count(&mut self) {
         for v in 0..self.points.len() {
@@ -244,7 +248,8 @@ impl VertexRun<'_> {
             let (raw, stored) = if options.preserve_affine && !has_offset {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
-                // With an offset the row's error stays; sparsification must not change its rest position.
+                // The offset compensates the row's error, so it is not corrected. Dropping weights must not change the
+                // position that the row reproduces.
                 let raw = columns.sums(&row, target);
                 let goal = columns.combined(&row).1;
                 self.restore_row(v, columns, options.threshold, &mut row, goal);
@@ -276,7 +281,7 @@ impl VertexRun<'_> {
     }
 
     /// Drops small weights and corrects the row, or keeps all weights if the correction is not acceptable. `row` holds
-    /// the vertex's sampled values. Returns the sums before and after.
+    /// the vertex's sampled values; `goal` is the position to reproduce. Returns the sums before and after.
     #[inline(always)]
     fn restore_row(
         &self,
@@ -305,8 +310,8 @@ impl VertexRun<'_> {
     }
 }
 
-/// Largest weight such that all smaller weights sum to at most `most`. Bisects the bits of f32, which are ordered like
-/// positive numbers.
+/// Largest weight such that all smaller weights sum to at most `most`. Bisects over the bit patterns of f32, which have
+/// the order of the numbers if these are positive.
 fn least_kept(row: &[Row], most: f32) -> f32 {
     let (mut low, mut high) = (0, most.to_bits() + 1);
     while high - low > 1 {
@@ -318,7 +323,7 @@ fn least_kept(row: &[Row], most: f32) -> f32 {
     f32::from_bits(low)
 }
 
-/// Corrects a row until it sums to 1 and reproduces `goal`. Returns its sums before (in f32 precision) and after.
+/// Corrects a row until it sums to 1 and reproduces `goal`. Returns the row's sums before (in f32 precision) and after.
 // Inlined where callers are compiled for several instruction sets; wasm keeps one copy to save download size.
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[cfg_attr(target_family = "wasm", inline(never))]

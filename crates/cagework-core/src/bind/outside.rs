@@ -18,23 +18,24 @@ use crate::weights::Weights;
 /// is rarely twice as large as its model.
 const MIN_UNIT_RATIO: f64 = 3.0;
 
-/// Largest difference of a weight over the model for which the model hardly bends.
+/// If no weight differs by more than this over the enclosed part of the model, this part hardly bends.
 const MIN_WEIGHT_SPREAD: f32 = 1e-3;
 
 /// Ratio of sizes from which the cage may have another unit: metres and centimetres differ by 100, and a cage is up to
-/// twice as large as its model. The weights of a coarse cage then differ by less than the inverse of this.
+/// twice as large as its model. Over a model that is smaller than a coarse cage by this ratio, each weight differs by
+/// less than the inverse of the ratio.
 const MIN_OVERSIZE_RATIO: f64 = 50.0;
 
-/// Difference of a weight from which no cage is oversized: the larger of [`MIN_WEIGHT_SPREAD`] and the inverse of
-/// [`MIN_OVERSIZE_RATIO`].
+/// If a weight differs by more than this over the model, the cage is not oversized. It is the larger of
+/// [`MIN_WEIGHT_SPREAD`] and the inverse of [`MIN_OVERSIZE_RATIO`].
 const MAX_OVERSIZE_SPREAD: f32 = 0.02;
 
 /// Relative position and size of a cage and a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
-    /// Distance between their boxes, object units; 0 if they overlap.
+    /// Distance between the bounding boxes of cage and model, object units; 0 if they overlap.
     pub gap: f64,
-    /// Diagonal of the model's box over that of the cage's.
+    /// Diagonal of the model's bounding box divided by that of the cage's.
     pub ratio: f64,
 }
 
@@ -49,7 +50,7 @@ impl Misfit {
 impl fmt::Display for Misfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let gap = about(self.gap);
-        // A single point has no size.
+        // A model of a single point has the ratio 0.
         let size = if self.ratio >= MIN_UNIT_RATIO {
             Some(format!("{} times smaller than the model", about(self.ratio)))
         } else if self.ratio > 0.0 && self.ratio <= 1.0 / MIN_UNIT_RATIO {
@@ -71,13 +72,13 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// A length or factor with two digits.
+/// Formats a length or factor with two significant digits.
 fn about(x: f64) -> String {
     let rounded = format!("{x:.1e}").parse().unwrap_or(x);
     if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
-/// Checks that the cage encloses some of a model or, if the options require it, all of it.
+/// Checks that the cage encloses at least one vertex of a model or, if the options require it, all of them.
 ///
 /// # Errors
 /// [`BindError::NoneInside`], [`BindError::Outside`].
@@ -106,14 +107,14 @@ pub(super) fn refuse_outside(
     }
 }
 
-/// The [`BindError::NoneInside`] for a model, whose `positions` must not be empty.
+/// The [`BindError::NoneInside`] for a model whose vertices are all outside. `positions` must not be empty.
 fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     let model = Bounds::of(positions).unwrap_or(cage.bounds());
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
-/// A notice if the cage is so much larger than the enclosed part of the model that all of that has nearly the same weights.
-/// `positions`: of the model, the first rows of `weights`; vertices `outside` are ignored.
+/// Notice that the cage is so much larger than the enclosed part of the model that this part has nearly the same
+/// weights everywhere. `positions`: vertices of the model, the first rows of `weights`; vertices `outside` are ignored.
 pub(super) fn oversized(
     cage: Bounds,
     positions: &[Vec3],
@@ -130,7 +131,7 @@ pub(super) fn oversized(
     let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [min, max] = inside().fold(none, |[min, max], v| [min.min(positions[v]), max.max(positions[v])]);
     let larger = 1.0 / Misfit::of(cage, Bounds { min, max }).ratio;
-    // A single point has no size.
+    // A single point has no size, so the ratio is infinite.
     if held == 0 || larger.is_infinite() {
         return None;
     }
@@ -142,7 +143,7 @@ pub(super) fn oversized(
     for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
-        // Mostly the first vertices show it.
+        // The first few vertices usually differ by more than this.
         if *high - low.max(0.0) > MAX_OVERSIZE_SPREAD {
             return None;
         }
@@ -168,7 +169,7 @@ mod tests {
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
-    /// Message of a bind of points of the unit cube to a box.
+    /// Error message of a bind of points of the unit square to a box.
     fn said(min: Vec3, size: f32) -> String {
         let bounds = Bounds { min, max: min + size };
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
@@ -241,7 +242,7 @@ mod tests {
         // 45 times larger, with vertices so dense that none has a large weight in the middle.
         let fine = said(&[box_of(0.0, 11.0, 12)], &tiny).unwrap();
         assert!(fine.starts_with("The cage is 45 times larger than what it encloses"), "{fine}");
-        // A second part of the model: outside it is ignored; inside it bends.
+        // A second part of the model is ignored if it is outside the cage. Inside, it bends, so there is no notice.
         assert!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 200.0)).is_some());
         assert_eq!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 12.0)), None);
         // The model lies in the large part of a cage, then in the small part beside a large one.

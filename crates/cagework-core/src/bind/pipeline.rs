@@ -1,7 +1,7 @@
 //! The stages of a bind: voxelize; per batch, solve and sample; assemble.
 //!
-//! All back ends share the first and last stage: [`PreparedBind::new`], then a solver of the back end produces a
-//! [`Solution`], then [`PreparedBind::finish`].
+//! All back ends share [`PreparedBind::new`] and [`PreparedBind::finish`]. Between them, the solver of the back end
+//! produces a [`Solution`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -33,16 +33,16 @@ use super::voxels::{Voxelization, VoxelizedCage};
 use super::watch::Watch;
 use super::{BindError, Binding};
 
-/// Notice if conjugate gradients finished the solve.
+/// Notice of the report if conjugate gradients finished the solve.
 const STALL_NOTICE: &str = "Multigrid converged slowly, as it does around many small parts or controls inside the cage: conjugate \
                        gradients finished the solve on the processor.";
 
-/// Memory that holds the fields of a solve: only host memory counts towards the limit.
+/// Where the fields of a solve are stored. Only fields in host memory count towards the memory limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldsOn {
-    /// This process.
+    /// In the memory of this process.
     Host,
-    /// A GPU, which plans its own memory.
+    /// In GPU memory, whose use the GPU back end plans.
     Device,
 }
 
@@ -54,7 +54,7 @@ pub struct PreparedBind<'a> {
     pub(super) voxelized: Arc<VoxelizedCage>,
     stencils: Stencils,
     estimated: u64,
-    /// Times on the watch's clock: start, after voxelization, after stencils.
+    /// Times on the watch's clock, in milliseconds: start, end of voxelization, end of the stencils.
     times_ms: [f64; 3],
 }
 
@@ -95,7 +95,8 @@ impl<'a> PreparedBind<'a> {
         Self::in_grid(mesh, controls, options, voxelized, needed.bytes, began, watch)
     }
 
-    /// With an existing grid. `estimated`: bytes; `began`: start on the watch's clock.
+    /// Computes the stencils in a grid that is already voxelized. `estimated`: memory, bytes; `began`: start on the
+    /// watch's clock, ms.
     pub(super) fn in_grid(
         mesh: WeldedPoints<'a>,
         controls: Controls<'a>,
@@ -118,7 +119,7 @@ impl<'a> PreparedBind<'a> {
         &self.voxelized.voxels.hierarchy
     }
 
-    /// Sampling stencils, one per distinct position.
+    /// Sampling stencils, one per distinct vertex position.
     #[must_use]
     pub fn stencils(&self) -> &Stencils {
         &self.stencils
@@ -128,10 +129,10 @@ impl<'a> PreparedBind<'a> {
         Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.voxelized.team, watch)?)
     }
 
-    /// Solves and samples all columns in this process, if the device cannot.
+    /// Solves and samples all columns in this process, as a fallback if the device cannot.
     ///
     /// # Errors
-    /// Memory above the limit, or cancelled.
+    /// If the memory exceeds the limit, or the bind is cancelled.
     pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solution, BindError> {
         let (vertices, threads) = (self.mesh.count(), self.voxelized.team.n_threads());
         let needed =
@@ -143,7 +144,7 @@ impl<'a> PreparedBind<'a> {
 
     /// Assembles weights and report from the sampled columns.
     ///
-    /// # Errors
+    /// If the bind is cancelled.
     /// Cancelled.
     pub fn finish(self, mut solved: Solution, watch: &Watch<'_>) -> Result<Binding, BindError> {
         let sampled = watch.now_ms();
@@ -164,7 +165,7 @@ impl<'a> PreparedBind<'a> {
         self.reported((rows, frames), blocks_bytes, solved, sampled, watch)
     }
 
-    /// Weights of all vertices with the report. `sampled`: time at which sampling ended, on the watch's clock.
+    /// Binding of all vertices, with the report. `sampled`: time at which sampling ended, on the watch's clock.
     fn reported(
         self,
         (rows, frames): (AssembledWeights, Frames),
@@ -248,10 +249,11 @@ impl<'a> PreparedBind<'a> {
     }
 }
 
-/// Joints of balls and tubes, and weights of their points in the cage alone.
+/// Joints of the inner balls and tubes, and the weights of their points in the cage without inner controls. `None` if
+/// there are no balls and tubes.
 ///
 /// # Errors
-/// As a bind.
+/// As [`super::bind`].
 fn bound_joints<'a>(
     controls: Controls<'a>,
     options: &BindOptions,
@@ -292,7 +294,7 @@ impl Progress for PollOnly<'_> {
     }
 }
 
-/// Stencils of all points, computed in runs on all threads.
+/// Stencils of all points, computed on all threads in runs of `VERTEX_RUN` points.
 fn sampling_stencils(
     controls: Controls<'_>,
     voxelized: &VoxelizedCage,
@@ -320,7 +322,7 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-/// Rows outside the cage, and how many of the first `n_vertices` lie inside a ball or tube.
+/// Vertices outside the cage, and the number of vertices among the first `n_vertices` that lie inside a ball or tube.
 fn outside_of(
     controls: Controls<'_>,
     points: &[OutsidePoint],
@@ -342,7 +344,7 @@ fn outside_of(
     (outside, n_held)
 }
 
-/// Notices about controls inside for a grid of `cells` along the longest side.
+/// Notices about inner controls whose radius is too small for a grid of `cells` cells along the longest side.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let Some(inner) = controls.inner() else { return Vec::new() };
     let mut notices = Vec::new();

@@ -1,4 +1,4 @@
-//! Validity of cages: accepted, repaired and rejected meshes.
+//! Tests of accepted, repaired and rejected meshes.
 
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ fn defect(mesh: &PolygonMesh) -> (u32, FaceDefect) {
     }
 }
 
-/// Six times the signed volume, exact for the small integers of these shapes.
+/// Six times the signed volume. It is exact for the small integer coordinates of these shapes.
 fn volume6(cage: &Cage) -> f64 {
     (0..cage.triangles().len() as u32)
         .map(|t| cage.triangle_corners(t))
@@ -191,7 +191,7 @@ fn duplicate_face_is_rejected() {
     assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
 }
 
-/// The solid between coinciding components is empty.
+/// Two components that coincide enclose an empty solid between them.
 #[test]
 fn coinciding_component_is_rejected() {
     let beside = cuboid(Vec3::new(5.0, 0.0, 0.0), Vec3::new(6.0, 1.0, 1.0));
@@ -202,7 +202,7 @@ fn coinciding_component_is_rejected() {
         let doubled = together(&together(&cube(), &beside), &copy);
         assert_eq!(error(&doubled), CageError::DoubledPart { first: 0, second: 2 });
     }
-    // Stacked components share only one face, and nested ones none.
+    // Stacked components share only one face, and nested components share none.
     let Bounds { min, max } = Cage::new(&cube()).unwrap().bounds();
     let above = cuboid(Vec3::new(min.x, max.y, min.z), Vec3::new(max.x, 2.0 * max.y - min.y, max.z));
     assert!(Cage::new(&together(&cube(), &above)).is_ok());
@@ -291,7 +291,7 @@ fn self_crossing_face_is_rejected() {
     assert_eq!(defect(&mesh), (0, FaceDefect::CrossesItself));
 }
 
-/// Triangulating a disc takes at least the square of its number of corners.
+/// Triangulating a disc takes time at least quadratic in its number of corners.
 #[test]
 fn face_with_too_many_corners_is_rejected() {
     let disc = |n: u32| (0..n).map(move |k| f64::from(k) / f64::from(n) * std::f64::consts::TAU);

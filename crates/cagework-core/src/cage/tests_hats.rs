@@ -1,4 +1,4 @@
-//! Hats are barycentric coordinates on every kind of face.
+//! Tests that hats are barycentric coordinates on every kind of face.
 
 use glam::Vec3;
 use proptest::prelude::*;
@@ -48,8 +48,8 @@ fn hats_reproduce_points_on_every_kind_of_face() {
     }
 }
 
-/// A facet of a bent face is within 2 % of the bend from its patch. The bend is the distance of corner 7 from the
-/// planes of the cube's other corners.
+/// The facets of a bent face lie within 2 % of the bend from its patch. The bend is the distance of corner 7 from the
+/// planes through the other corners of its faces.
 #[test]
 fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
     for by in [0.5, 0.01, 1e-4] {
@@ -57,7 +57,8 @@ fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
         mesh.positions[7] += Vec3::splat(by);
         assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.02 * f64::from(by));
     }
-    // A bent pentagon, whose facets are wider, and a bent concave face, whose facets are larger.
+    // The facets of a bent pentagon are wider, and those of a bent concave face larger, so their tolerances are 4 % and
+    // 8 %.
     let pentagon: Vec<[f32; 2]> =
         (0..5).map(|k| (k as f32 * std::f32::consts::TAU / 5.0).sin_cos()).map(|(y, x)| [x, y]).collect();
     let mut mesh = prism(&pentagon, 1.0);
@@ -151,8 +152,9 @@ fn rotated_faces_count_as_planar() {
     assert_linear_reproduction(&cage, 2.0 * polygon::PLANE_TOLERANCE * f64::from(cage.diagonal()));
 }
 
-/// On the C's caps the hats of one arm's end are below 1e-3 in the other arm (harmonic coordinates: 2e-4), because
-/// chords past the re-entrant corner end on the back; at the other arm's end they are 0. None is negative.
+/// On the caps of the C, the hats of the vertices at the end of one arm are below 1e-3 in the other arm (harmonic
+/// coordinates: 2e-4), because chords past the re-entrant corner end on the back of the C. They are 0 at the other
+/// arm's end, and no hat is negative.
 #[test]
 fn hats_of_a_concave_face_are_positive_and_small_across_the_gap() {
     let cage = Cage::new(&c_shape()).unwrap();
@@ -212,14 +214,14 @@ fn largest_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Points between the centre and each corner.
+/// Points at four fractions of the way from the centre to each corner.
 fn points_inside(outline: &[DVec2]) -> Vec<DVec2> {
     let middle = outline.iter().sum::<DVec2>() / outline.len() as f64;
     outline.iter().flat_map(|&corner| [0.1, 0.5, 0.9, 0.98].map(|t| middle + t * (corner - middle))).collect()
 }
 
-/// Moving a corner by `e` changes hats by at most `20 e / size`, also where the corner turns from convex to concave,
-/// and where its exterior angle is 1e-3 (`d = 2.5e-4`).
+/// Moving a corner by `e` changes hats by at most `20 e / size`. This includes the transitions at which the corner
+/// turns from convex to concave and at which its exterior angle is 1e-3 (`d = 2.5e-4`).
 #[test]
 fn hats_are_continuous_in_the_corners() {
     for (e, d) in [(1e-5, 0.2), (1e-3, 3e-2), (2e-5, 2.6e-4), (2e-5, 1e-5), (2e-5, -2.4e-4), (1e-5, -0.1)] {
@@ -232,7 +234,6 @@ fn hats_are_continuous_in_the_corners() {
     }
 }
 
-/// Hats are invariant under cyclic renumbering, scaling and reflection.
 #[test]
 fn hats_are_invariant_under_renumbering_scaling_and_reflection() {
     for outline in nearly_straight(-1e-3) {
@@ -257,7 +258,7 @@ fn hats_are_invariant_under_renumbering_scaling_and_reflection() {
     }
 }
 
-/// The outline touches itself: corners 4 and 0 coincide.
+/// The outline of a cap touches itself: its corners 4 and 0 coincide.
 #[test]
 fn face_with_a_slit_has_hats() {
     let mut mesh = l_shape();

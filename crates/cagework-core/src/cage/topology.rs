@@ -24,7 +24,7 @@ pub struct Side {
 /// Sides of the faces with the indices `some`, sorted by edge.
 #[must_use]
 pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
-    // Sorts arrays of three numbers: a sort of another key type would add 2 kB to the wasm module.
+    // The crate also sorts `[u32; 3]` elsewhere; sorting another key type would add 2 kB to the wasm module.
     let mut keys: Vec<[u32; 3]> = Vec::new();
     for f in some {
         let face = &faces[f as usize];
@@ -68,7 +68,8 @@ pub(super) fn check_repeats(faces: &[Vec<u32>]) -> Result<(), CageError> {
     Ok(())
 }
 
-/// Checks that every edge has two faces, joins seams if necessary, and orients faces consistently. Indices must be valid.
+/// Checks that every edge has two faces, joins seams if necessary, and orients faces consistently. Vertex indices must
+/// be valid.
 pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result<Surface, CageError> {
     let mut faces = mesh.faces.clone();
     let sides = match check_edges(&faces) {
@@ -259,7 +260,7 @@ pub(super) fn note_vertices(mesh: &PolygonMesh, surface: &Surface, notices: &mut
     if let Some(first) = first_touching {
         notices.push(CageNotice::TouchingVertices { vertices: touching, first });
     }
-    // Uses the input's faces: vertices that were joined with others have a notice of their own.
+    // Use the input's faces: vertices that were joined with others have a notice of their own.
     let mut used = vec![false; mesh.positions.len()];
     for &i in mesh.faces.iter().flatten() {
         used[i as usize] = true;

@@ -17,8 +17,8 @@ use crate::options::SMOOTH;
 use crate::smooth::subdivide;
 use crate::weights::Weights;
 
-/// Distance over the cage's diagonal by which corners of a sheet may lie outside: a sheet closes well against the cage
-/// if it is drawn slightly beyond it.
+/// Distance by which corners of a sheet may lie outside the cage, as a fraction of the cage's diagonal. A sheet that is
+/// drawn slightly beyond the cage leaves no gap to it.
 const MAX_PROTRUSION: f64 = 0.02;
 
 /// Owned [`Controls`] of a subdivided cage or with inner controls.
@@ -27,12 +27,12 @@ pub struct ControlSet {
     cage: Cage,
     smooth: u32,
     inner: InnerControls,
-    /// `[n_controls]`
+    /// Rest positions of the controls, object units. `[n_controls]`
     rest: Vec<Vec3>,
     surface: Cage,
-    /// B, `[n_surface, n_controls]`; `None` for the identity.
+    /// Matrix B of [`Controls`], `[n_surface, n_controls]`; `None` for the identity.
     rows: Option<Weights>,
-    /// As in [`Controls`]. `[n_surface_faces]`
+    /// Cage face of each surface face; `None` for an inner wall. `[n_surface_faces]`
     origins: Vec<Option<u32>>,
 }
 
@@ -64,7 +64,8 @@ impl ControlSet {
     /// Controls of a cage whose surface is subdivided `smooth` times (0 to 3), with optional inner controls.
     ///
     /// # Errors
-    /// [`ControlError`]: too many steps, inner controls that are outside, overlap, have invalid indices, or are too many.
+    /// [`ControlError`]: too many subdivision steps, or inner controls that are outside, overlap, have invalid indices,
+    /// or are too many.
     pub fn new(cage: &Cage, smooth: u32, inner: InnerControls) -> Result<Self, ControlError> {
         SMOOTH.check(smooth)?;
         let mut set = Self::plain(cage);
@@ -87,7 +88,7 @@ impl ControlSet {
         &self.cage
     }
 
-    /// Steps of subdivision.
+    /// Number of subdivision steps from the cage to the surface.
     #[must_use]
     pub fn smooth(&self) -> u32 {
         self.smooth
@@ -99,8 +100,8 @@ impl ControlSet {
         &self.inner
     }
 
-    /// Surface for display with the controls at `positions` (`[n_controls]`, object units): balls and tubes are
-    /// translated without rotation, so they keep their radius. `[n_surface]`
+    /// Positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`, object units).
+    /// Balls and tubes are translated without rotation, so they keep their radius. `[n_surface]`
     ///
     /// # Panics
     /// If there is not one position per control.
@@ -126,7 +127,7 @@ impl ControlSet {
         let mut walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
         let meeting = walls.meeting(&inner);
         if !meeting.is_empty() {
-            // Circumscribed meshes may meet although balls and tubes do not: retry with inscribed ones.
+            // Circumscribed meshes may intersect although balls and tubes do not: retry with inscribed ones.
             meeting.iter().flatten().for_each(|&element| sizes[element as usize] = Size::Inscribed);
             walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
             if let Some(&elements) = walls.meeting(&inner).first() {
@@ -162,7 +163,7 @@ impl ControlSet {
         Ok(())
     }
 
-    /// Checks that all corners are inside; corners of sheets may be slightly outside.
+    /// Checks that all inner controls are inside; corners of sheets may be up to `MAX_PROTRUSION` outside.
     fn check_inside(&self, inner: &InnerControls) -> Result<(), ControlError> {
         let near = MAX_PROTRUSION * f64::from(self.surface.diagonal());
         let mut may_stick_out = vec![true; inner.positions.len()];
@@ -189,7 +190,7 @@ fn steps_of(inner: &InnerControls) -> u32 {
     shapes::ball_steps(inner.elements.iter().filter(|e| matches!(e, InnerElement::Point(_))).count())
 }
 
-/// Faces of an element's mesh: balls are subdivided `steps` times, sheets have triangles on both sides.
+/// Number of faces of an element's mesh. Balls are subdivided `steps` times; sheets have triangles on both sides.
 fn faces_of(element: &InnerElement, steps: u32) -> usize {
     match element {
         InnerElement::Point(_) => shapes::ball_faces(steps),
@@ -206,7 +207,7 @@ type ControlShares = [(u32, f64); 2];
 struct Walls {
     points: Vec<(DVec3, ControlShares)>,
     faces: Vec<Vec<u32>>,
-    /// Element and connected part of each face.
+    /// Element, and connected part, to which each face belongs. `[n_faces]`
     element_of: Vec<u32>,
     part_of: Vec<u32>,
     /// Surface vertex of each control that is a corner of a sheet.
@@ -214,7 +215,7 @@ struct Walls {
 }
 
 impl Walls {
-    /// `sizes`: of each element's mesh.
+    /// Builds the meshes of all elements. `sizes[k]`: size of the mesh of element k.
     fn new(inner: &InnerControls, cage: &Cage, radius: f64, sizes: &[Size]) -> Result<Self, ControlError> {
         let mut walls = Self::default();
         let at = |i: u32| inner.positions[i as usize].as_dvec3();
@@ -248,7 +249,7 @@ impl Walls {
         Ok(walls)
     }
 
-    /// Surface vertex at a corner of a sheet, shared by all its faces.
+    /// Surface vertex at a corner of a sheet. All faces of the sheet share it.
     fn corner(&mut self, control: u32, at: DVec3) -> u32 {
         *self.corners.entry(control).or_insert_with(|| {
             self.points.push((at, [(control, 1.0), (control, 0.0)]));
@@ -270,7 +271,8 @@ impl Walls {
         self.part_of.push(part);
     }
 
-    /// Pairs of unconnected elements whose meshes meet. The list is incomplete if there are very many.
+    /// Pairs of unconnected elements whose meshes intersect. The list is incomplete if the search reaches a limit of
+    /// [`crate::contact`].
     fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
         let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
         for (face, &element) in self.faces.iter().zip(&self.element_of) {
@@ -300,7 +302,7 @@ impl Walls {
 fn parts(inner: &InnerControls) -> Vec<u32> {
     let mut part_of_vertex = vec![u32::MAX; inner.positions.len()];
     let mut parts: Vec<u32> = (0..inner.elements.len() as u32).collect();
-    // Iterate to a fixed point: elements are few, and chains of them are mostly in order.
+    // Iterate to a fixed point: there are few elements, and chains of them are mostly in order.
     loop {
         let before = parts.clone();
         for (part, element) in parts.iter_mut().zip(&inner.elements) {

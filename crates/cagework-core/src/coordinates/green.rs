@@ -21,7 +21,8 @@ const PLANE_TOLERANCE: f64 = 1e-8;
 /// a small ball on the surface.
 const MIN_SUM: f64 = 0.99;
 
-/// Columns: the cage's vertices, then its triangles, with `s n` as vectors (section 3.1 of the paper). Defined inside the cage.
+/// Columns: the cage's vertices, then its triangles, with the scaled normals `s n` (section 3.1 of the paper) as
+/// controls. Defined inside the cage.
 pub(super) const FORM: ClosedForm = ClosedForm {
     row: coordinates,
     triangles: Some(|cage, positions| {
@@ -58,7 +59,7 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
         };
         let potential = -(0..3).map(signed).sum::<f64>().abs();
         of_triangles[t] = -potential;
-        // Seen edge-on, its solid angle is zero.
+        // The point lies in the triangle's plane, so the solid angle of the triangle is zero.
         if foot.length() <= near {
             continue;
         }
@@ -73,8 +74,8 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
     of_vertices.iter().sum::<f64>() >= MIN_SUM
 }
 
-/// Integral of the Green's function `-1 / (4 pi r)` of the origin over the triangle of `foot` (projection of the origin to its
-/// plane), `a` and `b`; or, with the origin as `foot`, over the sector that the second call in the formula stands for. At most 0.
+/// Integral over the triangle (`foot`, `a`, `b`) of the Green's function `-1 / (4 pi r)`, where r is the distance from
+/// the origin. `foot` must be the projection of the origin to the triangle's plane. At most 0.
 fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (edge, to_a, to_b) = (b - a, foot - a, foot - b);
     let product = edge.cross(to_a).length();

@@ -29,15 +29,15 @@ use super::{Stencil, Stencils};
 /// error against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
 const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 
-/// Weight of ends outside the cage (rounding next to an edge) above which a vertex's winding number decides whether it
-/// is outside.
+/// Weight of ray ends outside the cage above which a vertex's winding number decides whether the vertex is outside.
+/// Such ends also occur by rounding, next to edges.
 const MAX_OUTSIDE_WEIGHT: f64 = 1e-6;
 
-/// Threshold of a point's winding number without its own facet, which is half the sum of those on both sides: 0.5 on a
-/// wall, 1 on a wall shared by two parts, at least 1.5 inside a part.
+/// Threshold of the winding number at a point of a facet, computed without that facet. It is the mean of the winding
+/// numbers on both sides: 0.5 on an outer wall, 1 on a wall shared by two parts, at least 1.5 inside another part.
 const MIN_INNER_WINDING: f64 = 1.25;
 
-/// Relative distance by which points on a facet's sides are moved towards its centroid.
+/// Fraction of the way to the facet's centroid by which points on its sides are moved.
 const SIDE_OFFSET: f64 = 1e-6;
 
 /// Computes sampling stencils of vertices in an embedded grid.
@@ -48,10 +48,10 @@ pub struct Sampler<'a> {
     lists: TriangleLists,
     edges: EdgeLists,
     overlaps: &'a Overlaps,
-    /// Created for the first point outside.
+    /// Sampler for points outside the cage, created for the first such point.
     beyond: OnceLock<OutsideSampler<'a>>,
     policy: OutsidePolicy,
-    /// Distance, in cells, within which faces coincide.
+    /// Distance, in cells, up to which faces count as coincident.
     same: f64,
 }
 
@@ -59,11 +59,11 @@ pub struct Sampler<'a> {
 struct Scratch {
     near: Vec<u32>,
     edges: Vec<u32>,
-    /// Facets near a point beside an edge, and near the point away from the edge.
+    /// Facets in the cube of a point beside an edge, and facets in the cube of the point on the far side of it.
     here: Vec<u32>,
     other: Vec<u32>,
     stencil: Stencil,
-    /// Weight of ends outside the cage.
+    /// Total weight of ray ends that lie outside the cage.
     outside: f64,
 }
 
@@ -79,21 +79,21 @@ struct Query<'a> {
     /// The cube's lowest corner.
     low: [u32; 3],
     p: DVec3,
-    /// Remaining axes; along the others the point lies on the cube's boundary.
+    /// Axes still to be interpolated, in order. Along the other axes, the point lies on the cube's boundary.
     order: &'a [usize],
     weight: f64,
     /// Whether rays are split at re-entrant edges.
     splits: bool,
 }
 
-/// End of a part of a split ray.
+/// Where one part of a split ray ends.
 #[derive(Clone, Copy)]
 enum Stop<'a> {
-    /// Beside an edge.
+    /// Beside a re-entrant edge.
     Beside(&'a Passage),
-    /// At a wall beyond the cube.
+    /// At a wall beyond the cube between centres.
     Wall(Wall),
-    /// At the ray's own end.
+    /// Where the unsplit ray ends.
     End,
 }
 
@@ -136,7 +136,7 @@ impl<'a> Sampler<'a> {
         stencils
     }
 
-    /// Size in bytes.
+    /// Size of the lists of triangles and edges in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.lists.bytes() + self.edges.bytes()
@@ -180,8 +180,8 @@ impl<'a> Sampler<'a> {
         inside && scratch.outside < 1.0
     }
 
-    /// The triangle on which a point lies, within the resolution of f32. From such a point rays hit or miss the
-    /// triangle by rounding, and may leave the cage through an edge.
+    /// The triangle on which a point lies, within the resolution of f32, and the point's barycentric coordinates.
+    /// Rounding decides whether rays from such a point hit the triangle, and they may leave the cage through an edge.
     fn touching(&self, p: DVec3, near: &[u32]) -> Option<(u32, [f64; 3])> {
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
@@ -215,7 +215,7 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Interpolates along the first axis, recursively along the rest.
+    /// Interpolates along the first axis of `at.order`, and recursively along the remaining axes.
     fn descend(&self, at: Query<'_>, scratch: &mut Scratch) {
         let Query { low, p, order, weight, splits } = at;
         let axis = order[0];
@@ -235,7 +235,8 @@ impl<'a> Sampler<'a> {
         self.follow(Query { weight: weight * t, ..at }, 1, above, scratch);
     }
 
-    /// [`Self::descend`] with split rays: pairs each part of one ray with each part of the other.
+    /// [`Self::descend`] for split rays: combines each part of the ray down the axis with each part of the ray up the
+    /// axis.
     fn descend_past(&self, at: Query<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
         let (p, axis) = (at.p, at.order[0]);
         // (share, length, end) of each part.
@@ -245,7 +246,7 @@ impl<'a> Sampler<'a> {
             for passage in &passed[side] {
                 let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
-                    // Beyond the cube: a wall may come first.
+                    // The edge lies beyond the cube: a wall may stop the ray before it.
                     let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
@@ -277,8 +278,9 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Value at `p` beside an edge at the offset `steps`: interpolated along the first step's axis between the edge and
-    /// the point one cell away from it, on the other side of `p`. That point depends only on `p`, not on the cube.
+    /// Adds the value at `p`, which lies beside an edge at the offset `steps` from it. The value is interpolated along
+    /// the axis of the first step between the edge and a point on the other side of `p`, one cell from the edge. That
+    /// point depends only on `p`, not on the cube.
     fn descend_beside(
         &self,
         p: DVec3,
@@ -301,7 +303,7 @@ impl<'a> Sampler<'a> {
         self.lists.in_cube(low, &mut scratch.other);
         self.lists.in_cube(self.cube_of(p), &mut scratch.here);
         let mut reach = [1.0 - offset.abs(); 2];
-        // The edge's own faces must not occlude it.
+        // The faces that meet at the edge must not occlude it.
         reach[side] = offset.abs() - EDGE_TOLERANCE;
         let ends = self.ends(p, axis, reach, [&scratch.here, &scratch.other]);
         let t = share(ends[side].0, ends[1 - side].0);
@@ -327,7 +329,7 @@ impl<'a> Sampler<'a> {
         p.floor().clamp(DVec3::ZERO, highest).to_array().map(|x| x as u32)
     }
 
-    /// Adds the value of a wall that a ray up (1) or down (0) ends at.
+    /// Adds the value of a wall at which a ray up (`side` 1) or down (0) ends.
     fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
         // From inside, the ray hits the back of a face: going up, a face that faces up.
         if faces_up == (side == 1) {
@@ -337,7 +339,7 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Adds the value at the upper (1) or lower (0) end of the segment along the first axis.
+    /// Adds the value at the upper (`side` 1) or lower (0) end of the segment along the first axis.
     fn follow(&self, at: Query<'_>, side: usize, end: End, scratch: &mut Scratch) {
         let Query { low, p, order, weight, .. } = at;
         if weight == 0.0 {
@@ -364,8 +366,8 @@ impl<'a> Sampler<'a> {
             .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
     }
 
-    /// Ends of the segment through `p` along `axis` with the given reach down and up, cut by the cage. Of coinciding
-    /// faces, as between two parts, the one seen from behind counts.
+    /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If faces
+    /// coincide, as between two parts, the face seen from behind is taken.
     fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near.into_iter().flatten() {
@@ -388,7 +390,7 @@ impl<'a> Sampler<'a> {
         ends
     }
 
-    /// Whether a point on a facet lies inside another part of the cage and is not a wall.
+    /// Whether a point on a facet lies inside another part of the cage, so that the facet is not a wall there.
     fn is_within(&self, facet: u32, barycentric: [f64; 3]) -> bool {
         let Overlaps { low, high, .. } = self.overlaps;
         if self.overlaps.parts.is_empty() {
@@ -412,7 +414,7 @@ fn along(mut p: DVec3, axis: usize, side: usize, length: f64) -> DVec3 {
     p
 }
 
-/// Interpolation parameter from the distances to both ends: 0 at the first.
+/// Interpolation parameter of a point, given its distances to both ends: 0 at the first end, 1 at the second.
 fn share(first: f64, second: f64) -> f64 {
     if first + second > 0.0 { first / (first + second) } else { 0.0 }
 }

@@ -18,7 +18,8 @@ use super::stop::{SolveReport, StopRule};
 use super::{BatchSolver, Preconditioner};
 use crate::simd::dispatch;
 
-/// Most steps over which the convergence rate is measured: longer than the ripple of the changes, 5 to 8 steps.
+/// Largest number of steps over which the convergence rate is measured: longer than the ripple of the changes, 5 to 8
+/// steps.
 const WINDOW: usize = 10;
 
 /// Upper bound on the measured rate.
@@ -30,7 +31,7 @@ const MAX_STALLED_STEPS: usize = 8;
 /// Rows whose products are summed in f32 before they are added in f64.
 const ROWS_PER_SUM: usize = 1024;
 
-/// One value per lane.
+/// One number per lane.
 type Lanes = [f64; LANES];
 
 /// Fields of a batch on the finest level, `[n_rows]` each.
@@ -63,8 +64,8 @@ impl ConjugateGradient {
         }
     }
 
-    /// Continues from `u`, where cycles of the preconditioner stalled, and stores the solution there. `rhs`: one row per
-    /// cut cell; `report`: of the cycles, which count towards the limit on iterations.
+    /// Continues from `u`, where cycles of the preconditioner stalled, and stores the solution there. `rhs`: one row
+    /// per cut cell; `report`: the report of the cycles, which count towards the limit on iterations.
     pub(super) fn resume(
         &mut self,
         hierarchy: &Hierarchy,
@@ -205,7 +206,7 @@ fn expected_error(squares: &[f64]) -> f64 {
         return 0.0;
     }
     let rate = (now / before).powf(0.5 / window as f64).min(RATE_BOUND);
-    // Change expected from the window's mean: a single change may lie below it by the ripple.
+    // Change expected from the window's mean. The latest change alone may be smaller by the ripple.
     let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
     // Weights lie between 0 and 1.
     (usual.max(latest) * rate / (1.0 - rate)).min(1.0)
@@ -277,7 +278,8 @@ mod tests {
         assert!(left >= 3.9 * latest && left < 6.0 * latest, "{left} after {latest}");
     }
 
-    /// Plain and preconditioned, the solution is multigrid's; the V-cycle needs fewer steps.
+    /// Plain and preconditioned conjugate gradients find multigrid's solution; the V-cycle at least halves the number
+    /// of steps.
     #[test]
     fn solution_equals_that_of_multigrid() {
         let hierarchy = hierarchy();
@@ -293,7 +295,7 @@ mod tests {
             n_steps.push(report.deltas.len());
             let pairs = solver.field().as_flattened().iter().zip(multigrid.field().as_flattened());
             let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            // Ten times the tolerance in the worst cell.
+            // The worst cell may differ by ten times the tolerance.
             assert!(apart < 1e-5, "{apart}, preconditioned: {is_preconditioned}");
         }
         assert!(n_steps[1] * 2 < n_steps[0], "{n_steps:?}");

@@ -2,21 +2,22 @@
 //!
 //! Solves the discrete Laplace equation of the embedded boundary for [`LANES`] right-hand sides at once, with red-black
 //! Gauss-Seidel as smoother; each coarse level is discretised from the cage itself. The first black half sweep of a
-//! cycle is over-relaxed by `OMEGA` (Yavneh 1996), at no cost, which makes V(2,1) converge as fast as V(2,2) without.
-//! RMS error of a cell's 16 columns on the Armadillo, g = 64: 5.7e-4 after full multigrid, then 3.1e-5, 2.5e-6 and
-//! 2.3e-7 after one, two and three more cycles. The initial guess of a level is the mean of the coarse solution rather
-//! than its trilinear interpolation with zeros outside, since the solution is not zero on the cage (error 2.9e-2
-//! instead of 7.5e-2).
+//! cycle is over-relaxed by `OMEGA` (Yavneh 1996). At no additional cost, V(2,1) then converges as fast as V(2,2) does
+//! without over-relaxation. RMS error of a cell's weights on the Armadillo, g = 64, with 16 columns per batch: 5.7e-4
+//! after full multigrid, then 3.1e-5, 2.5e-6 and 2.3e-7 after one, two and three more cycles. The initial guess of a
+//! level is the mean of the coarse solution at the neighbouring unknowns. Trilinear interpolation with zeros outside
+//! would be worse (error 7.5e-2 instead of 2.9e-2), since the solution is not zero on the cage.
 //!
-//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)): the Armadillo's 14
-//! batches take 42 cycles instead of 43, cheaper ones, and end at an error of 4e-6 instead of 7e-6 (5e-6 with the
-//! shorter last cycle, see [`Convergence::is_nearly_done`]).
+//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)), which makes cycles
+//! cheaper: the Armadillo's 14 batches take 42 cycles instead of 43, and end at an error of 4e-6 instead of 7e-6 (5e-6
+//! with the shorter last cycle, see [`Convergence::is_nearly_done`]).
 //!
 //! Coarse grids do not resolve balls and cavities smaller than their cells, and overcorrect there. If cycles converge slowly or
 //! diverge ([`Convergence::stalls`]), conjugate gradients preconditioned by the cycles continue from the latest iterate.
 //!
-//! All passes between two restrictions are streamed through memory together (`stream`): coarse correction, post-smoothing, the
-//! next cycle's two pre-smoothing sweeps and the residual of the red cells follow each other one z-plane apart.
+//! All passes between two restrictions are streamed through memory together (`stream`): coarse correction,
+//! post-smoothing, the next cycle's two pre-smoothing sweeps and the residual of the red cells each run one z-plane
+//! behind the previous pass.
 
 mod convergence;
 mod stream;
@@ -43,16 +44,16 @@ const SHORT_CYCLE_MARGIN: f64 = 1.5;
 /// Sweeps on the coarsest level, which has at most a few hundred unknowns, about six across.
 pub const COARSEST_SWEEPS: usize = 8;
 
-/// Over-relaxation of those sweeps. For six cells across, Jacobi contracts by 0.90, for which 1.4 is Young's optimum: a
-/// sweep then contracts by 0.4 instead of 0.8.
+/// Over-relaxation factor of the sweeps on the coarsest level. For six cells across, Jacobi contracts by 0.90, for
+/// which 1.4 is Young's optimum: a sweep then contracts by 0.4 instead of 0.8.
 pub const COARSEST_OMEGA: f32 = 1.4;
 
 /// Fields of a batch on every level; allocated once per thread and reused for all its batches.
 #[derive(Debug)]
 pub struct Workspace {
-    /// `u[k]`: the solution; on coarse levels, the correction. `[n_rows]`
+    /// `u[0]`: the solution; on coarser levels, `u[k]` is the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell or, in [`Self::precondition`], per cell; `f[k]`: one row per cell.
+    /// `f[0]`: right-hand side, one row per cut cell or, in [`Self::precondition`], per cell; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the current level, and a zero row.
     residual: Vec<Row>,
@@ -67,7 +68,7 @@ impl Workspace {
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
         let fields = || hierarchy.levels.iter().map(|l| vec![ZERO; l.n_rows()]);
-        // Sized later: its length depends on the kind of right-hand side.
+        // `f[0]` is sized later: its length depends on the kind of right-hand side.
         let mut f: Vec<_> = fields().collect();
         f[0] = Vec::new();
         Self {

@@ -79,7 +79,7 @@ struct Halves<'a> {
 /// Calls `each(row of out, visit)` for each cell of a colour's plane. With `OLD`, [`Visit::old`] is read from the
 /// field's own colour, which may otherwise be empty.
 ///
-/// Slices are cut once per run, so that runs need no bounds checks per cell.
+/// Slices are cut once per run, so that cells need no bounds checks.
 #[inline(always)]
 fn visit_plane<const OLD: bool>(
     level: &Level,
@@ -249,12 +249,12 @@ pub fn residual_plane(
     *squares = sum_squares;
 }
 
-/// Accumulates the changes of cells in a sweep.
+/// Sums of the changes of cells in one sweep.
 #[derive(Debug)]
 pub struct Changes<'a> {
-    /// Norm of the sum over lanes: squares, or absolute values as in the literal Eq. 2.
+    /// Selects what is summed over the lanes: squares of the changes, or their absolute values for the literal Eq. 2.
     pub norm: DeltaNorm,
-    /// Sum of each cell of the colour.
+    /// Sum for each cell of the colour, to which the kernel adds.
     pub of_cells: &'a mut [f32],
 }
 

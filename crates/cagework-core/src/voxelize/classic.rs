@@ -3,12 +3,13 @@
 //! Source: Smith, "CSC 473 Harmonic Coordinates", section 3.1, Algorithms 1 and 2.
 //!
 //! Changes versus the paper:
-//! - A triangle is tested only against the cells of its own rows (the paper proposes its bounding box). Slices of the grid are independent,
-//!   so they run in parallel, and the result does not depend on the number of threads.
+//! - A triangle is tested only against the cells that its part in each row of the grid spans (the paper proposes all
+//!   cells of its bounding box). Slices of the grid are independent, so they run in parallel, and the result does not
+//!   depend on the number of threads.
 //! - A cell's values are taken at the triangle's point closest to its centre. Barycentric coordinates of the centre itself can be negative or
 //!   exceed 1, as it need not lie over the triangle.
-//! - Of several triangles in a cell, the one closest to the centre gives the values (the first one if equal). In the paper each triangle
-//!   overwrites the values of its own vertices, and the sum of a cell's values can exceed 1.
+//! - Of several triangles in a cell, the one closest to the cell's centre gives the values (the first one in a tie). In
+//!   the paper each triangle overwrites the values of its own vertices, and the sum of a cell's values can exceed 1.
 //! - Faces may be polygons of any size, with the values of [`Cage::hats_at`].
 //! - The grid extends 1/1000 cell beyond the cage's box, so that no face lies on its outermost plane.
 //! - Cells can be cubes. With the paper's rectangular cells, the average over six neighbours does not discretise Laplace's equation.
@@ -22,10 +23,10 @@ use crate::geometry::{closest_point_on_triangle, triangle_box_overlaps};
 use crate::options::CellShape;
 use crate::team::map_indices;
 
-/// Distance between the cage's box and the end of the grid, in cells.
+/// Distance between the cage's box and the border of the grid, in cells.
 const PADDING: f64 = 1e-3;
 
-/// Enlargement of cell ranges, in cells, against rounding; an exact overlap test follows.
+/// Enlargement of ranges of cells against rounding, in cells. An exact overlap test follows.
 const RANGE_WIDENING: f64 = 1e-6;
 
 /// Kind of a cell.
@@ -39,7 +40,7 @@ pub enum CellKind {
     Boundary,
     /// Enclosed by boundary cells.
     Interior,
-    /// Connected to the outside.
+    /// Connected to the border of the grid without passing a boundary cell.
     Exterior,
 }
 
@@ -48,11 +49,11 @@ pub enum CellKind {
 pub struct BoundaryValues {
     /// The boundary cells, ascending. `[n_boundary]`
     pub cells: Vec<u32>,
-    /// First value of each cell. `[n_boundary + 1]`
+    /// Index of the first value of each cell. `[n_boundary + 1]`
     pub indptr: Vec<u32>,
-    /// Control of each value.
+    /// Control to which each value belongs. `[n_values]`
     pub indices: Vec<u32>,
-    /// Values; those of a cell sum to 1.
+    /// Dirichlet values; those of a cell sum to 1. `[n_values]`
     pub values: Vec<f32>,
 }
 
@@ -63,7 +64,7 @@ impl BoundaryValues {
         self.cells.binary_search(&cell).ok()
     }
 
-    /// Controls and values of a row.
+    /// Controls and values of the boundary cell in a row.
     #[must_use]
     pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
         let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
@@ -137,7 +138,7 @@ pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DV
     (dims, corner + 0.5 * cell_size, cell_size)
 }
 
-/// First and last cell of a range of coordinates, in cells from the grid's corner.
+/// Cells that overlap an interval of coordinates, which are measured in cells from the grid's corner.
 fn cell_range(low: f64, high: f64, n: u32) -> std::ops::RangeInclusive<u32> {
     // A cast to u32 clamps negative values to 0.
     (low - RANGE_WIDENING) as u32..=((high + RANGE_WIDENING) as u32).min(n - 1)
@@ -256,7 +257,7 @@ fn range(points: &[DVec3], axis: usize) -> Option<(f64, f64)> {
 fn fill_exterior(kinds: &mut [CellKind], dims: UVec3) {
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let untyped = |kinds: &[CellKind], cell: usize| kinds[cell] == CellKind::Untyped;
-    // Seed cells, each for a run of untyped cells along x.
+    // Stack of cells; each starts the fill of a run of untyped cells along x.
     let mut runs = Vec::new();
     for row in 0..ny * nz {
         let (y, z) = (row % ny, row / ny);

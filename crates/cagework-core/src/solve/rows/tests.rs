@@ -1,4 +1,4 @@
-//! Kernels compared with plain loops over the boundary's definition, on grids of odd dimensions.
+//! Tests that kernels match plain loops over the boundary's definition, on grids of odd dimensions.
 
 use super::*;
 use crate::grid::Grid;
@@ -178,7 +178,7 @@ fn operator_and_residual_match_plain_loops() {
     });
 }
 
-/// Half the transpose of trilinear interpolation, see [`crate::transfer`].
+/// Restriction is half the transpose of trilinear interpolation, see [`crate::transfer`].
 #[test]
 fn restriction_matches_plain_loops() {
     let hierarchy = hierarchy();
