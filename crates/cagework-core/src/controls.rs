@@ -24,9 +24,10 @@ pub struct Controls<'a> {
     cage: &'a Cage,
     rest: &'a [Vec3],
     surface: &'a Cage,
-    /// B; `None` for the identity.
+    /// Matrix B; `None` for the identity.
     rows: Option<&'a Weights>,
-    /// Cage face of each face of the surface, `None` for an inner wall; the whole is `None` if the surface is the cage.
+    /// Cage face of each face of the surface, `None` for an inner wall. The outer option is `None` if the surface is
+    /// the cage.
     origins: Option<&'a [Option<u32>]>,
     set: Option<&'a ControlSet>,
 }
@@ -45,13 +46,13 @@ impl<'a> Controls<'a> {
         self.set.cloned().unwrap_or_else(|| ControlSet::plain(self.cage))
     }
 
-    /// Number of controls: columns of the weights.
+    /// Number of controls, which are the first columns of the weights.
     #[must_use]
     pub fn n_controls(&self) -> usize {
         self.rest.len()
     }
 
-    /// Rest positions: the cage's vertices, then controls inside. `[n_controls]`, object units.
+    /// Rest positions: the cage's vertices, then the inner controls. `[n_controls]`, object units.
     #[must_use]
     pub fn rest(&self) -> &'a [Vec3] {
         self.rest
@@ -81,7 +82,8 @@ impl<'a> Controls<'a> {
         self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
     }
 
-    /// Edges of the inner controls, plus three from each of them to the nearest cage triangle, so that all are connected.
+    /// Edges of the inner controls, and three edges from each inner control to the nearest cage triangle, so that all
+    /// controls are connected.
     #[must_use]
     pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let Some(inner) = self.inner() else { return Vec::new() };
@@ -141,7 +143,7 @@ mod tests {
     }
 
     /// A box divided into 27 boxes, whose surface takes the values of the box's eight corners by rows of B. The
-    /// harmonic function with these values is trilinear, and bilinear on the small quads as their hats are.
+    /// harmonic function with these values is trilinear. On the small quads it is bilinear, as their hats are.
     #[test]
     fn rows_mix_the_values_of_the_surface() {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };

@@ -1,4 +1,4 @@
-//! Kinds of coordinates. A new closed form is a file in `coordinates/` and a row below.
+//! Kinds of coordinates. A new closed form takes a file in `coordinates/` and an entry of `kinds!` below.
 
 mod closed_form;
 mod green;
@@ -58,7 +58,8 @@ impl Coordinates {
         self.row().2.map_or(cage.n_vertices(), |form| form.n_columns(cage))
     }
 
-    /// Vectors that the columns multiply, for controls at `positions`: these, or vertices and triangles of the cage.
+    /// Vectors that the columns multiply, for controls at `positions`: the positions themselves or, for forms with
+    /// columns for triangles, the cage's vertices and one vector per triangle.
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.

@@ -13,7 +13,8 @@ use crate::words::{counted, grouped};
 /// Limit on the locations that are listed of each kind; counts are complete.
 pub const MAX_PLACES: usize = 2000;
 
-/// Distance over the diagonal up to which vertices have the same position: rounding to six decimals in a file.
+/// Distance, as a fraction of the mesh's diagonal, up to which vertices have the same position: rounding to six
+/// decimals in a file.
 const WELD_DISTANCE: f64 = 2e-6;
 
 /// Intersecting faces.
@@ -36,14 +37,15 @@ pub fn notices(cage: &Cage) -> Vec<String> {
     cage.notices().iter().map(ToString::to_string).chain(crossing).collect()
 }
 
-/// Intersecting faces of a cage.
+/// Intersecting faces of a cage; `None` if none are found.
 #[must_use]
 pub fn crossings_of(cage: &Cage) -> Option<Crossings> {
     let all: Vec<u32> = (0..cage.faces().len() as u32).collect();
     crossings(&cage.to_polygon_mesh(), Some(cage.component_of_face()), &all)
 }
 
-/// Intersecting faces among the valid faces `sound`. `parts`: component of each face of a cage.
+/// Intersecting faces among the faces with the indices `sound`, which must be valid. `parts`: component of each face of
+/// a cage. `None` if none are found.
 #[must_use]
 pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Option<Crossings> {
     let mut of_parts = parts.is_some();
@@ -91,8 +93,8 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
             face_of.push(f);
         }
     }
-    // Identify vertices at the same position, so that neighbours across a seam do not count as intersecting. Do not
-    // identify the corners of one triangle, in parts that are tiny against the diagonal.
+    // Identify vertices at the same position, so that neighbours across a seam do not count as intersecting. Exception:
+    // the corners of one triangle stay separate, as they may coincide in parts that are tiny relative to the diagonal.
     let (mut first, _) = same_places(mesh);
     for Corners { index, .. } in &triangles {
         let named = index.map(|i| first[i as usize]);
@@ -108,12 +110,12 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// A point near the intersection of two triangles: the centre of their boxes' overlap.
+/// A point near the intersection of two triangles: the centre of the overlap of their bounding boxes.
 fn between(a: &Corners, b: &Corners) -> DVec3 {
     0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
-/// First vertex at the position of each vertex, and the number of vertices that have an earlier one.
+/// For each vertex, the first vertex at its position; and the number of vertices that have an earlier one there.
 #[must_use]
 pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     let reach = WELD_DISTANCE * mesh.diagonal();
@@ -149,8 +151,8 @@ pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     (first, joined)
 }
 
-/// Message. `listed`: pairs in the list; `all`: pairs found, a lower bound unless `complete`; then faces and location
-/// of the first pair.
+/// Message about intersecting pairs of triangles. `listed`: pairs in the list; `all`: pairs found, a lower bound unless
+/// `complete`. The last argument holds the faces and the location of the first pair.
 fn sentence(
     [listed, all]: [usize; 2],
     complete: bool,

@@ -11,11 +11,11 @@ use crate::words::{counted, grouped};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct OutsideVertex {
-    /// Mesh vertex.
+    /// Index of the mesh vertex.
     pub vertex: u32,
     /// Distance from the cage, object units.
     pub distance: f32,
-    /// Share of the cage's motion that it follows: 1 near the cage, 0 if it stays in place.
+    /// Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
     pub share: f32,
 }
 
@@ -122,7 +122,7 @@ mod tests {
     const ROUNDING: f32 = 1e-6;
 
     fn weights() -> Weights {
-        // The midpoint of an edge, and a corner.
+        // Row 0 is the midpoint of an edge, row 1 a corner.
         Weights::new(3, vec![0, 2, 3], vec![0, 2, 1], vec![0.5, 0.5, 1.0]).unwrap()
     }
 
@@ -151,7 +151,8 @@ mod tests {
         positions.push(Vec3::splat(9.0));
         let normals = vertex_normals(&positions, cage.triangles());
         for (p, n) in positions[..8].iter().zip(&normals) {
-            // Two triangles of one face and one of another tilt a corner's normal by a factor of at most 2.
+            // A corner has two triangles of one face and one of another, so its normal is weighted by a factor of at
+            // most 2.
             let away = (p - Vec3::splat(0.5)).normalize();
             assert!((n.length() - 1.0).abs() <= ROUNDING && n.dot(away) > 0.9, "{n} at {p}");
         }

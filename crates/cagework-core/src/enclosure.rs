@@ -1,4 +1,4 @@
-//! Which points a cage encloses, updated incrementally while the cage is dragged.
+//! Finds the points that a cage encloses; updated incrementally while the cage is dragged.
 //!
 //! A winding number is a sum over the cage's triangles. When a few vertices move, only the terms of their triangles
 //! change, and only for points inside the bounding box of those triangles before and after.
@@ -11,7 +11,8 @@ use self::columns::Columns;
 use crate::cage::Cage;
 use crate::mesh::Bounds;
 
-/// Winding number above which a point is inside. It is an integer off the surface, and in between on it.
+/// Winding number above which a point is inside. Off the surface, winding numbers are integers; on it, they lie between
+/// the integers of both sides.
 const MIN_INSIDE_WINDING: f64 = 0.5;
 
 /// Winding numbers of points with respect to a cage.
@@ -73,8 +74,9 @@ impl Enclosure {
     }
 }
 
-/// [`crate::geometry::winding_number`] with a single arc tangent: half solid angles are arguments of complex numbers,
-/// whose product has their sum as argument. Full turns are counted separately.
+/// [`crate::geometry::winding_number`] with a single arc tangent: each half solid angle is the argument of a complex
+/// number, and the product of these numbers has the sum of the angles as its argument. Full turns are counted
+/// separately.
 #[must_use]
 pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
     let (mut re, mut im) = (1.0_f64, 0.0_f64);
@@ -134,7 +136,7 @@ mod tests {
             let expected = geometry::winding_number(p, triangles.iter().copied());
             let actual = winding_number(p, &triangles);
             assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
-            // Part of it, open, whose winding number is not an integer.
+            // An open part of the surface, whose winding number is not an integer.
             let expected = geometry::winding_number(p, triangles[..20].iter().copied());
             let actual = winding_number(p, &triangles[..20]);
             assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
@@ -145,7 +147,7 @@ mod tests {
     #[test]
     fn ray_crossings_equal_the_sum_of_angles() {
         let cage = box_cage();
-        // Rotated, twisted and dented, so that lines leave it more than once.
+        // Rotated, twisted and dented, so that a line leaves the cage more than once.
         let bend =
             |p: &Vec3| glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.2 + p.y, 0.5) * (*p * p.length());
         let bent =
@@ -182,7 +184,8 @@ mod tests {
         posed[0] += Vec3::splat(0.7);
         posed[5] *= 1.4;
         let moved = Cage::new(&PolygonMesh { positions: posed.clone(), ..cage.to_polygon_mesh() });
-        // Comparable only with the same triangles: a moved quad may be cut along its other diagonal.
+        // The winding numbers are comparable only for the same triangles: a moved quad may be cut along its other
+        // diagonal.
         let moved = moved.unwrap();
         if moved.triangles() == cage.triangles() {
             assert_eq!(enclosure.outside_of(&posed), Enclosure::new(&moved, &points()).outside());

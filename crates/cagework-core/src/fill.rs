@@ -1,15 +1,16 @@
-//! Holes: boundary loops and their triangulation.
+//! Finds the boundary loops of holes, and triangulates them.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::DVec3;
 
-/// Most edges of a hole that is filled. Triangulation costs the cube of it, and larger holes are usually intended.
+/// Largest number of edges of a hole that is filled. Triangulation costs the cube of this number, and larger holes are
+/// usually intended.
 const MAX_EDGES: usize = 64;
 
-/// Closed loops of edges, each directed like the majority of its edges. Ignores edges that are not part of a loop.
+/// Closed loops of edges. Each loop has the direction of the majority of its edges. Ignores edges that are in no loop.
 pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
-    // Undirected: a face next to the hole may be inverted.
+    // Store edges without direction, as a face next to the hole may be inverted.
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for &[from, to] in edges {
         next.entry(from).or_default().push(to);
@@ -48,15 +49,16 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Cost of a triangle that folds back onto the face behind one of its sides, as a multiple of its area, per such side. It decides
-/// between cuts of equal area: around a missing corner of a cube, one of the two lies on the remaining faces.
+/// Cost of a triangle that folds back onto the face behind one of its sides, as a multiple of the triangle's area, for
+/// each such side. It decides between triangulations of equal area: around a missing corner of a cube, one of two lies
+/// on the remaining faces.
 const FOLD_COST: f64 = 1.0;
 
 /// Cosine of the angle between two faces above which they are folded onto each other (8 degrees).
 const MAX_FOLD_COSINE: f64 = 0.99;
 
-/// Minimum-area triangulation of an outline with its orientation, which avoids folding onto `faces`, those around the
-/// hole. `None` if the outline has too many corners.
+/// Minimum-area triangulation of an outline, with the outline's orientation. It avoids folding onto the `faces` around
+/// the hole. `None` if the outline has too many corners.
 ///
 /// Source: Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
 pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
@@ -108,8 +110,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
     Some(triangles)
 }
 
-/// For each side of an outline, the direction across its neighbouring face, away from the side. Unit, or zero without
-/// such a face.
+/// For each side of an outline, the unit direction from the side across the neighbouring face. Zero if the side has no
+/// such face.
 fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
     let n = outline.len();
     let key = |a: u32, b: u32| [a.min(b), a.max(b)];
@@ -122,7 +124,8 @@ fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
             let Some(&side) = sides.get(&key(a, b)) else { continue };
             let point = |i: u32| at.get(i as usize).copied().unwrap_or_default();
             let corners = face.iter().zip(face.iter().cycle().skip(1));
-            // Newell's normal; independent of the face's orientation, since its own sides run around it.
+            // Newell's normal. The result does not depend on the face's orientation, which reverses both normal and
+            // side.
             let normal: DVec3 =
                 corners.map(|(&c, &d)| (point(c) - point(a)).cross(point(d) - point(a))).sum();
             across[side] = normal.cross(point(b) - point(a)).normalize_or_zero();

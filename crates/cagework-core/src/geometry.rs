@@ -5,7 +5,7 @@ use glam::DVec3;
 /// Relative enlargement of the box in [`triangle_box_overlaps`]: above f64 rounding, far below a cell.
 const BOX_WIDENING: f64 = 1e-9;
 
-/// Height of a triangle over its length below which it is treated as a segment: its plane is lost in f64 rounding.
+/// Height of a triangle divided by its length below which it is treated as a segment: f64 rounding hides its plane.
 const MIN_RELATIVE_HEIGHT: f64 = 1e-12;
 
 /// Closest point on a triangle.
@@ -19,8 +19,8 @@ pub struct ClosestPoint {
 
 /// Closest point of `triangle` to `point`. Degenerate triangles are treated as a segment or point.
 ///
-/// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster 5.1.5 picks a wrong side
-/// of degenerate triangles.
+/// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster method of section 5.1.5
+/// picks a wrong side of degenerate triangles.
 #[must_use]
 pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestPoint {
     let [a, b, c] = triangle;
@@ -28,7 +28,7 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
         let [on_ab, on_bc, on_ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| share_of_segment(point, p, q));
         let candidates = [[1.0 - on_ab, on_ab, 0.0], [0.0, 1.0 - on_bc, on_bc], [on_ca, 0.0, 1.0 - on_ca]];
         let distance = |[u, v, w]: [f64; 3]| (u * a + v * b + w * c).distance_squared(point);
-        // Ties: the first candidate.
+        // If candidates are equally close, the first one is taken.
         let mut best = candidates[0];
         for candidate in &candidates[1..] {
             if distance(*candidate) < distance(best) {
@@ -68,7 +68,7 @@ fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     (u >= 0.0 && v >= 0.0 && w >= 0.0).then_some([u, v, w])
 }
 
-/// Parameter, 0 to 1, of the segment's point closest to `point`.
+/// Parameter, 0 at `p` to 1 at `q`, of the point of the segment that is closest to `point`.
 fn share_of_segment(point: DVec3, p: DVec3, q: DVec3) -> f64 {
     let way = q - p;
     let length_squared = way.length_squared();

@@ -4,11 +4,11 @@ use glam::DVec3;
 
 use crate::mesh::Bounds;
 
-/// Offset of the cell centres, in cells: small and irregular, so that grid lines do not run along edges and vertices of
-/// axis-aligned cages.
+/// Offset of the cell centres, in cells. It is small and irregular, so that grid lines do not run along edges and
+/// vertices of axis-aligned cages.
 const SHIFT: DVec3 = DVec3::new(0.013_713_7, 0.007_071_1, 0.019_318_5);
 
-/// Index of no cell.
+/// Value that stands for "no cell" or "no row" in tables of indices.
 pub const NO_CELL: u32 = u32::MAX;
 
 /// A box of equal cells with unknowns at their centres; x runs fastest, then y, then z.
@@ -23,7 +23,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Cubic cells around `bounds`: `g` along its longest side, plus one layer all around.
+    /// Cubic cells around `bounds`: `g` along the longest side of `bounds`, plus one layer of cells on all sides.
     #[must_use]
     pub fn cubic(bounds: Bounds, g: u32) -> Self {
         let (min, extent) = (bounds.min.as_dvec3(), bounds.extent().as_dvec3());

@@ -12,7 +12,7 @@ use crate::grid::{Grid, NO_CELL};
 
 mod build;
 
-/// Coarsening stops at this many unknowns, where a few dozen sweeps cost almost nothing.
+/// Coarsening stops at this many unknowns, where a few dozen sweeps take negligible time.
 const COARSEST_UNKNOWNS: usize = 200;
 
 /// A level's view of the cage: which cells are unknowns, and where their arms end on the cage.
@@ -58,9 +58,9 @@ pub struct CutCell {
 pub struct BoundaryTerm {
     /// Number of the cut cell, red before black.
     pub cut_cell: u32,
-    /// Control.
+    /// Control whose column the term belongs to.
     pub column: u32,
-    /// Contribution to the right-hand side.
+    /// Contribution of the Dirichlet value to the right-hand side.
     pub value: f32,
 }
 
@@ -92,9 +92,9 @@ impl Colour {
 pub struct Level {
     /// The level's grid.
     pub grid: Grid,
-    /// Red and black.
+    /// Stencils of the red cells, then of the black cells.
     pub colours: [Colour; 2],
-    /// Right-hand sides, ascending in `cut_cell`, then `column`.
+    /// Terms of the right-hand sides, ascending in `cut_cell`, then `column`.
     pub boundary: Vec<BoundaryTerm>,
     /// Row of each grid cell in the level's fields; [`NO_CELL`] if it is not an unknown. `[nz, ny, nx]`
     pub row_of: Vec<u32>,
@@ -103,7 +103,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// Rows of a field, including the two zero rows.
+    /// Number of rows of a field, including the two zero rows.
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.n_unknowns() + 2
@@ -121,7 +121,7 @@ impl Level {
         if colour == 0 { 0 } else { self.colours[0].n_cells as usize + 1 }
     }
 
-    /// The zero row, which stands for cells that are not unknowns.
+    /// Row of zeros that stands for cells that are not unknowns.
     #[must_use]
     pub fn zero_row(&self) -> u32 {
         self.colours[0].n_cells
@@ -191,7 +191,7 @@ impl Level {
     }
 }
 
-/// The finest level and coarser ones from `coarsen`, until few unknowns remain.
+/// The finest level and the coarser ones that `coarsen` makes from it, until at most `COARSEST_UNKNOWNS` remain.
 pub fn coarsened_until_few<C>(
     finest: C,
     unknowns: impl Fn(&C) -> &[bool],

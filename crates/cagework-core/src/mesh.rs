@@ -64,7 +64,8 @@ pub struct PolygonMesh {
 }
 
 impl PolygonMesh {
-    /// Diagonal of the box of all finite vertices that faces use, object units: the cage's diagonal, also for invalid meshes.
+    /// Diagonal of the box of all finite vertices that faces use, object units. It equals the cage's diagonal, and also
+    /// exists for invalid meshes.
     #[must_use]
     pub fn diagonal(&self) -> f64 {
         let used = self.faces.iter().flatten().filter_map(|&i| self.positions.get(i as usize));
@@ -73,7 +74,7 @@ impl PolygonMesh {
     }
 }
 
-/// Vertices that share a position, so that a vertex split at a UV or normal seam is bound once.
+/// Groups vertices that share a position, so that a vertex split at a UV or normal seam is bound once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Weld {
     /// First input vertex of each distinct position. `[n_unique]`

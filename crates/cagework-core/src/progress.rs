@@ -27,7 +27,7 @@ pub struct ProgressEvent {
     pub stage: Stage,
     /// Completed share of the whole work, 0 to 1.
     pub fraction: f32,
-    /// Completed sweeps or V-cycles of this stage.
+    /// Number of iterations of the solver in this stage: sweeps, V-cycles or steps.
     pub iteration: u32,
     /// Latest delta (Eq. 2), if the stage has one.
     pub delta: Option<f32>,
@@ -38,8 +38,8 @@ pub trait Progress: Sync {
     /// Called many times a second. Return `Break` to cancel the work.
     fn report(&self, event: ProgressEvent) -> ControlFlow<()>;
 
-    /// Milliseconds of a monotonic clock. wasm has none in the standard library: implementations override this,
-    /// otherwise all times are 0.
+    /// Milliseconds of a monotonic clock. The standard library has no clock in wasm: implementations for wasm override
+    /// this, otherwise all times are 0.
     fn now_ms(&self) -> f64 {
         clock_ms()
     }

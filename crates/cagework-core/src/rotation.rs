@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat};
 
-/// Limit on Newton steps: five suffice at a simple root; at a double root each step halves the distance.
+/// Limit on Newton steps. Five suffice at a simple root; at a double root each step only halves the distance to it.
 const STEPS: usize = 40;
 
 /// The proper rotation R that maximises the trace of `R^T m`.
@@ -30,13 +30,13 @@ pub fn nearest_rotation(m: DMat3) -> DMat3 {
     let c2 = -2.0 * a.as_flattened().iter().map(|x| x * x).sum::<f64>();
     let c1 = -8.0 * m.determinant();
     let c0 = determinant4(&k);
-    // Upper bound on the sum of m's singular values, and so on all eigenvalues.
+    // An upper bound on the sum of m's singular values, which is an upper bound on all eigenvalues.
     let mut l = (-1.5 * c2).sqrt();
     for _ in 0..STEPS {
         let value = ((l * l + c2) * l + c1) * l + c0;
         let slope = (4.0 * l * l + 2.0 * c2) * l + c1;
         let next = l - value / slope;
-        // Newton's iterates decrease from above; an increase is rounding.
+        // Newton's iterates decrease towards the root; an increase is a rounding error.
         if !next.is_finite() || next >= l {
             break;
         }
@@ -46,7 +46,7 @@ pub fn nearest_rotation(m: DMat3) -> DMat3 {
     for (i, row) in shifted.iter_mut().enumerate() {
         row[i] -= l;
     }
-    // Each column of the adjugate is a multiple of the eigenvector; the longest is the most accurate.
+    // Each column of the adjugate is a multiple of the eigenvector. The longest column is the most accurate.
     let columns = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| cofactor(&shifted, i, j)));
     let squared = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>();
     let longest = columns.into_iter().max_by(|a, b| squared(a).total_cmp(&squared(b))).unwrap_or_default();
@@ -77,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    /// By singular value decomposition (Kabsch 1976).
+    /// Reference for the tests: the nearest rotation by singular value decomposition (Kabsch 1976).
     fn by_svd(m: DMat3) -> DMat3 {
         let svd = Matrix3::from_column_slice(&m.to_cols_array()).svd(true, true);
         let (mut u, v) = (svd.u.unwrap(), svd.v_t.unwrap());
@@ -102,7 +102,8 @@ mod tests {
         for m in matrices() {
             let (found, expected) = (nearest_rotation(m), by_svd(m));
             assert!((found.determinant() - 1.0).abs() < 1e-12);
-            // Equally good if two rotations are nearly equally near; otherwise equal.
+            // The trace is as large as that of the reference. The rotations are equal unless two rotations are nearly
+            // equally near.
             let trace = |r: DMat3| (r.transpose() * m).to_cols_array();
             let [ours, theirs] = [trace(found), trace(expected)].map(|t| t[0] + t[4] + t[8]);
             assert!(ours >= theirs - 1e-12, "{m}: {ours} {theirs}");

@@ -1,4 +1,4 @@
-//! Linear blend skinning and morph targets, for the playback of clips.
+//! Linear blend skinning and morph targets, for playing animation clips.
 
 use glam::{Mat4, Quat, Vec3};
 
@@ -64,9 +64,11 @@ impl Skin {
     }
 }
 
-/// Positions of all vertices: `sum_j w_j M_j (p + sum_k t_k d_k)` (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
+/// Positions of all vertices: `sum_j w_j M_j (p + sum_k t_k d_k)` (glTF 2.0, sections 3.7.2.2 and 3.7.3.3), with the
+/// joint matrices `M_j`, target weights `t_k` and displacements `d_k`.
 ///
-/// `palette`: world from mesh space for each joint. `targets`: weights of the morph targets. Returns `[n_vertices]`.
+/// `palette`: matrix from mesh space to world space of each joint. `targets`: weights of the morph targets. Returns
+/// `[n_vertices]`.
 ///
 /// # Panics
 /// If a joint or target index is out of range.
@@ -102,7 +104,8 @@ mod tests {
         let turn = Mat4::from_quat(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2));
         let palette = [Mat4::from_translation(Vec3::splat(4.0)), turn];
         let posed = skin_vertices(&skin, &palette, &[0.5, 1.0]);
-        // (2, 0, 0.5) rotated by 90 degrees about z; a quarter of (4, 5, 4) plus three quarters of (-1, 0, 0).
+        // Vertex 0: (2, 0, 0.5) rotated by 90 degrees about z. Vertex 1: a quarter of (4, 5, 4) plus three quarters of
+        // (-1, 0, 0).
         let copied = skin_vertices(&skin.with_copies(&[1, 0]), &palette, &[0.5, 1.0]);
         assert_eq!(copied, [posed[0], posed[1], posed[1], posed[0]]);
         assert!(posed[0].distance(Vec3::new(0.0, 2.0, 0.5)) < 1e-6, "{}", posed[0]);

@@ -1,6 +1,7 @@
 //! A slice through the grid for display: cell kinds, and harmonic coordinates at the cell centres.
 //!
-//! Values come from a bind ([`crate::bind()`]) with [`Slice::centers`] as mesh, so they are what a mesh vertex there would get.
+//! Values come from a bind ([`crate::bind()`]) with [`Slice::centers`] as mesh, so they equal the weights of a mesh
+//! vertex at the same place.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -23,7 +24,7 @@ pub struct Slice {
     pub layer: u32,
     /// Cells along [`Self::u`] and [`Self::v`].
     pub dims: [u32; 2],
-    /// Corner of the slice at which its first cell begins, in the plane of the cell centres, object units.
+    /// Corner at which the first cell of the slice begins, in the plane of the cell centres, object units.
     pub corner: Vec3,
     /// Edge vector of a cell along the next axis (y for x, z for y, x for z), object units.
     pub u: Vec3,
@@ -31,7 +32,7 @@ pub struct Slice {
     pub v: Vec3,
     /// Kind of each cell, u fastest; none is untyped. `[dims[1], dims[0]]`
     pub kinds: Vec<CellKind>,
-    /// Cells that are not exterior, ascending: the rows of [`Self::weights`].
+    /// Indices of the cells that are not exterior, ascending: the rows of [`Self::weights`].
     pub cells: Vec<u32>,
     /// Harmonic coordinates at the centres of [`Self::cells`], once computed. `[n_cells, n_cage]`
     pub weights: Option<Weights>,

@@ -1,8 +1,8 @@
-//! Smooth cages: Catmull-Clark subdivision with its basis functions as rows.
+//! Smooth cages: Catmull-Clark subdivision. The rows hold its basis functions.
 //!
 //! Each vertex of the subdivided mesh is a weighted mean of the cage's vertices: a row of B (see [`crate::controls`]).
-//! Values on the surface are close to cubic B-splines, so that the cage's edges do not show in the model. Columns
-//! remain the cage's vertices.
+//! Values on the surface are close to cubic B-splines, so that the cage's edges do not show in the model. The columns
+//! of the weights remain the cage's vertices.
 //!
 //! Source: Catmull and Clark 1978, "Recursively generated B-spline surfaces on arbitrary topological meshes".
 
@@ -16,12 +16,12 @@ use crate::weights::Weights;
 /// A subdivided mesh and its relation to the original.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subdivision {
-    /// Vertices per step: those of the previous mesh, then one per edge (ordered by its ends), then one per face.
-    /// Faces: one per corner of each previous face, in order.
+    /// Vertices of each step: the vertices of the previous mesh, then one per edge (ordered by its ends), then one per
+    /// face. Faces: one per corner of each face of the previous mesh, in order.
     pub mesh: PolygonMesh,
     /// Weights of the original vertices, non-negative, row sums 1. `[n_subdivided, n_vertices]`
     pub rows: Weights,
-    /// Original face of each face. `[n_subdivided_faces]`
+    /// Face of the original mesh from which each face comes. `[n_subdivided_faces]`
     pub face_of: Vec<u32>,
 }
 
@@ -56,7 +56,7 @@ pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivision {
     Subdivision { mesh: PolygonMesh { positions, faces }, rows, face_of }
 }
 
-/// One step: rows of the new vertices, new faces, and their original faces.
+/// One subdivision step: rows of the new vertices, new faces, and the original face of each.
 fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec<u32>>, Vec<u32>) {
     let n = rows.len();
     let mean = |of: &mut dyn Iterator<Item = &Row>| {
@@ -65,7 +65,7 @@ fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec
     };
     let face_points: Vec<Row> =
         faces.iter().map(|face| mean(&mut face.iter().map(|&i| &rows[i as usize]))).collect();
-    // Faces around each edge and each vertex.
+    // Collect the faces around each edge and each vertex.
     let mut edges: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
     let mut around: Vec<Vec<usize>> = vec![Vec::new(); n];
     for (f, face) in faces.iter().enumerate() {

@@ -21,7 +21,7 @@ use crate::solve::rows::Prolong;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
 
-/// Smaller changes of a weight count as zero: their squares would be denormal.
+/// Changes of a weight below this count as zero, because their squares would be denormal.
 const MIN_CHANGE: f32 = 1e-18;
 
 /// Right-hand side plus neighbours of a row, summed in the kernels' order.
@@ -72,7 +72,7 @@ pub fn jacobi_cells(
     }
 }
 
-/// Inner sum of Eq. 2 of each row, added to `changes` (`[row]`), or stored there for the `first` batch.
+/// Inner sum of Eq. 2 for each row. It is added to `changes` (`[row]`), or stored there for the `first` batch.
 /// GPU twin: `shaders/change_norms.wgsl`.
 pub fn change_norms(
     n_lanes: usize,
@@ -96,7 +96,7 @@ pub fn change_norms(
     }
 }
 
-/// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: red ones and their zero row.
+/// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: the red rows and their zero row.
 /// GPU twin: `shaders/residual.wgsl`.
 pub fn residual(
     n_rows: usize,

@@ -5,10 +5,10 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Vertices per piece: small enough for even distribution, large enough to make its overhead negligible.
+/// Number of vertices per piece: small enough for even distribution, large enough to make the overhead negligible.
 pub const VERTEX_RUN: usize = 512;
 
-/// Limit on threads per processor: more would only take memory.
+/// Limit on threads per processor. More threads would only take memory.
 const MAX_PER_PROCESSOR: usize = 4;
 
 /// A fixed number of threads.
@@ -28,7 +28,7 @@ impl Team {
         {
             let processors = std::thread::available_parallelism().map_or(1, usize::from);
             let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
-            // A single thread needs a pool, too: otherwise work that it spawns would run on all processors.
+            // A single thread also needs a pool: otherwise rayon would run work that it spawns on all processors.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok();
             let n_threads = if pool.is_some() { wanted } else { 1 };
             Self { pool, n_threads }
@@ -83,8 +83,8 @@ impl Team {
         states.iter_mut().for_each(work);
     }
 
-    /// Runs `work(state, piece)` for every piece in `0..n_pieces` on the next free thread; `start` creates a thread's
-    /// state. Results are in the order of pieces.
+    /// Runs `work(state, piece)` for every piece in `0..n_pieces` on the next free thread. `start` creates the state of
+    /// a thread. Results are in the order of pieces.
     pub fn share<S, T: Send>(
         &self,
         n_pieces: usize,
@@ -111,7 +111,7 @@ impl Team {
     }
 }
 
-/// `f` of each of `0..n`, in order; parallel with the feature `parallel`.
+/// Values `f(0)` to `f(n - 1)`, in order. They are computed in parallel with the feature `parallel`.
 pub(crate) fn map_indices<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "parallel")]
     {

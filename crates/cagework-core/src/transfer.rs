@@ -10,7 +10,7 @@ use crate::levels::Level;
 
 /// Weight in restriction of the fine cell at the coarse cell's centre.
 pub const RESTRICT_CENTRE: f32 = 0.5;
-/// Weight in restriction of each of the twelve red cells that share an edge with it.
+/// Weight in restriction of each of the twelve red cells that share an edge with the centre cell.
 pub const RESTRICT_EDGE: f32 = 0.125;
 
 /// Red fine cells around a coarse cell, as rows of the fine level: the centre, then twelve edge neighbours.
@@ -19,25 +19,25 @@ pub type RestrictRow = [u32; 13];
 /// A black fine cell between two coarse cells (one odd coordinate) or eight (three odd coordinates).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProlongRow<const N: usize> {
-    /// Index within black.
+    /// Index of the fine cell within black.
     pub cell: u32,
-    /// Rows of the coarse level.
+    /// Rows of these coarse cells; the coarse level's zero row for cells that are not unknowns.
     pub coarse: [u32; N],
-    /// Inverse of the number of coarse cells that are unknowns; 0 without any. Full multigrid starts from their mean,
-    /// because the solution, unlike the error, is not zero on the cage.
+    /// Inverse of the number of these coarse cells that are unknowns; 0 if none is. Full multigrid starts from the mean
+    /// of the coarse values, because the solution, unlike the error, is not zero on the cage.
     pub mean: f32,
 }
 
 /// Restriction and prolongation between a level and the next coarser one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transfer {
-    /// For each coarse unknown, in order: red, then black.
+    /// For the coarse unknowns in order, red and then black: the fine cells whose residuals each gathers.
     pub restrict_rows: [Vec<RestrictRow>; 2],
     /// Black cells with one odd coordinate, ascending.
     pub faces: Vec<ProlongRow<2>>,
     /// Black cells with three odd coordinates, ascending.
     pub corners: Vec<ProlongRow<8>>,
-    /// First face and first corner of each z-plane. `[nz + 1]`
+    /// First entry of `faces` and of `corners` for each z-plane. `[nz + 1]`
     pub planes: Vec<[u32; 2]>,
 }
 
@@ -67,7 +67,7 @@ impl Transfer {
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level) -> Self {
         let [nx, ny, nz] = fine.grid.dims;
-        // About a quarter of the black cells have three odd coordinates.
+        // Black cells have one odd coordinate or three. About a quarter of them have three.
         let n_black = fine.colours[1].n_cells as usize;
         let mut tables = Self {
             restrict_rows: [0, 1].map(|c| Vec::with_capacity(coarse.colours[c].n_cells as usize)),

@@ -1,4 +1,4 @@
-//! A camera as picking and dragging need it: projection, rays, and the scale of a pixel.
+//! A camera as picking and dragging need it: projection, rays, and the size of a pixel.
 
 use glam::{Vec2, Vec3};
 

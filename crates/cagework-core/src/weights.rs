@@ -30,7 +30,7 @@ pub enum WeightsError {
         /// Last row pointer.
         last: usize,
     },
-    /// A column index is too large.
+    /// A column index is not below the number of columns.
     #[error("row {row} names column {column}, but there are {n_columns} columns")]
     Column {
         /// The row.
@@ -102,7 +102,7 @@ impl Weights {
         Self { n_columns, indptr, indices, data }
     }
 
-    /// `indptr`, `indices` and `data`: the arrays that [`Self::new`] takes.
+    /// The arrays that [`Self::new`] takes: `indptr`, `indices` and `data`.
     #[must_use]
     pub fn into_parts(self) -> (Vec<u32>, Vec<u32>, Vec<f32>) {
         (self.indptr, self.indices, self.data)
@@ -146,7 +146,7 @@ impl Weights {
         made
     }
 
-    /// Horizontal concatenation: the columns of `more` follow.
+    /// Horizontal concatenation: the columns of this matrix, then the columns of `more`.
     ///
     /// # Panics
     /// If the numbers of rows differ.

@@ -1,8 +1,9 @@
 //! Edge collapses, cheapest first, down to the target or until the obstacle blocks every edge.
 //!
-//! Source: Garland and Heckbert 1997 for the cost. Changes: the merged vertex goes to the minimum of the quadric or, if the solid
-//! is in the way, outward along the normal until its triangles are clear, so that a coarse cage bulges around the model like a
-//! progressive hull (Sander et al. 2000). An edge whose position costs more than expected returns to the heap at that cost.
+//! Source: Garland and Heckbert 1997 for the cost. Changes: the merged vertex goes to the minimum of the quadric or, if
+//! the solid is in the way, outward along the normal until its triangles are clear. A coarse cage therefore bulges
+//! around the model like a progressive hull (Sander et al. 2000). An edge whose merged vertex costs more than expected
+//! returns to the heap at that cost.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -18,19 +19,19 @@ use cagework_core::progress::Cancelled;
 /// Offsets along the normal that are tried for the merged vertex, voxels.
 const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
 
-/// Smallest cosine between a triangle's normals before and after a collapse.
+/// Smallest cosine between the normals of a triangle before and after a collapse.
 const MIN_COLLAPSE_COSINE: f64 = 0.15;
 
 /// Smallest quality of a new triangle, see [`quality`].
 pub(super) const MIN_QUALITY: f64 = 0.12;
 
-/// Most triangles around a vertex.
+/// Largest number of triangles around a vertex.
 const MAX_VALENCE: usize = 11;
 
 /// An edge returns to the heap if it costs more than this factor times the expected cost.
 const MAX_COST_RATIO: f64 = 1.2;
 
-/// Collapses between polls for cancellation.
+/// Number of collapses between polls for cancellation.
 const COLLAPSES_PER_CHECK: usize = 64;
 
 /// An edge in the heap of collapses.
@@ -61,9 +62,9 @@ impl Ord for HeapEdge {
 pub(super) struct Collapser<'g, 'a> {
     pub(super) surface: &'g mut GuardedSurface<'a>,
     pub(super) quadrics: Vec<Quadric>,
-    /// Quadrics of the planes alone: squared distance of a vertex from the part of the hull that it replaces.
+    /// Quadrics of the planes alone: squared distance of a vertex from the part of the hull that the vertex replaces.
     planes: Vec<Quadric>,
-    /// Limit on the RMS of that distance, voxels; `None` without limit.
+    /// Limit on the RMS of the distance in `planes`, voxels; `None` for no limit.
     pub(super) budget: Option<f64>,
     /// Whether the spacing of vertices on plates is limited.
     pub(super) keeps_plates: bool,
@@ -71,7 +72,7 @@ pub(super) struct Collapser<'g, 'a> {
     spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
     heap: BinaryHeap<HeapEdge>,
-    /// Vertices of the whole surface, including the mirror image.
+    /// Number of vertices of the whole surface, including the mirror image.
     count: usize,
     scratch: Scratch,
 }
@@ -152,8 +153,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 if self.count == count_then || self.surface.has_band() {
                     break;
                 }
-                // Blocked edges may be free now that their surroundings have changed. (With a band they are retried in
-                // the next, wider one.)
+                // Blocked edges may be free now that the triangles around them have changed. (With a band, they are
+                // retried in the next, wider band.)
                 count_then = self.count;
                 self.wait_for_all();
                 continue;

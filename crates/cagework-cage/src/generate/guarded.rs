@@ -8,25 +8,26 @@ use super::surface::Surface;
 use super::voxels::Voxels;
 use cagework_core::contact::{Corners, meet};
 
-/// Smallest distance between triangles that are not neighbours, in voxels.
+/// Smallest distance between triangles that share no vertex, in voxels.
 const MIN_GAP: f64 = 0.05;
 
-/// Shrinkage of the voxels of gap sheets, in voxels: walls beside a sheet may graze it.
+/// Shrinkage of the voxels of gap sheets on all sides, in voxels, because walls beside a sheet may graze it.
 const SHEET_SHRINKAGE: f64 = 0.4;
 
-/// Smallest distance of vertices from the mirror plane, in voxels, unless they lie on it.
+/// Smallest distance from the mirror plane of vertices that do not lie on it, in voxels.
 const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
-/// Smallest cosine between the normals of neighbours (120 degrees): sharper folds invert the model when they are bent.
+/// Smallest cosine between the normals of neighbouring triangles (120 degrees). Sharper folds invert the model when
+/// they are bent.
 pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
 
 /// A solid that the surface must not meet.
 #[derive(Debug)]
 pub(super) struct Obstacle {
     pub(super) voxels: Voxels,
-    /// Distance to keep from its voxels along each axis, in voxels.
+    /// Distance to keep from the voxels along each axis, in voxels.
     pub(super) clearance: f64,
-    /// Longest edge of a voxel over its edge along each axis.
+    /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
 }
 
@@ -42,7 +43,7 @@ impl Obstacle {
     }
 }
 
-/// Whether a triangle (centred coordinates) overlaps a voxel of a set, each enlarged by `grow` on all sides.
+/// Whether a triangle (centred coordinates) overlaps a voxel of a set. Each voxel is enlarged by `grow` on all sides.
 fn overlaps(voxels: &Voxels, triangle: [DVec3; 3], grow: f64) -> bool {
     let half = DVec3::from_array(voxels.dims.map(|n| 0.5 * n as f64));
     any_run(triangle.map(|p| p + half), grow, voxels.dims, |y, z, first, last| {
@@ -70,12 +71,12 @@ pub(super) struct GuardedSurface<'a> {
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
-    /// Position in its list of the last triangle that was not clear.
+    /// Index, in the latest list of new triangles, of the triangle that was not clear.
     last_unclear: usize,
 }
 
 impl<'a> GuardedSurface<'a> {
-    /// `surface` must be clear of the obstacle and of itself.
+    /// Wraps a surface, which must be clear of the obstacle and of itself.
     pub(super) fn new(surface: Surface, obstacle: &'a Obstacle) -> Self {
         let half = DVec3::from_array(obstacle.voxels.dims.map(|n| 0.5 * n as f64));
         let n = surface.triangles.len();
@@ -139,7 +140,8 @@ impl<'a> GuardedSurface<'a> {
             && !self.sheets.as_ref().is_some_and(crosses)
     }
 
-    /// Whether no triangle may have a corner at a point: its voxel is one of the solid or outside the band.
+    /// Whether no triangle may have a corner at a point, because its voxel belongs to the solid or lies outside the
+    /// band.
     pub(super) fn is_blocked(&self, p: DVec3) -> bool {
         let dims = self.keep_out.dims.map(|n| n as f64);
         let at = p + 0.5 * DVec3::from_array(dims);
@@ -183,13 +185,14 @@ impl<'a> GuardedSurface<'a> {
         self.buckets.add(triangle, min, max);
     }
 
-    /// Smallest cosine between the normals of neighbours among `triangles`, to `others` and across the mirror.
+    /// Smallest cosine between the normals of neighbours: among `triangles`, between them and `others`, and across the
+    /// mirror.
     fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
         self.folds(triangles, others).into_iter().fold(1.0, f64::min)
     }
 
-    /// How far turns around triangles that stand, or would, where those numbered `gone` were exceed what [`MIN_FOLD_COSINE`] allows:
-    /// sum of cosines.
+    /// Sum of the amounts by which the fold cosines around `triangles` fall below [`MIN_FOLD_COSINE`]. The triangles
+    /// are in the surface or would replace the triangles with the indices `gone`.
     pub(super) fn excess(&self, triangles: &[Corners], gone: &[u32]) -> f64 {
         let around = triangles.iter().flat_map(|t| t.index).flat_map(|i| &self.around[i as usize]);
         let mut others: Vec<u32> = around.copied().filter(|t| !gone.contains(t)).collect();
@@ -199,7 +202,7 @@ impl<'a> GuardedSurface<'a> {
         self.folds(triangles, &others).into_iter().map(|cosine| (MIN_FOLD_COSINE - cosine).max(0.0)).sum()
     }
 
-    /// Cosines of the turns from the triangles to each other, to `others` and across the mirror.
+    /// Fold cosines between the normals of `triangles` and of their neighbours: each other, `others` and mirror images.
     fn folds(&self, triangles: &[Corners], others: &[Corners]) -> Vec<f64> {
         let real = |t: &Corners| self.obstacle.unstretched(t);
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
@@ -216,8 +219,9 @@ impl<'a> GuardedSurface<'a> {
         folds.collect()
     }
 
-    /// Whether `new` triangles may replace those with the indices `gone`: clear of the obstacle, of the rest of the
-    /// surface and of each other, and not folded more sharply than [`MIN_FOLD_COSINE`] or than those were.
+    /// Whether the triangles `new` may replace those with the indices `gone`: they must be clear of the obstacle, of
+    /// the rest of the surface and of each other, and not folded more sharply than [`MIN_FOLD_COSINE`] or than the
+    /// replaced triangles.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
         if let Some(axis) = self.mirror {
             let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
@@ -225,7 +229,7 @@ impl<'a> GuardedSurface<'a> {
                 return false;
             }
         }
-        // Candidates of one star mostly fail at the same triangle: test that one first.
+        // Candidate positions of one vertex mostly fail at the same triangle: test that triangle first.
         let mut order = (0..new.len()).map(|k| (k + self.last_unclear) % new.len());
         if let Some(k) = order.find(|&k| !self.is_clear(new[k].at)) {
             self.last_unclear = k;
@@ -304,8 +308,9 @@ impl<'a> GuardedSurface<'a> {
         self.place(kept, at);
     }
 
-    /// The triangle beyond the edge from corner `k` of one, and the two of the edge between their tips `c` and `d`, `[a, d, c]` and
-    /// `[d, b, c]`; none if the surface would be no manifold (or half of one) with them.
+    /// Flip of the edge from corner `k` of triangle `t`. Returns the triangle on the other side of the edge `a`-`b`,
+    /// and the two triangles `[a, d, c]` and `[d, b, c]` that have the edge between the opposite corners `c` and `d`
+    /// instead. `None` if the surface would then be no manifold (or no half of one).
     pub(super) fn swapped(&self, t: u32, k: usize) -> Option<(u32, [Corners; 2])> {
         let first = self.triangles[t as usize];
         let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
@@ -323,7 +328,7 @@ impl<'a> GuardedSurface<'a> {
         Some((other, [[a, d, c], [d, b, c]].map(corners)))
     }
 
-    /// Flips the edge `a`-`b` of two triangles.
+    /// Flips the common edge of the two triangles `pair`, which become `new`.
     pub(super) fn swap(&mut self, pair: [u32; 2], new: [[u32; 3]; 2]) {
         for t in pair {
             for i in self.triangles[t as usize] {
@@ -354,7 +359,7 @@ impl<'a> GuardedSurface<'a> {
 mod tests {
     use super::*;
 
-    /// Two triangles that open by 2 atan(0.2); the cosine is -(1 - 0.2^2) / (1 + 0.2^2).
+    /// Two triangles that open by an angle of 2 atan(0.2); the cosine of the fold is -(1 - 0.2^2) / (1 + 0.2^2).
     #[test]
     fn a_fold_is_measured_in_object_units() {
         let stretch = DVec3::new(3.0, 1.0, 1.0);

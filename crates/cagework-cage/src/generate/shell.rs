@@ -19,41 +19,41 @@ use cagework_core::progress::Cancelled;
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
 const MIN_MIRROR_SHARE: f64 = 0.985;
 
-/// Largest distance of a voxel from its mirror image, over the model's longest side; at least one voxel.
+/// Largest distance of a voxel from its mirror image, as a fraction of the model's longest side; at least one voxel.
 const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
 
-/// Largest extent of a cluster of voxels without mirror image, over the model's longest side. A larger cluster is an
-/// asymmetric part.
+/// Largest extent of a cluster of voxels without mirror image, as a fraction of the model's longest side. A larger
+/// cluster counts as an asymmetric part.
 const MAX_UNMATCHED: f64 = 0.08;
 
-/// Half the width of the widest gaps that are detected, over the model's longest side.
+/// Half the width of the widest gaps that are detected, as a fraction of the model's longest side.
 const MAX_GAP_HALF: f64 = 0.12;
 
 /// Minimum clearance in voxels.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// Clearance of a hull dilated by one voxel, in voxels: what smoothing leaves, minus rounding.
+/// Clearance of a hull dilated by one voxel, in voxels: what remains after smoothing and rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
-/// Minimum length of a limb over its thickness.
+/// Smallest ratio of length to thickness of a limb.
 const MIN_LIMB_RATIO: f64 = 2.2;
 
 /// Largest cosine between a limb's axis and directions across it.
 const MAX_ACROSS_COSINE: f64 = 0.3;
 
-/// Largest distance between rings along a limb over its thickness, within the budget.
+/// Largest distance between rings along a limb, as a multiple of its thickness. The vertex budget may enlarge it.
 const MAX_RING_DISTANCE: f64 = 1.3;
 
-/// Minimum length of a plate over its thickness.
+/// Smallest ratio of length to thickness of a plate.
 const MIN_PLATE_RATIO: f64 = 5.0;
 
-/// Minimum width of a plate over its length.
+/// Smallest ratio of width to length of a plate.
 const MIN_PLATE_WIDTH: f64 = 0.5;
 
-/// Largest distance between vertices on a plate over its length, within the budget.
+/// Largest distance between vertices on a plate, as a fraction of its length. The vertex budget may enlarge it.
 const MAX_PLATE_SPACING: f64 = 0.5;
 
-/// Spacing of plates applies if at least this share of the hull's vertices lies on plates.
+/// The spacing of plates is limited only if at least this share of the hull's vertices lies on plates.
 const MIN_PLATE_SHARE: f64 = 0.25;
 
 /// Directions in which length and thickness of limbs are measured: to the 26 neighbours on the lattice, one of each
@@ -87,7 +87,7 @@ pub(super) struct Spacing {
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) lattice: Lattice,
-    /// Voxels along the model's longest side over those derived from the target.
+    /// Number of voxels along the model's longest side, divided by the number that follows from the target.
     pub(super) fineness: f64,
     /// Longest side of the model's box, object units.
     pub(super) longest: f64,
@@ -95,13 +95,13 @@ pub(super) struct Shell {
     pub(super) obstacle: Obstacle,
     solid: Voxels,
     filled: Voxels,
-    /// The smoothed hull: clear of the obstacle and of itself.
+    /// The smoothed hull, which keeps clear of the obstacle and of itself.
     pub(super) hull: Surface,
-    /// The unsmoothed hull: a 2-manifold by construction.
+    /// The hull before smoothing, a 2-manifold by construction.
     pub(super) stairs: Surface,
-    /// Components of the hull before bridging.
+    /// Number of components of the hull before bridging.
     pub(super) separate: usize,
-    /// A voxel of each component of the solid.
+    /// One voxel of each component of the solid.
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
     pub(super) clearance: f64,
@@ -155,7 +155,7 @@ impl Shell {
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
-        // Dilation by whole voxels; the remainder is kept as a distance.
+        // The obstacle is dilated by whole voxels and keeps the remainder of the clearance as a distance.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
         for _ in 0..whole as usize {
@@ -233,14 +233,15 @@ impl Shell {
         let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
         let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
         let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
-        // Few such vertices: crossing wires, not plates.
+        // If only few vertices lie on plates, they belong to crossing wires rather than plates.
         if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
             spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
         }
         spacings
     }
 
-    /// Sheets of gaps whose area is at least this share of the largest one's.
+    /// Voxels of the sheets that span the open gaps, for gaps with at least the share `least` of the largest gap's
+    /// area.
     pub(super) fn sheets(&self, least: f64) -> Option<Voxels> {
         let largest = self.gaps.first()?.area;
         let mut sheets = Voxels::new(self.filled.dims);
@@ -268,7 +269,8 @@ fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     }
 }
 
-/// Smoothed hull; vertices of triangles that intersect others return to their stairs until none do.
+/// Smoothed hull. Vertices of triangles that intersect others return to their unsmoothed positions until none
+/// intersect.
 fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     let mut smooth = stairs.clone();
     smooth.smooth();
@@ -286,8 +288,8 @@ fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     }
 }
 
-/// Axis of the mirror: the requested one, or the first of x, z, y in which the solid is symmetric up to scattered voxels.
-/// `longest`: voxels along the model's longest side.
+/// Axis of the mirror: the requested one, or the first of x, z, y along which the solid is symmetric up to scattered
+/// voxels. `longest`: number of voxels along the model's longest side.
 fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
     match symmetry {
         Symmetry::None => None,
@@ -365,10 +367,10 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
     true
 }
 
-/// Voxels that are joined, or reached by the search.
+/// Voxels of components that are already joined, and voxels that the search has visited.
 struct JoinedVoxels<'a> {
     hull: &'a Voxels,
-    /// Predecessor of each reached voxel; a joined voxel is its own.
+    /// Predecessor of each visited voxel; a joined voxel is its own predecessor.
     from: Vec<[usize; 3]>,
 }
 
@@ -406,7 +408,7 @@ fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
         for y in -1..=1 {
             for z in 0..=1 {
                 let axis = [x, y, z];
-                // One of each opposite pair.
+                // Take one axis of each opposite pair.
                 if axis.iter().rev().find(|&&k| k != 0) == Some(&1) {
                     axes.push(DVec3::from_array(axis.map(f64::from)));
                 }

@@ -26,7 +26,7 @@ fn winding(cage: &Cage, p: Vec3) -> f64 {
     winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
 }
 
-/// Cuts quads from corner `k`, as other programs may.
+/// Cuts each face into a fan of triangles from corner `k`, as other programs may do with quads.
 fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
     let cut = |f: &Vec<u32>| {
         let f = f.clone();
@@ -35,7 +35,7 @@ fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
     PolygonMesh { positions: mesh.positions.clone(), faces: mesh.faces.iter().flat_map(cut).collect() }
 }
 
-/// Asserts without voxels that a cage encloses the model, whichever diagonal quads are cut along.
+/// Asserts by winding numbers that a cage encloses the model, whichever diagonal its quads are cut along.
 fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
     let cage = &made.cage;
     let mesh = cage.to_polygon_mesh();
@@ -69,7 +69,7 @@ fn options(target: u32) -> CageOptions {
     CageOptions { target, ..CageOptions::default() }
 }
 
-/// An open tube of triangulated quads along a polyline; `closed` joins its ends.
+/// An open tube of triangulated quads along a polyline. `closed` joins its two ends.
 fn tube(line: &[Vec3], radius: f32, closed: bool) -> Soup {
     const SIDES: u32 = 12;
     let n = line.len();
@@ -139,7 +139,7 @@ fn cage_goes_into_the_gap_between_legs() {
     }
 }
 
-/// Trunk, two legs with feet and two arms, 1.8 high. `gap`: distance between the legs; `radius`: of a leg.
+/// Trunk, two legs with feet and two arms, 1.8 high. `gap`: distance between the legs; `radius`: radius of a leg.
 fn mannequin(gap: f32, radius: f32) -> Soup {
     let x = 0.5 * gap + radius;
     let limb = |a: Vec3, b: Vec3, radius: f32| tube(&segment(a, b), radius, false);
@@ -192,9 +192,9 @@ fn a_gap_that_no_lattice_resolves_is_reported() {
     assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
 }
 
-/// A clearance closes narrow gaps on any lattice, so the lattice must not be refined for them. Voxels thin enough for the gap
-/// needed hundreds of layers for the clearance. A layer is one voxel, which is several times longer along the other axes, so
-/// the hull grew that many times too far along these and took 17 GB.
+/// A clearance closes narrow gaps on any lattice, so the lattice must not be refined for such gaps. Otherwise, the
+/// voxels become so thin across the gap that the clearance takes hundreds of layers. As voxels are several times longer
+/// along the other axes, such a hull grows several times too far along these, and once took 17 GB.
 #[test]
 fn clearance_that_closes_a_gap_asks_for_no_finer_lattice() {
     let (positions, triangles) = mannequin(0.03, 0.07);
@@ -218,7 +218,7 @@ fn an_accessory_on_one_side_prevents_mirroring() {
     assert_eq!(make(&mannequin(0.17, 0.06), &options(80)).report.mirror, Some(Mirror::X));
 }
 
-/// Twelve vertices would bound a straight bar; bending needs rings at most 1.3 hull thicknesses apart.
+/// Twelve vertices would bound a straight bar, but bending needs rings at most 1.3 hull thicknesses apart.
 #[test]
 fn limbs_get_rings_and_compact_models_few_vertices() {
     let bar = tube(&segment(vec3(0.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0)), 0.4, false);
@@ -319,7 +319,7 @@ fn clearance_is_kept() {
     for clearance in [0.0, 0.02, 0.1] {
         let made = make(&soup, &CageOptions { clearance, ..options(60) });
         assert!(made.report.clearance >= clearance * 2.0, "the diagonal is longer than 2");
-        // Every cage triangle keeps the clearance along some axis, which bounds vertex distances.
+        // Every cage triangle keeps the clearance along some axis, so vertices keep it nearly as a distance.
         for c in made.cage.positions() {
             let nearest = soup.0.iter().map(|p| p.distance(*c)).fold(f32::MAX, f32::min);
             assert!(nearest >= 0.97 * made.report.clearance, "{nearest} < {}", made.report.clearance);

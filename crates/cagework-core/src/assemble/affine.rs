@@ -1,10 +1,10 @@
 //! Restores `sum w = 1` and `sum w c = v` for a row of weights after some were dropped or rounded.
 //!
-//! Of all corrections d of the row w that restore the four sums, it takes the one that minimises `sum d_i^2 / w_i`.
-//! With `phi_i = (1, (c_i - v) / s)` and s the cage's diagonal, this is `d_i = w_i phi_i . lambda`, where lambda solves
-//! the 4 x 4 system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`. Zero weights stay zero. Each weight is
-//! multiplied by a factor that is linear in the control's position and near 1 if the sums are nearly right. The factors
-//! are not bounded: callers that drop weights must check them.
+//! Of all corrections d of the row w that restore these four sums, the correction minimises `sum d_i^2 / w_i`. With
+//! `phi_i = (1, (c_i - v) / s)` and s the cage's diagonal, it is `d_i = w_i phi_i . lambda`, where lambda solves the 4
+//! x 4 system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`. Zero weights stay zero. Each weight is multiplied
+//! by a factor that is linear in the control's position, and near 1 if the sums are nearly right. The factors are not
+//! bounded: callers that drop weights must check them.
 
 use glam::{DMat4, DVec3, DVec4};
 
@@ -20,7 +20,7 @@ const RIDGE: f64 = 1e-7;
 pub struct Sums {
     /// `sum w`.
     pub sum: f64,
-    /// Distance of `sum w c` from a target, over the cage's diagonal.
+    /// Distance of `sum w c` from a target, as a fraction of the cage's diagonal.
     pub miss: f64,
 }
 
@@ -35,9 +35,9 @@ impl Sums {
 /// Rest positions of the controls in rows of lanes, laid out like batches of columns.
 #[derive(Clone, Debug)]
 pub struct Columns {
-    /// Positions relative to the cage's centre, over its diagonal. `[3][n_batches]`
+    /// Positions relative to the cage's centre, divided by its diagonal. `[3][n_batches]`
     scaled: [Vec<Row>; 3],
-    /// The same in f64, to measure sums.
+    /// The same positions in f64, to measure sums.
     exact: [Vec<[f64; LANES]>; 3],
     center: DVec3,
     diagonal: f64,
@@ -112,8 +112,8 @@ impl Columns {
         (sum, DVec3::new(x, y, z))
     }
 
-    /// Corrects a row so that it sums to 1 and reproduces the scaled `target` ([`Self::scale`]). Returns the sums
-    /// before, in f32 precision.
+    /// Corrects a row so that it sums to 1 and reproduces the scaled `target` ([`Self::scale`]). Returns the sums of
+    /// the row before the correction, in f32 precision.
     #[inline(always)]
     pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> Sums {
         let m = self.moments(row, target);

@@ -1,12 +1,12 @@
-//! Output of the rows of a sparse matrix.
+//! Writes the rows of a sparse matrix.
 
 use crate::solve::rows::{LANES, Row};
 
 /// Destination of a run's column indices and weights.
 pub(super) enum Entries<'a> {
-    /// The rest of the run's range in the matrix.
+    /// The part of the run's range in the matrix that is not yet written.
     Part { indices: &'a mut [u32], data: &'a mut [f32] },
-    /// The matrix, growing.
+    /// A whole matrix that grows.
     All { indices: Vec<u32>, data: Vec<f32> },
 }
 
@@ -33,14 +33,14 @@ impl Entries<'_> {
         }
     }
 
-    /// Appends the entries of a row selected by `chosen(batch)`. Returns their number. `row`: `[n_batches]`.
+    /// Appends the entries of a row that `chosen(batch)` selects. Returns their number. `row`: `[n_batches]`.
     #[inline(always)]
     pub(super) fn put_row(&mut self, row: &[Row], chosen: impl Fn(usize) -> [bool; LANES]) -> u32 {
         let mut n = 0;
         for (batch, row) in row.iter().enumerate() {
             let columns: [u32; LANES] = std::array::from_fn(|k| (batch * LANES + k) as u32);
             let chosen = chosen(batch);
-            // Fast path without a branch per lane.
+            // Fast path for whole batches, without a branch per lane.
             if chosen.iter().fold(true, |all, &one| all & one) && self.put(&columns, row) {
                 n += LANES as u32;
                 continue;

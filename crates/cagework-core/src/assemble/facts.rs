@@ -9,13 +9,14 @@ use super::affine::Sums;
 /// Statistics of one row of weights.
 #[derive(Clone, Copy, Debug)]
 pub struct RowFacts {
-    /// Distance of `sum w c` from the vertex over the cage's diagonal; `None` until the row's offset is known.
+    /// Distance of `sum w c` from the vertex, as a fraction of the cage's diagonal; `None` until the row's offset is
+    /// known.
     pub error: Option<f32>,
-    /// Distance of its sum from 1.
+    /// Distance of the row's sum from 1.
     pub sum_error: f32,
-    /// Its smallest non-zero weight.
+    /// Smallest non-zero weight of the row.
     pub low: f32,
-    /// Its largest weight.
+    /// Largest weight of the row.
     pub high: f32,
     /// The row before correction; `None` if it is not corrected.
     pub raw: Option<RawRow>,
@@ -24,14 +25,15 @@ pub struct RowFacts {
 /// A sampled row before correction.
 #[derive(Clone, Copy, Debug)]
 pub struct RawRow {
-    /// Its sums.
+    /// Sums of the row.
     pub sums: Sums,
-    /// Its smallest value, before negative values are clamped to 0.
+    /// Smallest value of the row, before negative values are clamped to 0.
     pub lowest: f32,
 }
 
 impl RowFacts {
-    /// Statistics of a row (`[n_batches]`) with the given `sums`; `raw`: before correction, for vertices inside.
+    /// Statistics of a row (`[n_batches]`) with the given `sums`. `raw`: the row before correction, for vertices
+    /// inside.
     // wasm keeps one copy for all callers to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
@@ -57,7 +59,8 @@ impl RowFacts {
 }
 
 impl AssembledWeights {
-    /// Rest error of vertices inside, over the cage's diagonal, after and before correction, and statistics of the weights.
+    /// Rest error of vertices inside after correction, their error before it, and statistics of the weights.
+    /// `diagonal`: diagonal of the cage, object units.
     #[must_use]
     pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {
         let mut errors: Vec<f32> = self.facts.iter().filter_map(|facts| facts.error).collect();

@@ -1,4 +1,5 @@
-//! Binds many models to one cage with a single solve: fields depend only on the cage, samples on the model.
+//! Binds many models to one cage with a single solve. The solved fields depend only on the cage, the samples on the
+//! model.
 
 use std::sync::Arc;
 
@@ -23,19 +24,20 @@ pub struct SolvedCage<'a> {
     controls: Controls<'a>,
     options: BindOptions,
     voxelized: Arc<VoxelizedCage>,
-    /// `[n_batches][n_rows]`
+    /// Solved fields. `[n_batches][n_rows]`
     fields: Vec<Vec<Row>>,
-    /// Report of the solve, without samples.
+    /// Report of the solve; its `blocks` are empty.
     solved: Solution,
     elapsed_ms: f64,
 }
 
 impl<'a> SolvedCage<'a> {
-    /// Voxelizes and solves. All fields are kept; they may take half of the memory limit, models the other half.
-    /// Ignores `held` and `extra_points` of the options.
+    /// Voxelizes and solves. All fields stay in memory and may take half of the memory limit; binds of models may take
+    /// the other half. Ignores `held` and `extra_points` of the options.
     ///
     /// # Errors
-    /// [`BindError`]: options out of range, [`BindError::Memory`] if the fields exceed their share of the limit, cancelled.
+    /// [`BindError`]: an option is out of range, the fields exceed their half of the memory limit
+    /// ([`BindError::Memory`]), or the solve is cancelled.
     pub fn new(
         controls: impl Into<Controls<'a>>,
         options: &BindOptions,
@@ -50,7 +52,7 @@ impl<'a> SolvedCage<'a> {
         let grid = Voxelization::grid(controls.surface(), &options);
         let none = VertexCounts { rows: 0, points: 0 };
         let solving = estimate(controls, &grid, none, team.n_threads(), &options).bytes;
-        // Jacobi keeps all fields anyway.
+        // Jacobi holds the fields of all batches in any case, so `solving` includes them.
         let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
         let (needed, limit) = (solving + kept, options.memory_limit / 2);
         if needed > limit {
@@ -113,7 +115,7 @@ mod tests {
     use crate::options::Method;
     use crate::progress::Silent;
 
-    /// Points of a spiral in the cube, one of them repeated and one outside.
+    /// 300 points of a spiral in the cube, a repetition of one of them, and a point outside.
     fn points(turns: f32) -> Vec<Vec3> {
         let on_spiral = |k: u16| {
             let t = f32::from(k) / 300.0;

@@ -1,8 +1,8 @@
 //! Estimates memory before it is allocated.
 //!
-//! The number of unknowns follows from the cage's volume, the number of cut cells from its area; all else is
-//! proportional to these. Measured against the peak memory of the command's process, the estimate is within 25 % on
-//! models with repeated positions, with many nodes, and on many threads.
+//! The number of unknowns follows from the cage's volume, and the number of cut cells from its area; all other sizes
+//! are proportional to these two or to the number of vertices. Compared with the peak memory of the command's process,
+//! the estimate is within 25 % on models with repeated positions, with many nodes, and on many threads.
 
 use glam::DVec3;
 
@@ -18,35 +18,34 @@ use crate::solve::rows::{LANES, Row};
 use crate::transfer::{ProlongRow, RestrictRow};
 use crate::voxelize::lines::Hit;
 
-/// Size of all coarser levels over that of the finest: 1/8 + 1/64 + ...
+/// Size of all coarser levels together relative to that of the finest: 1/8 + 1/64 + ...
 const COARSE_LEVELS_SHARE: f64 = 1.0 / 7.0;
 
-/// Cut cells per cell area of the cage's surface: 1.5 on average over all orientations. Arms end on up to three cage
-/// vertices each.
+/// Cut cells per area of the cage's surface, in units of a cell's face: 1.5 on average over all orientations.
 const CUT_PER_AREA: f64 = 1.5;
 
-/// Bytes per vertex of the file: its entry in the hash table of positions, and its index.
+/// Bytes per mesh vertex: the entry of its position in the hash table of positions, and its index.
 const ROW_BYTES: f64 = 44.0;
 
 /// Bytes per distinct position: its sampling stencil (up to 8 rows and a dozen Dirichlet values of 8 bytes), which
 /// exists twice while threads' results are joined, and statistics of its row.
 const POINT_BYTES: f64 = 470.0;
 
-/// Bytes per row of offsets: three entries for each of four holds. (The bind of the joints to the cage alone uses an
-/// eighth of the cells and starts after the fields have been freed.)
+/// Bytes per row of offsets: three entries of 8 bytes for each of four holds. (The bind of the joints to the cage
+/// without inner controls uses an eighth of the cells and starts after the fields have been freed.)
 const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 
 /// Bytes per grid cell while lines and levels are built.
 const CELL_BYTES: f64 = 30.0;
 
-/// Bytes of the weights of `n_rows` vertices if none is dropped. The share of small weights is unknown before the solve
-/// (a threshold of 1e-5 keeps a third of 110 columns, all of 8).
+/// Bytes of the weights of `n_rows` vertices if none is dropped. The share of small weights is unknown before the
+/// solve: a threshold of 1e-5 keeps a third of the weights with 110 columns, and all of them with 8.
 #[must_use]
 pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
     n_rows as u64 * (n_columns as u64 * 8 + 4)
 }
 
-/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions, and are not corrected.
+/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions and are not corrected.
 pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
     options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
 }
@@ -55,7 +54,7 @@ pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MemoryEstimate {
     pub(super) bytes: u64,
-    /// Bytes that grow with the points rather than with the grid.
+    /// Part of `bytes` that grows with the number of points rather than with the grid.
     of_points: u64,
 }
 
@@ -74,7 +73,7 @@ impl MemoryEstimate {
     }
 }
 
-/// Peak memory of a bind. `threads`: 0 if the fields are kept elsewhere.
+/// Estimates the peak memory of a bind. `threads`: 0 if the fields are not in memory of this process or already exist.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
@@ -87,12 +86,12 @@ pub(super) fn estimate(
     let n_columns = controls.n_controls();
     let n_batches = n_columns.div_ceil(LANES) as f64;
     let row = size_of::<Row>() as f64;
-    // A thread without a batch has no fields.
+    // Threads beyond the number of batches stay idle and allocate no solution fields.
     let threads = threads.min(n_batches as usize);
 
     let voxels = n_cells * (CELL_BYTES + if options.method == Method::Embedded { 7.0 } else { 5.0 });
     let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
-    // Lines along three axes cross the surface about as often as it cuts cells.
+    // Lines along the three axes cross the surface about as often as the surface cuts cells.
     let lines = if options.method == Method::Embedded { n_cut * size_of::<Hit>() as f64 } else { 0.0 };
     let transfers = n_unknowns
         * (size_of::<RestrictRow>() as f64 / 8.0
@@ -102,7 +101,7 @@ pub(super) fn estimate(
         threads as f64 * row * (finest_rows + 2.0 * COARSE_LEVELS_SHARE * n_unknowns)
             + transfers * (1.0 + COARSE_LEVELS_SHARE)
     };
-    // V-cycles may stall at parts inside the cage; conjugate gradients then need five fields.
+    // V-cycles may stall if the cage has several parts. Conjugate gradients then take over and need five fields.
     let of_rescue =
         if controls.surface().component_of_face().iter().any(|&part| part > 0) { 5.0 } else { 0.0 };
     let fields = match options.solver {
@@ -135,7 +134,7 @@ pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
     (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
 }
 
-/// `(unknowns, cut cells)`.
+/// Estimated numbers of unknowns and of cut cells.
 fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
     let (volume, area) = volume_and_area(controls.surface());
     let (cell, n_cells) = (grid.cell, grid.n_cells() as f64);
@@ -171,7 +170,7 @@ mod tests {
         assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
     }
 
-    /// A threshold may drop nothing: the estimate must hold for all weights.
+    /// A threshold need not drop any weight, so the estimate must hold for all weights.
     #[test]
     fn binds_with_a_threshold_stay_below_their_estimate() {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };

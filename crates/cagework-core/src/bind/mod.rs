@@ -30,13 +30,14 @@ use crate::words::{counted, grouped};
 /// The result of a bind.
 #[derive(Clone, Debug)]
 pub struct Binding {
-    /// One row per mesh vertex in the caller's order; one column per control, then the columns of `frames` if offsets are needed.
+    /// One row per mesh vertex in the caller's order. One column per control, then the columns of `frames` if offsets
+    /// are needed.
     pub weights: Weights,
     /// Frames that carry the offsets of vertices outside the cage and near controls inside.
     pub frames: Frames,
     /// Vertices outside the cage, ascending.
     pub outside: Vec<OutsideVertex>,
-    /// Measurements.
+    /// Measurements and settings of the bind.
     pub report: BindReport,
 }
 
@@ -49,7 +50,7 @@ pub enum BindError {
     /// The mesh has no vertices.
     #[error("mesh has no vertices: nothing to bind")]
     EmptyMesh,
-    /// A mesh vertex is not a finite number.
+    /// A coordinate of a mesh vertex is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
         /// The vertex.
@@ -114,7 +115,8 @@ pub enum BindError {
 /// `positions`: `[n_vertices]`, object units, in any order. Equal positions are solved once.
 ///
 /// # Errors
-/// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, no vertex inside, cancelled.
+/// [`BindError`]: an option is out of range, the mesh is empty or not finite, the memory exceeds the limit, no vertex
+/// is inside, or the bind is cancelled.
 pub fn bind<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,
@@ -124,8 +126,8 @@ pub fn bind<'a>(
     pipeline::run(positions, controls.into(), options, progress)
 }
 
-/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU; allocates nothing. It is 5 to 40 %
-/// high, more if the threshold drops most of the weights.
+/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU. Allocates nothing. The estimate is 5
+/// to 40 % too high, more if the threshold drops most of the weights.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.

@@ -1,4 +1,4 @@
-//! Constant offsets that compensate errors of the weights: of points outside the cage, and around balls and tubes.
+//! Constant offsets that compensate errors of the weights, for points outside the cage and around balls and tubes.
 
 use glam::{DVec3, Vec3};
 
@@ -9,12 +9,12 @@ use crate::sample::Stencils;
 use crate::solve::rows::{LANES, Row};
 use crate::weights::Weights;
 
-/// Offsets shorter than this, over the cage's diagonal, are rounding and are dropped.
+/// Offsets shorter than this fraction of the cage's diagonal are rounding errors and are dropped.
 const MIN_OFFSET: f64 = 1e-7;
 
 pub(super) struct Offsets<'a> {
     controls: Controls<'a>,
-    /// Points outside, the share with which they follow the cage, and their sampled rows, `[n_batches]`.
+    /// Points outside the cage, the share with which each follows the cage, and its sampled row, `[n_batches]`.
     outside: Vec<(u32, f64, Vec<Row>)>,
     frames: Frames,
     /// Rest lengths of the bones, object units.
@@ -117,10 +117,10 @@ impl<'a> Offsets<'a> {
     }
 }
 
-/// Joints of balls and tubes, at which coordinates of the cage alone and their gradient are needed.
+/// Joints of balls and tubes, where the coordinates of the cage without inner controls and their gradients are needed.
 pub(super) struct JointPoints<'a> {
     inner: &'a InnerControls,
-    /// Indices among the interior controls.
+    /// Indices of the joints among the inner controls.
     joints: Vec<u32>,
     radius: f32,
 }
@@ -143,7 +143,7 @@ impl<'a> JointPoints<'a> {
         self.joints.iter().flat_map(|&j| around(self.inner.positions[j as usize])).collect()
     }
 
-    /// Frames from the weights of [`Self::points`] in the cage alone.
+    /// Frames from the weights of [`Self::points`] in the cage without inner controls.
     fn frames(self, controls: Controls<'_>, weights: &Weights) -> Frames {
         let Self { inner, joints, radius } = self;
         let number = |i: u32| joints.partition_point(|&j| j < i) as u32;

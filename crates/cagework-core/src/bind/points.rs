@@ -8,9 +8,9 @@ use crate::mesh::{Weld, weld};
 /// Numbers of vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VertexCounts {
-    /// Vertices in the file.
+    /// Number of vertices in the file.
     pub(super) rows: usize,
-    /// Distinct positions.
+    /// Number of distinct positions.
     pub(super) points: usize,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct WeldedPoints<'a> {
 
 impl<'a> WeldedPoints<'a> {
     /// # Errors
-    /// [`BindError`] without vertices, or if one is not finite.
+    /// [`BindError`] if there are no vertices, or if one is not finite.
     pub(super) fn new(positions: &'a [Vec3]) -> Result<Self, BindError> {
         if positions.is_empty() {
             return Err(BindError::EmptyMesh);

@@ -1,4 +1,4 @@
-//! Solves batch after batch and samples each, or keeps the fields for many models.
+//! Solves batch after batch. Samples each solution at the vertices, or keeps the solutions for binding many models.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -16,13 +16,13 @@ use crate::team::Team;
 
 use super::watch::Watch;
 
-/// Decades by which delta falls from the first Jacobi sweep to tau, roughly: for the progress bar only.
+/// Rough number of decades by which delta falls from the first Jacobi sweep to tau, for the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
 
 /// Sampled columns with statistics of the solve.
 #[derive(Clone, Debug, Default)]
 pub struct Solution {
-    /// `[n_batches][n_points]` rows of lanes.
+    /// Sampled values, `[n_batches][n_points]` rows of lanes.
     pub blocks: Vec<Vec<Row>>,
     /// Report of the solve of all columns.
     pub report: SolveReport,
@@ -32,7 +32,7 @@ pub struct Solution {
     pub delta_interval: u32,
     /// Peak size of the fields, bytes.
     pub field_bytes: usize,
-    /// Bytes planned for fields on a device, which the host's estimate excludes; 0 in this process.
+    /// Bytes planned for fields on a device, which the host's estimate excludes; 0 if the fields are in host memory.
     pub planned_bytes: u64,
     /// Share of the stage's time spent solving rather than sampling.
     pub solve_share: f64,
@@ -102,7 +102,7 @@ fn solve_batches<T: Send>(
         n_batches,
         || batch_solver(hierarchy, options),
         |solver, batch| {
-            // The first progress report of a batch comes after its most expensive part.
+            // The first progress report of a batch comes after the most expensive part of its solve, so poll before it.
             if watch.is_cancelled() {
                 return None;
             }

@@ -35,7 +35,7 @@ pub(super) struct Voxelization {
     classic: Option<ClassicCells>,
 }
 
-/// A voxelized cage with the threads that work on it; shared by all models of a cage.
+/// A voxelized cage with the threads that work on it. All models that are bound to the cage share it.
 #[derive(Debug)]
 pub(super) struct VoxelizedCage {
     pub(super) team: Team,
@@ -44,7 +44,7 @@ pub(super) struct VoxelizedCage {
 
 impl VoxelizedCage {
     /// # Errors
-    /// [`BindError::NoInterior`], or cancelled.
+    /// [`BindError::NoInterior`], or the bind is cancelled.
     pub(super) fn new(
         controls: Controls<'_>,
         grid: Grid,

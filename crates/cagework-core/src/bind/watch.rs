@@ -11,7 +11,7 @@ fn span(stage: Stage) -> [f32; 2] {
         Stage::Voxelize => [0.0, 0.1],
         Stage::Solve => [0.1, 0.9],
         Stage::Sample => [0.9, 1.0],
-        // Not part of a bind.
+        // Simplification is not part of a bind.
         Stage::Simplify => [0.0, 0.0],
     }
 }

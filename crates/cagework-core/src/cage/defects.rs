@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{MAX_DIAGONAL, MAX_FACES, MIN_DIAGONAL};
 use crate::words::{counted, grouped};
 
-/// Most corners of a face: triangulation takes the square, at worst the cube, of their number.
+/// Largest number of corners of a face. Triangulation takes at least the square, at worst the cube, of this number.
 pub(super) const MAX_CORNERS: usize = 1000;
 
 /// Why a polygon mesh is not a cage. Indices start at 0.
@@ -21,7 +21,7 @@ pub enum CageError {
     TooFewCorners {
         /// The face.
         face: u32,
-        /// Its corners.
+        /// Number of its corners.
         corners: usize,
     },
     /// A face has the index of a vertex that does not exist.
@@ -144,14 +144,14 @@ pub enum FaceDefect {
     CrossesItself,
 }
 
-/// A repair of a cage, or a remark about it.
+/// A repair of a cage, or an unusual property of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CageNotice {
     /// Vertices at equal positions along open edges were joined.
     Welded {
-        /// Number of vertices that the first one at their position replaces.
+        /// Number of vertices that were replaced by the first vertex at the same position.
         vertices: usize,
-        /// The first of them.
+        /// The first replaced vertex.
         first: u32,
     },
     /// Inverted faces were flipped.

@@ -1,12 +1,13 @@
-//! Barycentric coordinates of planar polygons, robust on sides and at corners: the hats' values on faces.
+//! Barycentric coordinates of planar polygons, robust on sides and at corners. They are the values of the hats on
+//! faces.
 //!
 //! Sources: Meyer, Lee, Barr and Desbrun 2002, "Generalized barycentric coordinates on irregular polygons" (Wachspress
 //! coordinates); Gordon and Wixom 1974, "Pseudo-harmonic interpolation on convex domains"; Manson, Li and Schaefer
 //! 2011, "Positive Gordon-Wixom coordinates".
 //!
 //! Changes: Meyer's quotients are multiplied by all distances, which avoids division by zero on a side. Chords end at
-//! the nearest sides, found by a sweep, and have other weights. Their mean is taken by quadrature, which keeps sum,
-//! sign and linear precision because every chord has them.
+//! the nearest sides, which a sweep finds, and have weights other than in the sources. The mean over chords is taken by
+//! quadrature; each chord keeps sum, sign and linear precision, so the mean keeps them.
 
 use std::f64::consts::PI;
 
@@ -26,7 +27,7 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     let n = outline.len();
     let before = |k: usize| if k == 0 { n - 1 } else { k - 1 };
     let after = |k: usize| if k + 1 == n { 0 } else { k + 1 };
-    // Doubled areas of the triangles of the point and each side, over the largest, so that their product neither
+    // Doubled areas of the triangles of the point and each side, divided by the largest, so that their product neither
     // overflows nor underflows. Comparisons instead of `max`, which has no single wasm instruction.
     let mut largest = f64::MIN_POSITIVE;
     for (k, area) in areas.iter_mut().enumerate() {
@@ -39,7 +40,7 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     }
     for (k, value) in values.iter_mut().enumerate() {
         let (first, next) = (before(k), after(k));
-        // All sides except the two that meet in the corner.
+        // Multiply the areas of all sides except the two that meet in the corner.
         let mut product = cross(outline[first], outline[k], outline[next]);
         let mut side = next;
         while side != first {
@@ -78,7 +79,7 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
     if nearest.0 <= OUTLINE_TOLERANCE * extent {
         return on_side(values);
     }
-    // Rotate a line about the point by half a turn: between two corners it crosses the same sides.
+    // Rotate a line about the point by half a turn. Between two corners, the line crosses the same sides.
     let is_above = |k: usize| to(k).y > 0.0 || to(k).y == 0.0 && to(k).x > 0.0;
     let angle = |k: usize| if is_above(k) { to(k).y.atan2(to(k).x) } else { (-to(k).y).atan2(-to(k).x) };
     let mut corners: Vec<(f64, usize)> = (0..n).map(|k| (angle(k), k)).collect();

@@ -1,4 +1,4 @@
-//! Orients components: faces point away from the solid.
+//! Orients components so that faces point away from the solid.
 
 use glam::{DVec3, Vec3};
 
@@ -7,15 +7,15 @@ use super::polygon::{MIN_FACE_HEIGHT, Polygon};
 use super::topology::Surface;
 use crate::geometry::winding_number;
 
-/// Sample points of a component for the test whether it lies inside another one. Odd, for a majority; many, because
-/// components may touch or overlap.
+/// Number of sample points of a component in the test whether it lies inside another one. It is odd, for a majority,
+/// and large, because components may touch or overlap.
 const NESTING_SAMPLES: usize = 31;
 
 /// Winding numbers below this mean outside, rather than on the surface.
 const MAX_OUTSIDE_WINDING: f64 = 0.25;
 
-/// Orients the faces of every component away from the solid (outward, or into a cavity) and measures all faces.
-/// `diagonal`: of the cage's bounding box.
+/// Orients the faces of every component away from the solid (outward, or into a cavity) and projects all faces to their
+/// planes. `diagonal`: diagonal of the cage's bounding box.
 pub(super) fn orient(
     positions: &[Vec3],
     surface: &mut Surface,
@@ -39,7 +39,7 @@ pub(super) fn orient(
     }
     let solids: Vec<Solid> = components.into_iter().map(Solid::new).collect();
     for (component, solid) in solids.iter().enumerate() {
-        // Volume over area is the thickness; below the rounding of coordinates the component is flat.
+        // Volume divided by area measures the thickness. Below the rounding of coordinates, the component is flat.
         if solid.volume.abs() <= MIN_FACE_HEIGHT * diagonal * solid.area {
             return Err(CageError::Flat { component: component as u32, face: faces_of[component][0] as u32 });
         }
@@ -81,7 +81,7 @@ impl Solid {
         let corners = || triangles.iter().flatten();
         let min = corners().fold(DVec3::INFINITY, |m, &p| m.min(p));
         let max = corners().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p));
-        // Tetrahedra with a nearby apex: with the origin as apex, volumes would cancel far away from it.
+        // Sum tetrahedra with a nearby apex: with the origin as apex, volumes would cancel far away from it.
         let center = 0.5 * (min + max);
         let (mut volume, mut area) = (0.0, 0.0);
         for t in &triangles {

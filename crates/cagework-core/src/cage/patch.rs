@@ -1,21 +1,22 @@
-//! A bent face as a patch: the planar coordinates of its outline applied to its corners.
+//! A bent face as a patch: the planar coordinates of the face's outline, applied to its corners in space.
 //!
 //! Over each point of the face's best-fitting plane, the patch is `sum hat_k c_k` with the planar coordinates of the
 //! projected outline. Values on a face therefore depend continuously on its corners, whether flat or bent, and
 //! reproduce the patch; over a parallelogram it is the bilinear patch. The patch is cut into *facets* along rings
-//! around its centre. Sides stay whole, so that any neighbour meets it without gaps.
+//! around its centre. The sides of the face are not divided, so that any neighbouring face meets it without gaps.
 
 use glam::DVec2;
 
-/// Scales of the rings within the outline, whose sides are halved. No facet is further from a bilinear patch than 1.8 %
-/// of the distance of its fourth corner from the plane of the other three. With rings at the relative distances a and b
-/// from the centre, facets are off by `a (a - b) / 16` of that; at the outline by 1/64.
+/// Scales of the rings inside the outline. The sides of the rings are halved. No facet is further from a bilinear patch
+/// than 1.8 % of the distance of the patch's fourth corner from the plane of the other three. Between rings at the
+/// relative distances a and b from the centre, the error of facets is `a (a - b) / 16` of that distance; at the outline
+/// it is 1/64.
 const RINGS: [f64; 2] = [0.75, 0.375];
 
 pub(super) struct Facets {
-    /// Coordinates in the plane.
+    /// Positions of the inner points in the plane of the face.
     pub(super) inner: Vec<DVec2>,
-    /// Indices of the face's corners, then of inner points.
+    /// Triangles, as indices of the face's corners, then of the inner points.
     pub(super) facets: Vec<[u32; 3]>,
 }
 
@@ -51,8 +52,8 @@ pub(super) fn rings(outline: &[DVec2]) -> Facets {
     Facets { inner, facets }
 }
 
-/// Facets of a simple polygon with the triangulation `triangles`: each triangle becomes a fan around its centroid, with
-/// diagonals halved.
+/// Facets of a simple polygon with the triangulation `triangles`. Each triangle becomes a fan around its centroid; the
+/// diagonals of the polygon are halved.
 pub(super) fn fans(outline: &[DVec2], triangles: &[[u32; 3]]) -> Facets {
     let n = outline.len() as u32;
     let (mut inner, mut facets) = (Vec::new(), Vec::new());

@@ -7,21 +7,23 @@ use super::hats;
 use super::patch::{self, Facets};
 use super::triangulate::{cross, ear_clip};
 
-/// Height of a face over the cage's diagonal below which it has no area: rounding of f32 coordinates (6e-8 relative).
+/// Height of a face, as a fraction of the cage's diagonal, below which the face has no area: rounding of f32
+/// coordinates (6e-8 relative).
 pub(super) const MIN_FACE_HEIGHT: f64 = 1e-7;
 
-/// Distance of corners from the face's plane, over the cage's diagonal, up to which a face is planar. The six decimals
-/// of OBJ files move the corners of a model of unit size by that much. It bounds the rest error on the face.
+/// Distance of the corners from the face's plane, as a fraction of the cage's diagonal, up to which a face is planar.
+/// The six decimals of OBJ files move the corners of a model of unit size by that much. This distance bounds the rest
+/// error on the face.
 pub(super) const PLANE_TOLERANCE: f64 = 2e-6;
 
 /// Smallest sine of the exterior angle at the corners of an outline that counts as convex.
 const MIN_CONVEX_SINE: f64 = 1e-3;
 
 /// Smallest sine of the exterior angles (14 degrees) for which a quad has Meyer's coordinates alone. At a straight
-/// corner Meyer's hat vanishes, so below this they are blended with pseudo-harmonic coordinates.
+/// corner Meyer's hat vanishes, so below this sine they are blended with pseudo-harmonic coordinates.
 const MIN_MEYER_SINE: f64 = 0.25;
 
-/// Smaller shares of Meyer's coordinates are set to 0, because at a straight corner they are 0 / 0.
+/// Shares of Meyer's coordinates below this are set to 0, because at a straight corner the coordinates are 0 / 0.
 const MIN_SHARE: f64 = 1e-6;
 
 /// A face projected to its plane.
@@ -41,7 +43,7 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// Measures a face with at least three corners. `diagonal`: of the cage.
+    /// Projects a face with at least three corners and triangulates it. `diagonal`: diagonal of the cage.
     pub(super) fn new(corners: &[DVec3], diagonal: f64) -> Result<Self, FaceDefect> {
         let n = corners.len();
         if n > MAX_CORNERS {
@@ -151,7 +153,7 @@ fn is_convex(outline: &[DVec2]) -> bool {
     total < 3.0 * std::f64::consts::PI
 }
 
-/// Sine of the exterior angle at `b` from `a` to `c`; positive to the left.
+/// Sine of the exterior angle at `b` of the path `a`, `b`, `c`; positive for a turn to the left.
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).normalize_or_zero().perp_dot((c - b).normalize_or_zero())
 }
@@ -168,7 +170,8 @@ fn crosses_itself(outline: &[DVec2]) -> bool {
     })
 }
 
-/// Splits a non-planar quad along its shorter diagonal (the first one if equal), unless that lies outside the quad in projection.
+/// Splits a non-planar quad along its shorter diagonal (the first one if equal), unless that diagonal lies outside the
+/// quad in projection.
 fn split_quad(arms: &[DVec3], normal: DVec3) -> Vec<[u32; 3]> {
     let first = [[0, 1, 2], [0, 2, 3]];
     let second = [[1, 2, 3], [1, 3, 0]];

@@ -11,7 +11,7 @@ fn mesh(positions: &[[f32; 3]], faces: &[&[u32]]) -> PolygonMesh {
     }
 }
 
-/// Corner at the origin, edges of length 1 along the axes.
+/// A tetrahedron with a corner at the origin and edges of length 1 along the axes.
 pub(crate) fn tetrahedron() -> PolygonMesh {
     mesh(
         &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -19,7 +19,7 @@ pub(crate) fn tetrahedron() -> PolygonMesh {
     )
 }
 
-/// Corners at distance 1 on the axes.
+/// An octahedron with corners at distance 1 on the axes.
 pub(crate) fn octahedron() -> PolygonMesh {
     let mut positions = Vec::new();
     for axis in Vec3::AXES {
@@ -35,7 +35,7 @@ pub(crate) fn octahedron() -> PolygonMesh {
     PolygonMesh { positions, faces }
 }
 
-/// A box of quads; vertex `x + 2 y + 4 z` with 0 for `min` and 1 for `max`.
+/// A box of quads. Its vertex `x + 2 y + 4 z` is at `min` along axes with the digit 0 and at `max` along axes with 1.
 pub(crate) fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
     PolygonMesh {
@@ -47,12 +47,12 @@ pub(crate) fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     }
 }
 
-/// `[0, 1]^3`.
+/// The cube `[0, 1]^3`.
 pub(crate) fn cube() -> PolygonMesh {
     cuboid(Vec3::ZERO, Vec3::ONE)
 }
 
-/// A counter-clockwise outline in x and y, from z = 0 to `height`.
+/// The prism of a counter-clockwise outline in x and y, from z = 0 to `height`.
 pub(crate) fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     let n = outline.len() as u32;
     let level = |z: f32| outline.iter().map(move |&[x, y]| Vec3::new(x, y, z));
@@ -61,12 +61,12 @@ pub(crate) fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(height)).collect(), faces }
 }
 
-/// L-shaped: `[0, 2]^2` without `(1, 2]^2`, from z = 0 to 1.
+/// An L-shape: `[0, 2]^2` without `(1, 2]^2`, from z = 0 to 1.
 pub(crate) fn l_shape() -> PolygonMesh {
     prism(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]], 1.0)
 }
 
-/// C-shaped: arms `[1, 3] x [0, 1]` and `[1, 3] x [2, 3]` on a back `[0, 1] x [0, 3]`, from z = 0 to 1.
+/// A C-shape: arms `[1, 3] x [0, 1]` and `[1, 3] x [2, 3]` on a back `[0, 1] x [0, 3]`, from z = 0 to 1.
 pub(crate) fn c_shape() -> PolygonMesh {
     let outline =
         [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [3.0, 2.0], [3.0, 3.0], [0.0, 3.0]];

@@ -4,11 +4,12 @@ use glam::{UVec3, Vec3};
 
 use crate::mesh::{Bounds, PolygonMesh};
 
-/// Minimum thickness of the box over the model's diagonal, so that a flat model gets a cage with a volume.
+/// Minimum thickness of the box, as a fraction of the model's diagonal, so that a flat model gets a cage with a volume.
 const MIN_THICKNESS: f32 = 0.01;
 
-/// A box around `bounds` with shared vertices and outward faces, each side divided into quads by `divisions` along x, y
-/// and z (at least one). `margin`: distance from the bounds over their diagonal; negative values count as 0.
+/// A box around `bounds` with shared vertices and outward faces. Each side is divided into quads by `divisions` along
+/// x, y and z (at least one). `margin`: distance from the bounds, as a fraction of their diagonal; negative values
+/// count as 0.
 #[must_use]
 pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> PolygonMesh {
     // A single point has no size: use the unit of length.
@@ -65,7 +66,7 @@ mod tests {
             let cage = Cage::new(&mesh).unwrap();
             assert_eq!(cage.notices(), []);
             assert_eq!(mesh.faces.len() as u32, 2 * (x * y + y * z + z * x));
-            // Lattice points minus the inner ones.
+            // The vertices are the lattice points minus the inner ones.
             assert_eq!(
                 mesh.positions.len() as u32,
                 (x + 1) * (y + 1) * (z + 1) - (x - 1) * (y - 1) * (z - 1)

@@ -1,11 +1,12 @@
-//! Ear clipping. The triangulation uses every corner, also straight ones, so that the triangles of neighbouring faces
-//! share whole edges and the triangulated surface is closed, too.
+//! Ear clipping. The triangulation uses every corner, including straight ones. The triangles of neighbouring faces then
+//! share whole edges, so the triangulated surface is closed, too.
 
 use glam::DVec2;
 
 use super::defects::FaceDefect;
 
-/// Most corners for which the best ear is searched; above, the first one is taken. Searching costs `n^3`.
+/// Largest number of remaining corners for which the best-shaped ear is searched. Above, the first ear is taken,
+/// because the search costs `n^3`.
 const MAX_CORNERS_FOR_SEARCH: usize = 128;
 
 /// An ear is straight if twice its area is below this fraction of the squared extent: rounding of f32 coordinates.
@@ -23,7 +24,7 @@ pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
     let mut left: Vec<usize> = (0..outline.len()).collect();
     let mut triangles = Vec::with_capacity(outline.len().saturating_sub(2));
     while left.len() > 3 {
-        // Straight ears last: they would give triangles without area.
+        // Clip straight ears last, because they give triangles without area.
         let k = find_ear(outline, &left, straight)
             .or_else(|| find_ear(outline, &left, -straight))
             .ok_or(FaceDefect::CrossesItself)?;
@@ -40,8 +41,8 @@ fn ear(left: &[usize], k: usize) -> [usize; 3] {
     [left[(k + n - 1) % n], left[k], left[(k + 1) % n]]
 }
 
-/// Position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no other corner,
-/// also not on its boundary unless straight ears are allowed.
+/// Position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no other corner.
+/// A corner on its boundary also counts unless straight ears are allowed.
 fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
     let rim = -min_area;
     let mut best: Option<(f64, usize)> = None;

@@ -1,7 +1,7 @@
 //! Controls inside a cage: points, polylines and sheets (Joshi et al. 2007, "interior control structure").
 //!
-//! On a grid the influence of a point or line would depend on the cell size, as they have zero capacity in space.
-//! Points are therefore balls and lines tubes, with a radius.
+//! On a grid, the influence of a point or line would depend on the cell size, as points and lines have zero capacity in
+//! space. Points are therefore balls and lines are tubes, with a radius.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -11,13 +11,14 @@ use crate::cage::{CageError, MAX_FACES};
 use crate::options::OutOfRange;
 use crate::words::grouped;
 
-/// Largest radius of balls and tubes, over the cage's longest side.
+/// Largest radius of balls and tubes, as a fraction of the cage's longest side.
 pub const MAX_RADIUS: f32 = 0.25;
 
-/// Smallest radius, over the cage's longest side: no grid resolves it, and in f32 smaller balls have faces without area.
+/// Smallest radius of balls and tubes, as a fraction of the cage's longest side. No grid resolves such a ball, and in
+/// f32 the faces of smaller balls have no area.
 const MIN_RADIUS: f32 = 1e-4;
 
-/// Default radius, over the cage's longest side: two cells of a grid of 64.
+/// Default radius of balls and tubes, as a fraction of the cage's longest side: two cells of a grid of 64.
 const DEFAULT_RADIUS: f32 = 2.0 / 64.0;
 
 /// An element of inner controls: indices into [`InnerControls::positions`].
@@ -58,7 +59,8 @@ impl InnerElement {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InnerControls {
-    /// Rest positions; their columns follow those of the cage. `[n_inner]`, object units.
+    /// Rest positions. In the weight matrix, their columns come after those of the cage vertices. `[n_inner]`, object
+    /// units.
     pub positions: Vec<Vec3>,
     /// Elements, with indices into `positions`.
     pub elements: Vec<InnerElement>,
@@ -81,7 +83,7 @@ pub enum ControlError {
     /// A coordinate is not a finite number.
     #[error("control {vertex} inside the cage has a coordinate that is not a finite number")]
     NotFinite {
-        /// The vertex.
+        /// Index of the vertex among the inner controls.
         vertex: u32,
     },
     /// An element has the index of a vertex that does not exist.
@@ -89,11 +91,11 @@ pub enum ControlError {
     Index {
         /// Kind of element.
         what: &'static str,
-        /// The element.
+        /// Index of the element.
         element: u32,
         /// The invalid index.
         vertex: u32,
-        /// Number of vertices.
+        /// Number of vertices of the inner controls.
         n: usize,
     },
     /// An element without extent.
@@ -101,9 +103,9 @@ pub enum ControlError {
     Degenerate {
         /// Kind of element.
         what: &'static str,
-        /// The element.
+        /// Index of the element.
         element: u32,
-        /// The defect.
+        /// Description of the defect.
         why: &'static str,
     },
     /// A radius out of range.
@@ -113,9 +115,9 @@ pub enum ControlError {
     Radius {
         /// The radius, object units.
         radius: f32,
-        /// The smallest, object units.
+        /// The smallest allowed radius, object units.
         least: f32,
-        /// The largest, object units.
+        /// The largest allowed radius, object units.
         most: f32,
     },
     /// The surface has too many faces.
@@ -126,13 +128,13 @@ pub enum ControlError {
     TooMany {
         /// Number of elements.
         elements: usize,
-        /// Number of faces of the surface.
+        /// Number of faces that the surface would have.
         faces: usize,
     },
     /// A control lies outside the surface.
     #[error("control {vertex} is outside the cage{}: move it in", if *smooth { "'s smooth surface" } else { "" })]
     Outside {
-        /// The vertex.
+        /// Index of the vertex among the inner controls.
         vertex: u32,
         /// Whether the surface is subdivided.
         smooth: bool,
@@ -143,7 +145,7 @@ pub enum ControlError {
     Overlap {
         /// Kinds of the elements.
         what: [&'static str; 2],
-        /// The elements.
+        /// Indices of the two elements.
         elements: [u32; 2],
     },
 }
@@ -167,7 +169,8 @@ impl InnerControls {
         rounded.flat_map(InnerElement::corners).any(|&i| i as usize == control)
     }
 
-    /// Closest point on the axes of balls and tubes: two controls with their shares. `None` without balls and tubes.
+    /// Point on the axes of balls and tubes that is closest to `place`, as two controls with their shares. `None`
+    /// without balls and tubes.
     pub(crate) fn foot(&self, place: DVec3) -> Option<[(u32, f64); 2]> {
         let at = |i: u32| self.positions[i as usize].as_dvec3();
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
@@ -184,7 +187,7 @@ impl InnerControls {
         feet.min_by(|(d, _), (e, _)| d.total_cmp(e)).map(|(_, shares)| shares)
     }
 
-    /// Vertices without elements; they have no influence.
+    /// Vertices that no element uses; they have no influence.
     #[must_use]
     pub fn unused(&self) -> Vec<u32> {
         let mut is_used = vec![false; self.positions.len()];

@@ -1,4 +1,5 @@
-//! Meshes of balls and tubes, oriented inwards: they are inner boundaries of the space between them and the cage.
+//! Meshes of balls and tubes, oriented inwards, because they are inner boundaries of the space between them and the
+//! cage.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +10,7 @@ const SIDES: usize = 16;
 /// Rings of a tube's hemispherical end, excluding its equator and pole.
 const RINGS: usize = 4;
 
-/// Faces of a segment of a tube with its ends.
+/// Number of faces of one tube segment with both of its ends.
 pub(super) const TUBE_FACES: usize = SIDES * (1 + 2 * (RINGS + 1));
 
 /// Subdivisions of a ball's icosahedron for a given number of balls. Weights beside a ball are off by 2e-3 after three
@@ -26,18 +27,18 @@ pub(super) fn ball_faces(steps: u32) -> usize {
     20 << (2 * steps)
 }
 
-/// Size of a mesh relative to its ball or tube.
+/// Size of a mesh relative to the ball or tube that it approximates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Size {
-    /// Equal volume (ball) or cross-section (tube); corners exceed the radius by a few per cent.
+    /// The mesh has the same volume (ball) or cross-section (tube); its corners exceed the radius by a few per cent.
     EqualVolume,
-    /// Inscribed, for neighbours closer than that.
+    /// The mesh is inscribed, for neighbours that would intersect meshes of equal volume.
     Inscribed,
 }
 
 /// Mesh of a ball or of a segment of a tube.
 pub(super) struct Shape {
-    /// Position, and parameter of its foot along the segment, 0 to 1.
+    /// Position of each point, and the parameter of its foot along the segment, 0 to 1.
     pub(super) points: Vec<(DVec3, f64)>,
     pub(super) faces: Vec<Vec<u32>>,
 }
@@ -52,7 +53,7 @@ pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape 
         DVec3::from(at).normalize()
     };
     let mut points: Vec<DVec3> = (0..12).map(corner).collect();
-    // Neighbours are at a distance of about 1.05, all other corners are further apart.
+    // Neighbouring corners are at a distance of about 1.05; all other pairs are further apart.
     let is_edge = |a: usize, b: usize| points[a].distance(points[b]) < 1.2;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -98,7 +99,8 @@ pub(super) fn tube(a: DVec3, b: DVec3, radius: f64, size: Size) -> Shape {
     let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
     let larger = (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();
     let size = if size == Size::EqualVolume { radius * larger } else { radius };
-    // Rings from the pole at a to the pole at b: (index from the equator, end, direction, parameter).
+    // Rings from the pole at `a` to the pole at `b`: (index from the equator, end, direction, parameter along the
+    // segment).
     let rings = (0..=RINGS).rev().map(|k| (k, a, -1.0, 0.0)).chain((0..=RINGS).map(|k| (k, b, 1.0, 1.0)));
     let mut points = vec![(a - turn * (size * DVec3::Z), 0.0)];
     for (k, end, side, share) in rings {

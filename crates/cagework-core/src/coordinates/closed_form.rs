@@ -1,4 +1,4 @@
-//! Closed forms of coordinates, which serve as comparison for harmonic ones, evaluated at many points.
+//! Closed forms of coordinates, for comparison with harmonic coordinates, evaluated at many points.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -7,14 +7,14 @@ use crate::cage::Cage;
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
 
-/// Vectors for the columns of the cage's triangles, in a pose of its vertices. `[n_triangles]`
+/// Computes the vectors for the columns of the cage's triangles from posed vertices. `[n_triangles]`
 type PoseTriangles = fn(&Cage, &[Vec3]) -> Vec<Vec3>;
 
-/// Formula of coordinates in a cage without controls inside.
+/// Formula of coordinates in a cage without inner controls.
 pub(super) struct ClosedForm {
     /// Fills a row of zeros, `[n_columns]`, at a point; returns whether the coordinates are defined there.
     pub(super) row: fn(DVec3, &Cage, &mut [f64]) -> bool,
-    /// Columns of triangles follow those of the vertices, if any.
+    /// If set, columns for the triangles come after those of the vertices, and this function computes their vectors.
     pub(super) triangles: Option<PoseTriangles>,
 }
 
@@ -36,7 +36,7 @@ pub enum ClosedFormError {
     /// A point is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
-        /// The point.
+        /// Index of the point.
         vertex: u32,
     },
     /// A point outside the cage has no coordinates.
@@ -74,10 +74,10 @@ pub enum ClosedFormError {
     },
 }
 
-/// Rows between two progress reports.
+/// Number of rows between two progress reports.
 const RUN: usize = 1 << 10;
 
-/// Dense rows of weights, within `memory_limit` bytes.
+/// Rows of weights of all points, with all columns stored. Fails if they exceed `memory_limit` bytes.
 pub(super) fn dense(
     kind: &'static str,
     form: &ClosedForm,
@@ -94,7 +94,7 @@ pub(super) fn dense(
     if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
         return Err(ClosedFormError::TooMany { rows, columns });
     }
-    // A value and a column index per weight.
+    // Each weight needs a value and a column index.
     let needed = 8 * (rows * columns) as u64;
     if needed > memory_limit {
         return Err(ClosedFormError::Memory { needed, limit: memory_limit });

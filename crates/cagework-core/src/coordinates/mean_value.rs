@@ -14,8 +14,9 @@ use glam::DVec3;
 use super::closed_form::ClosedForm;
 use crate::cage::Cage;
 
-/// Sine below which directions are coplanar or collinear, and distance over the cage's diagonal below which a point is on the
-/// surface. At this value, the square root of f64 rounding, the errors of the formula and of omitting the triangle are both 1e-8.
+/// Sine below which directions are coplanar or collinear, and distance, as a fraction of the cage's diagonal, below
+/// which a point is on the surface. It is the square root of f64 rounding. The errors of the formula and of omitting
+/// the triangle are both 1e-8 here.
 const SURFACE_TOLERANCE: f64 = 1e-8;
 
 /// Tolerance of the sum of a triangle's three angles against a full turn, at which a point lies on the triangle: ten
@@ -42,8 +43,8 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
         let sines = normals.map(DVec3::length);
         let angles = [0, 1, 2].map(|k| sines[k].atan2(directions[(k + 1) % 3].dot(directions[(k + 2) % 3])));
         let determinant = directions[0].dot(normals[0]);
-        // Over the largest sine, the determinant is the sine of the point's elevation above the plane; unscaled it
-        // would also be small for distant triangles.
+        // Divided by the largest sine, the determinant is the sine of the point's elevation above the triangle's plane.
+        // Without the division it would also be small for distant triangles.
         if determinant.abs() <= SURFACE_TOLERANCE * sines.into_iter().fold(0.0, f64::max) {
             if std::f64::consts::TAU - angles.iter().sum::<f64>() > FULL_TURN_TOLERANCE {
                 continue; // in the plane but outside the triangle: solid angle zero

@@ -1,15 +1,16 @@
 //! Winding numbers of many points by counting crossings of a vertical ray (along z) with the surface.
 //!
 //! The winding number is the number of crossings at which the ray leaves the closed surface minus those at which it
-//! enters. Faces are sorted into columns, so that each ray tests few. If rounding could matter, because the ray passes
-//! near an edge or the point lies near a face, the result is left to [`super::winding_number`].
+//! enters. Faces are sorted into columns, so that each ray is tested against few of them. If rounding could matter,
+//! because the ray passes near an edge or the point lies near a face, callers use [`super::winding_number`] instead.
 
 use glam::{DVec2, DVec3};
 
-/// Tolerance over the surface's extent (for areas, over its square): 1e7 times f64 rounding.
+/// Tolerance of lengths, as a fraction of the surface's extent (of areas: of the square of the extent): 1e7 times f64
+/// rounding.
 const TOLERANCE: f64 = 1e-9;
 
-/// Most columns along x and along y: the table stays in the cache.
+/// Largest number of columns along x and along y, for which the table stays in the cache.
 const MAX_COLUMNS: f64 = 64.0;
 
 /// Faces of a closed surface, sorted into columns along z.

@@ -1,4 +1,4 @@
-//! Comparison with independent computations.
+//! Comparison of geometric functions with independent computations.
 
 use proptest::prelude::*;
 

@@ -5,7 +5,7 @@ use crate::team::map_indices;
 
 use super::{Boundary, BoundaryTerm, Colour, CutCell, Level, Run};
 
-/// Planes per task: small, because the expensive cells next to the cage are unevenly distributed.
+/// Number of z-planes per task. It is small because the expensive cells next to the cage are unevenly distributed.
 const SLAB: u32 = 8;
 
 impl Level {
@@ -110,10 +110,10 @@ impl Level {
     }
 }
 
-/// Stencils of some planes, built by one thread; cut cells are numbered from 0.
+/// Stencils of `SLAB` planes, built by one thread. Cut cells are numbered from 0 in each slab.
 #[derive(Default)]
 struct Slab {
-    /// Without `n_cells`.
+    /// Runs, cut cells and planes of both colours; `n_cells` is not set.
     colours: [Colour; 2],
     terms: [Vec<BoundaryTerm>; 2],
 }

@@ -14,7 +14,7 @@ pub(crate) struct PlainCell {
     pub(crate) row: u32,
     /// Rows of the neighbours reached without crossing the cage.
     pub(crate) neighbours: Vec<u32>,
-    /// `(column, hat value times arm weight)`
+    /// Dirichlet terms: `(column, hat value times arm weight)`.
     pub(crate) hats: Vec<(u32, f64)>,
     pub(crate) diagonal: f64,
 }
@@ -84,7 +84,7 @@ pub(crate) fn some_field(level: &Level, seed: u32) -> Vec<Row> {
         .collect()
 }
 
-/// x, y, z and 1 at a cell's centre: functions that the operator must reproduce.
+/// Values of the functions x, y, z and 1 at a cell's centre, which the operator must reproduce.
 pub(crate) fn linear(center: DVec3) -> [f64; 4] {
     [center.x, center.y, center.z, 1.0]
 }

@@ -1,4 +1,4 @@
-//! Runs, cut cells and boundary terms agree with the boundary's definition.
+//! Tests that runs, cut cells and boundary terms match the boundary's definition.
 
 use super::plain::{cells, linear, on_two_levels};
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 /// f32 rounding of sums of at most six arm weights up to 1,000, relative to the diagonal.
 const ROUNDING: f64 = 1e-6;
 
-/// Neighbours (unknowns only) and diagonal of each row, from runs and cut cells.
+/// Neighbours that are unknowns, and the diagonal, of each row, from runs and cut cells.
 fn tables(level: &Level) -> Vec<(u32, Vec<u32>, f64)> {
     let mut all = Vec::new();
     for (number, colour) in level.colours.iter().enumerate() {
@@ -95,8 +95,8 @@ fn neighbours_are_mutual() {
     });
 }
 
-/// Constants and linear functions are solutions: hats reproduce them on the cage, and their difference quotients agree
-/// on both sides of a centre.
+/// Constants and linear functions solve the discrete equations: hats reproduce them on the cage, and their difference
+/// quotients are equal on both sides of a centre.
 #[test]
 fn operator_annihilates_linear_functions() {
     on_two_levels(|cage, level, _| {

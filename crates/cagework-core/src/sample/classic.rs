@@ -14,7 +14,7 @@ use crate::voxelize::classic::{CellKind, ClassicCells};
 use super::outside::OutsideSampler;
 use super::{Stencil, Stencils};
 
-/// Stencils of points (object units), one cell each.
+/// Stencils of points (object units). Each inside point takes one cell.
 #[must_use]
 pub fn stencils(
     controls: Controls<'_>,

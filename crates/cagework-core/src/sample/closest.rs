@@ -6,16 +6,16 @@ use super::OutsidePoint;
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
 
-/// Bounding boxes of a cage's faces, by which most faces are skipped in closest-point queries.
+/// Bounding boxes of a cage's faces, by which closest-point queries skip most faces.
 #[derive(Clone, Debug)]
 pub struct ClosestOnCage<'a> {
     cage: &'a Cage,
-    /// Facets and bounding box of each face.
+    /// Range of facets, and bounding box, of each face.
     faces: Vec<(std::ops::Range<u32>, [DVec3; 2])>,
 }
 
 impl<'a> ClosestOnCage<'a> {
-    /// For a cage in its rest pose.
+    /// Boxes of the faces of a cage in its rest pose.
     #[must_use]
     pub fn new(cage: &'a Cage) -> Self {
         let mut first = 0;

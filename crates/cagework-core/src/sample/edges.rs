@@ -1,9 +1,9 @@
 //! Re-entrant edges of the cage, next to which some rays end at a wall and others pass.
 //!
-//! Weights would jump there by a few per cent, because a ray that just misses the edge continues to the next centres. A
-//! ray that passes an edge at less than [`REACH`] is therefore split: the closer it passes, the larger the share that
-//! ends beside the edge, with a value that tends to the edge's own. Both shares are values inside the cage that
-//! reproduce linear functions, and their mean is continuous.
+//! Sampled weights would jump there by a few per cent, because a ray that just misses the edge continues to the next
+//! centres. A ray that passes an edge at less than [`REACH`] is therefore split. The closer it passes, the larger the
+//! share that ends beside the edge, with a value that tends to the value on the edge. Both shares have values inside
+//! the cage that reproduce linear functions, and their weighted mean is continuous.
 
 use glam::DVec3;
 
@@ -18,10 +18,11 @@ pub(super) const REACH: f64 = 0.25;
 /// half the cube's diagonal plus [`REACH`] along two axes.
 const MAX_SQUARED_DISTANCE: f64 = 1.5;
 
-/// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge; at flatter edges values hardly jump.
+/// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge. At flatter edges values hardly
+/// jump.
 const MIN_REENTRANT_SINE: f64 = 0.25;
 
-/// Smaller components of a unit normal are rounding.
+/// Components of a unit normal that are smaller than this are rounding errors.
 const NORMAL_TOLERANCE: f64 = 1e-9;
 
 /// Distance, in cells, within which a point is on an edge.
@@ -31,10 +32,11 @@ pub(super) const EDGE_TOLERANCE: f64 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     ends: [DVec3; 2],
-    /// One of its facets, and the corners of that facet at its ends.
+    /// One of the two facets at the edge, and the corners of that facet at the edge's ends.
     facet: u32,
     corners: [usize; 2],
-    /// Per axis of a ray, the axis along which the edge is nearest to the ray; `None` if the edge's faces do not stop such rays.
+    /// For each axis of a ray, the axis along which the edge is nearest to the ray. `None` if the edge's faces do not
+    /// stop rays along that axis.
     across: [Option<usize>; 3],
 }
 
@@ -43,12 +45,12 @@ struct Edge {
 pub(super) struct Passage {
     /// Distance along the ray, in cells.
     pub(super) distance: f64,
-    /// Offset from the ray to the edge as two steps (axis, signed length). The second is 0 unless the ray passes beyond
-    /// the edge's end.
+    /// Offset from the ray to the edge as two steps `(axis, signed length)`. The second length is 0 unless the ray
+    /// passes beyond an end of the edge.
     pub(super) steps: [(usize, f64); 2],
     /// Share of the ray that ends at this edge.
     pub(super) share: f64,
-    /// Nearest point on the edge.
+    /// Facet and barycentric coordinates of the nearest point on the edge.
     pub(super) facet: u32,
     pub(super) barycentric: [f64; 3],
 }
@@ -108,8 +110,9 @@ impl EdgeLists {
         });
     }
 
-    /// Passages of a ray from `p` along `axis` by some of the edges, nearest first. `up`: direction; `end`: where the
-    /// ray ends. If that is not a wall, edges beyond it count with a weight that decreases with their distance.
+    /// Passages of a ray from `p` along `axis` by the edges `some`, nearest first. `up`: direction of the ray; `end`:
+    /// distance at which it ends. If it does not end at a wall, edges beyond its end also count, with a share that
+    /// decreases with their distance from the end.
     pub(super) fn passed(
         &self,
         some: &[u32],
@@ -130,7 +133,8 @@ impl EdgeLists {
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
-            // Level with an edge, only one of the two opposite rays passes it, and none if its wall ends at the edge.
+            // Of the two opposite rays from a point that is level with an edge, only the upward one passes it, and none
+            // does if the ray's wall ends at the edge.
             let ahead = distance > 0.0 || up && distance == 0.0;
             let steps = [across, along].map(|axis| (axis, beside[axis]));
             let apart = beside[across].hypot(beside[along]);
@@ -190,7 +194,7 @@ fn across(ends: [DVec3; 2], normals: [DVec3; 2]) -> [Option<usize>; 3] {
     [0, 1, 2].map(|axis| {
         let [a, b] = normals.map(|n| if n[axis].abs() < NORMAL_TOLERANCE { 0.0 } else { n[axis] });
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        // Choose the axis closer to perpendicular to the edge as seen along the ray.
+        // Of the two axes across the ray, choose the one along which the edge extends less.
         (a * b <= 0.0 && (a, b) != (0.0, 0.0)).then_some(if way[u].abs() < way[v].abs() { u } else { v })
     })
 }

@@ -20,15 +20,15 @@ pub use closest::ClosestOnCage;
 /// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsidePoint {
-    /// Vertex.
+    /// Index of the vertex.
     pub vertex: u32,
     /// Facet of the cage with the closest point.
     pub triangle: u32,
     /// Barycentric coordinates of the closest point.
     pub barycentric: [f64; 3],
-    /// Distance, object units.
+    /// Distance of the vertex from this point, object units.
     pub distance: f64,
-    /// Share of the cage's motion that it follows, 0 to 1.
+    /// Share of the cage's motion that the vertex follows, 0 to 1.
     pub share: f64,
 }
 
@@ -49,9 +49,9 @@ pub type Entries<'a> = &'a [(u32, f32)];
 /// Stencil of a vertex under construction.
 #[derive(Clone, Debug, Default)]
 pub struct Stencil {
-    /// `(row of the field, weight)`
+    /// Field entries: `(row of the field, weight)`.
     pub nodes: Vec<(u32, f64)>,
-    /// `(control, weight)`
+    /// Dirichlet entries: `(control, weight)`.
     pub hats: Vec<(u32, f64)>,
 }
 
@@ -81,7 +81,7 @@ fn accumulate(list: &mut Vec<(u32, f64)>, key: u32, weight: f64) {
 }
 
 impl Stencils {
-    /// No stencils.
+    /// An empty list of stencils.
     #[must_use]
     pub fn new() -> Self {
         Self { node_start: vec![0], hat_start: vec![0], ..Self::default() }
@@ -108,7 +108,7 @@ impl Stencils {
         self.hat_start.push(self.hats.len() as u32);
     }
 
-    /// Appends the stencil of a vertex outside, and lists it unless it is on the cage.
+    /// Appends the stencil of a vertex outside the cage, and lists the vertex in `outside` unless it lies on the cage.
     pub fn push_outside(&mut self, controls: Controls<'_>, found: OutsidePoint, stencil: &Stencil) {
         if found.distance > CAGE_TOLERANCE * f64::from(controls.surface().diagonal()) {
             self.outside.push(OutsidePoint { vertex: self.len() as u32, ..found });

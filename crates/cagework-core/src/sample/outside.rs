@@ -1,9 +1,10 @@
 //! Weights of points outside the cage.
 //!
-//! Near the cage they are extrapolated linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with t =
-//! 1 and q the mirror image of x about p. Both rows reproduce positions, so the result does. If the cage is thin, q moves to at
-//! most the middle of it. If q is not inside, at an edge sharper than the angle towards x, the row is that of p, and an offset
-//! that moves with the whole cage adds the rest (`bind/offsets.rs`). All of this fades out with distance.
+//! Near the cage, weights are extrapolated linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t
+//! w(q)`, with t = 1 and q the mirror image of x about p. Both rows reproduce positions, so the result does. If the
+//! cage is thin, q moves at most to the middle of it. If q is not inside, at an edge sharper than the angle towards x,
+//! the row is w(p), and an offset that moves with the whole cage adds the rest (`bind/offsets.rs`). The weights and the
+//! offset fade out with distance from the cage.
 
 use glam::DVec3;
 
@@ -13,7 +14,7 @@ use crate::controls::Controls;
 use crate::geometry::distance_along;
 use crate::options::OutsidePolicy;
 
-/// Distances over the cage's diagonal between which a point's share fades from 1 to 0.
+/// Distances, as fractions of the cage's diagonal, between which a point's share fades from 1 to 0.
 const FADE_RANGE: [f64; 2] = [0.05, 0.15];
 
 #[derive(Debug)]
@@ -28,8 +29,9 @@ impl<'a> OutsideSampler<'a> {
         Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
     }
 
-    /// Computes the stencil of a point outside the surface; a point inside a ball or tube takes the values of its foot
-    /// on the axis. `inside(q, stencil)`: computes the stencil of a point inside, or returns false. Returns `vertex` 0.
+    /// Computes the stencil of a point outside the surface. A point inside a ball or tube takes the values of its foot
+    /// on the axis. `inside(q, stencil)` computes the stencil of a point q inside, or returns false. The result has
+    /// `vertex` 0.
     pub(super) fn fill(
         &self,
         point: DVec3,
@@ -48,7 +50,7 @@ impl<'a> OutsideSampler<'a> {
             return found;
         }
         if !of_cage {
-            // Where tubes meet, the closest facet may lie inside another tube: use the foot on the axis.
+            // Where tubes meet, the closest facet may lie inside another tube: use the foot of the point on the axis.
             if let Some(shares) = self.controls.inner().and_then(|inner| inner.foot(point)) {
                 stencil.clear();
                 let first = self.controls.cage().n_vertices() as u32;
@@ -70,7 +72,8 @@ impl<'a> OutsideSampler<'a> {
         let step = distance.min(0.5 * open);
         let (at, mut other) = (at + step * inwards, Stencil::default());
         if inside(at, &mut other) {
-            // If q is close to another wall, reduce t: q has that wall's values, as at an edge that is too sharp.
+            // If q is close to another wall, reduce t: q then has the values of that wall, as at an edge that is too
+            // sharp.
             let depth = self.closest.find(at).distance;
             let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
             for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
@@ -85,7 +88,7 @@ impl<'a> OutsideSampler<'a> {
         found
     }
 
-    /// Share of the cage's motion at a distance over the cage's diagonal.
+    /// Share of the cage's motion that a point follows. `distance`: fraction of the cage's diagonal.
     fn share(&self, distance: f64) -> f64 {
         if self.policy == OutsidePolicy::Stay {
             return 0.0;

@@ -5,7 +5,8 @@ use glam::DVec3;
 use crate::cage::Cage;
 use crate::grid::Grid;
 
-/// Cells along a block's side. Candidates of a block are filtered per cell, so lists need not be exact.
+/// Number of cells along a block's side. Candidates of a block are filtered per cell, so a block may list too many
+/// boxes.
 const BLOCK: u32 = 8;
 
 /// Tolerance of the overlap tests, in cells, against rounding of cell coordinates (up to 512 in f64).
@@ -21,7 +22,7 @@ pub struct CellTriangle {
     normal: DVec3,
 }
 
-/// Lists of boxes per block of cells.
+/// Numbers of the boxes that meet each block of `BLOCK`^3 cells.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     n_blocks: [u32; 3],
@@ -69,11 +70,12 @@ impl Blocks {
         ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
     }
 
-    /// Calls `found` with boxes that may meet the cube between centre `low` and centre `low + 1`, some of them several times.
+    /// Calls `found` for boxes that may meet the cube between centre `low` and centre `low + 1`, for some of them
+    /// repeatedly.
     #[inline]
     pub fn near(&self, low: [u32; 3], mut found: impl FnMut(u32)) {
-        // The cube may extend over the block's upper side by a cell: visit the blocks of both of its corners, which
-        // together list every box that meets it.
+        // The cube may extend beyond the block's upper side by a cell: visit the blocks of its lowest and highest
+        // corners, which together list every box that meets the cube.
         let first = low.map(|x| x / BLOCK);
         let last = low.map(|x| (x + 1) / BLOCK);
         for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
@@ -125,7 +127,8 @@ impl TriangleLists {
         Self { triangles, blocks }
     }
 
-    /// Triangles that meet the cube between centre `low` and centre `low + 1`, conservatively.
+    /// Triangles that may meet the cube between centre `low` and centre `low + 1`: all that do, and possibly some
+    /// others.
     pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
         found.clear();
         let cube_low = DVec3::from_array(low.map(f64::from));
@@ -144,13 +147,13 @@ impl TriangleLists {
         });
     }
 
-    /// All triangles.
+    /// All triangles, in the order of the cage's facets.
     #[must_use]
     pub fn all(&self) -> &[CellTriangle] {
         &self.triangles
     }
 
-    /// A triangle.
+    /// The triangle of a facet.
     #[must_use]
     pub fn triangle(&self, number: u32) -> &CellTriangle {
         &self.triangles[number as usize]

@@ -4,9 +4,9 @@ use crate::cage::shapes::{cube, prism, tetrahedron};
 /// f32 rounding of rows.
 const ROUNDING: f64 = 1e-6;
 
-/// One step on quads by an independent formulation: faces are split bilinearly, then each vertex moves to the mean of
-/// its quads' centroids with a factor of 4 over its valence. Source: Warren and Schaefer 2004, "A factored approach to
-/// subdivision surfaces".
+/// One subdivision step on quads by an independent formulation. Faces are split bilinearly; then each vertex moves
+/// towards the mean of its quads' centroids by the factor 4 divided by its valence. Source: Warren and Schaefer 2004,
+/// "A factored approach to subdivision surfaces".
 fn factored(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut split = values.to_vec();
     let mut middle_of: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -68,7 +68,8 @@ fn rows_equal_those_of_the_factored_scheme() {
     }
 }
 
-/// Corner of a cube of edge 2: three face centres at 1/3 of the diagonal, three edge midpoints at 2/3; (1/3 + 2 2/3) / 3 = 5/9.
+/// Corner of a cube of edge 2, in units of the half diagonal: three face centres at 1/3 and three edge midpoints at 2/3
+/// give (1/3 + 2 2/3) / 3 = 5/9.
 #[test]
 fn corner_of_a_cube_moves_to_five_ninths() {
     let mesh = PolygonMesh { positions: cube().positions.iter().map(|p| 2.0 * p - 1.0).collect(), ..cube() };
@@ -85,9 +86,9 @@ fn rows_of_a_tetrahedron_are_simple_fractions() {
     let rows = subdivide(&tetrahedron(), 1).rows;
     let expected = [
         (0, [12.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0]),
-        // The edge of vertices 0 and 1 comes first.
+        // Row 4: the edge of vertices 0 and 1 comes first.
         (4, [5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0, 1.0 / 12.0]),
-        // The first face does not contain vertex 3.
+        // Row 10: the first face does not contain vertex 3.
         (10, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0]),
     ];
     for (row, expected) in expected {

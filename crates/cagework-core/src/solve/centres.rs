@@ -1,9 +1,9 @@
-//! Restriction by half injection: the residual only at the centres of coarse cells.
+//! Restriction by half injection: takes the residual only at the centres of coarse cells.
 //!
 //! After a red-black sweep that ends with black, the residual is zero on black cells and, once errors are smooth,
-//! nearly equal on neighbouring red ones. The red cell at a coarse cell's centre then represents all cells that full
+//! nearly equal on neighbouring red cells. The red cell at a coarse cell's centre then represents all cells that full
 //! weighting would gather, so a quarter of the red residuals suffices (measured in docs/notes/multigrid.md). This does
-//! not hold for an initial guess, whose residuals are not smooth.
+//! not hold for the residual of an initial guess, which is not smooth.
 
 use crate::grid::NO_CELL;
 use crate::levels::{CutCell, Level};
@@ -11,19 +11,20 @@ use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE, Transfer};
 
 use super::rows::{LANES, Rhs, Row, ZERO, split, sum_around};
 
-/// Total weight that full weighting gives to the red cells around a coarse cell: a centre and twelve edges.
+/// Total weight that full weighting gives to the red cells around a coarse cell: one centre and twelve cells beside
+/// edges.
 pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 
 /// A red fine cell at the centre of a coarse cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Centre {
-    /// Its stencil, also if no arm is cut.
+    /// Stencil of the cell, also if none of its arms is cut.
     stencil: CutCell,
-    /// Index among the red cut cells; [`NO_CELL`] if no arm is cut.
+    /// Index among the red cut cells; [`NO_CELL`] if none of the cell's arms is cut.
     cut: u32,
 }
 
-/// Fine centre of each coarse unknown, red then black.
+/// Fine cell at the centre of each coarse unknown: red coarse unknowns, then black ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Centres {
     stencils: [Vec<Centre>; 2],
@@ -70,8 +71,8 @@ impl Centres {
     }
 
     /// Writes the coarse right-hand side `out`, `[n_rows]` of the coarse level, from the residual of `u` at the
-    /// centres. Returns the mean squared residual over the centres and as many black cells, which estimates that over
-    /// all cells if residuals are smooth.
+    /// centres. Returns the mean squared residual over the centres and as many black cells. If residuals are smooth, it
+    /// estimates the mean over all cells.
     #[inline(always)]
     pub fn inject(&self, fine: &Level, coarse: &Level, u: &mut [Row], rhs: Rhs<'_>, out: &mut [Row]) -> f64 {
         let (own, other) = split(fine, u, 0);

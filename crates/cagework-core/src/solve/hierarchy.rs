@@ -1,4 +1,4 @@
-//! All levels of a bind with transfers and right-hand sides per batch.
+//! All levels of a bind, the transfers between them, and the right-hand sides of each batch.
 
 use crate::levels::{Boundary, BoundaryTerm, Level};
 use crate::team::map_indices;
@@ -14,7 +14,7 @@ pub struct Hierarchy {
     pub levels: Vec<Level>,
     /// `transfers[k]`: between levels k and k + 1.
     pub transfers: Vec<Transfer>,
-    /// Fine centres of the second level's cells.
+    /// Fine cells at the centres of the second level's cells.
     pub centres: Centres,
     /// Number of columns (controls).
     pub n_columns: usize,
@@ -23,7 +23,8 @@ pub struct Hierarchy {
 }
 
 impl Hierarchy {
-    /// From each level's boundary, finest first ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
+    /// Builds all levels from their boundaries, finest first
+    /// ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
     #[must_use]
     pub fn new<B: Boundary>(boundaries: &[B], n_columns: usize) -> Self {
         let n_batches = n_columns.div_ceil(LANES);

@@ -22,10 +22,10 @@ use crate::progress::Cancelled;
 use crate::simd::dispatch;
 use crate::team::Team;
 
-/// Most sweeps of a batch per round: enough to amortise loading the batch into the cache.
+/// Largest number of sweeps of a batch per round: enough to amortise loading the batch into the cache.
 const MAX_ROUND: usize = 8;
 
-/// Share of the predicted remaining sweeps that a round runs.
+/// Fraction of the predicted remaining sweeps that the next round runs.
 const PREDICTION_SHARE: f64 = 0.8;
 
 /// Cells per task when changes are summed.
@@ -40,14 +40,14 @@ struct BatchFields {
     batch: usize,
 }
 
-/// Batches of a thread, with the changes of its cells per sweep of a round.
+/// Batches of a thread, with the summed changes of each cell for each sweep of a round.
 #[derive(Debug)]
 struct ThreadBatches {
     batches: Vec<BatchFields>,
     changes: Vec<Vec<f32>>,
 }
 
-/// Size of the fields for `n_unknowns` cells, `n_cut` of them cut.
+/// Bytes of the fields for `n_unknowns` cells, of which `n_cut` are cut, and of the changes per cell.
 #[must_use]
 pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) -> u64 {
     let row = size_of::<Row>() as u64;
@@ -63,7 +63,7 @@ pub const STALLED_SWEEPS: usize = 128;
 /// Calls `sweep_done(sweeps, delta)` after each round; returning false cancels.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if `sweep_done` returns false.
 pub fn solve(
     hierarchy: &Hierarchy,
     team: &Team,
@@ -100,7 +100,8 @@ pub fn solve(
     Ok((fields, report))
 }
 
-/// Number of sweeps that do not run past the sweep at which delta, extrapolated geometrically, meets tau.
+/// Number of sweeps of the next round, so that it ends before the sweep at which delta, extrapolated geometrically,
+/// meets tau.
 fn next_round(history: &[f64], tau: f64) -> usize {
     let n = history.len();
     if n < 4 {
@@ -139,8 +140,8 @@ fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MA
     sums.map(|sum| sum / level.n_unknowns().max(1) as f64)
 }
 
-/// Sum over a range of cells of the square root of each cell's change in one sweep. A cell's change is added over all
-/// threads.
+/// Sum over a range of cells of the square root of each cell's change in one sweep. The change of a cell is the sum of
+/// its changes over all threads.
 #[inline(always)]
 fn sum_of_roots(shares: &[ThreadBatches], sweep: usize, cells: std::ops::Range<usize>) -> f64 {
     let mut sums = ZERO;

@@ -34,7 +34,7 @@ pub trait BatchSolver {
     /// Solution of the latest batch. `[n_rows]`
     fn field(&self) -> &[Row];
 
-    /// Size of all fields, bytes.
+    /// Size of all fields in bytes.
     fn bytes(&self) -> usize;
 }
 

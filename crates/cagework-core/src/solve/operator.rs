@@ -1,4 +1,4 @@
-//! The discrete Laplace operator of a level: the solvers' interface to the cage.
+//! The discrete Laplace operator of a level.
 //!
 //! Each unknown has an arm to each of its six neighbours. A whole arm has weight a = 1. An arm that the cage cuts ends there
 //! and has weight a >= 1, the inverse of its length in cells. For cell c, `(A u)_c = (sum of a over all arms) u_c - sum of u
@@ -17,7 +17,8 @@ pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
     }
 }
 
-/// `out = f - A u`. `u`, `out`: `[n_rows]`; the zero rows of `u` must be zero. Returns its sum of squares per lane.
+/// Writes `out = f - A u` and returns the sum of squares of `out` per lane. `u`, `out`: `[n_rows]`; the zero rows of
+/// `u` must be zero.
 pub fn residual(level: &Level, u: &[Row], f: Rhs<'_>, out: &mut [Row]) -> Row {
     dispatch(
         #[inline(always)]

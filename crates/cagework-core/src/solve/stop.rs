@@ -12,7 +12,7 @@ pub struct StopRule {
     pub max_iterations: u32,
 }
 
-/// Limit on V-cycles of a batch, alone or as preconditioner: halving the error 60 times exceeds f32.
+/// Limit on V-cycles of a batch, alone or as preconditioner: halving the error 60 times exceeds the precision of f32.
 pub const MAX_CYCLES: u32 = 60;
 
 impl StopRule {
@@ -22,7 +22,8 @@ impl StopRule {
         Self { max_iterations: self.max_iterations.min(MAX_CYCLES), ..self }
     }
 
-    /// The rule for one of `n_batches` batches. Deltas add in squares, so each gets an equal share.
+    /// The rule for one of `n_batches` batches. Squares of deltas add up over batches, so each batch gets an equal
+    /// share.
     #[must_use]
     pub fn of_batch(self, n_batches: usize) -> Self {
         Self { tolerance: self.tolerance / (n_batches.max(1) as f64).sqrt(), ..self }
@@ -44,7 +45,8 @@ pub struct SolveReport {
     pub stalled: bool,
 }
 
-/// Delta below which f32 may be exhausted: remaining changes are rounding noise (3e-8 to 1e-7 on a C-shaped cage, g = 16 to 40).
+/// Delta below which f32 precision may be exhausted. The remaining changes are then rounding noise (3e-8 to 1e-7 on a
+/// C-shaped cage, g = 16 to 40).
 pub const ROUND_OFF: f64 = 1e-6;
 
 impl SolveReport {
@@ -56,8 +58,8 @@ impl SolveReport {
         self.converged || self.deltas.len() >= rule.max_iterations as usize
     }
 
-    /// Ends the solve as converged if none of the latest `n` deltas is below all earlier ones, near [`ROUND_OFF`].
-    /// Returns whether it did.
+    /// Ends the solve as converged if none of the latest `n` deltas is below all earlier ones and delta has been below
+    /// [`ROUND_OFF`]. Returns whether it ended the solve.
     pub fn ends_at_round_off(&mut self, n: usize) -> bool {
         let (before, latest) = self.deltas.split_at(self.deltas.len().saturating_sub(n));
         let least = |deltas: &[f64]| deltas.iter().copied().fold(f64::INFINITY, f64::min);
@@ -73,7 +75,7 @@ impl SolveReport {
         (self.deltas.len() as u32, self.deltas.last().copied().unwrap_or(f64::INFINITY))
     }
 
-    /// Combines the reports of separately solved batches; deltas and residuals add in squares.
+    /// Combines the reports of batches that were solved separately. Squares of deltas and residuals add up.
     #[must_use]
     pub fn together(batches: &[Self]) -> Self {
         let history = |of: fn(&Self) -> &[f64]| -> Vec<f64> {

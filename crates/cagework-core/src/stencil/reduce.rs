@@ -5,7 +5,7 @@ pub const REDUCE_LANES: usize = 256;
 /// Values that a workgroup reduces to a partial sum.
 pub const REDUCE_VALUES: usize = 4096;
 
-/// Sums every 256th value per lane, then the lanes as a tree.
+/// Lane k sums the values k, k + 256, ...; then the lanes are summed as a tree.
 fn tree_sum(values: impl Iterator<Item = f32>) -> f32 {
     let mut sums = [0.0f32; REDUCE_LANES];
     for (i, value) in values.enumerate() {

@@ -8,25 +8,25 @@ use crate::sample::Stencils;
 use crate::transfer::{ProlongRow, RestrictRow, Transfer};
 use crate::weights::Weights;
 
-/// Numbers before the coarse rows in an entry of a prolongation table.
+/// Numbers at the start of an entry of a prolongation table, before the coarse rows.
 pub const ENTRY_HEAD: usize = 2;
 
 /// Vertices per invocation in deformation, so that each control is read once for all of them. Fastest frame on lavapipe
 /// with 50,000 vertices, 112 weights each and normals: 16.3 ms with one vertex per invocation, 9.0 ms with four.
 pub const BUNDLE: usize = 4;
 
-/// Bundles per slice of [`SlicedWeights`]: fills 128-byte memory transactions, with little padding.
+/// Bundles per slice of [`SlicedWeights`]. Eight fill a memory transaction of 128 bytes with little padding.
 pub const SLICE: usize = 8;
 
-/// Stencils of a level, one entry per row, including zero rows.
+/// Stencils of a level as arrays with one entry per row, including zero rows.
 #[derive(Clone, Debug, Default)]
 pub struct LevelTable {
-    /// Rows of the neighbours; a zero row for cut arms. Zero rows refer to themselves. `[n_rows]`
+    /// Rows of the six neighbours; a zero row where the arm is cut. A zero row has itself as neighbours. `[n_rows]`
     pub neighbours: Vec<[u32; 6]>,
     /// Sum of the arm weights; 1 for zero rows. `[n_rows]`
     pub diagonal: Vec<f32>,
-    /// Row of the right-hand side. Finest level: index of the cut cell, `NO_CELL` for other cells; coarse levels: the
-    /// row itself. `[n_rows]`
+    /// Row of the right-hand side that belongs to each row. Finest level: index of the cut cell, or `NO_CELL` for other
+    /// cells. Coarse levels: the row itself. `[n_rows]`
     pub rhs_of_row: Vec<u32>,
 }
 
@@ -35,20 +35,22 @@ pub struct LevelTable {
 pub struct TransferTable {
     /// Fine rows around each coarse row. `[n coarse rows]`
     pub around: Vec<RestrictRow>,
-    /// Entries: fine row, bits of the inverse number of coarse unknowns, 2 coarse rows.
+    /// Black cells between two coarse cells, one entry each: fine row, bits of the inverse number of coarse unknowns, 2
+    /// coarse rows.
     pub faces: Vec<u32>,
-    /// Entries: fine row, bits of the inverse number of coarse unknowns, 8 coarse rows.
+    /// Black cells between eight coarse cells, one entry each: fine row, bits of the inverse number of coarse unknowns,
+    /// 8 coarse rows.
     pub corners: Vec<u32>,
 }
 
-/// Sampling stencils of all vertices.
+/// Sampling stencils of all vertices as arrays.
 #[derive(Clone, Debug, Default)]
 pub struct SamplingTable {
     /// First entry of each vertex in `nodes` and `hats`. `[n_vertices + 1]`
     pub starts: Vec<[u32; 2]>,
-    /// `(row of the field, bits of its weight)`
+    /// Field entries of the stencils: `(row of the field, bits of its weight)`.
     pub nodes: Vec<[u32; 2]>,
-    /// `(control, bits of its weight)`
+    /// Dirichlet entries of the stencils: `(control, bits of its weight)`.
     pub hats: Vec<[u32; 2]>,
 }
 
@@ -56,9 +58,9 @@ pub struct SamplingTable {
 /// list and stored column by column, so that neighbouring GPU invocations read neighbouring entries (sliced ELLPACK).
 #[derive(Clone, Debug, Default)]
 pub struct SlicedWeights {
-    /// Start of each slice in `columns` and `weights`, over [`SLICE`]. `[n_slices + 1]`
+    /// Start of each slice in `columns` and `weights`, divided by [`SLICE`]. `[n_slices + 1]`
     pub slices: Vec<u32>,
-    /// Controls; short lists are padded with weights of 0. `[slice][k][lane]`
+    /// Columns of the entries; short lists are padded with weights of 0. `[slice][k][lane]`
     pub columns: Vec<u32>,
     /// Weights of the bundle's rows. `[slice][k][lane]`
     pub weights: Vec<[f32; BUNDLE]>,
@@ -69,12 +71,12 @@ pub struct SlicedWeights {
 pub struct NormalTable {
     /// First triangle of each vertex in `others`. `[n_vertices + 1]`
     pub starts: Vec<u32>,
-    /// The other two vertices of a triangle, counter-clockwise; triangles ascending.
+    /// The other two vertices of each triangle, counter-clockwise. The triangles of a vertex are in ascending order.
     pub others: Vec<[u32; 2]>,
 }
 
 impl LevelTable {
-    /// Table of a level; on the `finest` one the right-hand side has one row per cut cell.
+    /// Table of a level. On the `finest` level, the right-hand side has one row per cut cell.
     #[must_use]
     pub fn new(level: &Level, finest: bool) -> Self {
         let n_rows = level.n_rows();
@@ -181,7 +183,7 @@ impl SlicedWeights {
                         list.push(column);
                     }
                 }
-                // Matrix order, which determines the order of additions.
+                // Sort into the column order of the matrix, which determines the order of additions.
                 list.sort_unstable();
             }
             let begin = sliced.columns.len();

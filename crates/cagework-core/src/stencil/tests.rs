@@ -13,7 +13,7 @@ use crate::solve::stop::StopRule;
 use crate::team::Team;
 use crate::{Cage, deform};
 
-/// f32 rounding of values in [0, 1]: the twins add neighbours one by one, the fast kernels in pairs.
+/// f32 rounding of values in [0, 1]: CPU twins add neighbours one by one, fast kernels add them in pairs.
 const TOLERANCE: f32 = 2e-6;
 
 fn prepared<T>(use_it: impl FnOnce(&PreparedBind<'_>) -> T) -> T {
@@ -62,7 +62,7 @@ fn jacobi_twin_equals_the_fast_sweeps() {
     });
 }
 
-/// Full multigrid and a V-cycle composed of twins, as on the GPU.
+/// Full multigrid and a V-cycle composed of CPU twins, as the GPU composes its kernels.
 #[test]
 fn multigrid_of_twins_equals_the_fast_one() {
     prepared(|prepared| {

@@ -1,4 +1,4 @@
-//! Both tables are trilinear interpolation: one forwards, one transposed.
+//! Tests that both tables hold the weights of trilinear interpolation; restriction uses its transpose.
 
 use std::collections::BTreeMap;
 
@@ -82,7 +82,7 @@ fn prolongation_is_trilinear_on_black_cells() {
 }
 
 /// Away from the cage, a constant residual on red cells alone is restricted with half the weight: `1/2 (1 + 12 / 4) =
-/// 2`; all 27 cells would give `8 / 2`.
+/// 2`. A constant on all 27 cells would give `8 / 2`.
 #[test]
 fn restriction_of_a_constant_is_two() {
     assert_eq!(RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE, 2.0);

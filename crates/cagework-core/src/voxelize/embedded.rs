@@ -2,9 +2,10 @@
 //!
 //! Lines through the centres are intersected with the cage once, on the finest grid. Parity along a line classifies
 //! each centre. Where the three axes disagree (because of rounding, or in a self-intersecting cage) the majority
-//! decides, and the cell is counted. An *arm* of an inside centre is whole (1 cell) if it reaches the neighbour without
-//! crossing the cage; otherwise it ends on the cage at a distance theta. Two centres on either side of a wall are never
-//! neighbours, however thin the wall. Coarser grids keep every second centre, so they reuse a subset of the lines.
+//! decides, and the cell is counted. An *arm* of an inside centre has length 1 if it reaches the neighbouring centre
+//! without crossing the cage; otherwise it ends on the cage at a distance theta, in cells. Two centres on either side
+//! of a wall are never neighbours, however thin the wall. Coarser grids keep every second centre, so they reuse a
+//! subset of the lines.
 //!
 //! Source: Joshi et al. 2007, section 4, for the grid; Gibou et al. 2002 for the stencil with cut arms.
 
@@ -69,17 +70,17 @@ impl Embedding {
         resolution::notice(controls, grid, &self.lines, cells).into_iter().collect()
     }
 
-    /// Overlaps of parts of the cage; only walls of their union count.
+    /// Overlaps of parts of the cage. Only walls of the union of all parts bound the interior.
     #[must_use]
     pub fn overlaps(&self) -> Overlaps {
         Overlaps::of(&self.lines)
     }
 
-    /// Peak size in bytes.
+    /// Peak size of lines, levels and temporary votes in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let lines: usize = self.lines.iter().map(Lines::bytes).sum();
-        // Votes are temporary.
+        // Votes are temporary: one byte per cell of the finest level.
         let finest = self.levels[0].inside.len();
         lines + finest + self.levels.iter().map(|cells| 2 * cells.inside.len()).sum::<usize>()
     }
@@ -186,7 +187,7 @@ impl Cells {
         cells
     }
 
-    /// Combines the cells with the controls and lines from which they were made.
+    /// Combines the cells with the controls and lines from which they were classified.
     #[must_use]
     pub fn with<'a>(&'a self, controls: Controls<'a>, lines: &'a [Lines; 3]) -> EmbeddedCells<'a> {
         EmbeddedCells { controls, lines, cells: self }
@@ -194,7 +195,7 @@ impl Cells {
 }
 
 impl EmbeddedCells<'_> {
-    /// Nearest crossing in a direction within one cell, and its distance in cells.
+    /// Nearest crossing of the cage in a direction within one cell of a centre, and its distance in cells.
     fn nearest(&self, cell: [u32; 3], direction: usize) -> Option<(Hit, f64)> {
         let axis = direction / 2;
         let step = self.cells.step;
@@ -210,8 +211,8 @@ impl EmbeddedCells<'_> {
     }
 }
 
-/// The two centres next to a crossing at `t`. A crossing exactly at a centre lies below it, as in [`votes`], where
-/// centre s is past the crossing if `t <= s`.
+/// The two centres next to a crossing at `t`. A centre exactly at the crossing counts as above it, as in [`votes`],
+/// where centre s is past the crossing if `t <= s`.
 fn wall_between(t: f64) -> (i64, i64) {
     let above = t.ceil() as i64;
     (above - 1, above)
@@ -234,7 +235,7 @@ impl Boundary for EmbeddedCells<'_> {
         let Some((hit, theta)) = self.nearest(cell, direction) else { return 0.0 };
         let [b0, b1] = hit.barycentric;
         self.controls.values_at(hit.triangle, [b0, b1, 1.0 - b0 - b1], hats);
-        // Comparison instead of `max`, which has no single wasm instruction.
+        // A comparison instead of `max`, which has no single wasm instruction.
         1.0 / if theta > MIN_ARM { theta } else { MIN_ARM }
     }
 }

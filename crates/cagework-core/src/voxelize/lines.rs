@@ -6,8 +6,7 @@
 //! and Muecke 1990), so that it crosses there exactly once or, at a silhouette, an even number of times.
 //!
 //! The interior is where the winding number is positive: of overlapping parts, only walls of their union are kept, as
-//! in Jacobson et al.
-//! 2013. At a face shared by two parts, a line leaves the first part before it enters the second.
+//! in Jacobson et al. 2013. At a face shared by two parts, a line leaves the first part before it enters the second.
 
 use std::ops::Range;
 
@@ -60,7 +59,7 @@ impl Default for Overlaps {
 }
 
 impl Overlaps {
-    /// Adds a wall inside a part, and the pair of parts that overlap there.
+    /// Adds the position of a wall inside a part, and the pair of parts that overlap there.
     fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
         (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
         if let Some(pair) = parts.map(|[a, b]| [a.min(b), a.max(b)])
@@ -70,7 +69,7 @@ impl Overlaps {
         }
     }
 
-    /// Union over the three axes.
+    /// Overlaps found along any of the three axes.
     #[must_use]
     pub fn of(lines: &[Lines; 3]) -> Self {
         let mut all = Self::default();
@@ -120,8 +119,8 @@ impl Lines {
         lines
     }
 
-    /// Keeps hits at which a line enters or leaves the union of all parts. Hits within `same` cells coincide: there a
-    /// line leaves a part before it enters another.
+    /// Keeps only the hits at which a line enters or leaves the union of all parts. Hits within `same` cells coincide:
+    /// there a line leaves one part before it enters another.
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);

@@ -1,7 +1,7 @@
 //! Levels of unknowns of the classic method: boundary cells are neighbours with fixed values.
 //!
 //! The finest level is the paper's: all six arms are one cell long, and each cell is the average of its neighbours.
-//! Coarser levels, used only by multigrid, keep every second cell; an arm ends at the first boundary cell.
+//! Coarser levels, used only by multigrid, keep every second cell; there, an arm ends at the first boundary cell.
 
 use crate::grid::Grid;
 use crate::levels::Boundary;
@@ -49,7 +49,7 @@ impl<'a> PublishedCells<'a> {
         self.cells.kinds[self.fine.index(cell)]
     }
 
-    /// First boundary cell in a direction within `step` cells, and its distance.
+    /// First boundary cell in a direction within `step` cells, and its distance in cells of the finest level.
     fn first_boundary(&self, cell: [u32; 3], direction: usize) -> Option<(u32, u32)> {
         let mut at = cell.map(|x| x * self.step);
         for distance in 1..=self.step {

@@ -1,7 +1,7 @@
 //! Detection of parts of a cage that the grid does not resolve: faces without grid lines, and parts thinner than a cell.
 //!
-//! Values of such faces reach the grid by chance: weights depend on the cage's orientation, and a vertex whose faces
-//! meet no line has no influence. The weights are still valid; a finer grid gives better ones.
+//! Values on such faces reach the grid by chance. Weights then depend on the cage's orientation, and a vertex whose
+//! faces meet no grid line has no influence. The weights are still valid; a finer grid gives better ones.
 
 use glam::DVec3;
 
@@ -14,20 +14,20 @@ use super::lines::Lines;
 /// Largest dot product of the normals of two faces that are opposite sides of a thin part rather than of a corner.
 const MAX_NORMAL_DOT: f64 = -0.5;
 
-/// Thickness of a resolved part, in cells.
+/// Smallest thickness of a part that counts as resolved, in cells.
 const MIN_CELLS: f64 = 1.0;
 
 /// Average number of lines per face in the suggested grid, so that every face almost certainly meets a line.
 const LINES_PER_FACE: f64 = 4.0;
 
-/// Lines that a face must meet before it is judged by its depth.
+/// Number of lines that a face must meet before it is judged by its depth.
 const MIN_LINES: u32 = 8;
 
 /// Statistics of the lines that meet a face.
 #[derive(Clone, Default)]
 struct FaceLines {
     lines: u32,
-    /// Number of lines that leave the cage within a cell through a roughly opposite face.
+    /// Number of lines that leave the cage within one cell through a roughly opposite face.
     thin: u32,
     /// Sum of the cage's thickness along those lines, in cells.
     thickness: f64,
@@ -36,8 +36,8 @@ struct FaceLines {
     depth: f64,
 }
 
-/// A notice about faces that the grid does not resolve. `cells`: along the cage's longest side. A face of a subdivided
-/// cage counts as met if any of its parts is; inner walls are ignored.
+/// Notice about faces that the grid does not resolve. `cells`: number of cells along the cage's longest side. A face of
+/// the cage counts as met if a line meets any of the faces into which it is subdivided. Inner walls are ignored.
 #[must_use]
 pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Option<String> {
     let (cage, surface) = (controls.cage(), controls.surface());

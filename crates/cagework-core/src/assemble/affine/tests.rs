@@ -1,4 +1,4 @@
-//! The correction restores the sums and keeps zeros and signs.
+//! Tests that the correction restores the sums and keeps zeros and signs.
 
 use proptest::prelude::*;
 
@@ -56,7 +56,7 @@ fn exact_row_is_unchanged() {
 fn row_on_a_face_is_corrected_within_its_plane() {
     let cage = Cage::new(&shapes::cube()).unwrap();
     let columns = Columns::new((&cage).into());
-    // Bottom corners only: the system is singular across the face.
+    // Only the bottom corners have weights, so the system is singular normal to the face.
     let mut row = rows_of(&[0.3, 0.2, 0.3, 0.1, 0.0, 0.0, 0.0, 0.0]);
     let target = columns.scale(DVec3::new(0.4, 0.5, 0.0));
     columns.restore_affine(&mut row, target);

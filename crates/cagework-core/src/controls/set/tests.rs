@@ -50,7 +50,7 @@ fn invalid_controls_are_errors_with_a_remedy() {
             InnerControls { radius: Some(0.3), ..inner(&middle, vec![Point(0)]) },
             "the radius of controls inside is 0.3; it must be from 0.0001 to 0.25",
         ),
-        // Rejected here, before its mesh would have faces without area.
+        // This radius is rejected before the ball's mesh could have faces without area.
         (
             InnerControls { radius: Some(1e-9), ..inner(&middle, vec![Point(0)]) },
             "the radius of controls inside is 0.000000001; it must be from 0.0001 to 0.25",
@@ -90,7 +90,8 @@ fn surface_follows_its_controls() {
     for (a, b) in rest.iter().zip(&posed) {
         assert!((*b - *a - by).length() < 1e-6, "{a} {b}");
     }
-    // A ball's vertices stay on a sphere around its control, with 1/32 of the smooth cage's longest side as radius.
+    // The vertices of a ball stay on a sphere around its control, whose radius is 1/32 of the smooth cage's longest
+    // side.
     let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
     assert!(posed[posed.len() - 642..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }

@@ -5,20 +5,21 @@ use crate::solve::stop::{ROUND_OFF, SolveReport, StopRule};
 /// Upper bound on the contraction of a V-cycle: 0.03 to 0.10 measured on the Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
 
-/// Below [`ROUND_OFF`], a cycle makes no progress if its correction exceeds this multiple of the previous one: the rest
-/// is rounding noise, and tau may be unreachable.
+/// Below [`ROUND_OFF`], a cycle makes no progress if its correction exceeds this multiple of the previous correction.
+/// What remains is rounding noise, and tau may be unreachable.
 const MAX_CORRECTION_RATIO: f64 = 0.5;
 
-/// Contraction above which cycles are slower than conjugate gradients preconditioned by them.
+/// Contraction above which plain cycles are slower than conjugate gradients preconditioned by cycles.
 const MAX_CONTRACTION: f64 = 0.5;
 
-/// Cycles before contraction is compared with [`MAX_CONTRACTION`].
+/// Number of cycles before contraction is compared with [`MAX_CONTRACTION`].
 const CYCLES_TO_JUDGE: usize = 4;
 
 /// Upper bound on the contraction with which the remaining error is extrapolated.
 const CONTRACTION_BOUND: f64 = 0.99;
 
-/// Number of consecutive cycles without progress, see [`MAX_CORRECTION_RATIO`], that end the solve; a single one may be chance.
+/// Number of consecutive cycles without progress (see [`MAX_CORRECTION_RATIO`]) that end the solve. A single one may be
+/// chance.
 const MAX_STALLED_CYCLES: u32 = 2;
 
 /// Convergence history of a batch.
@@ -30,7 +31,7 @@ pub struct Convergence {
     correction: f64,
     /// Ratio of the latest correction to the previous one.
     ratio: f64,
-    /// Number of latest consecutive cycles without progress.
+    /// Number of consecutive cycles without progress up to the latest one.
     stalled: u32,
 }
 
@@ -48,7 +49,7 @@ impl Convergence {
     pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        // The correction is the error before minus the error after the cycle: `1 - ratio` of the error before.
+        // The correction is the error before the cycle minus the error after it: `1 - ratio` of the error before.
         let ahead = ratio.min(CONTRACTION_BOUND);
         let extrapolated =
             if correction < ROUND_OFF { ratio.min(1.0) } else { (1.0 - CONTRACTION) * ahead / (1.0 - ahead) };
@@ -73,7 +74,7 @@ impl Convergence {
         is_judged && self.ratio > MAX_CONTRACTION && !self.report.converged
     }
 
-    /// Whether the next cycle is predicted to land a factor `spare` below tolerance.
+    /// Whether delta is predicted to be a factor `spare` below tolerance after the next cycle.
     #[must_use]
     pub fn is_nearly_done(&self, spare: f64) -> bool {
         spare * self.ratio * self.latest().1 <= self.rule.tolerance
@@ -105,8 +106,8 @@ mod tests {
         assert!(report.converged && report.at_round_off);
     }
 
-    /// Corrections that decrease by 0.8 per cycle sum to 0.8 / (1 - 0.8), four times the latest. Conjugate gradients
-    /// should then continue, but not at a contraction of 0.4.
+    /// If corrections decrease by a factor of 0.8 per cycle, the remaining ones sum to 0.8 / (1 - 0.8) = 4 times the
+    /// latest. Conjugate gradients should then continue the solve, but not at a contraction of 0.4.
     #[test]
     fn slow_cycles_are_detected_and_their_remaining_error_extrapolated() {
         for (contraction, stalls) in [(0.8, true), (1.5, true), (0.4, false)] {

@@ -1,8 +1,8 @@
 //! Streaming of several passes over a level through memory.
 //!
 //! Each pass runs one z-plane behind the previous one: a half sweep of a plane reads the other colour in that plane and
-//! its two neighbours, which the previous pass has finished and the next one has not reached. A field is thus read from
-//! memory once per list of passes, with the same results as running them one by one.
+//! its two neighbours, which the previous pass has finished and the next pass has not reached. A field is thus read
+//! from memory once per list of passes, with the same results as if the passes ran one after another.
 
 use crate::levels::Level;
 use crate::simd::dispatch;
@@ -17,7 +17,7 @@ use super::OMEGA;
 /// A pass over all planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// Prolongation from the coarser level to black cells; the next sweep overwrites red ones.
+    /// Prolongation from the coarser level to black cells. The next sweep overwrites the red cells.
     Prolong(Prolong),
     /// Gauss-Seidel on red cells.
     Red,
@@ -29,25 +29,25 @@ pub(super) enum Pass {
     RedFromZero,
     /// [`Pass::BlackFurther`] with zero black cells, whose stored values are ignored.
     BlackFurtherFromZero,
-    /// Residual of the red cells; that of black cells is zero after [`Pass::Black`].
+    /// Residual of the red cells. The residual of black cells is zero after [`Pass::Black`].
     Residual,
 }
 
 use Pass::{Black, BlackFurther, BlackFurtherFromZero, Red, RedFromZero, Residual};
 
-/// Pre-smoothing and residual, from the stored values.
+/// Pre-smoothing and residual, starting from the stored values.
 pub(super) const DOWN: &[Pass] = &[Red, BlackFurther, Red, Black, Residual];
-/// Pre-smoothing and residual, from zero.
+/// Pre-smoothing and residual, starting from zero.
 pub(super) const DOWN_FROM_ZERO: &[Pass] = &[RedFromZero, BlackFurtherFromZero, Red, Black, Residual];
-/// Pre-smoothing and residual, from the coarser level's solution.
+/// Pre-smoothing and residual, starting from the coarser level's solution.
 pub(super) const DOWN_FROM_COARSE: &[Pass] =
     &[Pass::Prolong(Prolong::Replace), Red, BlackFurther, Red, Black, Residual];
 /// Coarse correction and post-smoothing.
 pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
-/// On the finest level from one coarse correction to the next, whose residual is injected.
+/// Passes on the finest level between two coarse corrections. The residual after the last pass is injected.
 pub(super) const BETWEEN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
-/// [`BETWEEN`] before a short last cycle, with one sweep less.
+/// [`BETWEEN`] with one sweep less, before a short last cycle.
 pub(super) const BETWEEN_SHORT: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];

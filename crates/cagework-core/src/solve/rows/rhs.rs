@@ -1,4 +1,4 @@
-//! Right-hand sides: dense, or restricted to cut cells.
+//! Right-hand sides: one row per cell, or one row per cut cell.
 
 use super::Row;
 use crate::grid::NO_CELL;

@@ -1,4 +1,5 @@
-//! Kinds by formula; values compared with a test of every cell against every triangle (Algorithm 1 of the paper).
+//! Tests kinds of cells against formulas, and values against a test of every cell with every triangle (Algorithm 1 of
+//! the paper).
 
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
@@ -68,7 +69,7 @@ fn box_cells_are_equally_many_and_cubic_cells_equally_long_per_axis() {
     let long = shapes::cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 1.0));
     let (_, cells) = voxelized(&long, 16, CellShape::Box);
     assert_eq!(cells.dims, [16; 3]);
-    // The box is 16 cells minus 1/500 long.
+    // The cage's box is 16 cells minus the padding of 1/500 cell long.
     assert!((cells.cell_size * (16.0 - 2.0 * PADDING) - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-12);
     let (cage, cells) = voxelized(&long, 16, CellShape::Cubic);
     assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells plus padding");

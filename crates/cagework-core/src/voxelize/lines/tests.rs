@@ -1,4 +1,4 @@
-//! Watertightness: lines enter as often as they leave, and parity equals the winding number.
+//! Tests watertightness: lines enter the cage as often as they leave it, and parity equals the winding number.
 
 use glam::{DQuat, Vec3};
 use proptest::prelude::*;
@@ -9,8 +9,8 @@ use crate::geometry::winding_number;
 use crate::mesh::PolygonMesh;
 use crate::voxelize::embedded::{shoot_lines, votes};
 
-/// Asserts that lines cross the cage an even number of times, and that parity along each axis and the winding number
-/// agree at every `every`-th centre.
+/// Asserts that lines cross the cage an even number of times. At every `every`-th centre, the parity along each axis
+/// must match the winding number.
 fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     let lines = shoot_lines(cage, grid);
     for lines in &lines {
@@ -56,7 +56,7 @@ proptest! {
     }
 }
 
-/// Lines along edges, through vertices and in the planes of faces: the shapes have integer corners.
+/// The shapes have integer corners, so lines run along edges, through vertices and in the planes of faces.
 #[test]
 fn lines_through_vertices_and_along_edges_cross_once() {
     for mesh in [shapes::cube(), shapes::c_shape(), shapes::l_shape(), shapes::octahedron()] {
@@ -92,7 +92,7 @@ fn hits_lie_on_the_cage() {
         assert!(lines.crossing().count() > 0);
         for (_, _, hits) in lines.crossing() {
             let ends: Vec<f64> = hits.iter().map(|h| grid.origin[axis] + grid.cell[axis] * h.t).collect();
-            // One face at 0, the opposite one at the box's size.
+            // The line crosses one face at 0 and the opposite face at the box's size.
             assert!(ends.len() == 2 && ends[0].abs() < 1e-12);
             assert!((ends[1] - f64::from(cage.bounds().max[axis])).abs() < 1e-12);
         }
