@@ -15,7 +15,7 @@ use crate::models::PartOptions;
 use crate::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_face, split_edge};
 use crate::surface::SurfacePoint;
 
-/// Distance of an extrusion, over the diagonal of model and cage.
+/// Distance of an extrusion, as a fraction of the diagonal of model and cage.
 const EXTRUSION: f32 = 0.08;
 /// Number of sizes that are tried for a sheet, each 4/5 of the previous one.
 const SHEET_SIZES: i32 = 16;
@@ -97,7 +97,7 @@ pub enum Command {
     },
     /// Replaces the cage by another cage or a draft, at rest.
     ReplaceCage {
-        /// Positions of its vertices, then of interior controls, and its faces.
+        /// Positions of the vertices of the new cage, then of its interior controls, and the cage's faces.
         #[cfg_attr(feature = "typescript", ts(type = "unknown"))]
         mesh: PolygonMesh,
         /// Subdivision and interior controls; null keeps the current ones that fit.
@@ -119,7 +119,7 @@ pub enum Command {
     },
     /// Sets the radius of interior points and lines.
     SetRadius {
-        /// Object units; null for a share of the cage's size.
+        /// Radius, object units; null for a fixed fraction of the cage's size.
         radius: Option<f32>,
     },
     /// Adds an interior control, and selects it.
@@ -132,7 +132,7 @@ pub enum Command {
     },
     /// Adds the largest rectangular sheet that fits, and selects it.
     AddSheet {
-        /// Its centre.
+        /// Centre of the sheet.
         #[cfg_attr(feature = "typescript", ts(type = "readonly [number, number, number]"))]
         center: Vec3,
         /// Half axes of the largest size that is tried.
@@ -141,7 +141,7 @@ pub enum Command {
     },
     /// Replaces the interior controls.
     ReplaceControls {
-        /// Their positions.
+        /// Positions of the new controls.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
         /// Points, lines and faces; indices are relative to `positions`.
@@ -292,8 +292,8 @@ impl Editor {
         if self.document().cage.set.is_ok() { Ok(()) } else { Err(EditError::NoCage) }
     }
 
-    /// Computes the pose from the pose and shares of the last step, because a slider sends many shares and each replaces the
-    /// previous one.
+    /// Changes the share of a saved pose. Starts from the pose and shares as of the last history step, because a slider
+    /// sends many shares, each of which replaces the previous one.
     fn blend(&mut self, index: usize, share: f32) -> Result<(), EditError> {
         self.pose(index)?;
         if !share.is_finite() {

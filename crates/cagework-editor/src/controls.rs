@@ -86,7 +86,7 @@ impl RestCage {
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
-            // Only a radius, for future controls.
+            // There are no controls yet, only a radius for future ones.
             InnerControls::default()
         } else {
             InnerControls {
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn bones_that_meet_share_a_control_and_points_do_not() {
-        // A radius of 2 / 32 of the box's side.
+        // The default radius is 2 / 64 of the box's side of 2.
         let made = made().with(InnerKind::Line, &[at(-0.5), at(0.0)]).unwrap();
         let made = made.with(InnerKind::Line, &[at(0.05), at(0.5)]).unwrap();
         assert_eq!(made.controls.elements, [InnerElement::Line(vec![0, 1]), InnerElement::Line(vec![1, 2])]);
@@ -269,11 +269,11 @@ mod tests {
     fn deleting_controls_drops_unused_positions() {
         let made = made().with(InnerKind::Line, &[at(-0.5), at(0.0), at(0.5)]).unwrap();
         let made = made.with(InnerKind::Point, &[Vec3::new(0.0, 0.5, 0.0)]).unwrap();
-        // The middle of the line: the ends stay connected.
+        // Without the middle point of the line, its ends stay connected.
         let shorter = made.without(&[9]).unwrap();
         assert_eq!(shorter.controls.elements, [InnerElement::Line(vec![0, 1]), InnerElement::Point(2)]);
         assert_eq!(shorter.inner_positions(), [at(-0.5), at(0.5), Vec3::new(0.0, 0.5, 0.0)]);
-        // One of two ends: a single point is not a line.
+        // Without one of its two ends, the line becomes a point, because a line needs two points.
         let point = shorter.without(&[8]).unwrap();
         assert_eq!(
             (point.controls.elements.as_slice(), point.controls.inner),

@@ -11,7 +11,7 @@ use crate::surface::SurfacePoint;
 /// A saved pose of the cage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedPose {
-    /// Its name.
+    /// Name of the pose.
     pub name: Arc<str>,
     /// Positions of cage vertices and interior controls. `[n_controls]` of the cage it was saved for
     pub positions: Arc<[Vec3]>,
@@ -67,7 +67,7 @@ impl Document {
         Key { mesh: self.mesh_key, cage: self.cage_key }
     }
 
-    /// Whether the cage is posed.
+    /// Whether the pose differs from the cage at rest.
     #[must_use]
     pub fn is_posed(&self) -> bool {
         *self.pose != *self.cage.mesh.positions
@@ -84,7 +84,8 @@ impl Document {
         self.poses.iter().filter(|pose| self.fits(pose))
     }
 
-    /// Whether two clones are equal. Compares meshes by their keys.
+    /// Whether a document and a later or earlier clone of it are equal. Compares meshes, cages and models by their
+    /// keys.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.pose == other.pose
@@ -102,7 +103,7 @@ impl Document {
         let points = |own: &Arc<[Vec3]>, other: &Arc<[Vec3]>| {
             if Arc::ptr_eq(own, other) { 0 } else { size_of_val(&**own) }
         };
-        // Mesh, controls, triangles and subdivided surface.
+        // Estimate for mesh, controls, triangles and subdivided surface: 256 bytes per position.
         let cage =
             if Arc::ptr_eq(&self.cage, &other.cage) { 0 } else { 256 * self.cage.mesh.positions.len() };
         let shares = |pose: &NamedPose| {

@@ -26,12 +26,12 @@ use crate::view::{DocumentView, PoseView, SelectionView};
 #[derive(Debug, Default)]
 pub struct Editor {
     document: Document,
-    /// The document at the last step.
+    /// The document as of the last history step, without changes since then.
     committed: Document,
     history: History,
     /// Number of steps, undos and redos so far.
     steps: u64,
-    /// The last key that was assigned.
+    /// The last number that was assigned as a key of models, a mesh or a cage.
     keys: u64,
     topology: Topology,
     symmetry: Symmetry,
@@ -64,7 +64,7 @@ pub struct Contents {
     pub shares: Vec<f32>,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
-    /// Identifier of the built-in sample, if it is one.
+    /// Identifier of the built-in sample that the contents belong to, if any.
     pub sample: Option<String>,
 }
 
@@ -81,7 +81,7 @@ impl Editor {
         &self.document
     }
 
-    /// The document at the last step.
+    /// The document as of the last history step, without changes since then.
     pub(crate) fn committed(&self) -> &Document {
         &self.committed
     }
@@ -363,7 +363,7 @@ impl Editor {
         }
     }
 
-    /// Shares of the vertices in a gesture that starts at `positions`.
+    /// Share of the movement that each vertex follows, for a gesture that starts at `positions`.
     #[must_use]
     pub fn pull(&self, positions: &[Vec3]) -> Pull {
         let rest = &self.document.cage.mesh.positions;

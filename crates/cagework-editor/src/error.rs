@@ -25,7 +25,7 @@ pub enum EditError {
         /// What the command needs.
         what: &'static str,
     },
-    /// A saved pose that does not exist.
+    /// There is no saved pose with this number.
     #[error("there is no pose number {number}: {count} are saved")]
     NoSuchPose {
         /// Number of the pose, from 1.
@@ -41,7 +41,7 @@ pub enum EditError {
         /// Number of vertices of the model.
         expected: usize,
     },
-    /// A number that is not finite.
+    /// A number is not finite.
     #[error("{what} must be finite numbers")]
     NotFinite {
         /// The quantity.

@@ -7,7 +7,7 @@ use crate::document::Document;
 /// Default limit of the history, bytes.
 pub const HISTORY_BYTES: usize = 256 << 20;
 
-/// A step, with the document before it, or after an undo the document after it.
+/// A step of the history, with the document before the step or, while the step is undone, the document after it.
 #[derive(Clone, Debug)]
 struct Step {
     label: String,

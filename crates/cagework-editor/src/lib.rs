@@ -1,6 +1,7 @@
 //! Editing of models, cage, pose and saved poses: one [`Document`], changed by [`Command`]s, with undo.
 //!
-//! Independent of GPU and browser. Weights, checks and pictures are derived from a document and not part of it.
+//! The crate needs neither a GPU nor a browser. Weights, checks and pictures are derived from a document and not part
+//! of it.
 
 pub mod cache;
 mod command;

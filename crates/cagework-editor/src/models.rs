@@ -16,7 +16,7 @@ use crate::error::EditError;
 
 /// Largest number of a first triangle that is accepted from a project; leaves room for later models.
 const MAX_FIRST: u32 = u32::MAX / 2;
-/// The name that stands for all of a model.
+/// Name that stands for a whole model in a list of part names.
 const WHOLE: &str = "all";
 
 /// Visibility of a model, and which of its parts the cage does not bend.
@@ -24,7 +24,7 @@ const WHOLE: &str = "all";
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct PartOptions {
-    /// Whether it is drawn and can be picked.
+    /// Whether the model is drawn and can be picked.
     pub shown: bool,
     /// Names of parts that keep their shape; "all" for the whole model.
     pub rigid: Vec<String>,
@@ -43,7 +43,7 @@ impl Default for PartOptions {
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemberSettings {
-    /// Number of the first triangle in surface points.
+    /// Number by which surface points refer to the model's first triangle.
     first_triangle: u32,
     options: PartOptions,
     /// Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
@@ -303,7 +303,7 @@ impl Models {
         self.iter().next().map_or_else(UpAxis::default, |member| member.model.up())
     }
 
-    /// Triangles of hidden models.
+    /// Ranges of the triangles of hidden models in the joined mesh.
     #[must_use]
     pub fn hidden(&self) -> Vec<Range<u32>> {
         let hidden = self.iter().filter(|member| !member.options.shown);
@@ -395,7 +395,7 @@ impl Models {
         if all == [MemberSettings::default()] { Vec::new() } else { all }
     }
 
-    /// Approximate size of the data that other models do not share, bytes.
+    /// Approximate size of the data that `other` does not share, bytes.
     pub(crate) fn bytes_beyond(&self, other: &Self) -> usize {
         if Arc::ptr_eq(&self.members, &other.members) {
             return 0;
@@ -434,7 +434,7 @@ impl Member {
         let mut parts = self.model.parts(&named, &of_parts(rigid))?;
         let n = self.model.positions.len();
         if is_whole(rigid) {
-            // One rigid piece, also if the mesh has several components, such as a suit of armour.
+            // The whole model is one rigid piece, even if its mesh has several components, such as a suit of armour.
             parts.rigid = vec![(0..n as u32).collect()];
         }
         if is_whole(stays) {

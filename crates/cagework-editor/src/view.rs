@@ -21,7 +21,7 @@ pub struct DocumentView {
     pub shares: Vec<f32>,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
-    /// Whether the cage is posed.
+    /// Whether the pose differs from the cage at rest.
     pub posed: bool,
     /// Whether the cage is being reshaped.
     pub editing_rest: bool,
@@ -45,7 +45,7 @@ pub struct DocumentView {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct PoseView {
-    /// Its name.
+    /// Name of the pose.
     pub name: String,
     /// Whether the pose belongs to the current cage rather than a replaced one.
     pub fits: bool,

@@ -96,7 +96,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     step(&mut editor, &mut documents, Command::SetPose { positions });
     step(&mut editor, &mut documents, Command::SavePose { name: "up".to_owned() });
     assert_eq!(*editor.document().shares, [0.0, 1.0]);
-    // A slider sends many shares. They form one step, relative to the pose before it.
+    // A slider sends many shares. All of them form one step, relative to the pose before the step.
     for share in [0.9, 0.4, 0.25] {
         editor.apply(Command::Blend { index: 1, share }).unwrap();
     }
@@ -155,7 +155,7 @@ fn assert_survives_saving(editor: &Editor, k: usize) {
     for (a, b) in reopened.poses.iter().zip(&*document.poses) {
         assert_eq!((&a.name, &a.positions), (&b.name, &b.positions), "{k}");
     }
-    // A pose is stored in 16 bits for each coordinate of its largest movement.
+    // Projects store each coordinate of a pose in 16 bits, relative to the pose's largest movement.
     let movements = document.pose.iter().zip(&document.cage.mesh.positions).map(|(p, r)| p.distance(*r));
     let largest = movements.fold(0.0, f32::max);
     for (a, b) in reopened.pose.iter().zip(&*document.pose) {
@@ -289,7 +289,8 @@ fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
         editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
         assert!(editor.commit(format!("cage {k}")));
     }
-    // A cage of 98 vertices takes 25 kB, and its pose 1 kB: the first step replaced none.
+    // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first step replaced
+    // no cage, so the four steps take 78 kB.
     assert_eq!(editor.view().forgotten, 0);
     for k in 5..=9 {
         let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);

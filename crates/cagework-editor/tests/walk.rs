@@ -135,7 +135,7 @@ fn is_valid(editor: &Editor) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Deterministic unless the environment sets cases or seed.
+/// A test runner that is deterministic unless the environment sets the number of cases or the seed.
 fn runner(cases: u32) -> TestRunner {
     let is_set = |name: &str| std::env::var_os(name).is_some();
     let mut config = Config { failure_persistence: None, ..Config::default() };
@@ -196,7 +196,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
     assert!(done.get() > 300 && steps.get() > 100, "{} commands, {} steps", done.get(), steps.get());
 }
 
-/// Values that break what a field promises.
+/// Values that are invalid for many fields.
 fn hostile() -> impl Strategy<Value = Value> {
     prop::sample::select(vec![
         json!(null),
@@ -216,7 +216,7 @@ fn hostile() -> impl Strategy<Value = Value> {
     ])
 }
 
-/// Damage of a JSON document: which value, and its replacement; `None` removes it.
+/// Damage of a JSON document: index of a value, and its replacement; `None` removes the value.
 type Damage = (prop::sample::Index, Option<Value>);
 
 fn damages() -> impl Strategy<Value = Vec<Damage>> {
@@ -257,7 +257,7 @@ fn damaged_commands_are_refused_or_leave_a_valid_document() {
         .run(&prop::collection::vec((command(), damages()), 50), |commands| {
             let mut editor = opened();
             for (command, damages) in commands {
-                // A number that JSON lacks, such as NaN, becomes null.
+                // Numbers that JSON cannot represent, such as NaN, become null.
                 let mut text = serde_json::to_value(&command).expect("commands are data");
                 damages.iter().for_each(|d| damage(&mut text, d));
                 let Ok(command) = serde_json::from_value::<Command>(text) else { continue };

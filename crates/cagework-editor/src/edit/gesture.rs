@@ -6,7 +6,8 @@ use cagework_core::view::View;
 
 use super::pull::Pull;
 
-/// Sine of the angle between view and plane below which the view plane is used instead: near edge-on, a pixel would move too far.
+/// Minimum sine of the angle between the view direction and a constraint plane. Below it, the gesture uses the view
+/// plane, because a pixel would move vertices too far in a plane seen almost edge-on.
 const MIN_PLANE_SINE: f32 = 0.05;
 
 /// Minimum start distance of a scale gesture from the centre, pixels: below, a pixel would change the factor too much.
@@ -81,13 +82,13 @@ impl Gesture {
         self.constraint = constraint;
     }
 
-    /// The restriction.
+    /// The constraint of the gesture.
     #[must_use]
     pub fn constraint(&self) -> Constraint {
         self.constraint
     }
 
-    /// Replaces the shares, for instance when the radius of proportional editing changes.
+    /// Replaces the share of each vertex, for instance when the radius of proportional editing changes.
     pub fn set_pull(&mut self, pull: Pull) {
         self.pull = pull;
     }
@@ -228,14 +229,15 @@ impl Gesture {
     }
 }
 
-/// At most three decimals, without trailing zeros.
+/// Formats a number with at most three decimals, without trailing zeros.
 fn shown(value: f32) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Coordinate on the axis through `through` that is nearest to the pointer's ray; `None` if they are parallel.
+/// Coordinate on the axis through `through` that is nearest to the pointer's ray; `None` if axis and ray are almost
+/// parallel.
 fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Option<f32> {
     let (origin, direction) = view.ray(pointer);
     let between = through - origin;

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use cagework_core::view::View;
 
-/// Ray hits whose distance is below this, over their distance from the eye, count as one.
+/// Ray hits count as one hit if their distance is below this fraction of the distance from the eye.
 const HIT_TOLERANCE: f32 = 1e-5;
 
 /// Element type that a click selects.
@@ -47,8 +47,9 @@ impl Topology {
     }
 }
 
-/// The vertex within `radius` pixels of the pointer. Vertices of front faces take precedence; among those at about the same depth
-/// (within the radius) the one nearest to the pointer, otherwise the one in front. Vertices of back faces only `with_hidden`.
+/// The vertex within `radius` pixels of the pointer. Vertices of front faces take precedence over vertices of back
+/// faces, which are picked only `with_hidden`. Among vertices at about the same depth (within the radius), the one
+/// nearest to the pointer is picked, otherwise the one in front.
 #[must_use]
 pub fn pick_vertex(
     positions: &[Vec3],
@@ -94,7 +95,7 @@ fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View
 }
 
 /// A point inside the model under the pointer: midway between the first two hits of the ray. If the ray misses the
-/// model, its point nearest to `center`.
+/// model, the point of the ray nearest to `center`.
 #[must_use]
 pub fn pick_middle(
     positions: &[Vec3],
@@ -116,8 +117,8 @@ pub fn pick_middle(
     origin + along * direction
 }
 
-/// The edge within `radius` pixels of the pointer, as index into [`Topology::edges`]; of several, the one whose nearest
-/// point is in front, unless the pointer is much nearer to another one.
+/// The edge within `radius` pixels of the pointer, as index into [`Topology::edges`]. If there are several, the one
+/// whose nearest point is in front, unless the pointer is much nearer to another edge.
 #[must_use]
 pub fn pick_edge(
     positions: &[Vec3],
@@ -246,7 +247,7 @@ mod tests {
             cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
         let middle =
             |x, y| pick_middle(&cube.positions, &triangles, &Flat, pixel(x, y), Vec3::new(0.5, 0.5, 0.25));
-        // On a diagonal, where two triangles give one hit, and off it.
+        // The points are on a diagonal, where a ray hits two triangles at one place, and off the diagonal.
         for (x, y) in [(0.5, 0.5), (0.25, 0.75), (0.3, 0.8)] {
             assert!(middle(x, y).abs_diff_eq(Vec3::new(x, y, 0.5), 1e-5), "{}", middle(x, y));
         }

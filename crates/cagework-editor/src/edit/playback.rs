@@ -50,7 +50,8 @@ pub fn reblend(
     Ok(from.iter().zip(&moved).zip(rest).map(|((&from, &moved), &rest)| from + (moved - rest)).collect())
 }
 
-/// Looping animation from rest through all poses back to rest, one second each, at a time; exports play the same. `[n_cage]`
+/// Positions at a time of the looping animation from rest through all poses back to rest, one second each. Exports
+/// contain the same animation. `[n_cage]`
 ///
 /// # Errors
 /// [`PoseError`] if a pose and the cage differ in their number of vertices.

@@ -6,12 +6,12 @@ use cagework_pose::symmetry::{Symmetry, reflect};
 
 use super::selection::Selection;
 
-/// Vertices that move with the selection.
+/// Options for the vertices that move together with the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPull<'a> {
     /// Radius of proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for none.
     pub radius: f32,
-    /// Mirrors the movement to the other side.
+    /// Mirror images of the vertices; `None` if movements are not mirrored.
     pub symmetry: Option<&'a Symmetry>,
 }
 
@@ -19,9 +19,9 @@ pub struct SharedPull<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pull {
     share: Vec<f32>,
-    /// Vertex whose mirrored movement a vertex makes.
+    /// For each vertex, the vertex whose mirrored movement it makes, if any.
     mirrors: Vec<Option<u32>>,
-    /// Whether a vertex lies on the mirror plane, in which it then moves.
+    /// Whether each vertex lies on the mirror plane. Such vertices move only within the plane.
     on_plane: Vec<bool>,
 }
 
@@ -91,7 +91,7 @@ impl Pull {
     }
 }
 
-/// Smoothstep from 1 at a leader to 0 at `radius` from the nearest leader.
+/// Smoothstep from 1 at a leading vertex to 0 at distance `radius` from the nearest leading vertex.
 fn share(i: usize, leads: &[bool], positions: &[Vec3], radius: f32) -> f32 {
     if leads[i] {
         return 1.0;
@@ -138,7 +138,7 @@ mod tests {
         let rest = cuboid(Vec3::NEG_ONE, Vec3::ONE).positions;
         let symmetry = Symmetry::new(&rest);
         let shared = SharedPull { radius: 0.0, symmetry: Some(&symmetry) };
-        // One vertex of a pair, or both with vertex 1 selected last: vertex 1 leads, 0 mirrors it.
+        // Either vertex 1 of a pair is selected, or both with vertex 1 last: vertex 1 leads, and vertex 0 mirrors it.
         for vertices in [&[1][..], &[0, 1]] {
             let moved = Pull::new(&selection(8, vertices), &rest, &rest, shared).apply(&rest, &shifted);
             assert_eq!(moved[1], rest[1] + Vec3::new(1.0, 2.0, 3.0));

@@ -66,7 +66,7 @@ impl Selection {
         !self.selected.contains(&true)
     }
 
-    /// The vertex selected last, if it still is.
+    /// The vertex selected last, if it is still selected.
     #[must_use]
     pub fn last(&self) -> Option<u32> {
         self.last.filter(|&v| self.contains(v))
@@ -142,7 +142,7 @@ impl Selection {
         (!vertices.is_empty()).then(|| sum / vertices.len() as f32)
     }
 
-    /// Position of a pivot. A selection without border uses its mean.
+    /// Position of a pivot. A selection without a border uses the mean of the selection.
     #[must_use]
     pub fn pivot(&self, positions: &[Vec3], topology: &Topology, pivot: Pivot) -> Option<Vec3> {
         let only = |vertices: &[u32]| {
@@ -217,7 +217,7 @@ mod tests {
         let mut selection = Selection::new(8);
         let pivot = |s: &Selection, pivot| s.pivot(&cube.positions, &topology, pivot);
         assert_eq!(pivot(&selection, Pivot::Border), None);
-        // All but one corner: its three neighbours are the border.
+        // All corners but one are selected, so the three neighbours of the unselected corner are the border.
         selection.all();
         selection.change(&[0], SelectMode::Remove);
         let neighbours: Vec<u32> =

@@ -16,12 +16,12 @@ pub(crate) fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     }
 }
 
-/// `[0, 1]^3`.
+/// The unit cube, from (0, 0, 0) to (1, 1, 1).
 pub(crate) fn cube() -> PolygonMesh {
     cuboid(Vec3::ZERO, Vec3::ONE)
 }
 
-/// Looks along -z, 100 pixels a unit, the origin at pixel (200, 100).
+/// A view along -z with 100 pixels per unit, and the origin at pixel (200, 100).
 pub(crate) struct Flat;
 
 impl View for Flat {

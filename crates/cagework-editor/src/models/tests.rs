@@ -102,7 +102,7 @@ fn parts_are_named_painted_and_kept_in_settings() {
     let expected = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.2];
     let parts = models.parts();
     assert_eq!((parts.stays.as_slice(), &parts.rigid), (&expected[..], &vec![vec![4, 5, 6, 7]]));
-    // Through JSON, as in a project.
+    // Convert the settings to JSON and back, as projects do.
     let text = serde_json::to_string(&models.settings()).unwrap();
     let saved: Vec<MemberSettings> = serde_json::from_str(&text).unwrap();
     let mut opened = Models::default();

@@ -33,7 +33,7 @@ pub enum RestEditError {
     /// The vertex, edge or face does not exist.
     #[error("the cage has no {what}")]
     Missing {
-        /// `vertex 12`, `edge 3-4`, `face 7`.
+        /// What is missing, such as `vertex 12`, `edge 3-4` or `face 7`.
         what: String,
     },
     /// A value is not finite.
@@ -45,7 +45,7 @@ pub enum RestEditError {
     /// The result would not be a valid cage.
     #[error("{operation} here would break the cage: {source}")]
     Breaks {
-        /// `moving`, `splitting`, ...
+        /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
         /// The fault; indices are those of the result.
         source: CageError,
@@ -53,13 +53,13 @@ pub enum RestEditError {
     /// The result would be inverted.
     #[error("{operation} here would turn the cage inside out")]
     InsideOut {
-        /// `moving`, `splitting`, ...
+        /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
     },
     /// The result would intersect itself.
     #[error("{operation} here would make the cage intersect itself: faces {first} and {second} would meet")]
     Meets {
-        /// `moving`, `splitting`, ...
+        /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
         /// A face of the result.
         first: u32,
@@ -69,7 +69,7 @@ pub enum RestEditError {
     /// The hole has too many edges.
     #[error("the hole would have {edges} edges, more than 64: delete fewer faces at a time")]
     LargeHole {
-        /// Number of its edges.
+        /// Number of the hole's edges.
         edges: usize,
     },
     /// No face would be left.

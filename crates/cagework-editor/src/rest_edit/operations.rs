@@ -190,7 +190,7 @@ fn drop_unused(before: &PolygonMesh, edited: &mut CageEdit) {
     edited.touched = edited.touched.iter().filter_map(|&v| number[v as usize]).collect();
 }
 
-/// Positions of the ends of an edge, which some face must have.
+/// Positions of the ends of an edge, which must belong to a face.
 fn ends(mesh: &PolygonMesh, edge: [u32; 2]) -> Result<[Vec3; 2], RestEditError> {
     if !mesh.faces.iter().any(|face| side(face, edge).is_some()) {
         return Err(missing("edge", &edge));
@@ -198,7 +198,7 @@ fn ends(mesh: &PolygonMesh, edge: [u32; 2]) -> Result<[Vec3; 2], RestEditError> 
     Ok(edge.map(|i| mesh.positions[i as usize]))
 }
 
-/// Position in a face of an edge, in either direction.
+/// Index of the corner of a face at which an edge starts, in either direction.
 fn side(face: &[u32], [a, b]: [u32; 2]) -> Option<usize> {
     (0..face.len()).find(|&k| {
         let (p, q) = (face[k], face[(k + 1) % face.len()]);

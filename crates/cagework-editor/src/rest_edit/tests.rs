@@ -107,7 +107,7 @@ fn extruding_a_face_adds_a_box() {
         assert_eq!(edited.mesh.faces[face as usize], edited.touched);
         assert_follows(&cube, &edited, &[]);
     }
-    // Into the cage from the central one of a side's nine faces: a pit of 2/3 x 2/3.
+    // Extruding the central one of a side's nine faces into the cage makes a pit of 2/3 x 2/3.
     let fine = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [3; 3]);
     let middle = fine.faces.iter().position(|f| {
         let center: Vec3 = f.iter().map(|&i| fine.positions[i as usize]).sum::<Vec3>() / 4.0;
@@ -143,7 +143,7 @@ fn every_corner_of_a_cube_can_be_deleted() {
         let around: Vec<u32> = (0..6).filter(|&f| cube.faces[f as usize].contains(&corner)).collect();
         let edited = delete_faces(&cube, &around).unwrap();
         assert_eq!(edited.mesh.positions.len(), 7);
-        // The removed corner is bounded by three half faces: a sixth of the cube's volume of 8.
+        // The deletion cuts off a corner that is bounded by three half faces: a sixth of the cube's volume of 8.
         assert!((volume(&edited.mesh) - 8.0 * 5.0 / 6.0).abs() < 1e-6, "corner {corner}");
     }
 }

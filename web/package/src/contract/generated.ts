@@ -537,7 +537,7 @@ export type UpAxis = "y" | "z";
  */
 export type PartOptions = {
 /**
- * Whether it is drawn and can be picked.
+ * Whether the model is drawn and can be picked.
  */
 shown: boolean,
 /**
@@ -569,7 +569,7 @@ painted: boolean, };
  */
 export type MemberSettings = {
 /**
- * Number of the first triangle in surface points.
+ * Number by which surface points refer to the model's first triangle.
  */
 first_triangle: number, options: PartOptions,
 /**
@@ -681,7 +681,7 @@ shares: Array<number>, } | { "do": "set_pins",
  */
 pins: Array<SurfacePoint>, } | { "do": "replace_cage",
 /**
- * Positions of its vertices, then of interior controls, and its faces.
+ * Positions of the vertices of the new cage, then of its interior controls, and the cage's faces.
  */
 mesh: unknown,
 /**
@@ -701,7 +701,7 @@ edit: RestEdit, } | { "do": "subdivide",
  */
 steps: number, } | { "do": "set_radius",
 /**
- * Object units; null for a share of the cage's size.
+ * Radius, object units; null for a fixed fraction of the cage's size.
  */
 radius: number | null, } | { "do": "add_control",
 /**
@@ -713,7 +713,7 @@ kind: InnerKind,
  */
 places: readonly (readonly [number, number, number])[], } | { "do": "add_sheet",
 /**
- * Its centre.
+ * Centre of the sheet.
  */
 center: readonly [number, number, number],
 /**
@@ -721,7 +721,7 @@ center: readonly [number, number, number],
  */
 axes: readonly (readonly [number, number, number])[], } | { "do": "replace_controls",
 /**
- * Their positions.
+ * Positions of the new controls.
  */
 positions: readonly (readonly [number, number, number])[],
 /**
@@ -753,7 +753,7 @@ amounts: Array<number>, };
  */
 export type PoseView = {
 /**
- * Its name.
+ * Name of the pose.
  */
 name: string,
 /**
@@ -809,7 +809,7 @@ shares: Array<number>,
  */
 pins: Array<SurfacePoint>,
 /**
- * Whether the cage is posed.
+ * Whether the pose differs from the cage at rest.
  */
 posed: boolean,
 /**

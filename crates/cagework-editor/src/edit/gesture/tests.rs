@@ -62,7 +62,7 @@ fn typed_number_replaces_the_pointer_until_it_is_removed() {
 
 #[test]
 fn rotation_follows_the_pointer() {
-    // The corners at z = 1, y = 1 about their centre (0, 1, 1), at pixel (200, 0).
+    // The selected corners at z = 1, y = 1 rotate about their centre (0, 1, 1), at pixel (200, 0).
     let middle = ORIGIN - Vec2::new(0.0, 100.0);
     let mut turn = gesture(GestureKind::Rotate, &[6, 7], middle + Vec2::new(50.0, 0.0));
     turn.drag(middle - Vec2::new(0.0, 50.0));
@@ -88,7 +88,7 @@ fn scale_follows_the_pointers_distance_from_the_centre() {
     assert_eq!(scale.label(&Flat), "Scale × 2 along X");
     scale.constrain(Constraint::Plane(0));
     assert!(close(scale.positions(&Flat)[7], Vec3::new(1.0, 2.0, 2.0)));
-    // Across the centre: mirrored.
+    // A drag across the centre mirrors the selection.
     scale.constrain(Constraint::Free);
     scale.drag(ORIGIN - Vec2::new(50.0, 0.0));
     assert!(close(scale.positions(&Flat)[7], Vec3::splat(-1.0)));
