@@ -22,7 +22,7 @@ impl Edges {
         self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
     }
 
-    /// Edges of exactly one face, directed as in the missing neighbour.
+    /// Edges of exactly one face, in the direction in which the missing neighbour would traverse them.
     pub(super) fn open(&self) -> Vec<[u32; 2]> {
         self.groups()
             .filter(|g| g.len() == 1)
@@ -34,7 +34,7 @@ impl Edges {
     pub(super) fn report(&self, mesh: &PolygonMesh, found: &mut Vec<Problem>) {
         let open = self.open();
         if !open.is_empty() {
-            // Vertices split at a seam also leave open edges, so welding comes first.
+            // Vertices split at a seam also leave open edges, so welding is the first remedy.
             let (_, joined) = same_places(mesh);
             let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
             let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
@@ -102,9 +102,9 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
     }
 }
 
-/// Non-manifold vertices: their faces form more than one fan.
+/// Non-manifold vertices, whose faces form more than one fan.
 fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
-    // `[vertex, previous, next]` of each corner.
+    // Entries `[vertex, previous, next]`, one for each corner of a face.
     let mut corners: Vec<[u32; 3]> = Vec::new();
     for &f in sound {
         let face = &mesh.faces[f as usize];

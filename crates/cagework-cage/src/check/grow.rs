@@ -9,10 +9,10 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::geometry::closest_point_on_triangle;
 use cagework_core::mesh::{Bounds, PolygonMesh};
 
-/// Limit on rounds; each moves the cage past the vertices that are still outside.
+/// Limit on rounds. Each round moves the cage past the vertices that are still outside.
 const MAX_ROUNDS: usize = 40;
 
-/// Gap left beyond each point, over the cage's diagonal.
+/// Gap that is left beyond each point, as a fraction of the cage's diagonal.
 const MARGIN: f64 = 0.004;
 
 fn control_set(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
@@ -37,7 +37,7 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
         }
         push(mesh, controls, outside.iter().map(|&v| model[v as usize].as_dvec3()));
     }
-    // Scaling about the model's centre encloses what local moves did not.
+    // Enclose the vertices that local moves left outside by scaling about the model's centre.
     scale(mesh, model, smooth)?;
     let left_now = outside(mesh, smooth, model)?.len();
     if left_now > 0 {
@@ -68,7 +68,7 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
         };
         for &i in corners {
             let so_far = &mut offset[i as usize];
-            // Add only what earlier moves lack in this direction.
+            // Add only the part of the offset that earlier moves of the corner do not cover in this direction.
             let missing = needed.length() - so_far.dot(direction);
             if missing > 0.0 {
                 *so_far += direction * missing;

@@ -2,7 +2,7 @@
 
 use cagework_core::mesh::PolygonMesh;
 
-/// Tolerance of the plane over the diagonal of the mesh: rounding of the modelling program.
+/// Tolerance of the plane, as a fraction of the diagonal of the mesh: rounding of the modelling program.
 const PLANE_TOLERANCE: f64 = 1e-4;
 
 /// An axis-aligned plane that holds all open edges.
@@ -13,7 +13,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The plane of all `open` edges, if the whole mesh lies on one side of it.
+    /// The plane that holds all `open` edges, if there is one and the whole mesh lies on one side of it.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
         let reach = (PLANE_TOLERANCE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];
@@ -33,7 +33,7 @@ impl Plane {
         self.at == 0.0
     }
 
-    /// Adds the mirror image. Vertices of open edges are shared, and moved into the plane.
+    /// Adds the mirror image of the mesh. Both halves share the vertices of open edges, which are moved into the plane.
     pub(super) fn mirror(self, mesh: &mut PolygonMesh, open: &[[u32; 2]]) -> String {
         let Self { axis, at } = self;
         let mut other: Vec<u32> = (0..mesh.positions.len() as u32).collect();
@@ -71,7 +71,7 @@ mod tests {
     use cagework_core::cage::subdivided_box;
     use cagework_core::mesh::Bounds;
 
-    /// Half of a box of side 2, cut by a plane across `axis`; the whole box is centred at `at`.
+    /// Half of a box of side 2, cut by a plane across `axis`. The centre of the whole box is at `at` along `axis`.
     fn half(axis: usize, at: f32) -> PolygonMesh {
         let mut mesh = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [2; 3]);
         mesh.faces.retain(|face| face.iter().all(|&v| mesh.positions[v as usize][axis] <= 0.0));
@@ -101,7 +101,7 @@ mod tests {
         );
         let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
         assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
-        // An open boundary that is not planar: no mirror plane.
+        // The open boundary is not planar, so there is no mirror plane.
         let mut bent = half(0, 0.0);
         bent.positions.iter_mut().filter(|p| p.x == 0.0 && p.y > 0.5).for_each(|p| p.x = 0.25);
         assert_eq!(repair(&bent, &[Repair::Mirror], None).unwrap().done, [""; 0]);

@@ -86,7 +86,7 @@ pub struct Places {
     pub edges: Vec<[u32; 2]>,
     /// Cage faces.
     pub faces: Vec<u32>,
-    /// Points in space.
+    /// Points in space, object units.
     pub points: Vec<[f32; 3]>,
 }
 
@@ -111,7 +111,7 @@ pub enum Fix {
 pub struct Problem {
     /// Kind of problem.
     pub code: Code,
-    /// Its severity.
+    /// How severe the problem is.
     pub severity: Severity,
     /// Number of occurrences.
     pub count: usize,
@@ -136,14 +136,14 @@ pub struct CageCheck {
     pub faces: usize,
     /// Number of edge-connected components.
     pub components: usize,
-    /// Smallest thickness found, object units; `None` if the cage has no interior.
+    /// Smallest thickness that was measured, object units; `None` if the cage has no interior.
     pub thickness: Option<f32>,
     /// Problems, worst first.
     pub problems: Vec<Problem>,
 }
 
 impl CageCheck {
-    /// The problem with this code.
+    /// The problem with this code, if there is one.
     #[must_use]
     pub fn problem(&self, code: Code) -> Option<&Problem> {
         self.problems.iter().find(|p| p.code == code)
@@ -152,7 +152,8 @@ impl CageCheck {
 
 /// Checks a polygon mesh for use as a cage.
 ///
-/// `model`: positions that should lie inside. `grid`: cells along the longest side; parts thinner than a cell are reported.
+/// `model`: positions that should lie inside. `grid`: number of cells along the longest side; parts of the cage that
+/// are thinner than a cell are reported.
 #[must_use]
 pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
     check_smooth(mesh, model, grid, 0)
@@ -205,7 +206,7 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
         p.places.faces.truncate(MAX_PLACES);
         p.places.points.truncate(MAX_PLACES);
     }
-    // Sorts pairs of numbers: a sort of another key type would add 2 kB to the wasm module.
+    // Other code also sorts arrays of `u32`; sorting another key type would add 2 kB to the wasm module.
     let kind = |p: &Problem| (p.severity as u32) << 16 | p.code as u32;
     let mut order: Vec<[u32; 2]> = (0u32..).zip(&found).map(|(k, p)| [kind(p), k]).collect();
     order.sort_unstable();

@@ -12,13 +12,13 @@ use cagework_core::mesh::PolygonMesh;
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     pub(super) faces: Vec<u32>,
-    /// Whether each of `faces` must be flipped for all to point outward.
+    /// Whether each of `faces` must be flipped so that all point outward.
     pub(super) turn: Vec<bool>,
     /// An edge at which no consistent orientation exists.
     pub(super) one_sided: Option<[u32; 2]>,
 }
 
-/// Components in order of their first face, with the orientation of their faces.
+/// Components in order of their first faces, with the orientation of their faces.
 pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Vec<Component> {
     let n = mesh.faces.len();
     let mut neighbours: Vec<Vec<(u32, bool, [u32; 2])>> = vec![Vec::new(); n];
@@ -68,7 +68,8 @@ fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
 /// Flips whole components whose volume has the wrong sign: negative, or positive for a component nested inside another.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
-    // A triangle soup may have as many components as faces: test nesting only in components that can contain something.
+    // A triangle soup may have as many components as faces: search for nested parts only in components that can enclose
+    // any.
     let around: Vec<(usize, [DVec3; 2])> = solids
         .iter()
         .enumerate()
@@ -98,7 +99,7 @@ fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     }
 }
 
-/// Triangle fans of a component with consistent orientation; enough for volumes and winding numbers.
+/// Triangle fans of a component's faces with consistent orientation, which suffice for volumes and winding numbers.
 fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
     let mut triangles = Vec::new();
     for (&f, &turned) in component.faces.iter().zip(&component.turn) {

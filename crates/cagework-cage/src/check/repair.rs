@@ -43,7 +43,7 @@ pub struct RepairedMesh {
     pub mesh: PolygonMesh,
     /// New index of every old vertex; `None` if it was dropped. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
-    /// What was repaired, one sentence each; empty if nothing was.
+    /// Description of each repair that changed the mesh, one sentence each.
     pub done: Vec<String>,
 }
 
@@ -59,7 +59,7 @@ pub enum RepairError {
     /// Growing needs a valid subdivided surface.
     #[error(transparent)]
     NotSmooth(#[from] ControlError),
-    /// The model is still partly outside.
+    /// Model vertices are still outside the grown cage.
     #[error("{} still outside after growing: make a new cage", counted(*left, "model vertex is", "model vertices are"))]
     StillOutside {
         /// Number of model vertices outside.
@@ -67,7 +67,7 @@ pub enum RepairError {
     },
 }
 
-/// Repairs a mesh. Applies `repairs` in the order weld, drop, mirror, fill, flip, grow; faces keep their order.
+/// Repairs a mesh. Applies `repairs` in the order weld, drop, mirror, fill, flip, grow. Faces keep their order.
 ///
 /// # Errors
 /// [`RepairError`] if growing fails. Other repairs never fail.
@@ -79,7 +79,7 @@ pub fn repair(
     repair_smooth(mesh, repairs, model, 0)
 }
 
-/// [`repair`] of a cage that is subdivided `smooth` times: it grows until its subdivided surface encloses the model.
+/// [`repair`] of a cage that is subdivided `smooth` times: growing makes its subdivided surface enclose the model.
 ///
 /// # Errors
 /// As [`repair`].
@@ -122,7 +122,7 @@ pub fn repair_smooth(
 }
 
 impl RepairedMesh {
-    /// Removes vertices for which `keep` is false; the rest keep their order.
+    /// Removes vertices for which `keep` is false; the other vertices keep their order.
     fn keep_vertices(&mut self, keep: &[bool]) {
         let mut number = vec![None; keep.len()];
         let mut positions = Vec::new();

@@ -76,7 +76,7 @@ pub(super) fn one_sided(component: usize) -> String {
     format!("Component {component} has no inside: its faces cannot be turned consistently.")
 }
 
-/// Message for thin places. `cells`: a grid that resolves them, if that is within the limit.
+/// Message for thin places. `cells`: number of cells of a grid that resolves them, if it is within the limit.
 pub(super) fn thin(places: usize, cells: Option<u32>) -> String {
     let places = counted(places, "place", "places");
     let advice = cells.map_or("make the cage thicker".into(), |cells| format!("use a grid of {cells} cells"));

@@ -13,14 +13,15 @@ use cagework_core::options::MAX_GRID;
 /// Number of triangles up to which thickness is measured at every triangle; larger cages are sampled evenly.
 const MAX_MEASURED_TRIANGLES: usize = 1500;
 
-/// Thickness, in cells, from which on a part is not reported. A part one cell thick may have no unknown of its own.
+/// Thickness from which on a part is not reported, in cells. A part of one cell may have no unknown of its own.
 const MIN_CELLS: f64 = 1.0;
 
-/// Two faces bound a thin part if the cosine between one normal and the other's opposite exceeds this (70 degrees; the faces of a
-/// regular tetrahedron still count). Faces at a steeper angle form a corner, near which their distance tends to zero.
+/// Two faces bound a thin part if the cosine between one normal and the opposite of the other exceeds this (70 degrees;
+/// the faces of a regular tetrahedron still count). Faces at a larger angle form a corner, near which their distance
+/// tends to zero.
 const MIN_OPPOSITION_COSINE: f64 = 0.3;
 
-/// Indices of valid faces: existing, finite, distinct vertices and an area. Reports the others.
+/// Indices of valid faces, which have existing, finite, distinct vertices and an area. Reports all other faces.
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
@@ -73,8 +74,8 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     sound
 }
 
-/// Measures thickness by rays from face centres inwards to opposing faces, and reports where it is less than a grid
-/// cell. Returns the smallest thickness.
+/// Measures thickness by rays from face centres inwards to opposing faces. Reports where the thickness is less than a
+/// grid cell. Returns the smallest thickness.
 pub(super) fn report_thickness(
     controls: Controls<'_>,
     grid: Option<u32>,

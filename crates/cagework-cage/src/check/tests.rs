@@ -31,7 +31,7 @@ fn sound_cage_has_no_problems() {
     assert!((found.thickness.unwrap() - 2.0).abs() < 1e-6, "the box is 2 wide");
 }
 
-/// The diagonal once included vertices without faces: one far away made all faces seem to have no area.
+/// The diagonal must not include vertices without faces: with one far away, all faces would seem to have no area.
 #[test]
 fn a_far_unused_vertex_does_not_make_a_valid_cage_faulty() {
     let mut mesh = box_mesh(2);
@@ -66,7 +66,7 @@ fn split_seams_are_welded() {
         split.positions.extend(face.iter().map(|&i| whole.positions[i as usize]));
         split.faces.push((first..first + face.len() as u32).collect());
     }
-    // Rounding of a text file.
+    // Offset a corner by the rounding error of a text file.
     split.positions[3].x += 1e-6;
     let found = check(&split, None, None);
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 24 - 8);
@@ -180,7 +180,7 @@ fn vertices_outside_are_listed_and_growing_encloses_them() {
     assert_eq!(grown.faces, mesh.faces);
 }
 
-/// Two subdivisions round off the box's corners: (0.9, 0.9, 0.9) is outside the smooth surface but inside the box.
+/// Two subdivisions round off the corners of the box: (0.9, 0.9, 0.9) is outside the smooth surface but inside the box.
 #[test]
 fn a_smooth_cage_is_checked_by_its_smooth_surface() {
     let (mesh, model) = (box_mesh(2), [Vec3::ZERO, Vec3::splat(0.9)]);
@@ -255,7 +255,7 @@ proptest! {
     }
 }
 
-/// With one vertex dragged far away the rest of the cube is small against the diagonal: its other corners count as
+/// With one vertex dragged far away, the rest of the cube is small relative to the diagonal. Its other corners count as
 /// duplicates, and faces seem to share corners that they do not share.
 #[test]
 fn a_cube_with_a_far_vertex_is_checked() {
@@ -263,10 +263,10 @@ fn a_cube_with_a_far_vertex_is_checked() {
     mesh.positions[0].y = -1_429_490.6;
     let found = check(&mesh, Some(&[Vec3::ZERO]), Some(64));
     assert!(found.valid, "closed and free of intersections: {:?}", found.problems);
-    // Tolerance: 2e-6 of the diagonal is 2.86. All of the seven are that near to the first one, except its opposite at
-    // 3.46.
+    // The tolerance, 2e-6 of the diagonal, is 2.86. Of the seven other corners, all but the first one's opposite (at
+    // 3.46) are within it.
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 5);
-    // Like a damaged file: two corners of a face at the same position.
+    // Two corners of a face are at the same position, as in a damaged file.
     let mut mesh = box_mesh(1);
     mesh.positions[1] = mesh.positions[0];
     assert!(check(&mesh, Some(&[Vec3::ZERO]), Some(64)).problem(Code::DuplicateVertex).is_some());
@@ -274,7 +274,8 @@ fn a_cube_with_a_far_vertex_is_checked() {
     assert_eq!(codes(&repaired), [], "a cube with one edge collapsed");
 }
 
-/// Separate triangles have as many components and holes as faces: comparing all pairs would take half an hour for 100,000.
+/// Separate triangles have as many components and holes as faces. Comparing all pairs of 100,000 would take half an
+/// hour.
 #[test]
 fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     let mut soup = PolygonMesh::default();
@@ -290,7 +291,7 @@ fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     assert_eq!(repaired.faces.len(), 60_000, "each hole is filled by the triangle's back side");
 }
 
-/// Triangles that all intersect each other: listing the pairs of 100,000 of them would take 40 GB.
+/// Triangles that all intersect each other: a list of all pairs of 100,000 of them would take 40 GB.
 #[test]
 fn crossings_are_counted_and_listed_up_to_a_limit() {
     let star = |n: u32| {

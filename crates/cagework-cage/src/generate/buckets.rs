@@ -10,7 +10,7 @@ pub(super) struct Buckets {
     origin: DVec3,
     dims: [usize; 3],
     lists: Vec<Vec<u32>>,
-    /// For each triangle, the read of a list and the search that last returned it.
+    /// For each triangle, the numbers of the list reading and of the search that last met it.
     met: Vec<(u32, u32)>,
     lists_read: u32,
     searches: u32,
@@ -96,7 +96,7 @@ fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]
     })
 }
 
-/// Box of a bucket; outermost buckets extend to infinity.
+/// Box of a bucket. Outermost buckets extend to infinity.
 fn bucket_bounds(origin: DVec3, dims: [usize; 3], at: [usize; 3]) -> [DVec3; 2] {
     let [mut min, mut max] = [DVec3::NEG_INFINITY, DVec3::INFINITY];
     for k in 0..3 {

@@ -181,7 +181,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Ok(self.count)
     }
 
-    /// `(kept, removed)`: keeps the vertex on the mirror plane.
+    /// The vertex that remains, and the vertex that is removed; a vertex on the mirror plane remains.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         if self.surface.on_mirror[b as usize] { (b, a) } else { (a, b) }
     }
@@ -195,7 +195,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.quadrics[a as usize].plus(&self.quadrics[b as usize])
     }
 
-    /// Minimum of an edge's quadric if that is near the edge, otherwise the edge's middle.
+    /// Minimum of an edge's quadric if that is near the edge, otherwise the middle of the edge.
     fn optimum(&self, a: u32, b: u32) -> DVec3 {
         let (kept, _) = self.ordered(a, b);
         let pinned = self.pinned(kept);
@@ -208,7 +208,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
     }
 
-    /// Pushes an edge with its cost if nothing blocks it.
+    /// Pushes an edge to the heap with the cost of its merged vertex, as if nothing blocked it.
     fn wait(&mut self, edge: [u32; 2]) {
         let [a, b] = edge;
         let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
@@ -239,7 +239,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
             return false;
         }
-        // A tip loses a triangle and must keep enough to be the corner of a solid.
+        // Each of the two vertices opposite the edge loses a triangle and must keep enough of them to be the corner of
+        // a solid.
         let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
         if sides.iter().any(|&tip| surface.around[tip as usize].len() <= least(tip)) {
             return false;
@@ -304,7 +305,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
         candidates.retain(|&c| !self.surface.is_blocked(c));
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
-        // Cheapest valid candidate; mostly the first one tested.
+        // Find the cheapest valid candidate; it is mostly the first one tested.
         while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
             let (cost, place) = priced.remove(k);
             if self.is_place(kept, place) {
@@ -314,7 +315,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         None
     }
 
-    /// Whether the star found by [`Self::place_of`] is valid with its vertex `kept` at `p`.
+    /// Whether the triangles found by [`Self::place_of`] are valid with the vertex `kept` at `p`.
     fn is_place(&mut self, kept: u32, p: DVec3) -> bool {
         let Scratch { star, gone, new, .. } = &mut self.scratch;
         new.clear();
@@ -336,8 +337,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.surface.may_stand(new, gone)
     }
 
-    /// Whether a vertex at `at` exceeds its limits: RMS distance to the planes of the hull (weighted by area), or the
-    /// distance from its neighbours on a limb or plate. Limbs are limited only while a budget applies.
+    /// Whether the merged vertex at `at` exceeds its limits: the RMS distance to the planes of the hull (weighted by
+    /// area), or the distance from its neighbours on a limb or plate. Limbs are limited only while a budget applies.
     fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
         let is_off = |budget: f64| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
@@ -352,7 +353,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
             || (self.keeps_plates && spacings().filter(|spacing| spacing.along.is_none()).any(is_too_far))
     }
 
-    /// The stricter spacing of two vertices: that of a plate, which limits all directions, otherwise the smaller one.
+    /// The stricter spacing of two vertices: the one on a plate, which limits all directions, otherwise the smaller
+    /// one.
     fn spacing_of(&self, a: u32, b: u32) -> Option<Spacing> {
         let spacings = [a, b].into_iter().filter_map(|v| self.spacings[v as usize]);
         spacings

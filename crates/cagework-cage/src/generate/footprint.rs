@@ -1,16 +1,16 @@
 //! Voxels that a triangle overlaps, as one run per row.
 //!
-//! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). Along a row all terms but x are
-//! constant, so each separating axis bounds x from both sides and the row's voxels form one run, without a test per voxel.
+//! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). Along a row only x varies,
+//! so each separating axis bounds x from both sides. The row's voxels form one run, which needs no test per voxel.
 
 use glam::DVec3;
 
 use super::voxels::Voxels;
 
-/// Enlargement of voxels, in voxels, above f64 rounding.
+/// Enlargement of voxels against f64 rounding, in voxels.
 const ROUNDING_MARGIN: f64 = 1e-6;
 
-/// An axis with a smaller x component does not bound x.
+/// A separating axis with a smaller x component does not bound x.
 const MIN_AXIS_X: f64 = 1e-12;
 
 /// Separating-axis bounds of a triangle on voxel centres.
@@ -26,7 +26,8 @@ pub(crate) struct Footprint {
     max: DVec3,
 }
 
-/// `low <= x + y_share y + z_share z <= high`, or the same without x.
+/// The bounds `low <= x + y_share y + z_share z <= high`, or the same without x. The fields `y` and `z` are these
+/// shares.
 #[derive(Clone, Copy, Debug, Default)]
 struct RowBound {
     y: f64,
@@ -58,7 +59,7 @@ impl Footprint {
         footprint
     }
 
-    /// Adds a separating axis.
+    /// Adds the bounds of one separating axis.
     fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64) {
         let [p, q, r] = triangle.map(|v| axis.dot(v));
         let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
@@ -70,7 +71,7 @@ impl Footprint {
                 RowBound { y: axis.y * scale, z: axis.z * scale, low: one.min(other), high: one.max(other) };
             self.n_slanted += 1;
         } else {
-            // An edge along y or z up to rounding: widen the bounds by the range of the x term.
+            // The axis has no x component except by rounding: widen the bounds by the range of the x term.
             let (one, other) = (axis.x * self.min.x, axis.x * self.max.x);
             let (low, high) = (low - one.max(other), high - one.min(other));
             self.across[self.n_across] = RowBound { y: axis.y, z: axis.z, low, high };
@@ -83,7 +84,7 @@ impl Footprint {
         ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
     }
 
-    /// Adds the run of every row. Skips rows whose part of the bounding box is already set.
+    /// Adds the run of every row to `voxels`. Skips rows in which the bounding box is already set.
     pub(crate) fn add_to(&self, voxels: &mut Voxels) {
         let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
         // Rounding may extend runs by one voxel.
@@ -147,12 +148,12 @@ pub(super) fn any_run(
     false
 }
 
-/// Half-open range of voxels whose centre lies in a box, along each axis.
+/// Half-open range of the voxels whose centres lie in a box, along each axis.
 fn rows(min: DVec3, max: DVec3, dims: [usize; 3]) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + ROUNDING_MARGIN).min(dims[k])])
 }
 
-/// `max(ceil(x), 0)`. `f64::ceil` is a function call on baseline x86-64.
+/// Computes `max(ceil(x), 0)`. `f64::ceil` is a function call on baseline x86-64.
 fn ceil(x: f64) -> usize {
     let whole = x as usize;
     whole + usize::from(x > whole as f64)
@@ -162,7 +163,7 @@ fn ceil(x: f64) -> usize {
 mod tests {
     use super::*;
 
-    /// A face of an axis-parallel prism whose edge along y is off by the rounding of one coordinate. Expected: the
+    /// A face of an axis-parallel prism whose edge along y is tilted by the rounding of one coordinate must overlap the
     /// voxels of the exact face.
     #[test]
     fn an_edge_along_an_axis_but_for_rounding_leaves_no_hole() {

@@ -10,29 +10,30 @@ use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancelled;
 
-/// Largest cosine between the directions from a sheet to its walls: creases wider than 60 degrees are not gaps.
+/// Largest cosine between the directions from a sheet to its two walls: creases wider than 60 degrees are not gaps.
 const MAX_WALL_COSINE: f64 = -0.5;
 
-/// Smallest distance of a sheet from the crease where its walls meet, over the distance between the walls.
+/// Smallest distance of a sheet from the crease where its walls meet, as a multiple of the distance between the walls.
 const MIN_DEPTH: f64 = 1.0;
 
 /// Narrowest gap, in voxels, that a hull leaves open: three, plus one for flat walls beside round limbs.
 const MIN_OPEN_WIDTH: f64 = 4.0;
 
-/// Smallest area of a gap for which the lattice is refined, over the squared longest side of the model.
+/// Smallest area of a gap for which the lattice is refined, as a fraction of the squared longest side of the model.
 const MIN_GAP_AREA: f64 = 0.003;
 
-/// Length of a voxel over its thickness across narrow gaps. The second value is used where the first would need more than
-/// [`MAX_RESOLUTION`] thicknesses.
+/// Length of a voxel divided by its thickness across narrow gaps. The second value is used where the first would need
+/// more than [`MAX_RESOLUTION`] thicknesses along the model's longest side.
 const STRETCHES: [f64; 2] = [3.0, 8.0];
 
-/// Limit on the model's longest side over the thickness of a voxel with the first of [`STRETCHES`].
+/// Limit on the model's longest side divided by the thickness of a voxel, with the first of [`STRETCHES`].
 const MAX_RESOLUTION: f64 = 250.0;
 
-/// Thin voxels across the narrow part of a gap that a hull leaves open; with six, one of two test figures was bridged.
+/// Number of thin voxels across the narrow part of a gap that a hull leaves open. With six, one of two test figures was
+/// bridged.
 const MIN_OPEN_NARROW_WIDTH: f64 = 7.0;
 
-/// Share of a gap's sheet that is its narrow part.
+/// Share of a gap's sheet that counts as the narrow part.
 const NARROW_SHARE: f64 = 0.1;
 
 /// A gap is measured again on a stretched lattice if the mean `cos^2` between its direction and the thin axis is at least this.
@@ -41,13 +42,13 @@ const MIN_ACROSS: f64 = 0.7;
 /// Voxels are stretched rather than refined if gaps need more than this factor times the voxels of the target.
 const MIN_REFINEMENT: f64 = 2.0;
 
-/// Limit on voxels along the longest side of a stretched lattice, over [`MAX_VOXELS`].
+/// Limit on the voxels along the longest side of a stretched lattice, as a fraction of [`MAX_VOXELS`].
 const MAX_STRETCHED_SHARE: f64 = 0.66;
 
-/// Sample points of a sheet with which a cage is tested for closing the gap.
+/// Number of sample points of a sheet at which a cage is tested for closing the gap.
 const SAMPLES: usize = 32;
 
-/// No wall within reach.
+/// Marks a voxel without a wall within reach.
 const NO_WALL: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
@@ -55,9 +56,9 @@ pub(super) struct Gap {
     pub(super) voxels: Vec<[usize; 3]>,
     /// Area of the sheet, voxels squared.
     pub(super) area: f64,
-    /// Mean distance between the walls, voxels.
+    /// Mean distance between the gap's two walls, voxels.
     width: f64,
-    /// Distance between the walls of its narrow part, voxels: a quantile.
+    /// Distance between the walls at the narrow part of the gap, voxels: the quantile [`NARROW_SHARE`].
     narrow_width: f64,
     /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
@@ -66,15 +67,15 @@ pub(super) struct Gap {
 /// A large gap of the model.
 #[derive(Clone, Debug)]
 pub(super) struct ModelGap {
-    /// Sample points of its sheet, object units.
+    /// Sample points of the gap's sheet, object units.
     points: Vec<Vec3>,
     /// Mean distance between the walls, object units.
     width: f64,
     /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
-    /// Cubic voxels along the model's longest side that leave the gap open.
+    /// Number of cubic voxels along the model's longest side from which on the gap stays open.
     least_voxels: f64,
-    /// Voxels of the chosen lattice that leave the gap open.
+    /// Number of voxels of the chosen lattice along the model's longest side from which on the gap stays open.
     pub(super) voxels: usize,
 }
 
@@ -82,15 +83,15 @@ pub(super) struct ModelGap {
 #[derive(Debug)]
 pub(super) struct NarrowGaps {
     pub(super) gaps: Vec<ModelGap>,
-    /// Longest edge of a voxel over its edge along each axis.
+    /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
     /// Voxels along the model's longest side.
     pub(super) voxels: usize,
 }
 
 /// Finds the large gaps that a lattice of `base` voxels closes or nearly closes, and a lattice of at most `most` voxels
-/// that leaves them open.
-/// A distance of `clearance` to each wall (object units) closes narrower ones on any lattice; these are left out.
+/// that leaves them open. A distance of `clearance` to each wall (object units) closes gaps of less than twice that
+/// width on any lattice; these gaps are left out.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -140,8 +141,8 @@ pub(super) fn narrow_gaps(
     Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
 }
 
-/// Resolution (longest side over voxel thickness) that leaves open the narrow parts of the large gaps across the thin
-/// axis of `stretch`, as far as they are wider than two clearances; 0 without such gaps.
+/// Resolution (longest side divided by voxel thickness) that leaves open the narrow parts of the large gaps across the
+/// thin axis of `stretch`. Ignores narrow parts that are not wider than two clearances; 0 without such gaps.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -173,9 +174,10 @@ fn most_voxels(stretch: DVec3) -> usize {
     if stretch == DVec3::ONE { usize::MAX } else { (MAX_STRETCHED_SHARE * MAX_VOXELS as f64) as usize }
 }
 
-/// Stretch of the voxels. If most gaps have the same direction, voxels that are thin in it need fewer voxels than smaller cubes.
+/// Stretch of the voxels. If most gaps have the same direction, fewer voxels that are thin in this direction are needed
+/// than cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
-    // Number of gaps that stay closed, and voxels that the others need.
+    // Number of gaps that stay closed, and number of voxels that the other gaps need.
     let closed_and_finest = |stretch: DVec3| {
         let most = most_voxels(stretch).min(MAX_VOXELS);
         let needed = || gaps.iter().map(|gap| gap.voxels_of(stretch));
@@ -191,12 +193,12 @@ fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
 }
 
 impl ModelGap {
-    /// Voxels along the model's longest side that leave the gap open.
+    /// Number of voxels with this stretch along the model's longest side from which on the gap stays open.
     fn voxels_of(&self, stretch: DVec3) -> usize {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// If the cage, made with `voxels`, closes the gap: a sentence with its place and a remedy.
+    /// If the cage, made with `voxels` voxels, closes the gap: a sentence with the gap's place and a remedy.
     pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
@@ -228,7 +230,7 @@ impl Gap {
             let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
             winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
         };
-        // Most of three points; the third is needed only if the others differ.
+        // Majority of three points; the third is needed only if the first two differ.
         let [first, second] = [1, 2].map(is_inside);
         if first == second { first } else { is_inside(3) }
     }
@@ -248,7 +250,7 @@ fn voxel(dims: [usize; 3], i: usize) -> [usize; 3] {
     [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]]
 }
 
-/// Gaps of a solid at most `2 * reach` voxels wide, largest first. Ignores voxels of `closed`.
+/// Gaps of a solid that are at most `2 * reach` voxels wide, largest first. Voxels of `closed` belong to no gap.
 pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     let dims = solid.dims;
     let wall = nearest(solid, reach);
@@ -295,8 +297,8 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     gaps
 }
 
-/// Approximate nearest solid voxel of each outside voxel, up to `reach` away; [`NO_WALL`] elsewhere. Propagated between
-/// neighbours, so it may be the second nearest.
+/// Approximate nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere. Results
+/// spread from voxel to voxel, so a result may be the second nearest.
 fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     let dims = solid.dims;
     let square = |i: u32, v: [usize; 3]| {
@@ -323,7 +325,7 @@ fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     wall
 }
 
-/// Graph distance within a sheet from each of its voxels to the crease where its walls meet; `usize::MAX` if they do not meet.
+/// Graph distance within a sheet from each voxel to the crease where its walls meet; `usize::MAX` if they do not meet.
 fn depths(sheet: &Voxels, closed: &Voxels, to_wall: &dyn Fn(usize) -> DVec3) -> Vec<usize> {
     let dims = sheet.dims;
     let mut depth = vec![usize::MAX; dims.iter().product()];

@@ -8,19 +8,21 @@ use super::footprint::Footprint;
 use super::voxels::Voxels;
 use cagework_core::progress::Cancelled;
 
-/// Enlargement of voxels so that the model's ends lie inside voxels, not between two.
+/// Factor by which voxels are enlarged so that the model's ends lie inside voxels, not between two.
 const VOXEL_ENLARGEMENT: f64 = 1.002;
 
-/// Empty voxels between the solid's box and the lattice's, apart from dilation; the outermost layer always stays empty.
+/// Number of empty voxels between the box of the undilated solid and the lattice's box. The outermost layer always
+/// stays empty.
 pub(super) const MARGIN_VOXELS: usize = 6;
 
-/// Smallest edge of a voxel over the largest coordinate that f32 positions resolve.
+/// Smallest edge of a voxel, as a fraction of the largest coordinate, that f32 positions resolve.
 const MIN_VOXEL_RATIO: f64 = 2e-5;
 
-/// Triangles between polls for cancellation.
+/// Number of triangles between polls for cancellation.
 const TRIANGLES_PER_CHECK: usize = 4096;
 
-/// Triangles whose box has more rows are deduplicated (instances at the same place) before they are rasterised.
+/// Triangles whose bounding box has more rows than this are deduplicated before they are rasterised, because instances
+/// at the same place repeat them.
 const MAX_ROWS_WITHOUT_LOOKUP: usize = 64;
 
 /// A lattice of voxels: cubes, or boxes that are thinner along one axis. *Lattice coordinates* count voxels from the
@@ -31,14 +33,15 @@ pub(super) struct Lattice {
     center: DVec3,
     /// Longest edge of a voxel, object units.
     pub(super) cell: f64,
-    /// The longest edge over the edge along x, y, z.
+    /// Longest edge of a voxel divided by its edge along x, y and z.
     stretch: DVec3,
     /// Voxels along x, y, z: even numbers.
     pub(super) dims: [usize; 3],
 }
 
 impl Lattice {
-    /// A lattice whose voxels divide the longest side of `min`..`max` into `n`, with `pad` more voxels on every side.
+    /// A lattice whose voxels divide the longest side of `min`..`max` into `n`, with `pad` additional voxels on every
+    /// side.
     pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
         let extent = max - min;
         let largest = min.abs().max(max.abs()).max_element();

@@ -1,10 +1,10 @@
 //! Cage generation: a box of quads, or a coarse closed surface that follows the model's shape.
 //!
 //! [`generate`] accepts any triangle soup, however open, overlapping or scattered. Steps: conservative voxelisation;
-//! flood fill of the outside; a dilated hull of voxels whose boundary is a 2-manifold by construction; smoothing of its
-//! stairs; edge collapses that never make the cage meet the solid or itself; relaxation and pairing into quads under
-//! the same constraints. The final f32 mesh is verified as a whole. If verification fails, fewer edges are collapsed,
-//! down to the hull itself ([`CageReport::hull`]).
+//! flood fill of the outside; a dilated hull of voxels whose boundary is a 2-manifold by construction; smoothing of the
+//! stairs of this boundary; edge collapses that never make the cage meet the solid or itself; relaxation and pairing
+//! into quads under the same constraints. The final f32 mesh is verified as a whole. If verification fails, fewer edges
+//! are collapsed; as a last resort, the cage is the hull itself ([`CageReport::hull`]).
 //!
 //! Sources: Xian, Lin and Gao 2009 (voxels and hull); Garland and Heckbert 1997 (quadrics); Sander et al. 2000
 //! (progressive hulls). Changes: the constraint is a voxel set and a grid of the cage's own triangles instead of a
@@ -45,7 +45,7 @@ use quads::Faces;
 use shell::Shell;
 use verify::{verify_faces, verify_surface};
 
-/// Limit on the lattices that are tried to meet the target.
+/// Limit on the number of lattices that are tried to meet the target.
 const MAX_LATTICES: usize = 4;
 
 /// A coarser lattice is tried if a cage has more than this multiple of the target number of vertices.
@@ -55,7 +55,8 @@ const MAX_TARGET_RATIO: f64 = 1.1;
 /// bands keep the cage from spanning gaps; `None` does not confine it.
 const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
 
-/// Gaps that stay open have at least this share of the largest gap's area; tried in this order until the target is met.
+/// Smallest area of the gaps that must stay open, as a share of the largest gap's area. The shares are tried in this
+/// order until the target is met.
 const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 
 /// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
@@ -65,10 +66,11 @@ const N_NARROW_BANDS: usize = 3;
 /// leaves more than this multiple of the target, as bridges between pieces and walls of gaps cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// In these cases: ratio of the vertices that collapsing within the budget leaves to the final number of vertices.
+/// In the cases of [`MAX_FIRST_RATIO`]: number of vertices after collapsing within the budget, divided by the final
+/// number.
 const LATER_RATIO: f64 = 3.7;
 
-/// Estimated vertices per open gap: a ring on each side.
+/// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
 /// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps: two seconds of collapses.
@@ -86,7 +88,8 @@ const MAX_SPLIT_ROUNDS: usize = 4;
 /// soup. Takes 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
 ///
 /// # Errors
-/// [`CageGenError`]: an empty model, numbers or options out of range, no cage that passes verification, cancelled.
+/// [`CageGenError`]: the model is empty, numbers or options are out of range, no cage passes verification, or the work
+/// is cancelled.
 pub fn generate(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -112,7 +115,7 @@ fn generate_plain(
     let base = first_voxels(target);
     let most_gaps = target / VERTICES_PER_GAP;
     let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
-        // With subdivision the clearance keeps the surface off the model, and a finer lattice would halve it.
+        // With subdivision, the clearance keeps the surface off the model. A finer lattice would reduce this clearance.
         (Shape::Follow, 0) => {
             let clearance = options.distance(bounds);
             gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &|_| {
@@ -178,7 +181,8 @@ fn generate_plain(
     Err(CageGenError::Unresolved)
 }
 
-/// Initial voxels along the longest side: a cage of few vertices cannot follow small gaps.
+/// Initial number of voxels along the longest side. It grows with the target, as a cage of few vertices cannot follow
+/// small gaps.
 fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }
@@ -187,7 +191,7 @@ fn first_voxels(target: usize) -> usize {
 enum Simplification {
     /// The verified cage, and whether it is the hull itself.
     Cage(Box<Cage>, bool),
-    /// This many vertices are left: try a coarser lattice.
+    /// Too many vertices are left (their number): try a coarser lattice.
     TooMany(usize),
 }
 
@@ -212,7 +216,8 @@ fn simplify_hull(
         let narrow = BAND_LAYERS[..N_NARROW_BANDS]
             .iter()
             .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false, true));
-        // Preference: sharp folds before closed gaps, plates that bend badly before sharp folds.
+        // Order of preference: sharp folds are allowed before gaps are closed, and plates that bend badly before sharp
+        // folds.
         let passes_of_gaps = |&least| {
             let plates = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, true));
             let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, false));
@@ -244,7 +249,8 @@ fn simplify_hull(
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
             return Ok(Simplification::TooMany(left));
         }
-        // Rescale so that relaxation weighs distance against shape as on the target's lattice.
+        // Convert to the lattice that follows from the target, so that relaxation weighs distance against shape as on
+        // it.
         let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
         if let Some(cage) = relax_and_verify(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok(Simplification::Cage(Box::new(cage), false));

@@ -13,9 +13,9 @@ use cagework_core::progress::Cancelled;
 pub const MIN_TARGET: u32 = 8;
 /// Largest target number of vertices.
 pub const MAX_TARGET: u32 = 400;
-/// Fewest voxels along the longest side.
+/// Smallest number of voxels along the longest side.
 pub const MIN_VOXELS: usize = 8;
-/// Most voxels along the longest side.
+/// Largest number of voxels along the longest side.
 pub const MAX_VOXELS: usize = 128;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
@@ -29,7 +29,8 @@ pub const DETAIL: Number = Number {
     name: "detail",
     allowed: "a fraction of the longest side from 0.005 to 0.2",
     is_allowed: |part| (f64::from(0.005_f32)..=f64::from(0.2_f32)).contains(&part),
-    // Logarithmic, from a quarter of the default to four times the default; the step is a share of the way.
+    // The slider is logarithmic, from a quarter of the default to four times the default. The step is a share of its
+    // length.
     slider: Some(Slider { min: 0.007, max: 0.112, step: 0.05 }),
 };
 /// Range of [`CageOptions::clearance`].
@@ -46,7 +47,8 @@ pub const VOXELS: Number = Number {
     is_allowed: |n| n == 0.0 || n.fract() == 0.0 && (MIN_VOXELS as f64..=MAX_VOXELS as f64).contains(&n),
     slider: Some(Slider { min: 16.0, max: MAX_VOXELS as f64, step: 8.0 }),
 };
-/// Quads along each edge of a box cage: 16 give 1,538 vertices, which are solved in minutes.
+/// Range of the number of quads along each edge of a box cage: 16 give 1,538 vertices, whose columns are solved in
+/// minutes.
 pub const DIVISIONS: Number = Number {
     name: "divisions",
     allowed: "a whole number from 1 to 16",
@@ -84,7 +86,7 @@ choice! {
     }
 }
 
-/// The axis that a mirror inverts.
+/// The axis along which a mirror inverts coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mirror {
@@ -154,7 +156,7 @@ impl Default for CageOptions {
 }
 
 impl CageOptions {
-    /// [`CageOptions::clearance`] of a model with the box `min`..`max`, object units.
+    /// [`CageOptions::clearance`] as a distance in object units, for a model with the box `min`..`max`.
     pub(super) fn distance(&self, [min, max]: [DVec3; 2]) -> f64 {
         f64::from(self.clearance) * max.distance(min)
     }
@@ -177,11 +179,11 @@ impl CageOptions {
 pub struct GeneratedCage {
     /// The verified cage; its faces are triangles and quads.
     pub cage: Cage,
-    /// How it was generated.
+    /// Statistics of the generation.
     pub report: CageReport,
 }
 
-/// How a cage was generated.
+/// Statistics of the generation of a cage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageReport {
     /// Target number of vertices.
@@ -192,7 +194,8 @@ pub struct CageReport {
     pub faces: u32,
     /// Number of faces that are quads.
     pub quads: u32,
-    /// Whether the cage has at most a tenth more vertices than the target; otherwise the model's holes and gaps need them.
+    /// Whether the cage has at most a tenth more vertices than the target. If not, the model's holes and gaps need
+    /// more.
     pub target_met: bool,
     /// Voxels along the model's longest side.
     pub voxels: u32,
@@ -202,13 +205,13 @@ pub struct CageReport {
     pub clearance: f32,
     /// Mirror symmetry of the cage.
     pub mirror: Option<Mirror>,
-    /// Gaps of the model that the cage closes, with a remedy; a sentence each.
+    /// Gaps of the model that the cage closes, one sentence each with a remedy.
     pub notices: Vec<String>,
     /// Connected components of the cage.
     pub parts: u32,
-    /// Components of the hull before bridging.
+    /// Number of components of the hull before bridging.
     pub separate: u32,
-    /// Vertices of the hull before simplification.
+    /// Number of vertices of the hull before simplification.
     pub hull_vertices: u32,
     /// Whether the cage is the unsimplified hull.
     pub hull: bool,
@@ -227,16 +230,16 @@ pub enum CageGenError {
     /// The model has no vertices.
     #[error("the model has no vertices")]
     Empty,
-    /// A vertex is not a finite number.
+    /// A coordinate of a model vertex is not a finite number.
     #[error("model vertex {vertex} is not a finite number")]
     NotFinite {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: u32,
     },
     /// A triangle has the index of a vertex that does not exist.
     #[error("model triangle {triangle} names vertex {vertex}, but there are only {n}")]
     Index {
-        /// The triangle.
+        /// Index of the triangle.
         triangle: u32,
         /// The invalid index.
         vertex: u32,

@@ -1,18 +1,19 @@
 //! Pairs triangles into quads: a maximum-weight matching by simulated annealing.
 //!
-//! Seven times the moves give no more quads; see `docs/notes/cage-generator.md`.
+//! Seven times as many moves give no more quads; see `docs/notes/cage-generator.md`.
 
 use glam::DVec3;
 
 use super::guarded::GuardedSurface;
 use cagework_core::contact::Corners;
 
-/// Corners of a quad: vertex, and whether the corner is its mirror image.
+/// Corners of a quad: a vertex, and whether the corner is the vertex's mirror image.
 pub(super) type Quad = [(u32, bool); 4];
 
-/// Smallest cosine between the two triangles of a quad, cut either way: creases stay between quads.
+/// Smallest cosine between the normals of the two triangles of a quad, cut either way. Creases therefore stay between
+/// quads.
 const MIN_FOLD_COSINE: f64 = 0.0;
-/// Largest [`badness`] of a quad.
+/// Largest [`badness`] for which a quad is allowed.
 const MAX_BADNESS: f64 = 4.0;
 /// Number of moves of the annealing, and its initial temperature; a quad is worth about 1.
 const MOVES: usize = 15_000;
@@ -23,16 +24,16 @@ const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 /// The triangle with which a triangle forms a quad.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Partner {
-    /// Unpaired.
+    /// No partner.
     #[default]
     None,
-    /// Its own mirror image.
+    /// The triangle's own mirror image.
     Image,
     /// Another triangle.
     Triangle(u32),
 }
 
-/// Partner and quad weight of every triangle.
+/// Partner of every triangle, and the weight of its quad.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing {
     pub(super) partner: Vec<Partner>,
@@ -49,7 +50,7 @@ pub(super) fn places(surface: &GuardedSurface<'_>, quad: &Quad) -> [DVec3; 4] {
     })
 }
 
-/// Deviation of a quad from a plane: half the distance between its diagonals over its mean side.
+/// Deviation of a quad from a plane: half the distance between its diagonals, divided by its mean side.
 pub(super) fn warp(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let side = 0.25 * (0..4).map(|k| p[k].distance(p[(k + 1) % 4])).sum::<f64>();
@@ -92,7 +93,7 @@ pub(super) fn quad_of(surface: &GuardedSurface<'_>, t: u32, partner: Partner) ->
     }
 }
 
-/// The two triangles of a quad, cut along its other diagonal.
+/// The two triangles of a quad when it is cut along its other diagonal.
 pub(super) fn other_cut(surface: &GuardedSurface<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
     let [a, b, c, d] = quad_of(surface, t, Partner::Triangle(u))?.map(|corner| corner.0);
     let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| surface.positions[i as usize]) };
@@ -105,7 +106,7 @@ pub(super) fn is_free(surface: &mut GuardedSurface<'_>, t: u32, partner: Partner
     other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
 }
 
-/// Weight of a quad in the matching; 0 if it is not allowed.
+/// Weight of a quad in the matching; 0 if the quad is not allowed.
 pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f64 {
     let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
     let [_, (b, _), _, (d, _)] = quad;
@@ -127,12 +128,12 @@ pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f
         return 0.0;
     }
     let worth = 0.25 + 1.0 / (1.0 + badness) + 0.3 * fold;
-    // The other half of the surface gets the other half of the weight.
+    // The quad is shared with the mirrored half of the surface, so each half counts half of the weight.
     if partner == Partner::Image { 0.5 * worth } else { worth }
 }
 
-/// Pairs triangles to maximise the total weight, starting from `before`. `strict`: only quads that may be cut along either
-/// diagonal.
+/// Pairs triangles to maximise the total weight, starting from `before`. `strict`: allows only quads that may be cut
+/// along either diagonal.
 pub(super) fn pair(surface: &mut GuardedSurface<'_>, before: &Pairing, strict: bool) -> Pairing {
     let n = surface.triangles.len();
     let mut near: Vec<Vec<(Partner, f64)>> = vec![Vec::new(); n];
@@ -194,7 +195,8 @@ impl Pairing {
         (self.partner[t as usize], self.weight[t as usize]) = (partner, weight);
     }
 
-    /// Adds a quad, and pairs triangles that lose their partner with others if possible. Returns the gain in weight.
+    /// Adds a quad, and pairs the triangles that lose their partner with others if possible. Returns the gain in
+    /// weight.
     fn exchange(
         &mut self,
         t: u32,
@@ -244,8 +246,8 @@ impl Pairing {
         gain
     }
 
-    /// Splits one of two quads with the same other diagonal: cut along it, both would share an edge of four triangles.
-    /// This occurs at a vertex with two edges.
+    /// Splits one of two quads with the same other diagonal: if both were cut along it, four triangles would share this
+    /// edge. This occurs at a vertex with two edges.
     fn part_doubles(&mut self, surface: &GuardedSurface<'_>) {
         let mut taken = Vec::new();
         for t in 0..self.partner.len() as u32 {

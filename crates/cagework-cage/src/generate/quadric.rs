@@ -3,10 +3,11 @@
 
 use glam::{DMat3, DVec3};
 
-/// Weight of the squared distance to a vertex's original position relative to planes: keeps triangles of flat parts evenly sized.
+/// Weight of the squared distance to a vertex's original position, relative to the planes. It keeps the triangles of
+/// flat parts evenly sized.
 const POINT_WEIGHT: f64 = 0.004;
 
-/// `p . a p - 2 b . p + c`: sum of squared distances weighted by area, voxel units.
+/// The function `p . a p - 2 b . p + c` of a point p: sum of squared distances weighted by area, voxel units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quadric {
     a: DMat3,
@@ -29,7 +30,8 @@ impl Quadric {
         Self::weighted(corner, normal, 0.0)
     }
 
-    /// Squared distance to a triangle's plane, plus a small multiple of that to its corner, weighted by a third of its area.
+    /// Squared distance to a triangle's plane, plus [`POINT_WEIGHT`] times the squared distance to its corner, weighted
+    /// by a third of the triangle's area.
     pub(super) fn of_corner(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, POINT_WEIGHT)
     }
@@ -65,8 +67,8 @@ impl Quadric {
         (p.dot(self.a * p) - 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 
-    /// Cost of a vertex at `p`: area times the fourth power of the RMS distance. The squared distance alone neglects
-    /// thin limbs, whose area is small, and webs grow between them.
+    /// Cost of a vertex at `p`: area times the fourth power of the RMS distance. With the squared distance alone, thin
+    /// limbs, whose area is small, would cost too little, and webs would grow between them.
     pub(super) fn cost(&self, p: DVec3) -> f64 {
         self.at(p).powi(2) / self.area.max(1e-12)
     }
@@ -99,7 +101,7 @@ mod tests {
         let (corner, normal) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 5.0));
         let plane = Quadric::of_plane(corner, normal);
         assert!(plane.at(DVec3::new(-30.0, 8.0, 3.0)) < 1e-9);
-        // Squared distance times a sixth of the length of the normal.
+        // Squared distance 4, weighted by a third of the triangle's area, which is half the length of the normal.
         assert!((plane.at(DVec3::new(4.0, 4.0, 5.0)) - 4.0 * 5.0 / 6.0).abs() < 1e-9);
     }
 }

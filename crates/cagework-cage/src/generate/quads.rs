@@ -13,24 +13,24 @@ use super::unfold::unfold;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
-/// Rounds of vertex moves between two pairings, and after the last one.
+/// Number of rounds of vertex moves after each pairing.
 const ROUNDS: [usize; 3] = [2, 2, 3];
 /// Weight of the mean squared distance from the hull (voxels squared) against [`badness`].
 const DISTANCE_WEIGHT: f64 = 0.6;
-/// Weights of the inverse quality of triangles, and of the two halves of quads.
+/// Weights of the inverse quality of unpaired triangles, and of both halves of quads.
 const TRIANGLE_WEIGHT: f64 = 0.3;
 const HALF_WEIGHT: f64 = 0.01;
 /// Penalty of a quad that can be cut along one diagonal only.
 const SINGLE_CUT_PENALTY: f64 = 6.0;
 /// Step lengths that are tried for a move, as shares of the full step.
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
-/// Length of the outward step that is tried, over the mean distance of a vertex's neighbours.
+/// Length of the outward step that is tried, as a multiple of the mean distance between a vertex and its neighbours.
 const OUTWARD_STEP: f64 = 0.3;
 /// Smallest decrease of the energy for which a move is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 /// Largest [`warp`] of a quad that counts as planar.
 const MAX_PLANAR_WARP: f64 = 1e-2;
-/// Smallest cosine between a triangle's normals before and after a move.
+/// Smallest cosine between the normals of a triangle before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
 /// Pairs the triangles of a surface and moves its vertices to improve the quads.
@@ -97,14 +97,14 @@ impl Star {
             + HALF_WEIGHT * self.all.iter().map(inverse).sum::<f64>()
     }
 
-    /// Penalty of quads whose other diagonal is not allowed.
+    /// Penalty of quads that may not be cut along the other diagonal.
     fn penalty(&self, surface: &mut GuardedSurface<'_>) -> f64 {
         let bound = self.pairs.iter().filter(|[t, u]| !is_free(surface, *t, Partner::Triangle(*u)));
         SINGLE_CUT_PENALTY * bound.count() as f64
     }
 
-    /// Candidate positions: those that make each quad a parallelogram or planar, the mean of the neighbours, the
-    /// minimum of the quadric, and a step outward, where the model does not block either diagonal.
+    /// Candidate positions of the vertex: those that make each quad a parallelogram or planar, the mean of the
+    /// neighbours, the minimum of the quadric, and a step outward. Leaves out positions that the model blocks.
     fn goals(&self, surface: &GuardedSurface<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
         let here = surface.positions[v as usize];
         let mut goals = Vec::new();
@@ -178,8 +178,8 @@ fn straighten(surface: &mut GuardedSurface<'_>, pairing: &Pairing, quadrics: &[Q
     }
 }
 
-/// Cuts every quad along its shorter diagonal, as [`Cage`](cagework_core::cage::Cage) does, or splits it where that is
-/// not allowed.
+/// Cuts every quad along its shorter diagonal, as [`Cage`](cagework_core::cage::Cage) does. Splits a quad into two
+/// triangles if that is not allowed.
 fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
     for t in 0..surface.triangles.len() as u32 {
         let partner = pairing.partner[t as usize];
@@ -206,14 +206,14 @@ fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
 pub(super) struct Faces {
     pub(super) positions: Vec<DVec3>,
     pub(super) faces: Vec<Vec<u32>>,
-    /// A triangle of the half surface for each face.
+    /// A triangle of the half surface from which each face comes.
     pub(super) first: Vec<u32>,
 }
 
 /// Faces of the whole surface with quads for paired triangles.
 pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
     let mut positions = Vec::new();
-    // New indices of each vertex and its image.
+    // New indices of each vertex and of its mirror image.
     let mut number = vec![[u32::MAX; 2]; surface.positions.len()];
     for (v, &p) in surface.positions.iter().enumerate() {
         if surface.around[v].is_empty() {
@@ -241,12 +241,13 @@ pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
         let partner = pairing.partner[t as usize];
         let quad = quad_of(surface, t, partner).filter(|quad| {
             let p = places(surface, quad);
-            // The other diagonal of a quad across the mirror is not guarded; for a planar quad both cuts are the same.
+            // The other diagonal of a quad across the mirror has not been checked; for a planar quad both cuts are the
+            // same.
             let is_guarded = partner != Partner::Image || p[0].distance(p[2]) <= p[1].distance(p[3]);
             is_guarded || warp(&p) <= MAX_PLANAR_WARP
         });
         let corners: Vec<(u32, bool)> = match (quad, partner) {
-            // Emitted with the other triangle.
+            // The quad was added with its other triangle.
             (Some(_), Partner::Triangle(u)) if u < t => continue,
             (Some(quad), Partner::Image) => {
                 faces.push(of(&quad, false));

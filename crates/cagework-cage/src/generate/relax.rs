@@ -9,7 +9,7 @@ use super::quadric::Quadric;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
-/// Rounds over all vertices and edges; more than six do not visibly change the result.
+/// Number of rounds over all vertices and edges; more than six do not visibly change the result.
 const ROUNDS: usize = 6;
 
 /// Weight of the mean squared distance from the hull (voxels squared) against the inverse quality of triangles.
@@ -21,13 +21,13 @@ const STEP_SHARES: [f64; 3] = [0.8, 0.4, 0.15];
 /// Smallest decrease of the energy (dimensionless) for which a change is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 
-/// Smallest cosine between a triangle's normals before and after a move.
+/// Smallest cosine between the normals of a triangle before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.5;
 
-/// Smallest cosine between the normals of each triangle after and before an edge swap.
+/// Smallest cosine between the normals of a triangle before and after an edge swap.
 const MIN_SWAP_COSINE: f64 = 0.6;
 
-/// Most triangles around a vertex after a swap.
+/// Largest number of triangles around a vertex after a swap.
 const MAX_VALENCE: usize = 9;
 
 /// Improves the shape of triangles under the guard's constraints.
@@ -100,7 +100,7 @@ fn slide(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], v: u32) {
     }
 }
 
-/// Swaps the edge from corner `k` of a triangle if that improves both triangles.
+/// Swaps the edge from corner `k` of a triangle if that improves both triangles at the edge.
 fn swap(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], t: u32, k: usize) {
     let Some((other, after)) = surface.swapped(t, k) else { return };
     let [a, d, c] = after[0].index;

@@ -4,11 +4,11 @@ use glam::DVec3;
 
 use super::voxels::Voxels;
 
-/// Limit on the movement of a smoothed vertex along each axis, in voxels. Below half a voxel: the hull is one voxel
-/// away from the solid and keeps more than half of that.
+/// Limit on the movement of a smoothed vertex along each axis, in voxels. The hull is one voxel away from the solid;
+/// with less than half a voxel of movement, more than half a voxel of distance remains.
 pub(super) const SMOOTHING_REACH: f64 = 0.45;
 
-/// Smoothing rounds; eight flatten the stairs of a slanted plane.
+/// Number of smoothing rounds; eight flatten the stairs of a slanted plane.
 const SMOOTHING_ROUNDS: usize = 8;
 
 /// A closed, outward surface in centred voxel units; or, with a mirror, its half on the positive side, bounded by the
@@ -37,7 +37,7 @@ impl Surface {
             for side in 0..6 {
                 let (axis, up) = (side / 2, side % 2 == 1);
                 let mut next = voxel;
-                // The outermost layer is empty, so a next voxel always exists.
+                // The outermost layer is empty, so the neighbouring voxel always exists.
                 next[axis] = if up { voxel[axis] + 1 } else { voxel[axis] - 1 };
                 if voxels.has(next) {
                     continue;
@@ -54,7 +54,8 @@ impl Surface {
                     corner[v] += dv;
                     corner
                 });
-                // Cut along the diagonal between even corners: mirror-symmetric because dimensions are even.
+                // Cut along the diagonal between even corners. This is mirror-symmetric because the dimensions are
+                // even.
                 let even = quad[0].iter().sum::<usize>() % 2 == 0;
                 let [a, b, c, d] = quad.map(|corner| {
                     let slot = &mut number[(corner[2] * corners[1] + corner[1]) * corners[0] + corner[0]];

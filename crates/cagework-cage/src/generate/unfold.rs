@@ -1,4 +1,4 @@
-//! Folds above 120 degrees that collapses left, opened where the solid and the cage itself leave room.
+//! Opens folds above 120 degrees that remain after collapses, where the solid and the cage itself leave room.
 
 use glam::DVec3;
 
@@ -6,20 +6,20 @@ use super::collapse::{MIN_QUALITY, quality};
 use super::guarded::GuardedSurface;
 use cagework_core::contact::Corners;
 
-/// Rounds over all sharp folds.
+/// Number of rounds over all sharp folds.
 const ROUNDS: usize = 4;
 
-/// Steps of a vertex that are tried, over the mean length of its edges.
+/// Lengths of the moves that are tried, as fractions of the mean length of the vertex's edges.
 const STEP_SHARES: [f64; 4] = [0.1, 0.25, 0.5, 1.0];
 
-/// A change must lower the sum of excess cosines by this much.
+/// Smallest decrease of the sum of excess cosines for which a change is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 
 /// Smallest cosine between a triangle's normals before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
-/// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those less. `all_ways`: whether folds that are left
-/// are tried again with moves along each edge and against each normal, too.
+/// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those that remain are less sharp.
+/// `all_ways`: whether vertices at remaining folds are then also moved along each edge and against each normal.
 pub(super) fn unfold(surface: &mut GuardedSurface<'_>, all_ways: bool) {
     run(surface, false);
     if all_ways {
@@ -45,7 +45,7 @@ fn run(surface: &mut GuardedSurface<'_>, all_ways: bool) {
     }
 }
 
-/// Swaps the edge from corner `k` of a triangle if that leaves less excess.
+/// Swaps the edge from corner `k` of a triangle if that reduces the excess of the folds around it.
 fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
     let Some((other, new)) = surface.swapped(t, k) else { return false };
     let before = [t, other].map(|t| surface.corners(t));
@@ -59,7 +59,7 @@ fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
     false
 }
 
-/// Moves a vertex where its triangles have less excess.
+/// Moves a vertex to a position at which its triangles have less excess.
 fn shift(surface: &mut GuardedSurface<'_>, v: u32, all_ways: bool) -> bool {
     let gone = surface.around[v as usize].clone();
     let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
@@ -115,7 +115,8 @@ mod tests {
     use crate::generate::surface::Surface;
     use crate::generate::voxels::Voxels;
 
-    /// Turns across the rim of a square bipyramid of half height h and half side 2 are 180 degrees - 2 atan(h / 2): 163 for 0.3.
+    /// The fold at the rim of a square bipyramid of half height h and half side 2 is 180 degrees - 2 atan(h / 2): 163
+    /// for 0.3.
     #[test]
     fn a_flat_bipyramid_is_opened_to_120_degrees() {
         let positions =

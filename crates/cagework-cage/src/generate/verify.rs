@@ -10,17 +10,17 @@ use cagework_core::contact::{Corners, meeting};
 use cagework_core::geometry::winding_number;
 use cagework_core::mesh::PolygonMesh;
 
-/// Smallest share of the clearance that remains after rounding to f32.
+/// Smallest share of the clearance that must remain after rounding to f32.
 const MIN_CLEARANCE_SHARE: f64 = 0.98;
 
-/// The same for facets of bent faces, which lie slightly inside the guarded triangles.
+/// As [`MIN_CLEARANCE_SHARE`], for facets of bent faces, which lie slightly inside the guarded triangles.
 const MIN_FACET_CLEARANCE_SHARE: f64 = 0.1;
 
-/// Largest distance of a winding number from 1; it is an integer for closed surfaces.
+/// Largest allowed distance of a winding number from 1; off the surface, winding numbers are integers.
 const WINDING_TOLERANCE: f64 = 1e-3;
 
 /// The cage of a whole surface if it passes verification: closed, manifold, outward, free of self-intersections, clear
-/// of the solid and around every part of it. The solid contains the model, so the cage strictly encloses it.
+/// of the solid, and enclosing every part of the solid. The solid contains the model, so the cage strictly encloses it.
 pub(super) fn verify_surface(shell: &Shell, surface: &Surface) -> Option<Cage> {
     let whole = surface.whole();
     verify_faces(shell, &whole.positions, whole.triangles.iter().map(|t| t.to_vec()).collect()).ok()
@@ -79,13 +79,13 @@ pub(super) fn verify_faces(
     if around { Ok(cage) } else { Err(Vec::new()) }
 }
 
-/// Triangles of a cage; quads are cut along both diagonals, as other programs may.
+/// Triangles of a cage. Quads are cut along both diagonals, as other programs may cut them along either.
 struct Cut {
     triangles: Vec<Corners>,
     face_of: Vec<u32>,
-    /// Whether the cage itself cuts the face this way.
+    /// Whether the cage itself cuts the triangle's face this way. `[n_triangles]`
     is_ours: Vec<bool>,
-    /// Whether each is half a quad.
+    /// Whether each triangle is half of a quad. `[n_triangles]`
     is_half: Vec<bool>,
 }
 
@@ -110,13 +110,13 @@ impl Cut {
         cut
     }
 
-    /// Whether a triangle exists when quads are cut as the cage does (`ours`), or along the other diagonal.
+    /// Whether a triangle exists when quads are cut as by the cage (`ours`), or along the other diagonal.
     fn is_of(&self, t: usize, ours: bool) -> bool {
         !self.is_half[t] || self.is_ours[t] == ours
     }
 
-    /// Faces that intersect others or form a sharp fold with them when cut the other way. Of two intersecting faces,
-    /// prefers one that is cut the other way.
+    /// Faces that intersect others, or form a sharp fold with them, when they are cut along the diagonal that the cage
+    /// does not use. Of two intersecting faces, prefers one that is cut along this diagonal.
     fn wrong(&self, obstacle: &Obstacle) -> Vec<u32> {
         let mut wrong = Vec::new();
         for pair in meeting(&self.triangles) {

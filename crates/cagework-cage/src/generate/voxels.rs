@@ -91,7 +91,7 @@ impl Voxels {
         mirrored
     }
 
-    /// Dilation by the 26 neighbours. The outermost layer must be empty.
+    /// Dilation by the 26 neighbours. The outermost layer of the box must be empty.
     pub(super) fn dilated(&self) -> Self {
         let mut along_x = self.bits.clone();
         for (k, wide) in along_x.iter_mut().enumerate() {
@@ -112,7 +112,8 @@ impl Voxels {
         wide
     }
 
-    /// The set with its cavities filled: complement of what face-connects to the box's corner.
+    /// The set with its cavities filled: the complement of the outside voxels that are face-connected to the box's
+    /// corner.
     pub(super) fn filled(&self) -> Self {
         let mut all = Self::new(self.dims);
         for z in 0..self.dims[2] {
@@ -126,8 +127,8 @@ impl Voxels {
         all.without(&reached)
     }
 
-    /// Flood fill: adds to `reached` a voxel and the voxels of this set that are face-connected to it, row by row.
-    /// `waiting`: scratch, false for each row.
+    /// Flood fill: adds to `reached` the voxel `from` and the voxels of this set that are face-connected to it, row by
+    /// row. `waiting`: scratch with one flag per row, all false.
     fn reach(&self, from: [usize; 3], reached: &mut Self, waiting: &mut [bool]) {
         reached.add(from);
         let mut queue = vec![from[2] * self.dims[1] + from[1]];
@@ -183,7 +184,7 @@ impl Voxels {
         }
     }
 
-    /// Adds voxels until the set's boundary is a 2-manifold: where two voxels share only an edge or a corner, their
+    /// Adds voxels until the set's boundary is a 2-manifold. Where two voxels share only an edge or a corner, their
     /// bounding box is filled. Terminates because voxels are only added, within the set's bounding box.
     ///
     /// Well-composedness: Latecki 1997, "3D well-composed pictures". The repair is our own.
@@ -244,7 +245,7 @@ impl Voxels {
         ((row[word] >> bit | above) & 3) as usize
     }
 
-    /// A voxel of every face-connected component.
+    /// One voxel of each face-connected component.
     pub(super) fn parts(&self) -> Vec<[usize; 3]> {
         let (mut seen, mut waiting) = (Self::new(self.dims), vec![false; self.dims[1] * self.dims[2]]);
         let mut parts = Vec::new();
@@ -260,7 +261,7 @@ impl Voxels {
         parts
     }
 
-    /// The voxels of every face-connected component.
+    /// The voxels of each face-connected component.
     pub(super) fn islands(&self) -> Vec<Vec<[usize; 3]>> {
         let mut seen = Self::new(self.dims);
         let mut islands = Vec::new();

@@ -113,7 +113,7 @@ fn cage() -> PolygonMesh {
     mesh
 }
 
-/// Share of a point in the motion of the lower jaw: 0 on the back and above, 1 along the jaw.
+/// Share of the lower jaw's motion with which a point moves: 0 on the back and above, 1 along the jaw.
 fn share_of_jaw(p: Vec3) -> f32 {
     if p.y >= -0.01 {
         return 0.0;

@@ -23,21 +23,21 @@ const TROUSERS: [u8; 3] = [66, 70, 84];
 const SHOE: [u8; 3] = [112, 62, 44];
 const HAIR: [u8; 3] = [74, 50, 36];
 
-/// Trunk from the pelvis to the head: points and radii.
+/// Points and radii of the trunk from the pelvis to the head.
 const TRUNK: [(Vec3, f32); 4] = [
     (vec3(0.0, 0.98, 0.0), 0.15),
     (vec3(0.0, 1.18, 0.0), 0.13),
     (vec3(0.0, 1.42, 0.0), 0.15),
     (vec3(0.0, 1.60, 0.01), 0.065),
 ];
-/// Left arm from the shoulder to the fingers: points and radii.
+/// Points and radii of the left arm from the shoulder to the fingers.
 const ARM: [(Vec3, f32); 4] = [
     (vec3(0.20, 1.46, 0.0), 0.085),
     (vec3(0.47, 1.38, -0.01), 0.062),
     (vec3(0.73, 1.31, 0.04), 0.048),
     (vec3(0.88, 1.27, 0.06), 0.044),
 ];
-/// Left leg from the hip to the toes: points and radii.
+/// Points and radii of the left leg from the hip to the toes.
 const LEG: [(Vec3, f32); 4] = [
     (vec3(0.135, 0.90, 0.0), 0.108),
     (vec3(0.142, 0.50, 0.01), 0.078),
@@ -140,7 +140,7 @@ fn walk(vertices: &[Vec3]) -> Rig {
             4 | 7 => vec3(0.35 * own.sin(), 0.0, -1.1 * side),
             5 | 8 => vec3(0.0, -0.25 * side, 0.0),
             10 | 13 => vec3(-0.42 * own.sin(), 0.0, 0.0),
-            // The knee bends while its leg swings forward.
+            // The knee bends while the leg swings forward.
             11 | 14 => vec3(0.08 + 0.75 * own.cos().max(0.0).powi(2), 0.0, 0.0),
             12 | 15 => vec3(0.12 * own.sin(), 0.0, 0.0),
             _ => Vec3::ZERO,

@@ -7,10 +7,10 @@ use glam::{UVec3, Vec3};
 use super::sdf::Body;
 use cagework_core::mesh::TriMesh;
 
-/// Samples along the edge of a block; blocks far from the surface are skipped.
+/// Lattice points along the edge of a block. Blocks far from the surface are not sampled.
 const BLOCK: u32 = 4;
 
-/// Newton steps from a vertex of the net to the surface; two leave less than 1e-3 of a cell.
+/// Number of Newton steps from a vertex of the net to the surface; two leave less than 1e-3 of a cell.
 const STEPS: usize = 2;
 
 /// Mesh of a body's surface on cells of edge `cell`, with vertex colours.
@@ -45,21 +45,21 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
     (TriMesh { positions, triangles }, colours)
 }
 
-/// Blocks of the lattice, x fastest, with the part of the body near each.
+/// Blocks of the lattice, x fastest, each with the part of the body near it.
 struct Blocks {
     origin: Vec3,
     cell: f32,
     /// Numbers of lattice points and of blocks along each axis.
     n: UVec3,
     n_blocks: UVec3,
-    /// Distance at the block's centre, and the solids that matter in it if the surface can reach it.
+    /// Distance at each block's centre. If the surface can reach the block, also the solids that affect it.
     blocks: Vec<(f32, Option<Body>)>,
 }
 
 impl Blocks {
     fn new(body: &Body, origin: Vec3, cell: f32, n: UVec3) -> Self {
         let n_blocks = (n + (BLOCK - 1)) / BLOCK;
-        // From a block's centre to its farthest sample and one cell beyond.
+        // Distance from a block's centre to its farthest sample, plus one cell.
         let reach = 1.05 * cell * 3.0_f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
         let mut blocks = Vec::with_capacity((n_blocks.x * n_blocks.y * n_blocks.z) as usize);
         for z in 0..n_blocks.z {
@@ -108,7 +108,8 @@ impl Blocks {
 /// Projects a point near the surface onto it by Newton's method.
 fn on_surface(body: &Body, start: Vec3, cell: f32) -> Vec3 {
     let h = 0.05 * cell;
-    // Corners of a tetrahedron: their weighted sum gives the gradient, their mean the distance.
+    // Corners of a tetrahedron. Their sum weighted by distances gives the gradient, the mean of the distances the
+    // distance.
     let corners =
         [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
     let mut p = start;

@@ -1,7 +1,8 @@
 //! Built-in sample models, made by formula: no download and no third-party licence.
 //!
-//! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and projected onto the zero
-//! level, with a cage, poses of that cage and a sentence on what to try. Building one takes a few hundred milliseconds.
+//! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and projected onto
+//! the zero level. A cage, poses of that cage and a sentence on what to try belong to it. Building one takes a few
+//! hundred milliseconds.
 
 mod clamp;
 mod humanoid;
@@ -100,10 +101,10 @@ struct Recipe {
     rig: Option<fn(&[Vec3]) -> Rig>,
 }
 
-/// A pose made by one pull of the model. Stored as bytes because a pull needs a bind.
+/// A pose made by one pull of the model. It is stored as bytes, because a pull needs a bind.
 struct PulledPose {
     name: &'static str,
-    /// The model's vertex nearest to this point is grabbed, object units.
+    /// Point whose nearest vertex of the model is grabbed, object units.
     #[cfg_attr(not(test), expect(dead_code, reason = "only the test that makes the bytes pulls"))]
     at: Vec3,
     /// Displacement of the grab, object units.

@@ -19,7 +19,7 @@ const BELLY: [u8; 3] = [196, 184, 172];
 const SKIN: [u8; 3] = [222, 160, 152];
 const EYE: [u8; 3] = [28, 22, 24];
 
-/// Spine from the hips to the nose: points and radii.
+/// Points and radii of the spine from the hips to the nose.
 const SPINE: [(Vec3, f32); 5] = [
     (vec3(0.0, 0.46, -0.52), 0.34),
     (vec3(0.0, 0.47, -0.05), 0.35),
@@ -28,7 +28,7 @@ const SPINE: [(Vec3, f32); 5] = [
     (vec3(0.0, 0.45, 1.06), 0.06),
 ];
 
-/// Tail from the root to the tip: points and radii.
+/// Points and radii of the tail from the root to the tip.
 const TAIL: [(Vec3, f32); 8] = [
     (vec3(0.0, 0.40, -0.80), 0.105),
     (vec3(0.0, 0.31, -1.05), 0.085),
@@ -40,7 +40,7 @@ const TAIL: [(Vec3, f32); 8] = [
     (vec3(0.0, 0.42, -2.48), 0.038),
 ];
 
-/// Left legs from the hip to the toes: points and radii.
+/// Points and radii of the left legs from the hip to the toes.
 const FRONT_LEG: [(Vec3, f32); 4] = [
     (vec3(0.17, 0.36, 0.36), 0.125),
     (vec3(0.23, 0.20, 0.32), 0.085),

@@ -52,7 +52,7 @@ impl Solid {
     fn steepness(&self) -> f32 {
         match *self {
             Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
-            // The distance is only a bound; a test compares.
+            // The distance function is only a bound; a test checks this constant.
             Self::Ellipsoid { .. } => 2.0,
             Self::Block { .. } => 1.0,
         }
@@ -92,7 +92,7 @@ impl Body {
         self.add(image, blend, colour);
     }
 
-    /// Adds cones along a polyline with radii.
+    /// Adds cones along a polyline of points with radii.
     pub(super) fn add_chain(&mut self, chain: &[(Vec3, f32)], blend: f32, colour: [u8; 3]) {
         for pair in chain.windows(2) {
             let [(a, ra), (b, rb)] = [pair[0], pair[1]];
@@ -113,7 +113,8 @@ impl Body {
         self.parts.iter().fold(f32::MAX, |d, part| smooth_min(d, part.solid.distance(p), part.blend).0)
     }
 
-    /// The solids that affect distance and colour within `reach` of a point. Results there are identical to the whole body's.
+    /// The solids that affect distance and colour within `reach` of a point. Within `reach`, results equal the whole
+    /// body's.
     pub(super) fn near(&self, p: Vec3, reach: f32) -> Self {
         let mut parts = Vec::new();
         let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
@@ -155,7 +156,7 @@ impl Body {
     }
 }
 
-/// Polynomial smooth minimum of two distances, and the share of the second in it.
+/// Polynomial smooth minimum of two distances, and the share of the second distance in it.
 fn smooth_min(a: f32, b: f32, blend: f32) -> (f32, f32) {
     if blend <= 0.0 || a - b >= blend {
         return if b < a { (b, 1.0) } else { (a, 0.0) };

@@ -14,7 +14,7 @@ pub(super) struct Bone {
     pub(super) to: Vec3,
     /// Radius of the limb, the unit of distances from the bone.
     pub(super) radius: f32,
-    /// Index of the parent, lower than its own. The root's is its own.
+    /// Index of the parent, lower than the bone's own index. The root is its own parent.
     pub(super) parent: usize,
 }
 
@@ -41,7 +41,8 @@ impl Skeleton {
             .collect()
     }
 
-    /// Positions after bones have rotated. `turns`: (bone, rotation vector in radians, rest axes). `[n]`
+    /// Positions of points after bones have rotated. `turns`: (bone, rotation vector in radians about rest axes).
+    /// `[n_points]`
     pub(super) fn pose(&self, points: &[Vec3], turns: &[(usize, Vec3)]) -> Vec<Vec3> {
         let mut motion: Vec<Affine3A> = Vec::with_capacity(self.bones.len());
         for (k, bone) in self.bones.iter().enumerate() {
@@ -81,8 +82,8 @@ impl Skeleton {
         weights.into_iter().map(|weight| weight / total).collect()
     }
 
-    /// A rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: of the bones;
-    /// `turns`: rotation vector of a bone at a key, radians; `lift`: translation of the root at a key.
+    /// A rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: names of the
+    /// bones; `turns`: rotation vector of a bone at a key, radians; `lift`: translation of the root at a key.
     pub(super) fn rig(
         &self,
         names: &[&'static str],

@@ -9,7 +9,7 @@ use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 
-/// Mean rest error over the diagonal: f32 rounding of the corrected rows.
+/// Largest mean rest error, as a fraction of the diagonal: f32 rounding of the corrected rows.
 const REST_ERROR: f64 = 2e-6;
 
 fn recipes() -> [Recipe; 4] {
@@ -52,7 +52,8 @@ fn poses_move_part_of_the_cage_and_keep_its_vertex_count() {
     }
 }
 
-/// Regenerates stored poses: when a sample's model, cage or pull has changed, it rewrites the file and fails once.
+/// Regenerates stored poses: if a sample's model, cage or pull has changed, the test rewrites the pose's file and fails
+/// once.
 #[test]
 fn the_last_pose_of_each_sample_is_that_of_its_pull() {
     for (info, recipe) in all().iter().zip(recipes()) {
@@ -135,7 +136,7 @@ fn a_pruned_body_has_the_same_distance_and_colour() {
     }
 }
 
-/// The page opens with a sample, so none may show a problem.
+/// The page opens with a sample, so no sample may have a problem.
 #[test]
 fn no_sample_has_a_problem() {
     for info in all() {
