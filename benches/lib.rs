@@ -29,7 +29,7 @@ pub const GRIDS: [u32; 3] = [32, 64, 128];
 pub struct Input {
     /// Mesh vertices, object units.
     pub points: Vec<Vec3>,
-    /// The cage around them.
+    /// The cage around the points.
     pub cage: Cage,
 }
 
@@ -57,7 +57,7 @@ impl Input {
         input
     }
 
-    /// Binds with the default tau.
+    /// Binds the input with the default tau.
     ///
     /// # Panics
     /// If the input cannot be bound.

@@ -12,8 +12,8 @@ const TIMES: usize = 60;
 /// Number of repetitions of binds that take seconds.
 const TIMES_SLOW: usize = 3;
 
-/// Sum over all batches of the minimum time of each, ms. Batches are interleaved, so that each finds the caches as the previous batch
-/// left them.
+/// Sum over all batches of the minimum time of each batch, ms. Batches are interleaved, so that each finds the caches
+/// as the previous batch left them.
 fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut fastest = vec![f64::INFINITY; n_batches];
     for _ in 0..TIMES {

@@ -1,10 +1,12 @@
 //! Generates cages of four sizes for models defined by formulas, and measures their quality for other triangulations and for bending.
 //! Prints a Markdown table with a row per cage and a summary per size.
 //!
-//! Crossings (pairs of intersecting triangles), open (edges that do not belong to two triangles) and outside (model vertices) are the worst
-//! of four triangulations: diagonals from the first vertex, from the second, the shorter and the longer ones. Fold is the largest angle
-//! between the normals of adjacent triangles, for either diagonal of each quad. Off and over: the cage is bent by 1.2 rad along its longest
-//! side; off is the largest distance of the model from the exact bend, relative to its diagonal; over is the number of flipped triangles.
+//! The columns `crossings` (pairs of intersecting triangles), `open` (edges that do not belong to two triangles) and
+//! `outside` (model vertices) give the worst of four triangulations: diagonals from the first vertex, from the second,
+//! the shorter and the longer ones. The column `fold` is the largest angle between the normals of adjacent triangles,
+//! for either diagonal of each quad. For `off` and `over`, the cage is bent by 1.2 rad along its longest side: `off` is
+//! the largest distance of the model from the exact bend, relative to its diagonal, and `over` is the number of flipped
+//! triangles.
 //!
 //! `cargo bench -p cagework-benches --bench survey -- cup` measures the models whose names contain `cup`.
 

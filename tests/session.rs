@@ -104,14 +104,15 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
-/// In compute and draw-only sessions, with parts set before and after the weights, and after recovery on another device.
+/// Held and rigid parts, set before or after the weights or copied to another device, move the mesh as in an export,
+/// with compute kernels and on devices that only draw.
 #[test]
 fn parts_are_restored_as_in_an_export() {
     let (rest, cage) = input();
     let cpu = on_cpu(&options(Method::Embedded, Solver::Multigrid));
     let pose = posed(cage.positions());
     let n = rest.len() as u32;
-    // One vertex in five stays in place, and one in five stays by half; two pieces are rigid.
+    // One vertex in five stays in place, and one vertex in five moves half as far; two pieces are rigid.
     let stays = (0..n).map(|v| [0.0, 1.0, 0.0, 0.5, 0.0][v as usize % 5]).collect();
     let parts = Parts { stays, rigid: vec![(0..n / 4).collect(), (n / 2..n / 2 + 9).collect()] };
     let expected = parts.hold(&rest, &deform_bound(&cpu.weights, &cpu.frames, &pose));
@@ -160,7 +161,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     }
 }
 
-/// As in a browser without WebGPU: the processor binds and deforms, and a lost device is recovered.
+/// Tests a device as in a browser without WebGPU: the processor binds and deforms, and a lost device is recovered.
 #[test]
 fn session_that_only_draws_equals_the_cpu() {
     let only = ContextOptions { draws_only: true, ..ContextOptions::default() };
@@ -193,7 +194,7 @@ fn several_batches_give_the_same_weights() {
     let options = BindOptions { grid: 48, ..options(Method::Embedded, Solver::Multigrid) };
     let mut whole = session();
     let report = block_on(whole.bind(&options, &Silent)).expect("it binds");
-    // 16 of 112 columns of the finest level per batch.
+    // The limit allows batches of 16 of the 112 columns on the finest level.
     let limit = (report.levels[0] + 2) * 4 * 16 + 100;
     let limited = ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() };
     let mut split = session_with(&limited);

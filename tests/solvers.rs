@@ -16,14 +16,14 @@ use glam::Vec3;
 use pollster::block_on;
 use suite::BackEnd;
 
-/// One test per property, for one back end.
+/// Declares one test per property, for one back end.
 macro_rules! properties {
     ($back_end:expr; $($module:ident::$property:ident,)*) => {
         $(#[test] fn $property() { crate::suite::$module::$property(&$back_end); })*
     };
 }
 
-/// A module of tests: `every` for the properties of both methods, `embedded` for all properties.
+/// Declares a module of tests: `every` for the properties of both methods, `embedded` for all properties.
 macro_rules! solver_suite {
     ($name:ident, every, $back_end:expr) => {
         mod $name {
@@ -172,7 +172,7 @@ mod multigrid {
     }
 }
 
-/// Difficult cages. All back ends use the same levels and stencils, so one of them suffices.
+/// Difficult cages. All back ends use the same levels and stencils, so testing one back end suffices.
 mod any_cage {
     use super::*;
 
@@ -186,8 +186,8 @@ mod any_cage {
     }
 }
 
-/// Multigrid on every back end, and conjugate gradients with it as preconditioner. The other solvers take seconds at g = 64;
-/// [`agreement`] compares them with multigrid.
+/// Multigrid on every back end, and conjugate gradients with a V-cycle as preconditioner. The other solvers take
+/// seconds at g = 64; [`agreement`] compares them with multigrid.
 mod accuracy {
     use super::*;
 

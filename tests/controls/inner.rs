@@ -92,7 +92,7 @@ fn bent_bone_rotates_the_points_around_it_without_twist() {
             *controls.last_mut().unwrap() = turn * joints[2];
             let posed = deform_bound(&binding.weights, &binding.frames, &controls);
             for (v, p) in points.iter().enumerate().filter(|(_, p)| (0.18..0.32).contains(&p.z)) {
-                // Offsets across the bone, and along it.
+                // Compare the offsets to the opposite point across the bone, and to a point further along the bone.
                 for other in [v - v % 8 + (v + 4) % 8, v + 80] {
                     let [rest, posed] = [points[other] - *p, posed[other] - posed[v]];
                     let off = (turn * rest).angle_between(posed).to_degrees();
@@ -150,7 +150,7 @@ fn weights_are_linear_along_a_tube() {
     let way = (b - a).normalize();
     let side = way.any_orthonormal_vector();
     let shares: Vec<f32> = (1..20).map(|k| k as f32 / 20.0).collect();
-    // Inside the tube, and just outside its surface.
+    // The points are inside the tube, then just outside its surface, each with the largest allowed error.
     for (distance, most) in [(0.5 * radius, 1e-4), (1.06 * radius, 0.02)] {
         let around = |s: f32| {
             (0..6).map(move |k| a.lerp(b, s) + Quat::from_axis_angle(way, k as f32) * (distance * side))
@@ -189,7 +189,7 @@ fn all_kinds() -> ControlSet {
     ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap()
 }
 
-/// Points in that cage, with extra points inside inner controls and next to them.
+/// Points in the cage of [`all_kinds`], with extra points inside inner controls and next to them.
 fn everywhere() -> Vec<Vec3> {
     let mut points = scattered(1500, Vec3::splat(-0.99), Vec3::splat(0.99));
     for center in [Vec3::new(-0.5, 0.5, 0.2), Vec3::new(0.0, -0.4, 0.1)] {
@@ -239,7 +239,7 @@ fn affine_maps_of_all_controls_are_reproduced() {
             let controls: Vec<Vec3> = Controls::from(&set).rest().iter().map(|&p| motion(p)).collect();
             let posed = deform_bound(&binding.weights, &binding.frames, &controls);
             for (p, at) in points.iter().zip(posed) {
-                // 1e-5 relative to a size of 2.
+                // The tolerance is 1e-5 of the cage's size of 2.
                 assert!(at.distance(motion(*p)) < 2e-5, "{p}: {at}");
             }
         }
@@ -321,7 +321,7 @@ fn many_small_balls_do_not_stall_the_solve() {
         assert!(report.notices.iter().any(|n| n.contains("conjugate gradients")), "{:?}", report.notices);
         for c in 0..Controls::from(&set).n_controls() {
             for (w, expected) in column(&binding, c).iter().zip(column(&expected, c)) {
-                // Ten times tau.
+                // The tolerance is ten times tau.
                 assert!((w - expected).abs() < 1e-4, "control {c}: {w}, not {expected}");
             }
         }

@@ -75,8 +75,9 @@ fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) 
 /// Rounding of f32 weights between two binds with different batches of columns.
 const ROUND_OFF: f64 = 1e-5;
 
-/// Boundary values on bent quads miss the rest position by up to 2 % of the bend. Restoring rows distributes this error among the
-/// controls in one bind, and among the vertices of the subdivided cage in the other. The weights differ by at most this multiple of it.
+/// Boundary values on bent quads miss the rest position by up to 2 % of the bend. Restoring rows distributes this error
+/// among the controls in one bind, and among the vertices of the subdivided cage in the other bind. The weights of the
+/// two binds differ by at most this multiple of the error.
 const MAX_ERROR_RATIO: f64 = 2.0;
 
 #[test]

@@ -209,14 +209,14 @@ fn orthographic_from_above() {
 #[test]
 fn formats_without_srgb_look_the_same() {
     let mut session = creature();
-    // Only opaque elements, because blending happens in sRGB there.
+    // Draw only opaque elements, because such formats blend sRGB values.
     let bare = SceneOptions { floor: false, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.set_scene(bare);
     let expected = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
     let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);
     let n = expected.len();
     let sum: f64 = expected.iter().zip(&actual).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
-    // Multisampling averages in sRGB there, so edges are slightly darker.
+    // With such formats, multisampling averages sRGB values, so edges are slightly darker.
     assert!(sum / (n as f64) < 1.0, "{}", sum / n as f64);
 }
 

@@ -5,7 +5,7 @@ use cagework_tests::{Random, assert_close, dense, points};
 
 use super::{BackEnd, WEIGHT_TOLERANCE};
 
-/// Both solve the same equations, to an error far below the discretisation error.
+/// Both back ends solve the same equations, to an error far below the discretisation error.
 pub(crate) fn solvers_agree(a: &BackEnd, b: &BackEnd) {
     let turn = Random::new(20).rotation();
     for mesh in [c_shape(), moved(&triangulated(&c_shape()), |p| turn * p)] {

@@ -48,7 +48,7 @@ fn assert_independent(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, tole
     for (mesh, columns) in [(a, 0..n), (b, n..both.n_vertices())] {
         let alone = cage(mesh);
         let points = points::inside(&alone, 300, 72);
-        // The cell size that the cage of both parts has at g = 64.
+        // Use the cell size that the cage of both parts has at g = 64.
         let length = |c: &Cage| c.bounds().extent().max_element();
         let grid = (64.0 * length(&alone) / length(&both)).round() as u32;
         let expected = dense(&back_end.bind_with(&points, &alone, |o| o.grid = grid).weights);
@@ -109,7 +109,7 @@ fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &
 pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     let overlap = 0.03 * 6.0 / 64.0;
     let limbs = [
-        // Half inside the body; and overlapping it by 3 % of a cell.
+        // The first limb is half inside the body, the second overlaps the body by 3 % of a cell.
         [DVec3::new(2.0, 1.2, 1.3), DVec3::new(6.0, 2.6, 2.7)],
         [DVec3::new(4.0 - overlap, 1.2, 1.3), DVec3::new(6.0, 2.6, 2.7)],
     ];
@@ -218,7 +218,7 @@ pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd
     for lifts in lifts.windows(2) {
         let after = bind(lifts[1]);
         let change = largest_change(&before, &after);
-        // 1e-5: rounding, and the solver's error.
+        // The constant 1e-5 allows for rounding and the solver's error.
         let allowed = 20.0 * (lifts[1] - lifts[0]) + 1e-5;
         assert!(change <= allowed, "from {} to {}: a weight changes by {change}", lifts[0], lifts[1]);
         before = after;
@@ -229,7 +229,7 @@ pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd
 pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &BackEnd) {
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
-    // A rotated bar, which grid lines also leave through its other sides.
+    // The bar is rotated, so grid lines also leave it through its other sides.
     let turn = Random::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
     for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {

@@ -39,8 +39,9 @@ pub(crate) fn tetrahedron_is_barycentric(back_end: &BackEnd) {
     }
 }
 
-/// The classic method takes boundary values at the point of the cage closest to a cell's centre, and a vertex takes the weights of its
-/// cell. Each moves a point by at most half a cell's diagonal, and the exact coordinates are linear.
+/// The classic method takes boundary values at the point of the cage closest to a cell's centre, and a vertex takes the
+/// weights of its cell. Each of the two moves a point by at most half a cell's diagonal, and the exact coordinates are
+/// linear.
 pub(crate) fn tetrahedron_is_barycentric_within_a_cell(back_end: &BackEnd) {
     let cage = cage(&tetrahedron(CORNERS));
     let points = points::inside(&cage, 300, 1);
@@ -84,7 +85,8 @@ pub(crate) fn error_is_second_order(back_end: &BackEnd) {
         got.iter().zip(&expected).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / got.len() as f64
     });
     for pair in errors.windows(2) {
-        // Second order reduces the error to a quarter, roughly because cells intersect the cage differently on each grid.
+        // Second order reduces the error to about a quarter. The factor varies, because cells intersect the cage
+        // differently on each grid.
         let ratio = pair[0] / pair[1];
         assert!(
             (3.0..5.5).contains(&ratio),

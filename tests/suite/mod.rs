@@ -25,7 +25,7 @@ pub(crate) type Bind = fn(&[Vec3], &Cage, &BindOptions, &dyn Progress) -> Result
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BackEnd {
     pub(crate) bind: Bind,
-    /// Method, solver and threads; properties change the rest.
+    /// Method, solver and threads; properties set the other options.
     pub(crate) options: BindOptions,
 }
 
@@ -52,7 +52,7 @@ impl BackEnd {
         (self.bind)(points, cage, &options, &Silent)
     }
 
-    /// [`Self::try_bind`], asserting success.
+    /// Like [`Self::try_bind`], but panics on errors.
     pub(crate) fn bind_with(
         &self,
         points: &[Vec3],
@@ -62,7 +62,7 @@ impl BackEnd {
         self.try_bind(points, cage, edit).expect("this input can be bound")
     }
 
-    /// [`Self::bind_with`] without an edit.
+    /// Like [`Self::bind_with`], without changes of the options.
     pub(crate) fn bind(&self, points: &[Vec3], cage: &Cage) -> Binding {
         self.bind_with(points, cage, |_| ())
     }

@@ -10,7 +10,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::BackEnd;
 
-/// 1e-5 relative to positions of size 5.
+/// Tolerance for affine maps: 1e-5 relative to positions of size 5.
 const AFFINE_TOLERANCE: f32 = 5e-5;
 
 /// Points inside the C, points within 5 % of its diagonal (5.1) outside, some of them in its gap, and corners of a box beyond 15 %.

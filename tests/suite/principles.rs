@@ -73,7 +73,7 @@ pub(crate) fn points_are_reproduced(back_end: &BackEnd) {
         assert_eq!(binding.outside, []);
         assert_combined(&binding.weights, cage.positions(), &points, REST_TOLERANCE * diagonal);
         assert!(binding.report.rest_error.max_rel <= REST_TOLERANCE);
-        // The accuracy before rows are restored.
+        // The raw error is the error before rows are restored.
         let raw = binding.report.raw_error.point_rel;
         assert!(raw.max <= f64::from(WEIGHT_TOLERANCE), "{raw:?}");
     }
@@ -83,7 +83,7 @@ pub(crate) fn affine_motion_is_followed(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 400, 8);
     let binding = back_end.bind(&points, &cage);
-    // Shear, scaling, reflection and translation.
+    // The map contains shear, scaling, reflection and translation.
     let matrix = Mat3::from_cols_array(&[1.5, 0.3, -0.2, 0.4, -0.7, 0.1, 0.0, 0.6, 2.0]);
     let to = |p: &Vec3| matrix * *p + Vec3::new(3.0, -2.0, 1.0);
     let [posed, expected] = [cage.positions(), &points].map(|p| p.iter().map(to).collect::<Vec<_>>());

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::BackEnd;
 
-/// Number of vertices that have weights by Walk on Spheres: the first ones.
+/// Number of vertices with weights by Walk on Spheres, which are the first vertices.
 const N_WALKED: usize = 100;
 
 /// Limit of the mean error of a weight at g = 64; measured 6.9e-5. Taking the weights of the nearest cell centre gives 3.3e-4.

@@ -21,7 +21,8 @@ pub(crate) fn inside_out_cage_gives_the_same_weights(back_end: &BackEnd) {
 pub(crate) fn unused_cage_vertex_has_no_weight(back_end: &BackEnd) {
     let mesh = l_shape();
     let mut with_one_more = mesh.clone();
-    // Inserted first, so that all other columns are shifted by one; far away, so that it would enlarge the grid if it were used.
+    // The unused vertex is the first, so that all other columns are shifted by one, and far away, so that it would
+    // enlarge the grid if it were used.
     with_one_more.positions.insert(0, Vec3::splat(50.0));
     for i in with_one_more.faces.iter_mut().flatten() {
         *i += 1;
@@ -47,7 +48,7 @@ pub(crate) fn components_do_not_feel_each_other(back_end: &BackEnd) {
         let in_first = p.x < 1.0 + 0.5 * gap;
         let (columns, row) = binding.weights.row(v);
         for (&i, &w) in columns.iter().zip(row) {
-            // Coarse levels of multigrid couple both components; the cycles reduce that below tau.
+            // Coarse levels of multigrid couple both components; the cycles reduce this coupling below tau.
             assert!(
                 (i < n_first) == in_first || w < TAU,
                 "vertex {v} at {p} has weight {w} of cage vertex {i}"
@@ -112,7 +113,7 @@ pub(crate) fn quads_that_are_not_planar_reproduce_points(back_end: &BackEnd) {
     assert!(binding.report.weights.min >= -1e-6);
 }
 
-/// Like the leg of a horse on a coarse grid: few or no cell centres are inside.
+/// Few or no cell centres are inside such parts, as in the leg of a horse on a coarse grid.
 pub(crate) fn parts_thinner_than_a_cell_get_weights(back_end: &BackEnd) {
     let leg = moved(&blocks(&[[0, 0, 0], [0, 0, 1]]), |p| p * Vec3::new(0.02, 0.02, 1.0));
     let with_body = together(&cuboid(Vec3::new(1.0, 0.0, 0.0), Vec3::new(2.0, 1.0, 2.0)), &leg);

@@ -75,7 +75,8 @@ pub fn sphere(times: u32) -> PolygonMesh {
     rounded(octahedron(), times)
 }
 
-/// The same for an icosahedron: 12, 42, 162, 642, 2,562 vertices.
+/// An icosahedron with its faces split in four `times` times, projected onto the unit sphere: 12, 42, 162, 642, 2,562
+/// vertices.
 #[must_use]
 pub fn icosphere(times: u32) -> PolygonMesh {
     rounded(icosahedron(), times)
@@ -173,7 +174,7 @@ pub fn c_shape() -> PolygonMesh {
     blocks(&arms.chain((0..3).map(|y| [0, y, 0])).collect::<Vec<_>>())
 }
 
-/// The same C with one concave polygon for each of its two caps; 16 vertices.
+/// The shape of [`c_shape`] with one concave polygon for each of its two caps; 16 vertices.
 #[must_use]
 pub fn c_prism() -> PolygonMesh {
     const OUTLINE: [[f32; 2]; 8] =
@@ -185,7 +186,7 @@ pub fn c_prism() -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(1.0)).collect(), faces }
 }
 
-/// A bar of length 4 and the given thickness, not aligned with an axis. Thinner than the cells of a coarse grid.
+/// A bar of length 4 and the given thickness, not aligned with an axis, and thinner than the cells of a coarse grid.
 #[must_use]
 pub fn thin_bar(thickness: f32) -> PolygonMesh {
     let long = blocks(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]);

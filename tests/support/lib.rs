@@ -1,4 +1,4 @@
-//! Shared by tests and benches: seeded random numbers, cages with known coordinates, points inside them, comparison.
+//! Helpers of tests and benches: seeded random numbers, cages with known coordinates, points inside them, comparison.
 //!
 //! All inputs are generated, so that no test depends on a file outside the repository.
 

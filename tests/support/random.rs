@@ -26,18 +26,18 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in `[0, 1)`.
+    /// A number that is uniformly distributed in `[0, 1)`.
     pub fn unit(&mut self) -> f32 {
         // 24 bits, so that the value is exact in f32.
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// Uniform in `[low, high)`.
+    /// A number that is uniformly distributed in `[low, high)`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in the box from `min` to `max`.
+    /// A point that is uniformly distributed in the box from `min` to `max`.
     pub fn point(&mut self, min: Vec3, max: Vec3) -> Vec3 {
         let t = Vec3::new(self.unit(), self.unit(), self.unit());
         min + t * (max - min)
