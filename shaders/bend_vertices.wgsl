@@ -1,9 +1,10 @@
 // Adds the cage's displacement field to skinned positions: x += u(x). u is given at the nodes of a lattice and
-// interpolated linearly. One invocation per vertex, in place, after skin_vertices. A storage buffer, because 16-bit
-// textures are too coarse and 32-bit ones not filterable everywhere. CPU: cagework_core::field::bend_vertices.
+// interpolated linearly. One invocation per vertex, in place, after skin_vertices. The field is in a storage buffer,
+// because 16-bit textures are too coarse and 32-bit textures cannot be filtered everywhere. CPU:
+// cagework_core::field::bend_vertices.
 
 struct Field {
-    /// First node, object units.
+    /// Position of the first node, object units.
     origin: vec3f,
     /// Edge of a cell, object units.
     cell: f32,

@@ -1,4 +1,4 @@
-// The camera, common to all draw shaders. Mirrored by cagework_gpu::render::layout::Camera.
+// The camera, which all draw shaders use. Mirrored by cagework_gpu::render::layout::Camera.
 
 struct Camera {
     clip_from_world: mat4x4f,
@@ -13,7 +13,7 @@ struct Camera {
     scale: f32,
     /// 1 if shaders must encode sRGB, because the target's format does not.
     encode: u32,
-    /// Background at the top and bottom, linear.
+    /// Colours of the background at the top and the bottom, linear.
     background_top: vec4f,
     background_bottom: vec4f,
     /// Colour of the floor grid, linear, straight alpha.
@@ -47,7 +47,7 @@ fn linear_from_srgb(srgb: vec3f) -> vec3f {
     return select(high, srgb / 12.92, srgb <= vec3f(0.04045));
 }
 
-/// Colour for the target: premultiplied, sRGB if the format does not encode.
+/// Colour for the target: premultiplied, and in sRGB if the target's format does not encode.
 fn to_target(linear: vec3f, alpha: f32) -> vec4f {
     var color = clamp(linear, vec3f(0.0), vec3f(1.0));
     if camera.encode == 1u { color = srgb_from_linear(color); }

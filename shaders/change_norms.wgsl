@@ -1,10 +1,10 @@
 // Inner sum of Eq. 2: change of each cell's weights between two fields, summed over the columns of a batch.
 // One invocation per row; batches add to `changes`. CPU: cagework_core::stencil::change_norms.
 
-/// Bits of `mode`: absolute values instead of squares; overwrite, for the first batch.
+/// Bits of `mode`: sum absolute values instead of squares; overwrite `changes`, for the first batch.
 const CHANGE_ABSOLUTE = 1u;
 const CHANGE_FIRST = 2u;
-/// Smaller changes of a weight are ignored: their squares would be denormal.
+/// Changes of a weight below this are ignored, because their squares would be denormal.
 const CHANGE_NEGLIGIBLE = 1e-18f;
 
 @group(0) @binding(0) var<uniform> work: Work;

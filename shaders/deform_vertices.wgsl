@@ -8,11 +8,11 @@ const BUNDLE = 4u;
 const SLICE = 8u;
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// First entry of each slice in `columns` and `weights`, over 8.
+/// First entry of each slice in `columns` and `weights`, divided by 8.
 @group(0) @binding(1) var<storage, read> slices: array<u32>;
-/// Control vertices of a bundle; padding has weight 0.
+/// Control vertices of the bundles' entries. Padding entries have the weight 0.
 @group(0) @binding(2) var<storage, read> columns: array<u32>;
-/// Weights of the bundle's four vertices.
+/// Weights of the bundle's four vertices, one vec4f per entry.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;
 @group(0) @binding(4) var<storage, read> cage: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> positions: array<vec4f>;

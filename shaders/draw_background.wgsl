@@ -1,4 +1,4 @@
-// Vertical background gradient, dithered by half a step against banding. One triangle.
+// Vertical background gradient, dithered by half a colour step against banding. One triangle.
 
 struct Varying {
     @builtin(position) clip: vec4f,

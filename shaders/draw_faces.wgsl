@@ -1,5 +1,5 @@
-// Selected faces of the cage, translucent. Two items per triangle: (state and first corner, second), (third,
-// unused). One instance per triangle, three vertices each.
+// Selected faces of the cage, translucent. Each triangle has two items: (state and first corner, second corner) and
+// (third corner, unused). One instance per triangle, three vertices each.
 
 struct Varying {
     @builtin(position) clip: vec4f,

@@ -27,14 +27,14 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let along = select(vec2f(1.0, 0.0), from_a / max(length, 1e-6), length > 1e-6);
     let across = vec2f(-along.y, along.x);
     let half_width = 0.5 * state_width(state);
-    // Half a pixel for the anti-aliased edge.
+    // Add half a pixel for the anti-aliased edge.
     let reach = half_width + 0.5;
     let is_b = index == 1u || index == 3u || index == 5u;
     let up = select(-reach, reach, index == 2u || index == 3u || index == 4u);
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
     let offset = (along * beyond + across * up) * camera.pixel;
-    // Divide by w here for interpolation linear in the picture: WebGL2 lacks `linear` interpolation.
+    // Divide by w here, so that interpolation is linear on the screen: WebGL2 lacks `linear` interpolation.
     let clip = vec4f(own.xy / own.w + offset, lifted(own).z / own.w, 1.0);
     return Varying(clip, vec2f(select(0.0, length, is_b) + beyond, up), length, half_width, state_color(state));
 }

@@ -1,4 +1,4 @@
-// The mesh with its material, or with weights or errors in colours, in studio light. Vertices:
+// Draws the mesh with its material, or coloured by weights or errors, in studio light. The vertices come from
 // mesh_buffers.wgsl or mesh_textures.wgsl.
 
 struct Surface {
@@ -6,9 +6,10 @@ struct Surface {
     base_color: vec4f,
     /// Source of the colour: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
     mode: u32,
-    /// Fragments with less alpha are discarded.
+    /// Fragments with an alpha below this are discarded.
     alpha_cutoff: f32,
-    /// Values of the first and last colour. With materials, `high` is the strength of greying by `value`, 0 or 1.
+    /// Values of the first and last colour of the map. With materials, `high` is the strength of greying by `value`, 0
+    /// or 1.
     low: f32,
     high: f32,
 }
@@ -29,7 +30,7 @@ const GREY_DESATURATION = 0.8;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    // Centroid: extrapolated normals at outlines would face away from the eye.
+    // Centroid interpolation: normals that are extrapolated at outlines would face away from the eye.
     @location(0) @interpolate(perspective, centroid) world: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) uv: vec2f,
@@ -56,7 +57,7 @@ fn value_color(value: f32) -> vec3f {
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
-    // Before branches: derivatives need complete 2x2 quads.
+    // Compute derivatives before branches, because they need complete 2x2 quads.
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let flat_normal = cross(dpdx(in.world), dpdy(in.world));
     var base = surface.base_color * in.color * texel;
@@ -71,7 +72,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
         base = vec4f(mix(base.rgb, vec3f(GREY_BRIGHTNESS * grey), strength), base.a);
     }
     var normal = in.normal;
-    // Both sides are lit. If the vertex normal is zero (triangles without area), use the derivative's normal.
+    // Light both sides. If the vertex normal is zero (triangles without area), use the normal from derivatives.
     if !is_front { normal = -normal; }
     if dot(normal, normal) < 1e-6 { normal = faceForward(flat_normal, -to_eye(in.world), flat_normal); }
     if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }

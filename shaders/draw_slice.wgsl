@@ -1,14 +1,14 @@
-// A layer of the grid, coloured by cell type or by a control's weights, with lines between cells. One quad.
-// Cells: slice_buffers.wgsl or slice_textures.wgsl.
+// A layer of the grid, coloured by cell type or by a control's weights, with lines between cells. One quad. The cells
+// come from slice_buffers.wgsl or slice_textures.wgsl.
 
 struct SliceView {
     /// Outer corner of the first cell, world space.
     corner: vec3f,
     /// Value of the last colour; 0 to colour by cell type.
     high: f32,
-    /// Edge of a cell, object units.
+    /// Edge vector of a cell along u, object units; `v` is that along v.
     u: vec3f,
-    /// Cells along u.
+    /// Number of cells along u; `n_v` is that along v.
     n_u: u32,
     v: vec3f,
     n_v: u32,
@@ -55,7 +55,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     // Fade out the lines if cells are only a few pixels wide.
     let visible = clamp(1.5 - 6.0 * max(slope.x, slope.y), 0.0, 1.0);
     let line = max(covers.x, covers.y) * visible * slice.line_color.a;
-    // Exterior cells are not drawn and do not hide what is behind.
+    // Exterior cells are discarded, so they do not hide what is behind them.
     if content.x == EXTERIOR { discard; }
     return to_target(mix(color.rgb, slice.line_color.rgb, line), color.a);
 }

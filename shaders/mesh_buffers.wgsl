@@ -2,7 +2,7 @@
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(1) var<storage, read> normals: array<vec4f>;
-/// Per vertex: weight, error or greying.
+/// For each vertex: weight, error or strength of greying.
 @group(1) @binding(2) var<storage, read> values: array<f32>;
 
 fn point_at(index: u32) -> vec3f { return positions[index].xyz; }

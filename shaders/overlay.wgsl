@@ -1,4 +1,4 @@
-// Overlays: lines, points and faces over the model share a style, positions and items. Declared in
+// Overlays: lines, points and faces over the model. They share a style, positions and items, which are declared in
 // overlay_buffers.wgsl or overlay_textures.wgsl.
 
 struct Style {
@@ -6,11 +6,11 @@ struct Style {
     colors: array<vec4f, 8>,
     /// Line width or point diameter in states 0 to 3 and 4 to 7, CSS pixels.
     widths: array<vec4f, 2>,
-    /// Rim of points, linear, straight alpha.
+    /// Colour of the rim of points, linear, straight alpha.
     rim_color: vec4f,
     /// Width of the rim, CSS pixels.
     rim: f32,
-    /// Offset towards the eye, as a fraction of the depth: draws lines on a surface in front of it.
+    /// Offset towards the eye, as a fraction of the depth, so that lines on a surface are drawn in front of it.
     lift: f32,
     /// Factor of all alphas.
     opacity: f32,

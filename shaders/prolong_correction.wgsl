@@ -1,8 +1,8 @@
-// Prolongation to black rows with two or eight coarse neighbours: adds the interpolated correction, which is
-// zero outside the cage. For the initial guess of full multigrid, overwrites by the mean of the existing
-// neighbours. One invocation per table entry and quad. CPU: cagework_core::stencil::prolong_correction.
+// Prolongation to black rows with two or eight coarse neighbours: adds the interpolated correction, which is zero
+// outside the cage. For the initial guess of full multigrid, overwrites the rows by the mean of the neighbours that are
+// unknowns. One invocation per table entry and quad. CPU: cagework_core::stencil::prolong_correction.
 
-/// `mode`.
+/// Value of `mode` that replaces values instead of adding corrections.
 const PROLONG_REPLACE = 1u;
 /// Words of an entry before the rows of its `n_sources` coarse neighbours: fine row, 1 / (number of coarse
 /// unknowns) as bits.

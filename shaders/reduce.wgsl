@@ -1,5 +1,5 @@
-// Sums in a fixed order, hence reproducible: an invocation adds every 256th of the workgroup's 4096 values,
-// then the workgroup adds the invocations' sums as a tree. CPU: cagework_core::stencil::reduce.
+// Sums in a fixed order, so results are reproducible. An invocation adds every 256th of the workgroup's 4096 values,
+// then the workgroup adds the sums of its invocations as a tree. CPU: cagework_core::stencil::reduce.
 
 const REDUCE_LANES = 256u;
 const REDUCE_VALUES = 4096u;

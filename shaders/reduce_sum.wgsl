@@ -1,4 +1,4 @@
-// Sums all partial sums into slot `first_row` of the numbers that are read back. One workgroup. CPU:
+// Sums all partial sums into the slot `first_row` of `numbers`, which is read back. One workgroup. CPU:
 // cagework_core::stencil::reduce_sum.
 
 @group(0) @binding(0) var<uniform> work: Work;

@@ -1,7 +1,7 @@
 // Restriction: coarse right-hand side from 13 red residuals around each coarse cell, its centre and twelve
 // edge neighbours. One invocation per coarse row and quad. CPU: cagework_core::stencil::restrict_residual.
 
-/// Fine rows per coarse row.
+/// Number of fine rows per coarse row.
 const N_AROUND = 13u;
 /// Weights of the centre, 4/8, and of the twelve edge neighbours, 1/8 each.
 const RESTRICT_CENTRE = 0.5f;

@@ -2,7 +2,7 @@
 
 const ROW_SHIFT = 11u;
 
-/// Texel of an entry.
+/// Texel at which an entry of a table is stored.
 fn place_of(index: u32) -> vec2u {
     return vec2u(index & ((1u << ROW_SHIFT) - 1u), index >> ROW_SHIFT);
 }

@@ -4,9 +4,9 @@
 @group(0) @binding(0) var<uniform> work: Work;
 /// First entry of each vertex in `nodes` and `hats`.
 @group(0) @binding(1) var<storage, read> starts: array<vec2u>;
-/// (row of the field, weight as bits)
+/// Field entries of the stencils: (row of the field, weight as bits).
 @group(0) @binding(2) var<storage, read> nodes: array<vec2u>;
-/// (control vertex, weight as bits)
+/// Dirichlet entries of the stencils: (control vertex, weight as bits).
 @group(0) @binding(3) var<storage, read> hats: array<vec2u>;
 @group(0) @binding(4) var<storage, read> field: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> block: array<vec4f>;

@@ -11,7 +11,7 @@ struct Delta { target_index: u32, x: f32, y: f32, z: f32 }
 @group(0) @binding(2) var<storage, read> starts: array<vec2u>;
 @group(0) @binding(3) var<storage, read> influences: array<Influence>;
 @group(0) @binding(4) var<storage, read> deltas: array<Delta>;
-/// Mesh to world space, per joint.
+/// Matrix from mesh to world space for each joint.
 @group(0) @binding(5) var<storage, read> palette: array<mat4x4f>;
 /// Weights of the morph targets.
 @group(0) @binding(6) var<storage, read> targets: array<f32>;

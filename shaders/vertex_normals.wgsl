@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<uniform> work: Work;
 /// First entry of each vertex in `others`.
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
-/// The next two vertices of a triangle, counter-clockwise.
+/// The other two vertices of each triangle, counter-clockwise.
 @group(0) @binding(2) var<storage, read> others: array<vec2u>;
 @group(0) @binding(3) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> normals: array<vec4f>;

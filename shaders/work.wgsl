@@ -6,26 +6,26 @@ struct Work {
     first: u32,
     /// Number of items.
     count: u32,
-    /// Invocations per row of workgroups; further rows are along y.
+    /// Number of invocations per row of workgroups; further rows are along y.
     stride: u32,
     /// Quads per row of a field: columns of the batch / 4.
     n_quads: u32,
-    /// Offset of items: first row of a field, or first slot of a result.
+    /// First row of the field, or first slot of the result, from which items are counted.
     first_row: u32,
     /// First quad of the batch.
     first_quad: u32,
-    /// Variant of the kernel; its constants.
+    /// Variant of the kernel; the kernel defines the values as constants.
     mode: u32,
-    /// Number of coarse rows that a fine row is interpolated from.
+    /// Number of coarse rows from which a fine row is interpolated.
     n_sources: u32,
     /// Over-relaxation factor; 1 is Gauss-Seidel. Dimensionless.
     omega: f32,
 }
 
-/// "No row" in tables.
+/// Value that stands for "no row" in tables.
 const NONE = 0xffffffffu;
 
-/// Index of an invocation in its dispatch; out of range from `work.count` on.
+/// Index of an invocation in its dispatch. Invocations with an index from `work.count` on have no item.
 fn invocation(id: vec3u, stride: u32) -> u32 {
     return id.x + id.y * stride;
 }

@@ -1,6 +1,6 @@
 //! Parts of a model that the cage does not bend: vertices that stay in place and rigid pieces.
 //!
-//! Both are functions of displacements, so they apply after any deformation, to vertices and to morph targets.
+//! Both are functions of displacements, so they can be applied after any deformation, to vertices and to morph targets.
 
 mod bound;
 
@@ -13,8 +13,8 @@ use cagework_core::rotation::nearest_rotation;
 
 pub use bound::{BoundParts, PieceMotion, hold_parts};
 
-/// Multiple of the identity that is added to a piece's covariance, over its trace. It fixes the rotation where the
-/// points do not determine one: a line does not rotate about itself.
+/// Multiple of the identity that is added to a piece's covariance, as a fraction of the covariance's trace. It fixes
+/// the rotation where the points do not determine one: a line of points does not rotate about itself.
 const IDENTITY_WEIGHT: f64 = 1e-9;
 
 /// Vertices that do not follow the cage.
@@ -70,7 +70,7 @@ impl Motion {
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    /// The motion as three rows, see [`PieceMotion`].
+    /// The motion as three rows of a matrix, see [`PieceMotion`].
     fn rows(&self) -> PieceMotion {
         let at_origin = self.by(DVec3::ZERO);
         let rows = self.turn.transpose();
@@ -90,7 +90,7 @@ impl Motion {
     }
 }
 
-/// `a b^T`.
+/// The matrix `a b^T`.
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
@@ -102,8 +102,8 @@ impl Parts {
         self.stays.is_empty() && self.rigid.is_empty()
     }
 
-    /// The constrained displacement field, for vertices at `rest` that the cage displaces by `by`, `[n_vertices]`,
-    /// object units. A fully fixed vertex, and a rigid piece without displacements, move by exactly zero.
+    /// The motion of vertices at `rest` that the cage displaces by `by`, `[n_vertices]`, object units, with fixed
+    /// vertices and rigid pieces. A fully fixed vertex, and a rigid piece without displacements, move by exactly zero.
     ///
     /// # Panics
     /// If a piece has a vertex outside `rest`, or the lengths differ.
@@ -123,7 +123,8 @@ impl Parts {
         }
     }
 
-    /// Deformed positions with fixed vertices and rigid pieces put right. `rest`, `deformed`: `[n_vertices]`, object units.
+    /// Deformed positions in which fixed vertices stay in place and rigid pieces move rigidly. `rest`, `deformed`:
+    /// `[n_vertices]`, object units.
     ///
     /// # Panics
     /// As [`Self::held`].
@@ -152,18 +153,19 @@ pub struct HeldMotion {
 }
 
 impl HeldMotion {
-    /// Whether a vertex moves differently from what the cage gives.
+    /// Whether a vertex is partly fixed or belongs to a rigid piece, so that its motion differs from the cage's.
     #[must_use]
     pub fn is_held(&self, vertex: u32) -> bool {
         self.piece_of.contains_key(&vertex) || self.stays.get(vertex as usize).is_some_and(|&s| s > 0.0)
     }
 
-    /// Constrained displacement of a vertex, or of a state of it in a morph target, that is at `at` and would move by `by`.
+    /// Constrained displacement of a vertex (or of its state in a morph target) that is at `at` and that the cage would
+    /// move by `by`.
     #[must_use]
     pub fn by(&self, vertex: u32, at: DVec3, by: DVec3) -> DVec3 {
         let by = self.piece_of.get(&vertex).map_or(by, |&piece| self.motions[piece].by(at));
         match self.stays.get(vertex as usize) {
-            // A literal zero: a product could be -0.
+            // Return a literal zero: a product could be -0.
             Some(&stays) if stays >= 1.0 => DVec3::ZERO,
             Some(&stays) if stays > 0.0 => (1.0 - f64::from(stays)) * by,
             _ => by,
@@ -181,7 +183,7 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
     let mut is_selected = vec![false; positions.len()];
     selected.iter().for_each(|&v| is_selected[v as usize] = true);
     let unique_of = weld(positions).unique_of;
-    // Union-find forest over welded positions; roots are the smallest index of a piece.
+    // Union-find forest over welded positions. The root of a piece is its smallest index.
     let mut above: Vec<u32> = (0..positions.len() as u32).collect();
     for triangle in triangles.iter().filter(|t| t.iter().all(|&v| is_selected[v as usize])) {
         let [a, b, c] = triangle.map(|v| unique_of[v as usize]);
@@ -305,7 +307,8 @@ mod tests {
 
     #[test]
     fn pieces_are_connected_by_selected_triangles_and_equal_positions() {
-        // Two triangles that share a position (2 and 3), a third one apart, and an unselected one that joins them.
+        // Two triangles that share a position (2 and 3), a separate third one, and an unselected triangle that joins
+        // them.
         let positions = [0, 1, 2, 2, 3, 4, 5, 6, 7].map(|x| Vec3::new(x as f32, (x * x) as f32, 0.0));
         let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [5, 6, 7]];
         let found = pieces(&positions, &triangles, &[0, 1, 2, 3, 4, 5, 6, 8]);

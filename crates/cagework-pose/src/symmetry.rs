@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use cagework_core::Bounds;
 
-/// Tolerance of mirror images over the diagonal: covers grid snapping and rounding by exporters.
+/// Tolerance of mirror images, as a fraction of the diagonal of the cage's box. It covers grid snapping and rounding by
+/// exporters.
 const IMAGE_TOLERANCE: f32 = 2e-3;
 
 /// Pairs of mirror-symmetric vertices of a cage in its rest pose.
@@ -33,7 +34,7 @@ impl Symmetry {
             (distance <= tolerance).then_some(j)
         };
         let nearest: Vec<Option<usize>> = (0..rest.len()).map(nearest).collect();
-        // Vertices are a pair if each is the other's nearest image.
+        // Two vertices are a pair if each is nearest to the other's image.
         let partner = (0..rest.len())
             .map(|i| nearest[i].filter(|&j| nearest[j] == Some(i)).map(|j| j as u32))
             .collect();
@@ -46,7 +47,7 @@ impl Symmetry {
         self.plane
     }
 
-    /// Mirror image of a vertex: the vertex itself on the plane, `None` without an image.
+    /// Mirror image of a vertex. A vertex on the plane is its own image; `None` without an image.
     #[must_use]
     pub fn partner(&self, vertex: u32) -> Option<u32> {
         self.partner.get(vertex as usize).copied().flatten()
@@ -78,7 +79,7 @@ pub fn reflect(d: Vec3) -> Vec3 {
 mod tests {
     use super::*;
 
-    /// Corners of a box; corner `x + 2 y + 4 z` with 0 for `min` and 1 for `max`.
+    /// Corners of a box. Corner `x + 2 y + 4 z` is at `min` along axes with the digit 0 and at `max` along axes with 1.
     fn cuboid(min: Vec3, max: Vec3) -> Vec<Vec3> {
         let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
         (0..8).map(|v| Vec3::new(at(v, 0), at(v, 1), at(v, 2))).collect()
@@ -90,7 +91,7 @@ mod tests {
             let rest = cuboid(Vec3::new(min_x, 0.0, 0.0), Vec3::new(min_x + 2.0, 1.0, 1.0));
             let symmetry = Symmetry::new(&rest);
             assert!(symmetry.is_complete() && (symmetry.plane() - (min_x + 1.0)).abs() < 1e-6);
-            // Vertices are x + 2 y + 4 z: mirror images differ in the lowest bit.
+            // The index of a corner is x + 2 y + 4 z, so mirror images differ in the lowest bit.
             assert!((0..8).all(|i| symmetry.partner(i) == Some(i ^ 1)));
         }
     }

@@ -120,8 +120,8 @@ impl Footprint {
 }
 
 /// Whether `each(y, z, first, last)` holds for the run of any row that a triangle overlaps, for voxels enlarged by
-/// `grow`. `each` is called with a row's part of the bounding box first and, only if that holds, with the run: most
-/// rows are rejected without computing the run.
+/// `grow`. `each` is first called with the row's part of the bounding box and, only if it holds there, with the run.
+/// Most rows are rejected without computing the run.
 pub(super) fn any_run(
     triangle: [DVec3; 3],
     grow: f64,

@@ -62,8 +62,9 @@ const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 /// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
 const N_NARROW_BANDS: usize = 3;
 
-/// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried at once if collapsing within the budget
-/// leaves more than this multiple of the target, as bridges between pieces and walls of gaps cannot be collapsed.
+/// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried at once if collapsing
+/// within the budget leaves more than this multiple of the target. Bridges between pieces and walls of gaps cannot be
+/// collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
 /// In the cases of [`MAX_FIRST_RATIO`]: number of vertices after collapsing within the budget, divided by the final

@@ -1,7 +1,8 @@
-//! [`Parts`] of a model bound to a cage, evaluated for every frame without a pass over the vertices of the pieces.
+//! [`Parts`] of a model bound to a cage. A frame needs no pass over the vertices of the pieces.
 //!
-//! Displacements are linear in the controls, and so are the two sums from which Kabsch's rotation follows. They are
-//! summed per piece and control once, so a frame costs a few operations per control, whatever the size of the piece.
+//! Displacements are linear in the controls, and so are the two sums from which Kabsch's rotation follows. These sums
+//! are precomputed per piece and control, so a frame costs a few operations per control, whatever the size of the
+//! piece.
 
 use glam::{DMat3, DVec3, Vec3, Vec4};
 
@@ -12,9 +13,10 @@ use cagework_core::weights::Weights;
 /// Fixed vertices and rigid pieces of a bound model, ready for any pose.
 #[derive(Clone, Debug)]
 pub struct BoundParts {
-    /// Rest position, object units, and share of the displacement that is suppressed, 0 to 1. `[n_vertices]`
+    /// Rest position, object units, and in the fourth component the share of the displacement that is suppressed, 0 to
+    /// 1. `[n_vertices]`
     pub rest: Vec<Vec4>,
-    /// Rigid piece of each vertex, counted from 1; 0 if it belongs to none. `[n_vertices]`
+    /// Rigid piece of each vertex, counted from 1; 0 if the vertex belongs to none. `[n_vertices]`
     pub piece_of: Vec<u32>,
     pieces: Vec<PieceSums>,
     /// Rest positions of the columns of the weights.
@@ -33,12 +35,13 @@ struct PieceSums {
     /// Sum of `from from^T`, with `from` the rest position minus the centre.
     moments: DMat3,
     n: f64,
-    /// Per control that moves the piece: its index, the sum of its weights, and the sum of weight times `from`.
+    /// For each control that moves the piece: its index, the sum of its weights, and the sum of weight times `from`.
     columns: Vec<(u32, f64, DVec3)>,
 }
 
 impl BoundParts {
-    /// `rest`: the model's vertices; `weights`, `frames`: its bind; `controls`: their rest positions. Object units.
+    /// `rest`: the model's vertices; `weights`, `frames`: results of its bind; `controls`: rest positions of the
+    /// controls. Object units.
     ///
     /// # Panics
     /// If `weights` or `parts.stays` does not have one entry per vertex.
@@ -123,7 +126,7 @@ impl PieceSums {
 /// `piece_of`: fields of [`BoundParts`]; `motions`: from [`BoundParts::motions`]. GPU twin: `shaders/hold_parts.wgsl`.
 ///
 /// # Panics
-/// If `piece_of` names a piece beyond `motions`.
+/// If an entry of `piece_of` is larger than the number of `motions`.
 pub fn hold_parts(rest: &[Vec4], piece_of: &[u32], motions: &[PieceMotion], positions: &mut [Vec3]) {
     for ((position, &rest), &piece) in positions.iter_mut().zip(rest).zip(piece_of) {
         let (at, stays) = (rest.truncate(), rest.w);

@@ -8,13 +8,13 @@ const HISTORY: usize = 6;
 /// The history is cleared when the residual grows by more than this factor.
 const MAX_GROWTH: f64 = 2.0;
 
-/// Regularisation of the least-squares system, over its trace.
+/// Regularisation of the least-squares system, as a fraction of its trace.
 const REGULARISATION: f64 = 1e-10;
 
 /// History of a fixed-point iteration `x -> g(x)`.
 #[derive(Default)]
 pub(super) struct Anderson {
-    /// Residual `g(x) - x` and image `g(x)`, oldest first.
+    /// Residual `g(x) - x` and image `g(x)` of each stored iterate, oldest first.
     last: Vec<(DVector<f64>, DVector<f64>)>,
 }
 
@@ -56,7 +56,8 @@ impl Anderson {
 mod tests {
     use super::*;
 
-    /// `x -> A x + b` converges by a factor 0.95 a step; Anderson acceleration solves a map in two dimensions in four steps.
+    /// Without acceleration, `x -> A x + b` converges by a factor of 0.95 per step. Anderson acceleration solves a map
+    /// in two dimensions in four steps.
     #[test]
     fn a_linear_map_converges_in_as_many_steps_as_it_has_dimensions() {
         let a = DMatrix::from_row_slice(2, 2, &[0.95, 0.0, 0.0, -0.5]);

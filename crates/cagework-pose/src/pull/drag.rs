@@ -1,4 +1,4 @@
-//! A drag: matrices factorised when it starts, and its state while the pointer moves.
+//! A drag: the matrices that are factorised when the drag starts, and its state while the pointer moves.
 
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
@@ -10,34 +10,36 @@ use super::{MAX_HANDLES, PullError};
 use crate::symmetry::Symmetry;
 use cagework_core::rotation::nearest_rotation;
 
-/// Weight of the cage's own edges in the energy; results are flat from 0.02 to 0.4. Below, the cage spikes where it
-/// hardly moves the model.
+/// Weight of the cage's own edges in the energy. Results are nearly equal from 0.02 to 0.4. Below this range, the cage
+/// gets spikes where it hardly moves the model.
 pub(super) const CAGE_WEIGHT: f64 = 0.1;
-/// Weight of the cage's edges while a cage vertex is dragged: below this its neighbours move against the drag.
+/// Weight of the cage's edges while a cage vertex is dragged. With a lower weight, its neighbours move against the
+/// drag.
 const GRABBED_CAGE_WEIGHT: f64 = 3.0;
-/// Weight of samples beyond the reach that stay in place; results are flat from 100 to 300.
+/// Weight of samples beyond the reach, which stay in place. Results are nearly equal from 100 to 300.
 const STAY_WEIGHT: f64 = 200.0;
-/// Share of the reach within which samples move freely; from there to the reach their weight rises to 1.
+/// Share of the reach within which samples move freely. From there to the full reach, their weight rises from 0 to 1.
 const FREE_SHARE: f64 = 0.75;
-/// Share of the model's area within the automatic reach of one grab.
+/// Share of the model's area that the automatic reach of one grab encloses.
 const REACH_AREA: f64 = 0.15;
-/// Range of the automatic reach, over the model's size.
+/// Smallest and largest automatic reach, as multiples of the model's size.
 const REACH_RANGE: [f64; 2] = [0.15, 0.5];
-/// Least automatic reach over the greatest distance between two grabs.
+/// Smallest automatic reach, as a multiple of the largest distance between two grabs.
 const REACH_PER_GRAB_DISTANCE: f64 = 1.2;
-/// Radius of the patch that a pin holds, over the model's size: a pinned point without area would let the model roll about it.
+/// Radius of the patch that a pin fixes, as a fraction of the model's size. With a single point pinned, the model would
+/// roll about it.
 const PIN_RADIUS: f64 = 0.05;
 /// Weight of a pin's patch.
 const PIN_WEIGHT: f64 = 2e4;
-/// Stiffness of grabs and pins, over the mean diagonal of the whole matrix.
+/// Stiffness of grabs and pins, as a multiple of the mean diagonal of the whole matrix.
 const HANDLE_STIFFNESS: f64 = 1e3;
-/// Regularisation, over the mean diagonal of the matrix without fixed samples.
+/// Regularisation, as a fraction of the mean diagonal of the matrix without fixed samples.
 pub(super) const REGULARISATION: f64 = 1e-6;
-/// The drag has settled when a frame moves the cage by less than this, over the model's size. At 1e-4 a pull of the
-/// whole model stops 5 % short.
+/// The drag has settled when a frame moves the cage by less than this, as a fraction of the model's size. At 1e-4, a
+/// pull of the whole model stops 5 % short of the targets.
 const MIN_FRAME_MOVE: f64 = 2e-5;
 
-/// How far along the surface a drag moves the model.
+/// Distance along the surface, from the grabs, up to which a drag moves the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Reach {
     /// The distance that encloses 15 % of the model's area per grab.
@@ -52,11 +54,11 @@ pub enum Reach {
 /// Options of a drag.
 #[derive(Clone, Copy, Debug)]
 pub struct DragOptions<'a> {
-    /// How far along the surface the model moves.
+    /// Distance along the surface up to which the model moves.
     pub reach: Reach,
-    /// How much parts within reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
+    /// Share by which parts within the reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
     pub relax: f64,
-    /// Keeps the cage symmetric: each step is averaged with its mirror image.
+    /// Keeps the cage symmetric: each step is averaged with its mirror image. `None` for no symmetry.
     pub symmetry: Option<&'a Symmetry>,
 }
 
@@ -79,21 +81,22 @@ pub struct Drag {
     pub(super) handles: DMatrix<f64>,
     /// Targets of the grabs and pins. `[n_handles, 3]`
     pub(super) targets: DMatrix<f64>,
-    /// Positions of the grabs at the start. `[n_grabs]`
+    /// Positions of the grabs at the start of the drag. `[n_grabs]`
     pub(super) start: Vec<DVec3>,
-    /// `A^-1`, `A^-1 Q^T`, `(Q A^-1 Q^T + 1 / mu)^-1`.
+    /// `A^-1`, `A^-1 Q^T` and `(Q A^-1 Q^T + 1 / mu)^-1`, with the matrix A of the energy without grabs and pins.
     pub(super) inverse: DMatrix<f64>,
     pub(super) spread: DMatrix<f64>,
     pub(super) hold: DMatrix<f64>,
     /// Rotation-independent part of the right-hand side. `[n, 3]`
     pub(super) constant: DMatrix<f64>,
-    /// Moments (see [`Pull::moments`]) of the start pose, what full relaxation adds to them, and their current blend.
+    /// Moments (see [`Pull::moments`]) of the start pose, the moments that full relaxation adds, and their current
+    /// blend.
     pub(super) posed: Vec<f64>,
     pub(super) relaxing: Vec<f64>,
     pub(super) moments: Vec<f64>,
     /// Distance along the surface to the nearest grab, object units. `[n_vertices]`
     walks: Vec<f32>,
-    /// A single grab without reach or pins: the model is translated.
+    /// Whether the drag has a single grab and neither reach nor pins, so that it only translates the model.
     pub(super) is_shift: bool,
     pub(super) anderson: Anderson,
     pub(super) moved: f64,
@@ -104,7 +107,8 @@ impl Drag {
     /// Starts a drag of `grabs` with `pins` fixed, from the cage `start`, `[n]`, object units.
     ///
     /// # Errors
-    /// [`PullError`]: a handle that does not exist, too many handles, a number out of range, a pose that is not finite.
+    /// [`PullError`]: a handle does not exist, there are too many handles, a number is out of range, or a pose is not
+    /// finite.
     pub fn new(
         pull: &Pull,
         start: &[DVec3],
@@ -150,7 +154,7 @@ impl Drag {
         for i in 0..n {
             matrix[(i, i)] += REGULARISATION * mean;
         }
-        // Scaled by the whole matrix: a coarse cage couples all of it to each handle.
+        // Scale by the whole matrix, because a coarse cage couples all of it to each handle.
         let firm = HANDLE_STIFFNESS * matrix.trace() / n as f64;
         let constant = &held * (&pull.sample_rows * &cage) + REGULARISATION * mean * &cage;
         let inverse = matrix.cholesky().ok_or(PullError::Singular)?.inverse();
@@ -161,7 +165,7 @@ impl Drag {
         }
         let hold = hold.cholesky().ok_or(PullError::Singular)?.inverse();
 
-        // References of the start pose, and those of the rest shape with each group rotated to the start pose.
+        // References of the start pose, and references of the rest shape with each group rotated to the start pose.
         let posed = pull.references(start);
         let rest = pull.references(&pull.cage);
         let of_rest = pull.moments(&rest, gamma);
@@ -217,7 +221,7 @@ impl Drag {
         &self.start
     }
 
-    /// Reach over the model's size; infinite for the whole model.
+    /// Reach as a multiple of the model's size; infinite for the whole model.
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.reach / self.size
@@ -235,7 +239,7 @@ impl Drag {
         &self.walks
     }
 
-    /// How firmly a vertex of the model stays in place: 0 within reach, 1 beyond.
+    /// Weight with which a vertex of the model stays in place: 0 within the reach, 1 beyond.
     #[must_use]
     pub fn stays(&self, vertex: u32) -> f64 {
         stays(self.walks[vertex as usize], self.reach)
@@ -254,7 +258,7 @@ impl Drag {
         self.moved < MIN_FRAME_MOVE
     }
 
-    /// Largest distance of a grab or pin from its target, over the model's size.
+    /// Largest distance of a grab or pin from its target, as a fraction of the model's size.
     #[must_use]
     pub fn error(&self) -> f64 {
         let cage = DMatrix::from_column_slice(self.n, 3, self.cage.as_slice());
@@ -330,7 +334,8 @@ fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64
     reach.max(REACH_PER_GRAB_DISTANCE * between.fold(0.0, f64::max))
 }
 
-/// How firmly a point at a distance from the grabs stays in place: 0 within reach, 1 beyond, smooth in between.
+/// Weight with which a point stays in place, given its distance from the grabs: 0 up to `FREE_SHARE` of the reach, 1
+/// from the reach on, smooth in between.
 fn stays(walk: f32, reach: f64) -> f64 {
     if reach.is_infinite() {
         0.0
@@ -339,7 +344,8 @@ fn stays(walk: f32, reach: f64) -> f64 {
     }
 }
 
-/// How far each group lies within reach, 0 to 1. A cage vertex takes the weighted mean of the samples that it moves. `[n_groups]`
+/// Share with which each group takes part in relaxation: 1 within the reach, 0 beyond. The share of a cage vertex is
+/// the mean over the samples, weighted by how far the vertex moves them. `[n_groups]`
 fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     let shares = DVector::from_column_slice(&pull.probes.shares);
     let followed =
@@ -349,7 +355,7 @@ fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     follows.iter().copied().chain(of_cage).collect()
 }
 
-/// All x, then all y, then all z. `[3 n]`
+/// The coordinates of a cage as one vector: all x, then all y, then all z. `[3 n]`
 pub(super) fn flat(cage: &[DVec3]) -> DVector<f64> {
     DVector::from_iterator(3 * cage.len(), (0..3).flat_map(|x| cage.iter().map(move |p| p[x])))
 }
@@ -360,7 +366,7 @@ pub(super) fn smooth(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `c^T B_r` for each group r: the covariance of its current edges with its references.
+/// `c^T B_r` for each group r: the covariance of the group's current edges with its references.
 pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
     let width = 3 * n_groups;
     let n = moments.len() / width;

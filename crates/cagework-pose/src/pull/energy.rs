@@ -1,4 +1,4 @@
-//! Precomputation per bind: samples, gradients and the matrix of the energy.
+//! Precomputation once per bind: samples, gradients and the matrix of the energy.
 
 use glam::{DVec3, Vec3};
 use nalgebra::DMatrix;
@@ -13,10 +13,10 @@ use cagework_core::weights::Weights;
 
 /// A model and its cage, ready for pulling and fitting.
 pub struct Pull {
-    /// Diagonal of the model's box, object units. Lengths that are shares refer to it.
+    /// Diagonal of the model's box, object units. Lengths that are fractions refer to it.
     pub(super) size: f64,
     pub(super) n_vertices: usize,
-    /// Rest positions of cage vertices and controls inside. `[n]`
+    /// Rest positions of cage vertices and inner controls. `[n]`
     pub(super) cage: Vec<DVec3>,
     pub(super) geodesic: Geodesic,
     pub(super) probes: Probes,
@@ -24,17 +24,17 @@ pub struct Pull {
     pub(super) sample_rows: DMatrix<f64>,
     /// Gradients of the weights at the samples; row `3 s + x` is d/dx at sample s. `[3 n_samples, n]`
     gradients: DMatrix<f64>,
-    /// Edges of the cage and of controls inside, in both directions.
+    /// Edges of the cage and of inner controls, in both directions.
     edges: Vec<[u32; 2]>,
-    /// Weight of each edge. All edges together weigh as much as the model.
+    /// Weight of each edge. The total weight of all edges equals that of the model's samples.
     edge_weight: f64,
-    /// `sum_e w_e D_e^T D_e` over the model's rows and over the cage's. `[n, n]`
+    /// The sum `sum_e w_e D_e^T D_e` over the model's rows, and the same sum over the cage's edges. `[n, n]`
     of_model: DMatrix<f64>,
     of_cage: DMatrix<f64>,
 }
 
 impl Pull {
-    /// `weights`: of the controls at [`Probes::points`].
+    /// `weights`: weights of the controls at [`Probes::points`].
     ///
     /// # Errors
     /// [`PullError::Shape`] if `weights` do not have one row per probe and one column per control.
@@ -92,7 +92,7 @@ impl Pull {
         })
     }
 
-    /// Number of cage vertices and interior controls.
+    /// Number of cage vertices and inner controls.
     #[must_use]
     pub fn n_cage(&self) -> usize {
         self.cage.len()
@@ -104,7 +104,7 @@ impl Pull {
         self.probes.samples.len()
     }
 
-    /// Groups that rotate as one: a group per sample, then a group per cage vertex.
+    /// Number of groups that rotate as one: a group per sample, then a group per cage vertex.
     #[must_use]
     pub fn n_groups(&self) -> usize {
         self.n_samples() + self.n_cage()
@@ -115,7 +115,7 @@ impl Pull {
         &self.of_model + gamma * &self.of_cage
     }
 
-    /// References `d_e` of all rows for a cage: gradients at the samples, then edges.
+    /// References `d_e` of all rows for a cage: first the gradients at the samples, then the edges.
     pub(super) fn references(&self, cage: &[DVec3]) -> Vec<DVec3> {
         let gradient = |e: usize| {
             let row = self.gradients.row(e);
@@ -130,8 +130,8 @@ impl Pull {
         (0..3 * samples).map(|e| e / 3).chain(self.edges.iter().map(move |[a, _]| samples + *a as usize))
     }
 
-    /// `sum_e w_e D_e^T d_e` per group: columns `3 r` to `3 r + 2` of row i are the moment of cage vertex i and group r.
-    /// `[n, 3 n_groups]`, row-major.
+    /// The sum `sum_e w_e D_e^T d_e` of each group: columns `3 r` to `3 r + 2` of row i are the moment of cage vertex i
+    /// and group r. `[n, 3 n_groups]`, row-major.
     pub(super) fn moments(&self, references: &[DVec3], gamma: f64) -> Vec<f64> {
         let width = 3 * self.n_groups();
         let mut moments = vec![0.0; self.n_cage() * width];

@@ -1,4 +1,4 @@
-//! Fits a cage so that the model meets targets: all vertices for a target of the same topology, or landmarks.
+//! Fits a cage so that the model meets targets for all vertices (a model of the same topology) or for landmarks.
 
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
@@ -11,38 +11,40 @@ use super::{MAX_CAGE, PullError};
 use crate::parts::Motion;
 use cagework_core::weights::Weights;
 
-/// Range of the energy's weight when it is estimated from the noise. The lower end leaves 1e-5 of the model's size on a
-/// target without noise.
+/// Range of the energy's weight lambda when it is estimated from the noise. With the lower end, a target without noise
+/// is met within 1e-5 of the model's size.
 const LAMBDA_RANGE: [f64; 2] = [1e-10, 1e-2];
 
-/// Limit on the rounds of that estimate, and the ratio of successive weights below which it has converged.
+/// Limit on the rounds that estimate lambda, and the ratio of successive values below which the estimate has converged.
 const MAX_LAMBDA_ROUNDS: usize = 8;
 const LAMBDA_RATIO: f64 = 1.1;
 
-/// Points per cage vertex from which on noise can be estimated.
+/// Number of points per cage vertex from which on noise can be estimated.
 const MIN_POINTS_PER_VERTEX: usize = 4;
 
-/// Weight of the energy with fewer points: landmarks are met within about 1e-3 of the model's size, and the model bends
+/// Value of lambda with fewer points. Landmarks are then met within about 1e-3 of the model's size, and the model bends
 /// as little as possible between them.
 const LANDMARK_LAMBDA: f64 = 1e-5;
 
-/// Limit on local-global steps, and the movement per step, over the model's size, at which they stop.
+/// Limit on local-global steps, and the movement of the cage in a step, as a fraction of the model's size, at which
+/// they stop.
 const MAX_STEPS: usize = 2000;
 const MIN_STEP_MOVE: f64 = 1e-8;
 
 /// Options of [`Pull::fit`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
-    /// Weight of the energy against the mean squared distance from the targets (over the model's size squared), at least 0.
-    /// `None`: the most likely value given the remaining distance, `n d / (N E)`, for N points at the mean squared distance d and
-    /// a cage of n vertices with the energy E; with fewer than four points per cage vertex, 1e-5.
+    /// Weight of the energy against the mean squared distance from the targets (divided by the model's size squared),
+    /// at least 0. `None`: the most likely value given the remaining distance, `n d / (N E)`, for N points at the mean
+    /// squared distance d and a cage of n vertices with the energy E; with fewer than four points per cage vertex,
+    /// 1e-5.
     pub lambda: Option<f64>,
 }
 
-/// A fitted pose. Lengths are shares of the model's size, the diagonal of its box.
+/// A fitted pose. Distances are fractions of the model's size, the diagonal of its box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// Cage vertices and controls inside. `[n]`, object units
+    /// Positions of the cage vertices and inner controls. `[n]`, object units
     pub cage: Vec<DVec3>,
     /// Weight of the energy.
     pub lambda: f64,
@@ -59,7 +61,7 @@ pub struct Fit {
     pub is_settled: bool,
 }
 
-/// Data term `sum_k m_k |W_k c - t_k|^2`, over the model's size squared, as normal equations.
+/// The data term `sum_k m_k |W_k c - t_k|^2`, divided by the model's size squared, as normal equations.
 struct Goals<'a> {
     weights: &'a Weights,
     shares: &'a [f64],
@@ -71,7 +73,8 @@ struct Goals<'a> {
 }
 
 impl Pull {
-    /// Share of the model's area at each vertex: the weight of a vertex when all vertices have targets. `[n_vertices]`
+    /// Share of the model's area at each vertex, for use as `shares` of [`Self::fit`] with targets for all vertices.
+    /// `[n_vertices]`
     #[must_use]
     pub fn areas(&self) -> &[f64] {
         &self.probes.areas
@@ -80,11 +83,12 @@ impl Pull {
     /// Minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`, with E the energy of a pull (see the module)
     /// relative to the rest shape, without fixed samples.
     ///
-    /// `weights`: of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight of each point, scaled to sum
-    /// to 1; 0 ignores the point. `to`: targets, object units.
+    /// `weights`: rows of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight `m_k` of each point,
+    /// scaled to sum to 1; a point with the share 0 is ignored. `to`: targets, object units.
     ///
     /// # Errors
-    /// [`PullError`]: weights of another cage, lengths that differ, no point with a target, numbers out of range.
+    /// [`PullError`]: the weights are of another cage, lengths differ, no point has a target, or numbers are out of
+    /// range.
     pub fn fit(
         &self,
         weights: &Weights,
@@ -108,7 +112,7 @@ impl Pull {
         let [least, most] = LAMBDA_RANGE;
         let mut fitted = self.fit_with(&goals, least)?;
         for _ in 0..MAX_LAMBDA_ROUNDS {
-            // n of the degrees of freedom fit the noise: unbiased variance.
+            // The cage's n degrees of freedom fit a part of the noise: divide by the others for an unbiased variance.
             let noise = fitted.rms * fitted.rms * used as f64 / (used - n) as f64;
             let lambda = (noise * n as f64 / (used as f64 * fitted.energy)).clamp(least, most);
             let ratio = lambda / fitted.lambda;
@@ -205,7 +209,7 @@ impl Pull {
         })
     }
 
-    /// Rest cage moved rigidly onto the targets: initial guess of the rotations.
+    /// The rest cage moved rigidly onto the targets. It is the initial guess of the rotations.
     fn align_rest(&self, goals: &Goals<'_>) -> Vec<DVec3> {
         let points = goals.used().map(|(row, _, to)| {
             let at = place(row, &self.cage);

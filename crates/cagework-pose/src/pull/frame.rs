@@ -7,19 +7,20 @@ use super::drag::{Drag, group_matrices, smooth};
 use super::grip::Handle;
 use cagework_core::rotation::nearest_rotation;
 
-/// Most frames that [`Drag::settle`] takes.
+/// Limit on the frames that [`Drag::settle`] runs.
 const MAX_SETTLING_FRAMES: u32 = 60;
 /// Local-global steps per frame.
 const STEPS_PER_FRAME: usize = 4;
-/// A target has changed if it moves by more than this, over the model's size.
+/// A target counts as changed if it moves by more than this, as a fraction of the model's size.
 const MIN_TARGET_MOVE: f64 = 1e-9;
-/// Drag length, over the model's size, at which relaxation is complete.
+/// Length of a drag, as a fraction of the model's size, at which relaxation is complete.
 const RELAX_LENGTH: f64 = 0.1;
 
-/// Rotation of the grabs, radians, above which [`Drag::go`] follows arcs: straight paths of a half turn would meet in one point.
+/// Rotation of the grabs, in radians, above which [`Drag::go`] moves them on arcs. On straight paths, grabs that make a
+/// half turn would meet in one point.
 const MIN_ARC_ANGLE: f64 = 0.5;
-/// Multiple of the identity added to the grabs' covariance, over its trace. Grabs that do not determine a rotation
-/// (two, about the line between them) do not rotate.
+/// Multiple of the identity that is added to the grabs' covariance, as a fraction of the covariance's trace. It
+/// prevents rotations that the grabs do not determine, such as that of two grabs about the line between them.
 const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {
@@ -65,7 +66,7 @@ impl Drag {
         }
     }
 
-    /// Moves the grabs from the start to `to` (`[n_grabs]`, object units) in `frames` frames, on straight paths, or on
+    /// Moves the grabs from the start to `to` (`[n_grabs]`, object units) in `frames` frames. Paths are straight, or
     /// arcs if the grabs rotate together by more than 0.5 radians.
     pub fn go(&mut self, to: &[DVec3], frames: u32) {
         if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
@@ -78,7 +79,7 @@ impl Drag {
         }
     }
 
-    /// Runs frames with the grabs at `to` until the cage settles, at most 60. Returns their number.
+    /// Runs frames with the grabs at `to` until the cage settles, at most 60. Returns the number of frames.
     pub fn settle(&mut self, to: &[DVec3]) -> u32 {
         let mut frames = 0;
         while frames == 0 || frames < MAX_SETTLING_FRAMES && !self.is_settled() {
@@ -88,8 +89,9 @@ impl Drag {
         frames
     }
 
-    /// Targets that bring the grabbed handles to `to`. A vertex outside the cage differs from what its weights give by a constant
-    /// offset, by which its target is shifted. `deformed`: the model at the start of the drag, `[n_vertices]`, object units.
+    /// Targets of the drag that bring the grabbed handles to `to`. A vertex outside the cage has a constant offset from
+    /// the position that its weights give, so its target is shifted by this offset. `deformed`: the model at the start
+    /// of the drag, `[n_vertices]`, object units.
     #[must_use]
     pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
         let beside = |(grab, start): (&Handle, &DVec3)| match grab {
@@ -113,7 +115,7 @@ impl Drag {
         for (h, target) in to.iter().enumerate() {
             (0..3).for_each(|x| self.targets[(h, x)] = target[x]);
         }
-        // The map changes with the targets: its history no longer applies.
+        // The map of the iteration changes with the targets, so its history no longer applies.
         self.anderson.forget();
         let drag = to.iter().zip(&self.start).map(|(to, from)| to.distance(*from)).fold(0.0, f64::max);
         let relax = self.relax * smooth(drag / (RELAX_LENGTH * self.size));
@@ -121,7 +123,7 @@ impl Drag {
         self.moments.iter_mut().zip(parts).for_each(|(m, (posed, more))| *m = posed + relax * more);
     }
 
-    /// One local step (rotations) and one global step (the cage that best fits them).
+    /// One local step (rotations of the groups) and one global step (the cage that best fits these rotations).
     fn step(&self) -> DVector<f64> {
         let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
@@ -131,11 +133,11 @@ impl Drag {
     }
 }
 
-/// Paths of the grabs: a rigid motion plus what remains of each displacement.
+/// Paths of the grabs: a common rigid motion, plus the part of each displacement that it does not explain.
 struct GrabPath<'a> {
     from: &'a [DVec3],
     to: &'a [DVec3],
-    /// Means of `from` and `to`, and the nearest rotation between them.
+    /// Means of `from` and `to`, and the rotation that best maps one set about its mean to the other.
     middles: [DVec3; 2],
     turn: DQuat,
 }
@@ -171,7 +173,7 @@ impl<'a> GrabPath<'a> {
     }
 }
 
-/// `sum_r B_r R_r^T` with each rotation R nearest to the group's covariance for `cage`. `[n, 3]`
+/// `sum_r B_r R_r^T`, where R_r is the rotation nearest to the covariance of group r for `cage`. `[n, 3]`
 pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> DMatrix<f64> {
     let width = 3 * n_groups;
     let mut turned = vec![0.0; 3 * width];
@@ -185,7 +187,7 @@ pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> D
     DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
 }
 
-/// Dot product in eight partial sums, which the compiler vectorises.
+/// Dot product as eight partial sums, which the compiler vectorises.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];

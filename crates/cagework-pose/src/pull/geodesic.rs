@@ -8,11 +8,11 @@ use glam::Vec3;
 use super::nearest::KdTree;
 use cagework_core::mesh::weld;
 
-/// Minimum length of a bridge, over the model's size.
+/// Minimum length of a bridge, as a fraction of the model's size.
 const MIN_BRIDGE_LENGTH: f32 = 1e-9;
 
-/// Graph of the model's edges. Equal positions are one node; each component is joined to the largest one by a bridge
-/// between their nearest points.
+/// Graph of the model's edges. Vertices at equal positions are one node. A bridge joins each component to the largest
+/// one, between the nearest nodes of both.
 pub(super) struct Geodesic {
     /// Node of each vertex of the model.
     unique_of: Vec<u32>,
@@ -61,7 +61,7 @@ impl Geodesic {
         let mut distance = vec![f32::INFINITY; self.starts.len() - 1];
         let first = self.unique_of[seed as usize];
         distance[first as usize] = 0.0;
-        // Non-negative floats sort like their bits.
+        // Non-negative floats have the order of their bits.
         let mut heap = BinaryHeap::from([Reverse((0_u32, first))]);
         while let Some(Reverse((bits, at))) = heap.pop() {
             let here = f32::from_bits(bits);
@@ -81,7 +81,7 @@ impl Geodesic {
     }
 }
 
-/// An edge from each smaller component to the nearest node of the largest one.
+/// One edge from each smaller component to the nearest node of the largest one.
 fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let mut part: Vec<u32> = (0..points.len() as u32).collect();
     for &[a, b] in edges {

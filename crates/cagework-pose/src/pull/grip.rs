@@ -29,13 +29,14 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// A point of the model by its weights, `[n_cage]`, and its nearest vertex. [`super::Drag::new`] checks both.
+    /// Grip of a point of the model, given its weights, `[n_cage]`, and its nearest vertex. [`super::Drag::new`] checks
+    /// both.
     #[must_use]
     pub fn of_row(row: Vec<f64>, seed: u32) -> Self {
         Self { row, seed, is_cage: false }
     }
 
-    /// `triangles` and `weights`: the model's.
+    /// Grip of a handle. `triangles` and `weights`: those of the model.
     ///
     /// # Errors
     /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another model or cage.

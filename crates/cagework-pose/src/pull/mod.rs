@@ -1,5 +1,5 @@
-//! Direct manipulation of the model: the user moves points of it, and the cage is solved for so that the rest bends as
-//! little as possible.
+//! Direct manipulation of the model: the user moves points of the model, and the cage is solved for so that the rest of
+//! the model bends as little as possible.
 //!
 //! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is as rigid as possible (Sorkine and Alexa 2007), with
 //! rotation groups and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
@@ -10,10 +10,11 @@
 //!      + mu |Q c - T|^2 + eps |c - c0|^2                grabs and pins; regularisation
 //! ```
 //!
-//! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures the distance
-//! of the deformation's Jacobian from a rotation), or a cage vertex with its edges. A bind of extra points yields the gradients
-//! ([`Probes`]), once per model; a drag factorises its matrix once ([`Drag`]); a frame is a few local-global steps
-//! ([`Drag::frame`]). [`Pull::fit`] minimises the same energy with targets for all vertices or for landmarks.
+//! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures the
+//! distance of the deformation's Jacobian from a rotation), or a cage vertex with its edges. The gradients come from a
+//! bind of additional points, once per model ([`Probes`]). A drag factorises its matrix once ([`Drag`]), and a frame is
+//! a few local-global steps ([`Drag::frame`]). [`Pull::fit`] minimises the same energy with targets for all vertices or
+//! for landmarks.
 
 mod anderson;
 mod drag;
@@ -35,10 +36,10 @@ pub use fit::{Fit, FitOptions};
 pub use grip::{Grip, Handle};
 pub use samples::Probes;
 
-/// Most grabs and pins together: a drag inverts a dense matrix of that size.
+/// Limit on grabs and pins together, because a drag inverts a dense matrix of that size.
 pub const MAX_HANDLES: usize = 200;
 
-/// Most cage vertices: the matrices are dense, and every frame multiplies by them.
+/// Limit on cage vertices, because the matrices are dense and every frame multiplies by them.
 pub const MAX_CAGE: usize = 1000;
 
 /// Why a pull or a fit failed.
@@ -47,7 +48,7 @@ pub enum PullError {
     /// The model has no vertices.
     #[error("the model has no vertices to grab")]
     Empty,
-    /// Weights of another model or cage.
+    /// The weights belong to another model or cage.
     #[error(
         "the weights are of {rows} model vertices and {columns} cage vertices, but the model has {vertices} and the cage {cage}: \
      bind this model to this cage"
@@ -78,13 +79,13 @@ pub enum PullError {
         /// The largest valid index.
         last: usize,
     },
-    /// Coordinates that are not barycentric.
+    /// The coordinates are not barycentric.
     #[error("{0:?} are not barycentric coordinates: give three numbers that are not negative and sum to 1")]
     Barycentric([f64; 3]),
-    /// No grab.
+    /// There is no grab.
     #[error("nothing is grabbed: give at least one grab")]
     NoGrab,
-    /// Too many grabs and pins.
+    /// There are too many grabs and pins.
     #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}")]
     Handles(usize),
     /// A value that is not finite or out of range.
@@ -100,20 +101,20 @@ pub enum PullError {
     /// Targets and points differ in number.
     #[error("there are {given} targets for {points} points: give one per point")]
     Targets {
-        /// Targets.
+        /// Number of targets.
         given: usize,
-        /// Points.
+        /// Number of points.
         points: usize,
     },
     /// No point has a target and weight.
     #[error("no point has a target: all points lie outside the cage or have zero weight")]
     NoTarget,
-    /// The start pose is of another cage.
+    /// The start pose belongs to another cage.
     #[error("the start has {given} vertices, but the cage has {cage}")]
     Start {
-        /// Vertices of the start.
+        /// Number of vertices of the start pose.
         given: usize,
-        /// Vertices of the cage.
+        /// Number of vertices of the cage.
         cage: usize,
     },
     /// The matrix is singular in f64.

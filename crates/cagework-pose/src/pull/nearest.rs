@@ -15,7 +15,7 @@ impl<'a> KdTree<'a> {
         Self { points, order }
     }
 
-    /// Index and squared distance of the point nearest to `at`, if that is below `limit` (squared).
+    /// Index and squared distance of the point nearest to `at`. `None` if this distance is not below `limit` (squared).
     pub(super) fn find(&self, at: Vec3, limit: f32) -> Option<(u32, f32)> {
         let mut best = (u32::MAX, limit);
         self.search(&self.order, 0, at, &mut best);

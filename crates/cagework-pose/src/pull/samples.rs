@@ -8,16 +8,17 @@ use cagework_core::controls::Controls;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::weights::Weights;
 
-/// Number of samples. The energy with 300 samples is within 1 % of that with 600.
+/// Number of samples. The energy with 300 samples differs by at most 1 % from that with 600.
 const N_SAMPLES: usize = 300;
 
-/// Cage extent over the distance of a probe from its sample.
+/// Longest side of the cage's box divided by the distance of a probe from its sample.
 const STEPS_PER_EXTENT: f32 = 64.0;
 
-/// Probe points per sample.
+/// Number of probe points per sample, including the sample.
 const PROBES_PER_SAMPLE: usize = 7;
 
-/// Largest entry of Jacobian minus identity: a sample is ignored above it. A probe far outside the cage does not move with it.
+/// Largest entry of the Jacobian minus identity for which a sample is used. A probe far outside the cage does not move
+/// with the cage, which makes the Jacobian wrong.
 const MAX_JACOBIAN_ERROR: f64 = 0.5;
 
 /// Samples of a model with probe points for central differences.
@@ -25,7 +26,7 @@ const MAX_JACOBIAN_ERROR: f64 = 0.5;
 pub struct Probes {
     /// Farthest-point samples: vertices of the model. `[n_samples]`
     pub(super) samples: Vec<u32>,
-    /// Share of the model's area nearest to each sample; sums to 1. `[n_samples]`
+    /// Share of the model's area that is nearer to each sample than to the others; sums to 1. `[n_samples]`
     pub(super) shares: Vec<f64>,
     /// Share of the model's area at each vertex; sums to 1. `[n_vertices]`
     pub(super) areas: Vec<f64>,
@@ -36,7 +37,7 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Samples of `mesh`. `controls`: at rest.
+    /// Samples of `mesh`. `controls`: the controls at rest.
     ///
     /// # Errors
     /// [`PullError::Empty`], [`PullError::Cage`], or [`PullError::Missing`] if a triangle has an invalid corner.
@@ -76,9 +77,9 @@ impl Probes {
         DMatrix::from_fn(rows.len(), weights.n_columns(), |s, i| rows[s][i])
     }
 
-    /// Gradients of the weights at the samples by central differences, corrected so that `cage` (`[n]`, at rest) has
-    /// the identity as its Jacobian. Row `3 s + x` is d/dx at sample s. If a probe has left the cage, the sample's rows
-    /// and share are zero. `[3 * n_samples, n]`
+    /// Gradients of the weights at the samples by central differences, corrected so that the positions `cage` (`[n]`,
+    /// at rest) have the identity as their Jacobian. Row `3 s + x` is d/dx at sample s. If a probe is too far outside
+    /// the cage, the sample's rows and share are zero. `[3 * n_samples, n]`
     pub(super) fn gradients(&mut self, weights: &Weights, cage: &[DVec3]) -> Vec<Vec<f64>> {
         let n = cage.len();
         let scale = 0.5 / f64::from(self.step);
@@ -99,7 +100,7 @@ impl Probes {
                 continue;
             }
             let inverse = DMat3::from_cols(jacobian[0], jacobian[1], jacobian[2]).transpose().inverse();
-            // G <- (G C)^-1 G
+            // Replace the gradients G by (G C)^-1 G, with the rest positions C.
             all.extend([0, 1, 2].map(|x| {
                 let mix = inverse.row(x);
                 (0..n)
@@ -119,7 +120,7 @@ pub(super) fn dense(weights: &Weights, row: usize) -> Vec<f64> {
     dense
 }
 
-/// Share of the area at each vertex: a third of its triangles' area. Uniform if the model has no area.
+/// Share of the area at each vertex: a third of the area of the vertex's triangles. Uniform if the model has no area.
 fn areas(mesh: &TriMesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -135,7 +136,8 @@ fn areas(mesh: &TriMesh) -> Vec<f64> {
     areas
 }
 
-/// Farthest-point sampling (Gonzalez 1985): the samples, and the nearest sample of each vertex. `None` without vertices.
+/// Farthest-point sampling (Gonzalez 1985). Returns the samples, and the nearest sample of each vertex. `None` without
+/// vertices.
 fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
     let center = Bounds::of(positions)?.center();
     let farthest = |distances: &[f32]| {

@@ -39,7 +39,7 @@ fn bound(id: &str) -> BoundSample {
     BoundSample { mesh, weights, cage, pull, size }
 }
 
-/// The humanoid; bound once for all tests.
+/// The humanoid sample, bound once for all tests.
 fn humanoid() -> &'static BoundSample {
     static BOUND: OnceLock<BoundSample> = OnceLock::new();
     BOUND.get_or_init(|| bound("humanoid"))
@@ -87,7 +87,7 @@ impl BoundSample {
         row.iter().zip(cage.iter().zip(self.rest())).map(|(w, (c, r))| *w * (*c - r)).sum()
     }
 
-    /// Largest distance between two cages, over the model's size.
+    /// Largest distance between corresponding vertices of two cages, as a fraction of the model's size.
     fn apart(&self, a: &[DVec3], b: &[DVec3]) -> f64 {
         a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.size
     }
@@ -160,7 +160,7 @@ fn grabs_that_move_rigidly_move_all_rigidly() {
     assert!(b.apart(&drag.cage(), &expected) < 1e-3, "{}", b.apart(&drag.cage(), &expected));
 }
 
-/// A half turn in few frames: on straight paths all grabs would meet in the middle, and the model would collapse.
+/// A half turn in few frames. On straight paths, all grabs would meet in the middle, and the model would collapse.
 #[test]
 fn grabs_that_make_a_half_turn_turn_the_model() {
     let b = humanoid();
@@ -199,7 +199,7 @@ fn the_result_is_independent_of_the_path() {
     let mut away = drag();
     pulled(&mut away, 50.0 * by, 5);
     pulled(&mut away, DVec3::ZERO, 5);
-    // A drag counts as settled at 2e-5 a step; more frames bring it the rest of the way.
+    // A drag counts as settled at 2e-5 per frame; more frames bring it closer to the end.
     let back = pulled(&mut away, DVec3::ZERO, 30);
     assert!(b.apart(&back, &b.rest()) < 1e-4, "{}", b.apart(&back, &b.rest()));
 }
@@ -350,7 +350,7 @@ fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
         let grip = Grip::new(Handle::Vertex(0), &pull, &mesh.triangles, &weights).unwrap();
         let start: Vec<DVec3> = cage.positions().iter().copied().map(Vec3::as_dvec3).collect();
         let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
-        // Eight corners cannot bend a triangle: fixed samples and the grab share the error.
+        // The eight corners of the box cannot bend the triangle, so fixed samples and the grab share the error.
         (0..30).for_each(|_| drag.frame(&[DVec3::new(0.1, 0.0, 0.0)]));
         assert!(drag.cage().iter().all(|p| p.is_finite()) && drag.error() < 0.1, "{}", drag.error());
     }

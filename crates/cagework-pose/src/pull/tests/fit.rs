@@ -1,4 +1,4 @@
-//! Fits to targets.
+//! Tests of fits to targets.
 
 use glam::{DQuat, DVec3, Vec3};
 
@@ -6,7 +6,7 @@ use super::{BoundSample, bound, humanoid};
 use crate::pull::{Fit, FitOptions, PullError};
 use cagework_core::deform::deform_vertices;
 
-/// A map that bends, twists, stretches and translates the cage; lengths over the model's size.
+/// A map that bends, twists, stretches and translates the cage. Its lengths are fractions of the model's size.
 fn moved(bound: &BoundSample, cage: &[DVec3]) -> Vec<DVec3> {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 1.0);
     let size = bound.size;
@@ -50,7 +50,7 @@ impl BoundSample {
     }
 }
 
-/// Root mean squared and largest distance, over the model's size.
+/// Root mean squared and largest distance, as fractions of the model's size.
 fn apart(a: &[Vec3], b: &[Vec3], size: f64) -> [f64; 2] {
     let all: Vec<f64> = a.iter().zip(b).map(|(a, b)| f64::from(a.distance(*b)) / size).collect();
     [
@@ -83,7 +83,7 @@ fn a_fit_averages_noise_as_statistics_predict() {
             model.iter().map(|p| (p.as_dvec3() + each * random.vector()).as_vec3()).collect();
         let fitted = bound.fit(&noisy, None);
         let [rms, _] = apart(&bound.model(&fitted.cage), &model, bound.size);
-        // RMS error of n unknowns fitted to N values of unit variance.
+        // RMS error of a fit with n unknowns to N values of unit variance.
         let expected = noise * (bound.pull.n_cage() as f64 / model.len() as f64).sqrt();
         assert!(rms <= 1.2 * expected, "{noise:e}: {rms:e}, expected {expected:e}");
         assert!(rms <= 1e-4 || noise > 1e-3, "{noise:e}: {rms:e}");
