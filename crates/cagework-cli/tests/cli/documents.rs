@@ -23,7 +23,7 @@ fn files() -> Sandbox {
     sandbox.run("cage fox.glb -o fox-cage.obj").success();
     sandbox.run("bind horse.glb --cage cage.obj -g 16 --weights horse.npz").success();
     for (cage, poses) in [
-        ("cage.obj", &["gallop.obj", "a.obj", "b.obj", "body.obj", "bulky.obj"][..]),
+        ("cage.obj", &["gallop.obj", "bent.obj", "a.obj", "b.obj", "body.obj", "bulky.obj"][..]),
         ("fox-cage.obj", &["long-legs.obj"]),
     ] {
         for pose in poses {
@@ -48,6 +48,9 @@ fn files() -> Sandbox {
         .map(|v| format!(r#"{{"vertex": {v}, "to": [{}, {}, {}]}}"#, positions[v].x, positions[v].y, 0.1))
         .collect::<Vec<_>>();
     sandbox.write("body.json", format!("[{}]", landmarks.join(",")));
+    for name in ["probes.csv", "sliced.csv"] {
+        sandbox.write(name, format!("x,y,z\n0,{},0\n", 0.65 * top));
+    }
     sandbox.write("garments.txt", "jacket.glb\ntrousers.glb\n");
     sandbox
 }
