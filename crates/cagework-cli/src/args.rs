@@ -1,4 +1,5 @@
-//! Definition of the command line. Arguments that do not parse end the command with exit code 2 before any work starts.
+//! Definition of the command line. If the arguments do not parse, the command ends with exit code 2 before any work
+//! starts.
 
 mod cages;
 mod controls;
@@ -77,7 +78,7 @@ pub(crate) enum Command {
     Demo(DemoArgs),
 }
 
-/// `cagework info`
+/// Arguments of `cagework info`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  cagework info horse.glb\n  cagework info cage.obj --json")]
 pub(crate) struct InfoArgs {
@@ -88,7 +89,7 @@ pub(crate) struct InfoArgs {
     pub(crate) read: ReadArgs,
 }
 
-/// `cagework bind`
+/// Arguments of `cagework bind`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \
     cagework bind horse.glb --cage cage.obj --weights horse.npz\n  \
@@ -130,7 +131,7 @@ pub(crate) struct BindArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// How models are read: shared by all commands that read a model or a cage.
+/// Options for reading files. All commands that read a model or a cage share them.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct ReadArgs {
     /// Up axis of the files. With z, models, cages and poses are rotated to y up when they are read, and rotated back when
@@ -142,13 +143,13 @@ pub(crate) struct ReadArgs {
 }
 
 impl ReadArgs {
-    /// The up axis of the files.
+    /// The up axis of the files that the command reads and writes.
     pub(crate) fn axis(self) -> UpAxis {
         self.up
     }
 }
 
-/// `cagework deform`
+/// Arguments of `cagework deform`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "One pose gives the deformed model. Several give a GLB with one morph target per pose and an \
@@ -197,7 +198,7 @@ pub(crate) struct DeformArgs {
     pub(crate) smooth: u32,
 }
 
-/// `cagework pull`
+/// Arguments of `cagework pull`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "JOB.json:\n  {\"grabs\": [{\"vertex\": 12, \"to\": [0.1, 2.0, 0.3]}],\n   \"pins\": [{\"vertex\": 5}, \
@@ -217,7 +218,7 @@ pub(crate) struct PullArgs {
     pub(crate) job: PathBuf,
 }
 
-/// `cagework bench`
+/// Arguments of `cagework bench`.
 #[derive(Args, Debug)]
 #[command(after_help = "Without a mesh, the built-in sample is timed.\n\n\
     Examples:\n  cagework bench\n  cagework bench horse.obj --cage cage.obj -g 32,64,128 --runs 5 --json")]
@@ -236,7 +237,7 @@ pub(crate) struct BenchArgs {
     pub(crate) runs: u32,
 }
 
-/// `cagework evaluate`
+/// Arguments of `cagework evaluate`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  cagework evaluate\n  cagework evaluate --runs 5 -o evening\n  \
     cagework evaluate --mesh horse.obj --cage cage.obj -g 32 -o horse")]
@@ -258,7 +259,7 @@ pub(crate) struct EvaluateArgs {
     pub(crate) runs: u32,
 }
 
-/// `cagework demo`
+/// Arguments of `cagework demo`.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  cagework demo -o out")]
 pub(crate) struct DemoArgs {
@@ -267,11 +268,11 @@ pub(crate) struct DemoArgs {
     pub(crate) output: PathBuf,
 }
 
-/// A model file to write.
+/// A model file that the command writes, and its format.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelOutput {
     pub(crate) path: PathBuf,
-    /// Selected by the file extension.
+    /// Format that the file extension selects.
     pub(crate) format: ModelFormat,
 }
 
@@ -285,13 +286,13 @@ impl FromStr for ModelOutput {
     }
 }
 
-/// Help for a model argument: `what`, then the supported file extensions.
+/// Help text of a model argument: `what`, followed by the supported file extensions.
 fn model_help(what: &str) -> String {
     let endings = ModelFormat::ALL.map(|format| format.facts().endings).concat().join(", .");
     format!("{what} (.{endings})")
 }
 
-/// Parser of an option that takes one of several words.
+/// Parser of an option whose value is one word of a fixed set.
 fn words<T>() -> impl TypedValueParser<Value = T>
 where
     T: Choice + FromStr<Err: Error + Send + Sync> + Send + Sync,
@@ -300,7 +301,7 @@ where
     PossibleValuesParser::new(values).try_map(|word| word.parse::<T>())
 }
 
-/// Parser of a number within an option's range.
+/// Parser of a number that must be within the range of `option`.
 fn number<T>(option: Number) -> impl TypedValueParser<Value = T>
 where
     T: FromStr + Into<f64> + Copy + Send + Sync + 'static,

@@ -21,7 +21,7 @@ struct Bench {
     mesh: String,
     vertices: usize,
     cage_vertices: usize,
-    /// Number of threads in the cases that use all threads.
+    /// Number of threads in the cases that use all of them.
     threads: usize,
     runs: u32,
     grids: Vec<GridBench>,
@@ -32,7 +32,7 @@ struct Bench {
 struct GridBench {
     grid: u32,
     cases: Vec<Case>,
-    /// Ratios of the medians of total times.
+    /// Ratios of the median total times of the cases.
     ratios: Ratios,
 }
 
@@ -44,26 +44,26 @@ struct Case {
     threads: usize,
     iterations: u32,
     converged: bool,
-    /// Median over all runs, for each stage separately.
+    /// Median time of each stage over all runs.
     median_ms: Timings,
     min_total_ms: f64,
     max_total_ms: f64,
 }
 
-/// Ratios of the median total times.
+/// Ratios of median total times. A value above 1 means that the first case named is slower.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Ratios {
-    /// Classic Jacobi over embedded multigrid, both on one thread.
+    /// Classic Jacobi over embedded multigrid, both with one thread.
     classic_over_embedded_one_thread: f64,
-    /// Classic Jacobi over embedded multigrid, both on all threads.
+    /// Classic Jacobi over embedded multigrid, both with all threads.
     classic_over_embedded_all_threads: f64,
-    /// Classic Jacobi on one thread over all threads.
+    /// Classic Jacobi: time with one thread over time with all threads.
     classic_threads: f64,
-    /// Embedded multigrid on one thread over all threads.
+    /// Embedded multigrid: time with one thread over time with all threads.
     embedded_threads: f64,
 }
 
-/// Method, solver, number of threads (0: all), in the order that [`Ratios::of`] expects.
+/// Method, solver and number of threads (0 for all) of each case, in the order that [`Ratios::of`] expects.
 const CASES: [(Method, Solver, usize); 4] = [
     (Method::Classic, Solver::Jacobi, 1),
     (Method::Classic, Solver::Jacobi, 0),
@@ -102,7 +102,8 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
 
 fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBench, CliError> {
     let mut reports: [Vec<BindReport>; CASES.len()] = Default::default();
-    // Round-robin, so that a change of the machine's speed affects all cases equally and cancels in the ratios.
+    // Run the cases in turn, so that a change of the machine's speed affects all of them equally and cancels in the
+    // ratios.
     for _ in 0..runs {
         for (reports, (method, solver, threads)) in reports.iter_mut().zip(CASES) {
             let options = BindOptions { grid, method, solver, threads, ..BindOptions::default() };
@@ -115,7 +116,7 @@ fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBe
 }
 
 impl Case {
-    /// Summarises the reports of one case. `reports` must not be empty.
+    /// Summarises the bind reports of one case. `reports` must not be empty.
     fn of(reports: &[BindReport]) -> Self {
         let sorted = |time: fn(&Timings) -> f64| -> Vec<f64> {
             let mut times: Vec<f64> = reports.iter().map(|r| time(&r.timings_ms)).collect();

@@ -105,10 +105,11 @@ fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
 }
 
-/// Memory in use while a file of `to_write` bytes is encoded: `held`, the weights and the file. Bytes.
+/// Checks the memory needed while a file of `to_write` bytes is encoded: `options.held`, the weights, and the file.
+/// Returns it, bytes.
 ///
 /// # Errors
-/// If that exceeds the limit.
+/// If the needed memory exceeds the limit.
 pub(crate) fn check_memory(
     options: &BindOptions,
     points: usize,
@@ -152,12 +153,12 @@ pub(crate) fn bind_on(
     Ok(pollster::block_on(bind_on_gpu(positions, controls, options, &bar, context))?)
 }
 
-/// Positions of the bound points for posed controls. `[n_points]`, object units.
+/// Deforms the bound points by posed controls. `[n_points]`, object units.
 pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
     deform_bound(&binding.weights, &binding.frames, cage_positions)
 }
 
-/// Encodes the model's own document with new positions, in the output's format.
+/// Encodes the model's file with new vertex positions, in the output's format.
 ///
 /// # Errors
 /// If the model cannot be written in that format.

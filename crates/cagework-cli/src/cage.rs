@@ -23,7 +23,7 @@ struct CageSummary {
     divisions: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     margin: Option<f32>,
-    /// Report of the generator; only for generated cages.
+    /// Report of the cage generator; `None` for a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<CageReport>,
 }
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     print(&text(&summary))
 }
 
-/// Writes a cage in the output's format. `origin` is added to its positions.
+/// Writes a cage in the output's format. `origin` is added to all its positions.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -75,7 +75,7 @@ pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3
     write(&output.path, &export(&Model::of_mesh("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
-/// A length with three significant digits.
+/// Formats a length with three significant digits.
 fn three_digits(length: f32) -> String {
     let after_point = 2.0 - length.log10().floor();
     match after_point {

@@ -1,4 +1,4 @@
-//! The summary of a bind that the command prints: a dozen lines from its report.
+//! Summary of a bind as text: about a dozen lines from its report.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,7 +9,8 @@ use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
 use crate::controls::inner_controls_text;
 use crate::files::shown_path;
 
-/// Formats a report. `model_notices`: notices from reading the mesh; `written`: files that were written.
+/// Formats a bind report. `model_notices`: notices from reading the mesh; `written`: paths of the files that were
+/// written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
     let mut out = format!(
         "bound {} vertices to {} cage vertices{}\n",
@@ -127,7 +128,7 @@ fn solver(report: &BindReport) -> &'static str {
     }
 }
 
-/// Formats milliseconds with a suitable unit.
+/// Formats a time, with the unit that suits its size.
 pub(crate) fn duration(ms: f64) -> String {
     if ms < 10.0 {
         format!("{ms:.1} ms")

@@ -16,11 +16,11 @@ use crate::load::{cage_mesh, load_model};
 #[derive(Debug, Serialize)]
 struct CheckSummary {
     file: String,
-    /// A sentence per repair.
+    /// Sentences that describe the applied repairs, one for each repair.
     repaired: Vec<String>,
-    /// File of the repaired cage.
+    /// Path of the repaired cage; `None` if nothing was written.
     output: Option<String>,
-    /// Faults after the repairs.
+    /// Faults that remain after the repairs.
     #[serde(flatten)]
     check: CageCheck,
 }
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
     let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
-    // The faults of a cage do not depend on the up axis.
+    // Read with Y up, because the faults of a cage do not depend on the up axis.
     let load = |path| load_model(path, UpAxis::Y, args.memory);
     let refused = |source| CliError::Cage { name: args.cage.display().to_string(), source };
     let of_cage = load(&args.cage)?;
@@ -117,7 +117,8 @@ fn text(summary: &CheckSummary) -> String {
     out
 }
 
-/// The first element with this fault. `None` for self-intersections, whose message names it already.
+/// Text that names the first faulty edge, face or vertex. `None` for self-intersections, whose message already names
+/// the faces.
 fn place(p: &cagework_cage::check::Problem) -> Option<String> {
     if p.code == Code::SelfIntersection {
         return None;

@@ -1,4 +1,4 @@
-//! Inner controls: reads them and their poses.
+//! Reads inner controls and their poses.
 
 use std::path::{Path, PathBuf};
 
@@ -10,8 +10,8 @@ use crate::args::{ControlArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{read, shown_path};
 
-/// Builds the controls that the arguments describe. Returns `None` if the vertices of the cage are the only controls. `axes`:
-/// up axis of the files, and origin of the cage's positions.
+/// Builds the controls that the arguments describe. Returns `None` if the cage's vertices are the only controls and the
+/// cage is not subdivided. `axes`: up axis of the files, and origin of the cage's positions.
 ///
 /// # Errors
 /// If the file cannot be read, or a control is invalid.
@@ -26,7 +26,7 @@ pub(crate) fn load_controls(
         None => InnerControls::default(),
         Some(path) => InnerControls { radius: args.radius, ..load_inner(path, axes, memory)? },
     };
-    // `ControlSet::new` accepts an empty set, which is a mistake if a file was given.
+    // `ControlSet::new` accepts a set without controls, which is a mistake if the user gave a file.
     if args.controls.is_some() && inner.elements.is_empty() {
         return Err(control_error(args, cagework_core::ControlError::Empty));
     }
@@ -51,10 +51,12 @@ fn load_inner(
     Ok(inner)
 }
 
-/// Appends the inner controls to each pose of the cage: `files[k]` to pose k, or `rest` if there are no files.
+/// Appends the positions of the inner controls to each pose of the cage: those in `files[k]` to pose k, or `rest` if no
+/// files are given.
 ///
 /// # Errors
-/// If a file cannot be read or has another number of vertices, or the number of files is neither zero nor that of the poses.
+/// If a file cannot be read or has another number of vertices than `rest`, or the number of files is neither zero nor
+/// that of the poses.
 pub(crate) fn with_inner(
     poses: Vec<Vec<Vec3>>,
     files: &[PathBuf],
@@ -93,7 +95,7 @@ pub(crate) fn rest_of(cage: &Cage, saved: &SavedWeights) -> Vec<Vec3> {
     [cage.positions(), &saved.inner_controls].concat()
 }
 
-/// Text for `n` inner controls that follows the number of cage vertices; empty for zero.
+/// Text such as " and 2 inner controls", which follows the number of cage vertices; empty if `n` is 0.
 pub(crate) fn inner_controls_text(n: usize) -> String {
     match n {
         0 => String::new(),

@@ -1,4 +1,4 @@
-//! `cagework deform`: deforms a bound mesh by a moved cage.
+//! `cagework deform`: deforms a bound mesh by poses of its cage.
 
 use std::path::Path;
 use std::time::Instant;
@@ -28,13 +28,13 @@ struct DeformSummary {
     cage_vertices: usize,
     inner_controls: usize,
     outside_vertices: usize,
-    /// Outside vertices that do not follow the cage at all.
+    /// Number of vertices outside the cage that do not follow it at all.
     staying_vertices: usize,
     poses: Vec<String>,
-    /// Changes of skeleton, morph targets and clips; absent if the model has none or `--static` drops them.
+    /// Changes of skeleton, morph targets and clips; `None` if the model has no rig or `--static` drops it.
     #[serde(flatten)]
     rig: Option<ReshapeReport>,
-    /// Time to compute all poses, without file input and output.
+    /// Time to compute all poses, without reading and writing files, ms.
     deform_ms: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     lattice: Option<LatticeSummary>,
@@ -128,7 +128,7 @@ fn deform(
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
-    // Keyframe times are kept for one file; those of several files are unrelated.
+    // Keep the keyframe times of a single pose file; times of several files are unrelated.
     if args.pose.len() == 1 && seconds.len() == poses.len() {
         options.pose_seconds = seconds;
     }
@@ -159,25 +159,26 @@ fn deform(
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Poses of all controls.
+/// Poses of the cage and its inner controls.
 pub(crate) struct Poses {
     pub(crate) names: Vec<String>,
-    /// Controls at rest. `[n_controls]`, object units
+    /// Positions of the controls at rest. `[n_controls]`, object units
     pub(crate) rest: Vec<Vec3>,
-    /// Controls in each pose. `[n_poses][n_controls]`, object units
+    /// Positions of the controls in each pose. `[n_poses][n_controls]`, object units
     pub(crate) positions: Vec<Vec<Vec3>>,
 }
 
-/// A model in all poses.
+/// A model deformed by all poses.
 pub(crate) enum Deformation {
-    /// Displacements of all bound points, `[n_poses][n_points]`, object units; and the indices of the points outside the cage.
+    /// A rigged model: displacements of all bound points, `[n_poses][n_points]`, object units, and indices of the
+    /// points outside the cage.
     Rig { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
-    /// Vertex positions. `[n_poses][n_vertices]`, object units
+    /// A model without rig: vertex positions in each pose. `[n_poses][n_vertices]`, object units
     Shape(Vec<Vec<Vec3>>),
 }
 
 impl Deformation {
-    /// Deforms a model. `shape_only`: ignore its rig.
+    /// Deforms a model by all poses. If `shape_only` is set, its rig is ignored.
     pub(crate) fn new(
         model: &Model,
         saved: SavedWeights,
@@ -196,7 +197,8 @@ impl Deformation {
         Self::Shape(poses.positions.iter().map(posed).collect())
     }
 
-    /// Encodes the model: deformed by a single pose, or at rest with several poses as morph targets. Also returns the changes of its rig.
+    /// Encodes the model: deformed by a single pose, or at rest with several poses as morph targets. Also returns a
+    /// report of the changes to its rig.
     ///
     /// # Errors
     /// If the weights lack the rig's points, or the model cannot be written in that format.
@@ -230,10 +232,10 @@ impl Deformation {
     }
 }
 
-/// Reads weights and checks that they match a mesh and a cage.
+/// Reads weights, and checks that they match the mesh and the cage.
 ///
 /// # Errors
-/// If the file cannot be read, or the numbers of vertices differ.
+/// If the file cannot be read, or its numbers of vertices differ from those of mesh and cage.
 pub(crate) fn load_weights(
     path: &Path,
     model: &Model,
@@ -259,7 +261,7 @@ pub(crate) fn load_weights(
     })
 }
 
-/// Name of a pose: the file name without folder and extension.
+/// Name of a pose: its file name without folder and extension.
 pub(crate) fn pose_name(path: &Path) -> String {
     path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
 }

@@ -1,4 +1,4 @@
-//! `cagework demo`: binds and deforms the built-in sample, and writes all files of the workflow.
+//! `cagework demo`: binds and deforms the built-in sample, and writes every kind of file that this produces.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -77,7 +77,7 @@ fn file_stem(name: &str) -> String {
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// Writes files into one folder and collects their paths.
+/// Writes files into one folder, and records their paths.
 struct Files<'a> {
     folder: &'a Path,
     written: Vec<PathBuf>,

@@ -1,4 +1,4 @@
-//! `cagework deform --dynamic`: a clip moves the model, and the cage bends each frame.
+//! `cagework deform --dynamic`: applies a clip to the model, then bends each frame with the posed cage.
 
 use cagework_core::BindOptions;
 use cagework_core::field::{self, FieldWeights, Lattice, bend_vertices};
@@ -22,10 +22,10 @@ struct DynamicSummary {
     notices: Vec<String>,
 }
 
-/// Writes the frames of a clip, each bent by the posed cage.
+/// Writes the frames of a clip, each frame bent by the posed cage.
 ///
 /// # Errors
-/// If a file cannot be read or written, the model has no such clip, or files do not match.
+/// If a file cannot be read or written, the model has no clip with this name, or files do not match.
 pub(crate) fn run(
     args: &DeformArgs,
     clip: &str,

@@ -1,4 +1,4 @@
-//! Errors of the command, with hints.
+//! Errors of the command, with hints for the user.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -13,78 +13,78 @@ use cagework_gpu::GpuError;
 use cagework_io::{GltfError, ObjError, ReadError, shown};
 use thiserror::Error;
 
-/// A path with control characters escaped.
+/// Displays a path with control characters escaped.
 pub(crate) fn shown_path(path: &Path) -> String {
     shown(&path.display().to_string())
 }
 
-/// Why a command failed.
+/// Reason why a command failed.
 #[derive(Debug, Error)]
 pub(crate) enum CliError {
-    /// A failure that concerns one file.
+    /// An error about one file.
     #[error("{}: {source}", shown_path(path))]
     File {
         path: PathBuf,
-        /// What failed.
+        /// The error without the file's name.
         source: Box<dyn Error + Send + Sync>,
     },
     /// A model could not be read. The source names the file.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A file is not a pose of the cage.
+    /// A file does not contain a pose of the cage.
     #[error(transparent)]
     Pose(#[from] cagework_io::PoseError),
     /// A mesh is not a valid cage.
     #[error("{}: {source}", shown(name))]
     Cage {
-        /// File or description of the cage.
+        /// Path or description of the cage.
         name: String,
         source: CageError,
     },
     /// The bind failed.
     #[error(transparent)]
     Bind(#[from] BindError),
-    /// The GPU, or a bind on it, failed.
+    /// The GPU is not available, or a bind on it failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// Cage generation failed.
     #[error(transparent)]
     CageGen(#[from] CageGenError),
-    /// The cage cannot be subdivided, or a control inside it is invalid.
+    /// The cage cannot be subdivided, or an inner control is invalid.
     #[error(transparent)]
     Controls(#[from] ControlError),
     /// A repair of the cage failed.
     #[error(transparent)]
     Repair(#[from] RepairError),
-    /// Coordinates by a closed form could not be computed.
+    /// Closed-form coordinates could not be computed.
     #[error(transparent)]
     ClosedForm(#[from] ClosedFormError),
     /// A plot or picture could not be drawn or encoded.
     #[error("a plot cannot be drawn: {message}")]
     Plot { message: String },
-    /// Files that do not match each other, outputs that would overwrite inputs, and other conflicts between arguments.
+    /// Files do not match each other, an output would overwrite an input, or arguments are in conflict.
     #[error("{message}")]
     Mismatch {
-        /// What is wrong, with the conflicting numbers or names.
+        /// What conflicts, with the numbers or names involved.
         message: String,
-        /// What to do.
+        /// What the user can do.
         hint: &'static str,
     },
 }
 
 impl CliError {
-    /// A failure that concerns one file.
+    /// Creates an error about one file.
     pub(crate) fn file(path: &Path, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { path: path.to_path_buf(), source: source.into() }
     }
 
-    /// The error followed by its causes, each once.
+    /// The error and its chain of causes, each cause once.
     pub(crate) fn message(&self) -> String {
         let mut text = self.to_string();
         let mut cause = self.source();
         while let Some(error) = cause {
             let cause_text = error.to_string();
-            // Some errors already include their cause.
+            // Some error messages already include the message of their cause.
             if !text.contains(&cause_text) {
                 text = format!("{text}: {cause_text}");
             }
@@ -93,7 +93,7 @@ impl CliError {
         text
     }
 
-    /// What the user can do about the error.
+    /// Advice about what the user can do.
     pub(crate) fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Mismatch { hint, .. } => Some(hint),
@@ -133,6 +133,6 @@ impl CliError {
 /// Prints an error and its hint on stderr.
 pub(crate) fn print_error(message: &str, hint: Option<&str>) {
     let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-    // Ignored: if stderr is closed, the error cannot be reported.
+    // Ignore failures: if stderr is closed, the error cannot be reported.
     let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

@@ -1,4 +1,4 @@
-//! File input and output. No other module of the command accesses the file system.
+//! File input and output of the command.
 
 mod outputs;
 mod whole;
@@ -20,10 +20,10 @@ use outputs::FileIdentity;
 pub(crate) use outputs::{check_outputs, refuse_files_named, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
-/// Largest file that is read, bytes. The arrays of a larger model would exceed 32-bit indices.
+/// Largest size of a file that is read, bytes. The arrays of a larger model would exceed 32-bit indices.
 pub(crate) const MAX_FILE_BYTES: u64 = 2 << 30;
 
-/// Files read so far, including those that a model names (buffers, materials, textures). Outputs must not overwrite them.
+/// All files read so far, including buffers, materials and textures that models name. Outputs must not overwrite them.
 static INPUT_FILES: Mutex<Vec<FileIdentity>> = Mutex::new(Vec::new());
 
 /// Reads a whole file.
@@ -40,7 +40,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
 /// Reads a file that `main` names by a relative path, such as a glTF buffer. `None` if the file does not exist.
 ///
 /// # Errors
-/// If [`read`] would fail, or the path or a symbolic link on it leaves the folder of `main`. The message has no subject, because it follows the file's name.
+/// If [`read`] would fail, or if the path, or a symbolic link on it, leads out of the folder of `main`. The message has
+/// no subject, because the caller puts the file's name in front of it.
 pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>, String>> {
     let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
     match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
@@ -50,7 +51,7 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>,
         }
         Err(error) => match error.kind() {
             ErrorKind::NotFound => None,
-            // cap-std reports an escape from the folder as this kind, without a system error number.
+            // cap-std reports a path that leads out of the folder with this kind, and without a system error number.
             ErrorKind::PermissionDenied if error.raw_os_error().is_none() => {
                 Some(Err("leads out of the model's folder".into()))
             }
@@ -63,16 +64,16 @@ fn record_input(path: &Path) {
     INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner).push(FileIdentity::new(path));
 }
 
-/// Read options. Non-blocking, because opening a pipe would otherwise wait for a writer.
+/// Options for opening files to read. They are non-blocking, because opening a pipe would otherwise wait for a writer.
 fn to_read() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.read(true).nonblock(true);
     options
 }
 
-/// Reads an open file. The error message has no subject, because it follows the file's name.
+/// Reads an open file. The error message has no subject, because the caller puts the file's name in front of it.
 fn content(file: File) -> Result<Vec<u8>, String> {
-    // Of the open file, because the path may be replaced at any time.
+    // Ask the open file rather than its path, which another process may replace.
     let metadata = file.metadata().map_err(|e| reason(&e))?;
     if metadata.is_dir() {
         return Err("is a folder, not a file".into());
@@ -88,7 +89,7 @@ fn content(file: File) -> Result<Vec<u8>, String> {
     if let Some(problem) = too_large(metadata.len()) {
         return Err(problem);
     }
-    // Files in /proc and similar file systems report this length too.
+    // The length is also 0 for files in /proc and similar file systems, which are not empty.
     if metadata.len() == 0 {
         return Err("is empty".into());
     }
@@ -109,14 +110,14 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), CliError> {
         .map_err(|e| CliError::file(path, format!("the folder cannot be created: {}", reason(&e))))
 }
 
-/// Whether a file was modified after all of `than`. False if a modification time is not available.
+/// Whether a file was modified after all files in `than`. False if a modification time is not available.
 pub(crate) fn is_newer(file: &Path, than: &[&Path]) -> bool {
     let modified = |path: &Path| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
     modified(file)
         .is_some_and(|file| than.iter().all(|path| modified(path).is_some_and(|other| other < file)))
 }
 
-/// Prints text and a line end on stdout. A closed pipe (`| head`) is ignored.
+/// Prints text and a line end on stdout. Ignores a closed pipe, such as after `| head`.
 ///
 /// # Errors
 /// If stdout cannot be written to.
@@ -128,7 +129,7 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// A value as indented JSON.
+/// Formats a value as indented JSON.
 pub(crate) fn json(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("only structs with text keys are serialized here")
 }

@@ -21,34 +21,34 @@ use landmarks::landmarks;
 #[derive(Debug, Serialize)]
 struct FitSummary {
     output: String,
-    /// Vertices or landmarks with a target.
+    /// Number of vertices or landmarks with a target.
     points: usize,
-    /// Vertices without one, because they are outside the cage.
+    /// Number of vertices without a target, because they are outside the cage.
     left_out: usize,
     cage: usize,
     lambda: f64,
     energy: f64,
-    /// Root mean square and maximum of the distances from the targets, at rest.
+    /// Root mean square of the distances from the targets at rest; `largest_before` is their maximum.
     rms_before: f64,
     largest_before: f64,
-    /// The same after the fit.
+    /// Root mean square of the distances from the targets after the fit; `largest` is their maximum.
     rms: f64,
     largest: f64,
     steps: usize,
     settled: bool,
-    /// Time of the precomputation for this model and cage, including the bind of the probes.
+    /// Time of the precomputation for this model and cage, ms. It includes binding the sample points.
     precompute_ms: f64,
     fit_ms: f64,
     notices: Vec<String>,
 }
 
-/// Points of the model and their targets.
+/// Points of the model with their target positions.
 struct Goals {
     /// Weights of the points. `[n_points, n_controls]`
     weights: Weights,
     /// Weight of each point in the sum of squared distances. `[n_points]`
     importance: Vec<f64>,
-    /// Targets, object units. `[n_points]`
+    /// Target position of each point, object units. `[n_points]`
     to: Vec<Vec3>,
     notices: Vec<String>,
 }
@@ -71,7 +71,7 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
             vertices(&bound, target, pull.areas())?
         }
         (None, Some(path)) => landmarks(&bound, path)?,
-        // Excluded by clap: one of both arguments is required.
+        // clap rejects this case: one of the two arguments is required.
         (None, None) => return Ok(()),
     };
     let begun = Instant::now();
@@ -111,7 +111,8 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Targets of all vertices inside the cage: the vertices of another model with the same indices.
+/// The vertices of the target model as targets of the vertices with the same indices. Vertices outside the cage get
+/// importance 0.
 fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, CliError> {
     let (given, expected) = (target.positions.len(), bound.model.positions.len());
     if given != expected {
@@ -140,7 +141,7 @@ fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, C
     Ok(Goals { weights: bound.rows(), importance, to: target.positions, notices })
 }
 
-/// Weighted root mean square and maximum of the distances of points from their targets, divided by `size`.
+/// Weighted root mean square and maximum of the distances of points from their targets, both divided by `size`.
 fn distances(weights: &Weights, cage: &[Vec3], importance: &[f64], to: &[Vec3], size: f64) -> (f64, f64) {
     let (mut sum, mut total, mut largest) = (0.0, 0.0, 0.0_f64);
     for (((indices, data), share), to) in
@@ -180,7 +181,7 @@ fn text(summary: &FitSummary) -> String {
     out
 }
 
-/// A file with valid JSON but invalid values.
+/// An error about a file with valid JSON but invalid values.
 fn wrong(path: &std::path::Path, what: &str) -> CliError {
     CliError::Mismatch {
         message: format!("{}: {what}", shown_path(path)),

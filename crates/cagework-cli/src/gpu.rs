@@ -1,4 +1,4 @@
-//! Opens a GPU, and converts models to what it draws.
+//! Opens a GPU, and converts models to the renderer's data.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use image::ImageReader;
 
 use crate::error::CliError;
 
-/// Opens a GPU.
+/// Opens a GPU with the default options.
 ///
 /// # Errors
 /// If no adapter is available.
@@ -18,12 +18,12 @@ pub(crate) fn open() -> Result<GpuContext, GpuError> {
     pollster::block_on(GpuContext::new(&ContextOptions::default()))
 }
 
-/// Converts a model for drawing. Also returns notices about textures that are scaled down or not drawn.
+/// Converts a model to the renderer's data. Also returns notices about textures that are scaled down or omitted.
 pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
     let TexturePlan { side, admitted, mut notices } = TexturePlan::new(&[&look]);
     let mut textures = Vec::new();
-    // Groups with an undecodable image are drawn in their base colour.
+    // Groups whose image cannot be decoded are drawn in their base colour.
     let numbers: Vec<Option<u32>> = look
         .images
         .iter()
@@ -83,7 +83,7 @@ fn wrap(wrap: LookWrap) -> Wrap {
     }
 }
 
-/// Decodes a texture. Also returns a notice if it was scaled down to `side`.
+/// Decodes a texture. Also returns a notice if the texture was scaled down to `side` pixels.
 fn decode(image: &LookImage, side: u32) -> Result<(DrawTexture, Option<String>), String> {
     let reader = ImageReader::new(Cursor::new(&image.bytes)).with_guessed_format();
     let mut decoded = reader.map_err(|e| e.to_string())?.decode().map_err(|e| e.to_string())?;
@@ -108,7 +108,7 @@ pub(crate) fn png(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, C
     let failed = |message: String| CliError::Plot { message };
     let picture = image::RgbaImage::from_raw(width, height, rgba)
         .ok_or_else(|| failed(format!("the pixels do not fill {width} x {height}")))?;
-    // Pictures are opaque; without alpha the file is a quarter smaller.
+    // Drop the alpha channel, because pictures are opaque; the file is then a quarter smaller.
     let picture = image::DynamicImage::ImageRgba8(picture).into_rgb8();
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|e| failed(e.to_string()))?;

@@ -1,4 +1,4 @@
-//! `cagework info`: describes a model, and whether it is a valid cage.
+//! `cagework info`: describes a model, and says whether it is a valid cage.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -30,16 +30,16 @@ struct Info {
     joints: usize,
     morph_targets: usize,
     clips: Vec<Clip>,
-    /// Names of nodes that carry a mesh on a joint but no skin, such as a hat; `--rigid` accepts them.
+    /// Names of meshes that are attached to a joint but not skinned, such as a hat; `--rigid` accepts them.
     props: Vec<String>,
     bounds: BoundsInfo,
-    /// Whether every edge belongs to two triangles after equal positions are welded.
+    /// Whether every edge belongs to two triangles after vertices at equal positions are merged.
     closed: bool,
     cage: CageInfo,
     notices: Vec<String>,
 }
 
-/// The bounding box, object units.
+/// Bounding box of the model, object units.
 #[derive(Debug, Serialize)]
 struct BoundsInfo {
     min: [f64; 3],
@@ -47,11 +47,11 @@ struct BoundsInfo {
     diagonal: f32,
 }
 
-/// Whether the model is a valid cage.
+/// Whether the model is a valid cage, and why not.
 #[derive(Debug, Serialize)]
 struct CageInfo {
     valid: bool,
-    /// The first fault.
+    /// Message about the first fault; `None` if the model is a valid cage.
     problem: Option<String>,
     notices: Vec<String>,
 }
@@ -63,7 +63,7 @@ struct CageInfo {
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
     let inner = inner_info(args)?;
     let model = match (load_model(&args.model, args.read.axis(), args.read.memory), &inner) {
-        // Files of inner controls may contain only points and lines.
+        // A file of inner controls may contain only points and lines, which `load_model` rejects.
         (Err(_), Some(inner)) => return print(&if as_json { json(inner) } else { inner.to_string() }),
         (model, _) => model?,
     };
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
 struct InnerInfo {
     file: String,
     format: &'static str,
-    /// Each is a column of the weights.
+    /// Number of vertices, each of which is a column of the weights.
     vertices: usize,
     points: usize,
     lines: usize,
@@ -127,7 +127,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         joints: counts.joints,
         morph_targets: counts.morph_targets,
         clips: model.clips(),
-        // Errors of the rig are reported by the commands that deform it.
+        // Ignore errors of the rig here; commands that deform it report them.
         props: model.props().unwrap_or_default(),
         bounds: BoundsInfo {
             min: in_world(model, bounds.min),
@@ -140,7 +140,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
     })
 }
 
-/// A position in world space, Y up, rounded to the decimal digits of the file.
+/// World position with Y up, rounded to the decimal digits of the file.
 fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     let origin = model.up().vector_turned(model.origin()).to_array();
     let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
@@ -149,7 +149,7 @@ fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     std::array::from_fn(|_| axes.next().unwrap_or_default())
 }
 
-/// Whether every edge belongs to exactly two triangles. Triangles with two equal corners after welding are ignored.
+/// Whether every edge belongs to exactly two triangles. Ignores triangles of which two corners are merged.
 fn is_closed(triangles: &[[u32; 3]], unique_of: &[u32]) -> bool {
     let mut uses: HashMap<(u32, u32), u32> = HashMap::new();
     for triangle in triangles {
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn seams_between_welded_vertices_are_closed() {
-        // Vertex 4 is a copy of vertex 0.
+        // Vertex 4 is at the position of vertex 0.
         let mut split = TETRAHEDRON;
         split[0][0] = 4;
         assert!(!is_closed(&split, &[0, 1, 2, 3, 4]));

@@ -18,40 +18,40 @@ use crate::error::CliError;
 use crate::files::{read, read_beside, shown_path};
 use crate::progress::Bar;
 
-/// A cage, and the model it was read from, which its pose files must match.
+/// A cage, and the model that it was read from. Pose files must match this model.
 #[derive(Debug)]
 pub(crate) struct LoadedCage {
     pub(crate) cage: Cage,
     model: Model,
-    /// Up axis of the cage's file and its pose files.
+    /// Up axis of the cage's file and of its pose files.
     up: UpAxis,
     /// Memory limit for reading a pose.
     memory: MemoryArgs,
-    /// Set if the cage is subdivided or has inner controls.
+    /// Controls of the bind; `None` if the cage is not subdivided and has no inner controls.
     set: Option<ControlSet>,
 }
 
 /// Reads a model with faces. `up`: up axis of the file.
 ///
 /// # Errors
-/// If the file cannot be read, has no faces, or needs more than the memory limit.
+/// If the file cannot be read, has no faces, or needs more memory than the limit.
 pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let model = load_any(path, up, memory)?;
     model.require_faces()?;
     Ok(model)
 }
 
-/// The polygons of a model, not yet checked to be a cage.
+/// The faces of a model as a polygon mesh, not yet checked to be a valid cage.
 ///
 /// # Errors
-/// If it has more than [`MAX_FACES`] faces.
+/// If the model has more than [`MAX_FACES`] faces.
 pub(crate) fn cage_mesh(model: &Model) -> Result<PolygonMesh, CageError> {
-    // Checked before the faces are listed, because the list takes more memory than the model.
+    // Check the number first, because the list of faces takes more memory than the model.
     let faces = model.n_faces();
     if faces > MAX_FACES { Err(CageError::TooManyFaces { faces }) } else { Ok(model.cage_mesh()) }
 }
 
-/// Reads a model, or a point cloud without faces.
+/// Reads a model, which may be a point cloud without faces.
 ///
 /// # Errors
 /// If the file cannot be read, or needs more than the memory limit.
@@ -64,24 +64,24 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
     Ok(model)
 }
 
-/// The built-in sample: the default input of `demo`, `bench` and `evaluate`.
+/// The built-in sample, which `demo`, `bench` and `evaluate` use by default.
 #[derive(Debug)]
 pub(crate) struct BuiltInSample {
-    /// Identifier, such as `rat`.
+    /// Identifier of the sample, such as `rat`.
     pub(crate) name: String,
-    /// Mesh for `write_cage_obj`.
+    /// The sample's mesh.
     pub(crate) mesh: PolygonMesh,
-    /// The same mesh as a model.
+    /// The sample's mesh as a model.
     pub(crate) model: Model,
     pub(crate) cage: Cage,
     /// Names and positions of the poses. `[n_poses][n_cage]`, object units.
     pub(crate) poses: Vec<(String, Vec<Vec3>)>,
 }
 
-/// Builds the first sample, which is also the page's initial model.
+/// Builds the first sample, which the page also opens first.
 ///
 /// # Errors
-/// Never for the samples as they are: tests of cagework-core bind each of them.
+/// Never for the present samples: a test of cagework-core binds each of them.
 pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     let missing = || CliError::Cage { name: "built-in sample".into(), source: CageError::Empty };
     let id = samples::all().first().ok_or_else(missing)?.id;
@@ -93,7 +93,7 @@ pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     Ok(BuiltInSample { name: id.to_owned(), mesh, model, cage, poses })
 }
 
-/// Reads or generates the cage for a model. A cage file has the model's up axis.
+/// Reads or generates the cage of a model. A cage file has the same up axis as the model.
 ///
 /// # Errors
 /// If the file cannot be read or is not a valid cage, or no cage can be generated.
@@ -119,7 +119,8 @@ pub(crate) fn load_cage(
     LoadedCage::new(model, around.up(), memory, controls)
 }
 
-/// Reads a cage file. `up`: up axis of the file; `origin`: subtracted from its positions, by default a point near the cage.
+/// Reads a cage file. `up`: up axis of the file. `origin` is subtracted from its positions; by default, a point near
+/// the cage.
 ///
 /// # Errors
 /// If the file cannot be read or is not a valid cage.
@@ -135,10 +136,10 @@ pub(crate) fn load_cage_file(
     LoadedCage::new(model, up, memory, controls)
 }
 
-/// Generates a cage around a model, its morph targets and the frames of a clip, with a progress bar.
+/// Generates a cage around a model, its morph targets and the frames of a clip, and shows a progress bar.
 ///
 /// # Errors
-/// Those of [`generate`], and if the model has no such clip.
+/// The errors of [`generate`]. If the model has no clip with this name.
 pub(crate) fn generate_for(
     model: &Model,
     clip: Option<&str>,
@@ -150,7 +151,8 @@ pub(crate) fn generate_for(
     Ok((made.cage.to_polygon_mesh(), made.report))
 }
 
-/// A subdivided box around positions. `margin`: distance between both, as a fraction of their bounding box's diagonal.
+/// A subdivided box around positions. `margin`: distance from the box to the positions, as a fraction of their bounding
+/// box's diagonal.
 ///
 /// # Errors
 /// If `positions` is empty, or the box overflows or degenerates in `f32`.
@@ -174,17 +176,17 @@ impl LoadedCage {
         Ok(Self { cage, model, up, memory, set })
     }
 
-    /// Point that was subtracted from all positions, in the axes of the file.
+    /// Point that was subtracted from all positions of the cage, in the axes of its file.
     pub(crate) fn origin(&self) -> DVec3 {
         self.model.origin()
     }
 
-    /// Controls to bind to: the cage's vertices, and the inner controls.
+    /// Controls to bind to: the cage's vertices and the inner controls.
     pub(crate) fn controls(&self) -> Controls<'_> {
         self.set.as_ref().map_or_else(|| Controls::from(&self.cage), Controls::from)
     }
 
-    /// Inner controls.
+    /// Inner controls of the cage; `None` if it has none.
     pub(crate) fn inner(&self) -> Option<&InnerControls> {
         self.controls().inner()
     }
@@ -203,20 +205,20 @@ impl LoadedCage {
         })
     }
 
-    /// Encodes a pose in the output's format and with the cage file's axes. `pose`: `[n_cage]`, object units.
+    /// Encodes a pose in the output's format, in the axes of the cage's file. `pose`: `[n_cage]`, object units.
     ///
     /// # Errors
     /// If the pose cannot be written in that format.
     pub(crate) fn write_pose(&self, pose: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
         let mut positions = self.model.posed_as_cage(pose);
-        // Generated cages have y up; the pose gets the axes of the model file.
+        // A generated cage has Y up, but the pose file gets the axes of the model's file.
         if self.model.up() != self.up {
             positions = self.up.turned_back(&positions).into_owned();
         }
         self.model.write(output.format, &positions).map_err(|e| CliError::file(&output.path, e))
     }
 
-    /// Reads the pose in a file. `[n_cage]`, object units, in the cage's vertex order.
+    /// Reads the single pose in a file. `[n_cage]`, object units, in the cage's vertex order.
     ///
     /// # Errors
     /// If the file cannot be read, has another number of vertices than the cage, or contains several poses.
@@ -235,7 +237,7 @@ impl LoadedCage {
         }
     }
 
-    /// Reads all poses in a file: keyframes, shape keys, or its positions.
+    /// Reads all poses in a file: its keyframes or shape keys, or its vertex positions if it has neither.
     ///
     /// # Errors
     /// If the file cannot be read, or has another number of vertices than the cage.

@@ -33,8 +33,8 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser as _;
 
-/// A bind allocates and frees about 30 MB within milliseconds. The system allocator returns such blocks to the kernel each
-/// time; the page faults took a fifth of a bind at g = 64.
+/// A bind allocates and frees about 30 MB within milliseconds. The system allocator returns such blocks to the kernel
+/// each time, and the resulting page faults took a fifth of a bind's time at g = 64.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

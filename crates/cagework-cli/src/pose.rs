@@ -1,4 +1,4 @@
-//! Input and output of the commands that solve for a pose of the cage: `pull` and `fit`.
+//! Reads and writes the files of the commands that solve for a pose of the cage: `pull` and `fit`.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use crate::error::CliError;
 use crate::files::{check_outputs, shown_path, write};
 use crate::load::{LoadedCage, load_cage, load_model};
 
-/// A model, its cage and their weights.
+/// A model with its cage and weights.
 pub(crate) struct BoundModel {
     pub(crate) model: Model,
     pub(crate) cage: LoadedCage,
@@ -26,12 +26,13 @@ pub(crate) struct BoundModel {
 }
 
 impl BoundModel {
-    /// Weights whose offsets are folded in, so that positions are linear in the controls. `[n_vertices, n_controls]`
+    /// Weights into which the frames are folded, so that positions are linear in the controls. `[n_vertices,
+    /// n_controls]`
     pub(crate) fn rows(&self) -> Weights {
         self.frames.folded(&self.weights)
     }
 
-    /// Reads model, cage and weights. No output may overwrite these files or `other_inputs`.
+    /// Reads model, cage and weights. Fails if an output would overwrite one of these files or of `other_inputs`.
     ///
     /// # Errors
     /// If a file cannot be read, or the files do not match.
@@ -69,10 +70,11 @@ impl BoundModel {
     }
 }
 
-/// Precomputation of a pull, shared by all grabs: binds the probes and factorises the energy.
+/// Does the precomputation that all pulls of this model and cage share: binds the sample points and factorises the
+/// energy.
 ///
 /// # Errors
-/// If the cage is too large, or the probes cannot be bound.
+/// If the cage is too large, or the sample points cannot be bound.
 pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Result<Pull, CliError> {
     let mesh = model.tri_mesh();
     let wrong = |e| CliError::file(&args.mesh, e);
@@ -83,7 +85,8 @@ pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Re
     Pull::new(&mesh, controls, probes, &bound.frames.folded(&bound.weights)).map_err(wrong)
 }
 
-/// Writes a pose of the cage, and that of the inner controls with `--save-controls`. `pose`: `[n_controls]`, object units.
+/// Writes a pose of the cage and, with `--save-controls`, the pose of the inner controls. `pose`: `[n_controls]`,
+/// object units.
 ///
 /// # Errors
 /// If a file cannot be written.

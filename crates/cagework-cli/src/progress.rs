@@ -1,4 +1,4 @@
-//! The progress bar.
+//! The progress bar of long operations.
 
 use std::io::IsTerminal as _;
 use std::ops::ControlFlow;
@@ -8,17 +8,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::signals::{self, CancelGuard};
 
-/// Resolution of the bar, finer than the columns of a terminal.
+/// Number of positions of the bar, more than a terminal has columns.
 const STEPS: u64 = 1000;
 
-/// A progress bar on stderr, hidden unless stderr is a terminal. Cancels the work on Ctrl-C and SIGTERM.
+/// A progress bar on stderr, hidden unless stderr is a terminal. Reports a signal such as Ctrl-C or SIGTERM as
+/// cancellation of the work.
 pub(crate) struct Bar {
     bar: ProgressBar,
     _guard: CancelGuard,
 }
 
 impl Bar {
-    /// Shows the bar and starts to poll for cancellation.
+    /// Shows the bar, and makes the first signal cancel the work.
     pub(crate) fn start() -> Self {
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
@@ -43,7 +44,7 @@ impl Progress for Bar {
         }
         if !self.bar.is_hidden() {
             self.bar.set_prefix(stage_name(event.stage));
-            // Threads report out of order; keep the bar from moving backwards.
+            // Keep the bar from moving backwards: threads report their progress out of order.
             let position = (f64::from(event.fraction.clamp(0.0, 1.0)) * STEPS as f64) as u64;
             self.bar.set_position(position.max(self.bar.position()));
             if let Some(delta) = event.delta {

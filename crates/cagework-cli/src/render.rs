@@ -29,10 +29,10 @@ struct RenderSummary {
     output: String,
     size: [u32; 2],
     adapter: String,
-    /// Coordinates of the left and the right picture, with `--compare`.
+    /// Coordinates of the left and of the right picture, with `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
     compared: Option<[String; 2]>,
-    /// Time to draw and read back, without binding, file input and output.
+    /// Time to draw and to read back the picture, ms. It excludes binding, reading and writing.
     render_ms: f64,
     notices: Vec<String>,
 }
@@ -120,7 +120,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Rejects comparisons without anything to compare.
+/// Rejects arguments for which `--compare` has nothing to show.
 fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     let hint = "leave out --compare, or --show the model";
     if args.compare.is_some() && matches!(args.show, ShowArg::Cells | ShowArg::Slice) {
@@ -134,21 +134,21 @@ fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Minimum width of two pictures side by side, pixels: one column each, and the divider.
+/// Minimum width of a picture that consists of two parts, pixels: one column for each part, and the divider.
 const MIN_PAIR_WIDTH: u32 = 2 + DIVIDER_WIDTH;
 
-/// Width of the divider between two pictures, pixels.
+/// Width of the divider between the two parts of a picture, pixels.
 const DIVIDER_WIDTH: u32 = 2;
 
 /// RGBA colour of the divider, visible on dark and light backgrounds.
 const DIVIDER_COLOR: [u8; 4] = [128, 128, 128, 255];
 
-/// Width of each of two pictures side by side in a picture of `width`, pixels.
+/// Width of each of the two parts of a picture of `width` pixels.
 fn half(width: u32) -> u32 {
     (width - DIVIDER_WIDTH) / 2
 }
 
-/// Joins two RGBA pictures of `part` columns to one of `width` columns, with the divider between them.
+/// Joins two RGBA pictures, each `part` pixels wide, to one that is `width` pixels wide, with the divider between them.
 fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
     let row = 4 * part as usize;
     let line = DIVIDER_COLOR.repeat((width - 2 * part) as usize);
@@ -156,7 +156,7 @@ fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
     rows.flat_map(|(left, right)| [left, &line, right].concat()).collect()
 }
 
-/// Scene options that follow from the arguments alone.
+/// Scene options that depend only on the arguments.
 fn scene_of(args: &RenderArgs) -> SceneOptions {
     let column = args.column;
     let mesh = match args.show {
@@ -181,7 +181,8 @@ fn scene_of(args: &RenderArgs) -> SceneOptions {
     }
 }
 
-/// Sets the weights, pose and slice that the picture needs. Returns the control positions at rest and posed, for framing.
+/// Sets the weights, pose and slice that the picture needs. Returns the positions of the controls at rest and posed,
+/// which the camera frames.
 fn prepare(
     args: &RenderArgs,
     model: &Model,

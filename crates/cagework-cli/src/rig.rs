@@ -1,4 +1,4 @@
-//! Rigged models: the points that are bound with them, and writing them deformed.
+//! Rigged models: lists the points to bind, and writes the deformed model.
 
 use std::path::Path;
 
@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 
 use crate::error::CliError;
 
-/// Encodes a rigged model deformed by one pose, or at rest with several poses as morph targets. `by`: displacements of all bound
-/// points, `[n_poses][n_points]`, object units; `outside`: indices of the points outside the cage.
+/// Encodes a rigged model, deformed by one pose, or at rest with several poses as morph targets. `by`: displacements of
+/// all bound points, `[n_poses][n_points]`, object units; `outside`: indices of the points outside the cage.
 ///
 /// # Errors
 /// If the weights lack the rig's points, or the model cannot be written.
@@ -39,7 +39,7 @@ pub(crate) fn write(
     model.write_reshaped(&rest, outside, &poses, options).map_err(wrong)
 }
 
-/// Points to bind: the vertices, then the points of the rig. Also returns the number of the latter.
+/// Points to bind: the vertices, then the points of the rig. Also returns the number of points of the rig.
 ///
 /// # Errors
 /// If the rig cannot be read.

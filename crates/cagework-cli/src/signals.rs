@@ -1,19 +1,20 @@
-//! Signals: cancel the work, or end the process without leaving a partial file.
+//! Signal handlers, which cancel the work or end the process without leaving a partial file.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Set by the first Ctrl-C, SIGTERM or SIGHUP.
+/// Whether a first Ctrl-C, SIGTERM or SIGHUP has arrived.
 static IS_CANCELLED: AtomicBool = AtomicBool::new(false);
 
 /// Number of running operations that poll [`cancelled`].
 static N_POLLING: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether a signal has cancelled the work.
+/// Whether a signal has requested to cancel the work.
 pub(crate) fn cancelled() -> bool {
     IS_CANCELLED.load(Ordering::SeqCst)
 }
 
-/// Guard of an operation that polls [`cancelled`]. While one exists, the first signal cancels instead of ending the process.
+/// Guard of an operation that polls [`cancelled`]. While a guard exists, the first signal cancels the operation instead
+/// of ending the process.
 pub(crate) struct CancelGuard(());
 
 impl CancelGuard {
@@ -29,9 +30,9 @@ impl Drop for CancelGuard {
     }
 }
 
-/// Installs the handlers. The first Ctrl-C, SIGTERM or SIGHUP cancels if an operation polls for it. A second one, SIGQUIT,
-/// SIGXCPU and SIGUSR1 end the process through `abandon`, which deletes the partial file. SIGXFSZ (`ulimit -f`) is ignored, so that
-/// the write fails with an error.
+/// Installs the signal handlers. The first Ctrl-C, SIGTERM or SIGHUP cancels the work if an operation polls for it.
+/// Otherwise, these signals end the process through `abandon`, which deletes the partial file; so does a second one,
+/// and so do SIGQUIT, SIGXCPU and SIGUSR1. SIGXFSZ (`ulimit -f`) is ignored, so that the write fails with an error.
 #[cfg(unix)]
 pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU, SIGXFSZ};
@@ -56,6 +57,6 @@ pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     });
 }
 
-/// On other systems signals keep their default action.
+/// Does nothing on other systems, where signals keep their default action.
 #[cfg(not(unix))]
 pub(crate) fn listen(_abandon: fn(&mut dyn FnMut())) {}

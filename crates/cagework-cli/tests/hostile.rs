@@ -1,5 +1,5 @@
-//! Small files that try to provoke endless work or allocation: five commands on each, under limits of the operating system.
-//! Prints a table of times and memory (`--nocapture`).
+//! Tests small files that try to provoke endless work or allocation. Five commands read each file, under limits of the
+//! operating system. Prints a table of times and memory (`--nocapture`).
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 #![cfg(target_os = "linux")]
@@ -13,13 +13,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Time limit of a command, seconds; for a build without optimisation.
+/// Time limit of a command, seconds. It suits a build without optimisation.
 const SECONDS: f64 = 10.0;
 
 /// Memory limit of a command, MB.
 const MEGABYTES: u64 = 1000;
 
-/// Result of one command.
+/// Result of running one command.
 struct Run {
     code: Option<i32>,
     seconds: f64,
@@ -27,7 +27,7 @@ struct Run {
     stderr: String,
 }
 
-/// Runs the command in `folder` with 4 GB of address space, and polls its memory until it ends.
+/// Runs the command in `folder` with 4 GB of address space, and polls its memory use until it ends.
 fn run(folder: &Path, args: &str) -> Run {
     let limits = format!("ulimit -v 4000000; exec timeout -s KILL {SECONDS} \"$0\" {args}");
     let stderr = folder.with_extension("stderr");
@@ -56,7 +56,7 @@ fn run(folder: &Path, args: &str) -> Run {
     }
 }
 
-/// Peak memory so far of a process, or of its child process if it has one, kB.
+/// Peak memory so far of a process or, if it has a child process, of the first child, kB.
 fn peak_of(process: u32) -> Option<u64> {
     let children = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).ok()?;
     let process = children.split_whitespace().next().map_or(process.to_string(), str::to_owned);
@@ -68,10 +68,11 @@ fn peak_of(process: u32) -> Option<u64> {
 const TETRAHEDRON: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n";
 const F: &str = "f 1/1 3/1 2/1\nf 1/1 2/1 4/1\nf 1/1 4/1 3/1\nf 2/1 3/1 4/1\n";
-/// Length of the accessors of zeros.
+/// Number of elements of the accessors that contain only zeros.
 const N_ZEROS: u32 = 1 << 24;
 
-/// A tetrahedron as GLB after `change` of its document. Accessors 2 and 3 have `N_ZEROS` zeros and no buffer.
+/// A tetrahedron as GLB, with its JSON document changed by `change`. Accessors 2 and 3 have `N_ZEROS` zeros and no
+/// buffer.
 fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let mut bin: Vec<u8> = TETRAHEDRON.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
     bin.extend([0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
@@ -103,7 +104,8 @@ fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     out
 }
 
-/// Gives the document `n` nodes with a mesh: as a chain of children, or all at the root.
+/// Adds `n` nodes with a mesh to the document: each the child of the previous one if `is_chain`, otherwise all at the
+/// root.
 fn nodes(json: &mut Value, n: usize, is_chain: bool) {
     let node = |i: usize| {
         if is_chain && i + 1 < n { json!({ "mesh": 0, "children": [i + 1] }) } else { json!({ "mesh": 0 }) }
@@ -112,7 +114,8 @@ fn nodes(json: &mut Value, n: usize, is_chain: bool) {
     json["scenes"][0]["nodes"] = if is_chain { json!([0]) } else { (0..n).collect() };
 }
 
-/// Gives the document an animation of `channels` channels that share one sampler with this number of keys and values, all zeros.
+/// Adds an animation of `channels` channels to the document. They share one sampler with this number of keys and
+/// values, all zeros.
 fn clip(json: &mut Value, [keys, values]: [Value; 2], interpolation: &str, channels: usize) {
     json["accessors"].as_array_mut().unwrap().extend([
         json!({ "componentType": 5126, "count": keys, "type": "SCALAR" }),
@@ -123,7 +126,7 @@ fn clip(json: &mut Value, [keys, values]: [Value; 2], interpolation: &str, chann
         "samplers": [{ "input": 4, "output": 5, "interpolation": interpolation }] }]);
 }
 
-/// Corner i of a star with `n` corners.
+/// Corner i of a star-shaped polygon with `n` corners.
 fn star(i: usize, n: usize) -> [f64; 3] {
     let (angle, radius) = (std::f64::consts::TAU * i as f64 / n as f64, 1.0 - 0.5 * (i % 2) as f64);
     [radius * angle.cos(), radius * angle.sin(), 0.0]
@@ -133,7 +136,7 @@ const PLY_FACES: &[u8] =
     b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
     element face 3000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
 
-/// A file with a single face of `n` corners at three positions.
+/// A PLY file with a single face of `n` corners at three positions.
 fn ply_of_one_face(n: u32) -> Vec<u8> {
     let mut bytes =
         b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -145,14 +148,14 @@ fn ply_of_one_face(n: u32) -> Vec<u8> {
     bytes
 }
 
-/// A black PNG.
+/// A black PNG image.
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image::GrayImage::new(width, height).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
-/// A polygon with corners `place(0)` to `place(n - 1)`, as OBJ.
+/// An OBJ file of one polygon with corners `place(0)` to `place(n - 1)`.
 fn polygon(n: usize, place: impl Fn(usize) -> [f64; 3]) -> String {
     let mut text: String = (0..n).map(place).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
     text.push('f');
@@ -160,7 +163,7 @@ fn polygon(n: usize, place: impl Fn(usize) -> [f64; 3]) -> String {
     text
 }
 
-/// A pseudorandom number from 0 to 1, the same in each run.
+/// A pseudorandom number from 0 to 1 that depends only on `i`.
 fn noise(i: usize) -> f64 {
     (i as f64 * 12.9898).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0)
 }
@@ -173,7 +176,7 @@ fn triangles_that_all_meet(n: usize) -> String {
     text
 }
 
-/// All files by name; some are materials and textures that the models name.
+/// All files by name. Some are materials and textures that the models refer to.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
     let obj = |head: &str| format!("{head}{V}usemtl a\n{F}").into_bytes();
     let textured: String = (0..40).map(|i| format!("usemtl a{i}\n{F}")).collect();
@@ -299,7 +302,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Asserts that the command succeeded, or failed with an error message, within the memory limit.
+/// Asserts that the command succeeded or failed with an error message, and stayed within the memory limit.
 fn assert_orderly_end(name: &str, run: &Run) {
     assert!(
         matches!(run.code, Some(0 | 1)),
@@ -319,7 +322,7 @@ fn assert_orderly_end(name: &str, run: &Run) {
 
 #[test]
 fn every_command_ends_with_success_or_an_error_message() {
-    // The files are kept, because the page's tests open them too (web/e2e/hostile.spec.ts).
+    // Keep the files, because a test of the page opens them too (web/e2e/hostile.spec.ts).
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hostile");
     let (folder, files) = (folder.as_path(), files());
     fs::create_dir_all(folder).unwrap();
@@ -353,7 +356,7 @@ fn every_command_ends_with_success_or_an_error_message() {
     std::io::stdout().write_all(table.as_bytes()).unwrap();
 }
 
-/// Files with repeated, distinct and instanced positions, because weights are shared by equal positions only.
+/// The files have repeated, distinct and instanced positions, because only equal positions share their weights.
 #[test]
 fn memory_estimate_is_near_the_peak() {
     let folder = tempfile::tempdir().unwrap();
@@ -387,7 +390,7 @@ fn memory_estimate_is_near_the_peak() {
         let estimated = report["memory_bytes"]["estimated"].as_f64().unwrap() / 1e6;
         let used = (run.megabytes - program) as f64;
         println!("{bind}: {estimated:.0} MB estimated, {used} MB used");
-        // Peaks differ by a tenth between runs, because threads free their fields in a different order.
+        // Peaks differ by a tenth between runs, because threads free their fields in varying order.
         assert!(
             (0.75..=1.35).contains(&(estimated / used)),
             "{bind}: {estimated:.0} MB estimated, {used} MB used"

@@ -1,4 +1,4 @@
-//! Arguments about cages: where a cage comes from, how it is generated, checked and repaired.
+//! Arguments that say where a cage comes from, and how it is generated, checked and repaired.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -15,10 +15,10 @@ use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
 /// Default distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
 pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
-/// Default number of vertices of a hull.
+/// Default maximum number of vertices of a hull cage.
 const DEFAULT_HULL_VERTICES: u32 = 24;
 
-/// `cagework cage`
+/// Arguments of `cagework cage`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \
     cagework cage horse.glb -o cage.obj\n  \
@@ -74,13 +74,13 @@ pub(crate) struct CageArgs {
 }
 
 impl CageArgs {
-    /// The kind: given by --kind, or implied by --divisions.
+    /// The kind of cage that `--kind` selects. Without it, `--divisions` implies a box.
     pub(crate) fn kind(&self) -> KindArg {
         let guess = if self.divisions.is_some() { KindArg::Box } else { KindArg::Auto };
         self.kind.unwrap_or(guess)
     }
 
-    /// The options of a generated cage.
+    /// Options for generating the cage.
     pub(crate) fn options(&self) -> CageOptions {
         let hull = self.kind() == KindArg::Hull;
         CageOptions {
@@ -101,7 +101,7 @@ impl CageArgs {
     }
 }
 
-/// `cagework check`
+/// Arguments of `cagework check`.
 #[derive(Args, Debug)]
 #[command(after_help = "The exit code is 1 if the mesh is not a valid cage.\n\n\
     Examples:\n  \
@@ -131,16 +131,16 @@ pub(crate) struct CheckArgs {
     pub(crate) memory: MemoryArgs,
 }
 
-/// Where a cage comes from.
+/// Source of a cage: a file, or a generator with its options.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CageSource {
     File(PathBuf),
-    /// A subdivided box around the mesh.
+    /// A subdivided box around the model.
     Box {
-        /// Quads along each edge.
+        /// Number of quads along each edge of the box.
         divisions: u32,
     },
-    /// A generated cage.
+    /// A cage that follows the model, or its convex hull.
     Auto(CageOptions),
 }
 
@@ -164,7 +164,7 @@ impl FromStr for CageSource {
     }
 }
 
-/// Kinds of cages.
+/// Kinds of cages that `cagework cage` makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum KindArg {
     Auto,
@@ -172,7 +172,7 @@ pub(crate) enum KindArg {
     Hull,
 }
 
-/// Repairs.
+/// Repairs that `cagework check --repair` applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RepairArg {
     /// Merge vertices at the same position.

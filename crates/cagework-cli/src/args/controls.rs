@@ -1,11 +1,11 @@
-//! Arguments about controls: subdivision of the cage, and controls inside it.
+//! Arguments that subdivide the cage, and that add controls inside it.
 
 use std::path::PathBuf;
 
 use cagework_core::options;
 use clap::Args;
 
-/// Subdivision of the cage.
+/// Argument for the subdivision of the cage.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct SmoothArgs {
     /// Steps of Catmull-Clark subdivision of the cage, 0 to 3: the model follows the smooth surface, and the cage's vertices
@@ -14,7 +14,7 @@ pub(crate) struct SmoothArgs {
     pub(crate) smooth: u32,
 }
 
-/// Subdivision, and controls inside the cage.
+/// Arguments for the subdivision of the cage, and for controls inside it.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ControlArgs {
     #[command(flatten)]

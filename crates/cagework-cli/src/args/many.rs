@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
 
-/// `cagework refit`
+/// Arguments of `cagework refit`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Each model is written under its own name (.gltf as .glb) as soon as it is done. If a model fails, the \

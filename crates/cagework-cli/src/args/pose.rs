@@ -1,4 +1,4 @@
-//! Arguments of commands that solve for a pose of the cage: `pull` and `fit`.
+//! Arguments of the commands that solve for a pose of the cage: `pull` and `fit`.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, model_help, number, obj_output};
 
-/// The bound model, and the files for the resulting pose.
+/// Files of the bound model, and files for the pose that the command finds.
 #[derive(Args, Debug)]
 pub(crate) struct PoseArgs {
     /// Mesh that was bound.
@@ -34,7 +34,7 @@ pub(crate) struct PoseArgs {
     pub(crate) save_controls: Option<PathBuf>,
 }
 
-/// `cagework fit`
+/// Arguments of `cagework fit`.
 #[derive(Args, Debug)]
 #[command(after_help = "LANDMARKS is a list of pairs, such as\n\n  \
     [{\"vertex\": 1204, \"to\": [0.4, 1.1, 0]},\n   {\"triangle\": 88, \"bary\": [0.2, 0.3, 0.5], \"to\": [0, 1, 0]},\n   \

@@ -1,4 +1,4 @@
-//! The arguments of `cagework render`.
+//! Arguments of `cagework render`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 
 use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
 
-/// `cagework render`
+/// Arguments of `cagework render`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "The model is bound first if the picture needs weights and --weights is not given.\n\n\
@@ -95,10 +95,10 @@ pub(crate) struct RenderArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// Word of harmonic coordinates as those to compare with.
+/// Word of `--compare` that compares with harmonic coordinates of the cage without inner controls.
 const PLAIN: &str = "plain";
 
-/// Parser of the coordinates to compare with.
+/// Parser of the word that selects the coordinates to compare with.
 fn compared() -> impl TypedValueParser<Value = Coordinates> {
     let forms =
         Coordinates::ALL.iter().filter(|(_, kind)| *kind != Coordinates::Harmonic).map(|(word, kind)| {
@@ -112,7 +112,7 @@ fn compared() -> impl TypedValueParser<Value = Coordinates> {
         .try_map(|word| if word == PLAIN { Ok(Coordinates::Harmonic) } else { word.parse() })
 }
 
-/// What to draw.
+/// What the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ShowArg {
     /// The model with its materials.
@@ -133,7 +133,7 @@ pub(crate) enum ShowArg {
     Slice,
 }
 
-/// A coordinate axis.
+/// Coordinate axis perpendicular to the slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AxisArg {
     X,
@@ -156,7 +156,7 @@ impl FromStr for Size {
     }
 }
 
-/// Camera direction.
+/// Direction of the camera, radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
     yaw: f32,
@@ -164,7 +164,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Yaw and pitch, radians.
+    /// Yaw and pitch of the camera, radians.
     pub(crate) fn angles(self) -> (f32, f32) {
         (self.yaw, self.pitch)
     }

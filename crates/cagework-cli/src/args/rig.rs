@@ -1,4 +1,4 @@
-//! Arguments about rigged models and parts of models.
+//! Arguments for rigged models, and for parts of models that the cage does not bend.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::error::CliError;
 
-/// Parts of a model that the cage does not bend.
+/// Arguments that select parts of the model which the cage does not bend.
 #[derive(Args, Debug)]
 pub(crate) struct PartArgs {
     /// Part that keeps its shape, such as buckles, eyes or teeth: each connected piece moves rigidly. The name of a material, a node,
@@ -31,7 +31,7 @@ fn mask(text: &str) -> Result<(String, f32), String> {
     Err(format!("the amount is {amount}; expected 0 (follows the cage) to 1 (stays in place)"))
 }
 
-/// Treatment of the rig of a model.
+/// Arguments for the treatment of a model's rig.
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
     /// Joints, and other nodes that clips animate or that carry meshes: follow moves them with the cage and keeps their rotations; stay leaves
@@ -49,7 +49,7 @@ pub(crate) struct RigArgs {
 }
 
 impl RigArgs {
-    /// Options of a reshape.
+    /// Options for deforming a rigged model.
     ///
     /// # Errors
     /// If no part of the model has a given name.
@@ -57,7 +57,7 @@ impl RigArgs {
         self.options_with(model, path, &self.parts)
     }
 
-    /// Options for one of many models, and the part names that this model does not have.
+    /// Options for deforming one of many models, and the given part names that this model does not have.
     ///
     /// # Errors
     /// If a name is ambiguous, or the rig cannot be read.
@@ -82,7 +82,7 @@ impl RigArgs {
         Ok((self.options_with(model, path, &PartArgs { rigid, mask })?, missing))
     }
 
-    /// Names given by --rigid and --mask.
+    /// Part names that `--rigid` and `--mask` give.
     pub(crate) fn part_names(&self) -> impl Iterator<Item = &String> {
         self.parts.rigid.iter().chain(self.parts.mask.iter().map(|(name, _)| name))
     }

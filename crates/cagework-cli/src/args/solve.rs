@@ -1,4 +1,4 @@
-//! Arguments of the solver, and the memory limit.
+//! Arguments for the solver and the memory limit.
 
 use cagework_core::options::{
     self, Backend, BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{number, words};
 
-/// The memory limit.
+/// Argument for the memory limit.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct MemoryArgs {
     /// Memory limit for reading models, binding and writing, in MiB. Work that would need more is refused before it starts.
@@ -22,13 +22,13 @@ impl Default for MemoryArgs {
 }
 
 impl MemoryArgs {
-    /// The limit, bytes.
+    /// The memory limit, bytes.
     pub(crate) fn bytes(self) -> u64 {
         self.memory_limit << 20
     }
 }
 
-/// Arguments of the solver: shared by all commands that bind.
+/// Arguments of the solver. All commands that bind share them.
 #[derive(Args, Debug)]
 pub(crate) struct SolveArgs {
     /// Boundary of the grid: embedded takes the exact intersections of grid lines with the cage, classic whole cells, as published.
@@ -69,12 +69,12 @@ pub(crate) struct SolveArgs {
 }
 
 impl SolveArgs {
-    /// Whether to solve on the GPU.
+    /// Whether `--backend` selects the GPU.
     pub(crate) fn on_gpu(&self) -> bool {
         self.backend == Backend::Gpu
     }
 
-    /// Bind options for `grid` cells and this memory limit.
+    /// Bind options for `grid` cells along the cage's longest side, and this memory limit.
     pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
         BindOptions {
             grid,

@@ -1,4 +1,4 @@
-//! The cases of the evaluation: the paper's, and the same grids with the embedded method.
+//! The binds that the evaluation runs: those of the paper, and the embedded method on the same grids.
 
 use cagework_core::Frames;
 use cagework_core::bind::Binding;
@@ -14,30 +14,30 @@ use crate::error::CliError;
 
 use super::spread::Spread;
 
-/// A combination of method, solver and processor.
+/// A combination of method, solver, and number of threads or GPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Implementation {
-    /// The published algorithm on one thread.
+    /// The paper's algorithm on one thread.
     PaperOneThread,
-    /// The published algorithm on all threads.
+    /// The paper's algorithm on all threads.
     PaperThreads,
-    /// The published algorithm on the GPU.
+    /// The paper's algorithm on the GPU.
     PaperGpu,
-    /// Embedded conjugate gradients on one thread.
+    /// The embedded method with conjugate gradients, on one thread.
     CgOneThread,
-    /// Embedded conjugate gradients on all threads.
+    /// The embedded method with conjugate gradients, on all threads.
     CgThreads,
-    /// Embedded multigrid on one thread.
+    /// The embedded method with multigrid, on one thread.
     MultigridOneThread,
-    /// Embedded multigrid on all threads.
+    /// The embedded method with multigrid, on all threads.
     MultigridThreads,
-    /// Embedded multigrid on the GPU.
+    /// The embedded method with multigrid, on the GPU.
     MultigridGpu,
 }
 
 impl Implementation {
-    /// All implementations, in the order of the plots.
+    /// All implementations, in the order in which plots show them.
     pub(super) const ALL: [Self; 8] = [
         Self::PaperOneThread,
         Self::PaperThreads,
@@ -49,7 +49,7 @@ impl Implementation {
         Self::MultigridGpu,
     ];
 
-    /// Name in tables and plots.
+    /// Name of the implementation in tables and plots.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::PaperOneThread => "paper, one thread",
@@ -63,7 +63,7 @@ impl Implementation {
         }
     }
 
-    /// Name in CSV files.
+    /// Name of the implementation in CSV files.
     pub(super) fn id(self) -> &'static str {
         match self {
             Self::PaperOneThread => "paper-one-thread",
@@ -77,7 +77,7 @@ impl Implementation {
         }
     }
 
-    /// Name of its iterations.
+    /// What the solver's iterations are called.
     pub(super) fn iterations(self) -> &'static str {
         match self {
             Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu => "sweeps",
@@ -86,7 +86,7 @@ impl Implementation {
         }
     }
 
-    /// Whether it solves on the GPU.
+    /// Whether the implementation solves on the GPU.
     pub(super) fn is_gpu(self) -> bool {
         matches!(self, Self::PaperGpu | Self::MultigridGpu)
     }
@@ -105,18 +105,19 @@ impl Implementation {
     }
 }
 
-/// Result of one case.
+/// Result of one or more binds with the same options.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Run {
     pub(super) implementation: Implementation,
-    /// Report of the bind with the median total time.
+    /// Report of the bind that has the median total time.
     pub(super) report: BindReport,
-    /// Shortest and longest total time.
+    /// Range of the total times of all binds, ms.
     pub(super) total_ms: Spread,
 }
 
 impl Run {
-    /// The median of several binds of one case, which differ only in their times. `None` if `reports` is empty.
+    /// Summarises repeated binds with the same options, whose reports differ only in their times. `None` if `reports`
+    /// is empty.
     fn median(implementation: Implementation, mut reports: Vec<BindReport>) -> Option<Self> {
         let total_ms = Spread::of(reports.iter().map(|r| r.timings_ms.total))?;
         reports.sort_by(|a, b| a.timings_ms.total.total_cmp(&b.timings_ms.total));
@@ -124,7 +125,8 @@ impl Run {
         Some(Self { implementation, report, total_ms })
     }
 
-    /// (milliseconds of solving, delta) after each iteration, assuming that all iterations take the same time.
+    /// (Milliseconds of solving, delta) pairs at the iterations that report delta, assuming that all iterations take
+    /// the same time.
     pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
         let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
         let every = f64::from(self.report.delta_interval);
@@ -133,19 +135,19 @@ impl Run {
     }
 }
 
-/// One of the rest-pose reconstructions shown in figures 2 to 5 of the report.
+/// A rest pose reconstructed from weights, for one of figures 2 to 5.
 #[derive(Clone, Debug)]
 pub(super) struct Reconstruction {
-    /// File name without extension.
+    /// File name of the figure, without extension.
     pub(super) figure: &'static str,
-    /// Caption in the report.
+    /// Caption of the figure in the report.
     pub(super) caption: String,
     pub(super) report: BindReport,
     pub(super) weights: Weights,
     pub(super) frames: Frames,
 }
 
-/// All results.
+/// Results of the whole evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) mesh: String,
@@ -154,11 +156,11 @@ pub(super) struct Evaluation {
     pub(super) threads: usize,
     pub(super) runs: u32,
     pub(super) grids: Grids,
-    /// Name of the GPU, or why it is not available.
+    /// Name of the GPU, or the reason why none is available.
     pub(super) adapter: Result<String, String>,
-    /// Figures 8 to 11: every implementation at every g and tau.
+    /// Runs of figures 8 to 11: each implementation on each grid of [`Grids::timed`], for each of [`TIMED_TAUS`].
     pub(super) timed: Vec<Run>,
-    /// Figure 12.
+    /// Runs of figure 12, for the rest error.
     pub(super) errors: Vec<Run>,
     pub(super) reconstructions: Vec<Reconstruction>,
 }
@@ -176,12 +178,12 @@ pub(super) struct Summary<'a> {
     errors: &'a [Run],
 }
 
-/// Thresholds of figures 8 to 11.
+/// Convergence thresholds of figures 8 to 11.
 pub(super) const TIMED_TAUS: [f32; 2] = [1e-4, 1e-5];
-/// Thresholds of figure 12.
+/// Convergence thresholds of figure 12.
 pub(super) const ERROR_TAUS: [f32; 3] = [1e-3, 1e-4, 1e-5];
 
-/// Numbers of cells along the cage's longest side; 16, 32 and 64 in the paper.
+/// Numbers of cells along the cage's longest side. The paper uses 16, 32 and 64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grids {
     pub(super) coarse: u32,
@@ -194,19 +196,19 @@ impl Grids {
         Self { coarse: fine / 4, middle: fine / 2, fine }
     }
 
-    /// Grids of figures 8 to 11.
+    /// Grids that figures 8 to 11 use.
     pub(super) fn timed(self) -> [u32; 2] {
         [self.middle, self.fine]
     }
 
-    /// Grids of figure 12.
+    /// Grids that figure 12 uses.
     pub(super) fn all(self) -> [u32; 3] {
         [self.coarse, self.middle, self.fine]
     }
 }
 
 impl Evaluation {
-    /// Runs all cases.
+    /// Runs all binds of the evaluation.
     pub(super) fn run(
         name: &str,
         model: &Model,
@@ -231,7 +233,7 @@ impl Evaluation {
                 let implementations: Vec<Implementation> =
                     Implementation::ALL.into_iter().filter(|w| gpu.is_ok() || !w.is_gpu()).collect();
                 let mut reports = vec![Vec::new(); implementations.len()];
-                // Round-robin, so that a change of the machine's speed affects all implementations equally.
+                // Run the implementations in turn, so that a change of the machine's speed affects all of them equally.
                 for _ in 0..args.runs {
                     for (&implementation, reports) in implementations.iter().zip(&mut reports) {
                         reports.push(bind(implementation, grid, tau)?.report);
@@ -277,19 +279,19 @@ impl Evaluation {
         })
     }
 
-    /// The timed run of an implementation at one g and tau.
+    /// The timed run of an implementation for one grid and threshold.
     pub(super) fn timed(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<&Run> {
         self.timed.iter().find(|run| {
             run.implementation == implementation && run.report.grid == grid && run.report.tau == tau
         })
     }
 
-    /// The run that figure 7 shows.
+    /// The run of an implementation that figure 7 shows.
     pub(super) fn delta_run(&self, implementation: Implementation) -> Option<&Run> {
         self.timed(implementation, self.grids.middle, 1e-5)
     }
 
-    /// Mean rest error of an implementation at one g and tau, relative to the cage's diagonal.
+    /// Mean rest error of an implementation for one grid and threshold, as a fraction of the cage's diagonal.
     pub(super) fn mean_rel(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<f64> {
         self.errors
             .iter()

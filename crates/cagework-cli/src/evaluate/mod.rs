@@ -1,6 +1,7 @@
-//! `cagework evaluate`: repeats the paper's evaluation, with the embedded method for comparison.
+//! `cagework evaluate`: repeats the paper's evaluation, and adds the embedded method for comparison.
 //!
-//! Figures have the paper's numbers: 2-5 reconstructions, 6 a deformation, 7 delta over time, 8-11 time to completion, 12 error.
+//! Figures have the numbers of the paper: 2 to 5 are reconstructions, 6 is a deformation, 7 shows delta over time, 8 to
+//! 11 show times to completion, 12 shows the error.
 
 mod cases;
 mod pictures;
@@ -67,7 +68,7 @@ fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     Ok((format!("built-in sample, {name}"), model, cage))
 }
 
-/// Writes figures 2 to 5: the rest pose reconstructed from the weights of each implementation.
+/// Writes figures 2 to 5 as GLB files: rest poses reconstructed from weights.
 fn reconstructions(
     model: &Model,
     cage: &Cage,

@@ -1,4 +1,4 @@
-//! Figures 2 to 6 as PNG pictures.
+//! Draws figures 2 to 6 as PNG files.
 
 use cagework_core::Cage;
 use cagework_gpu::render::{MeshStyle, SceneOptions, Theme};
@@ -12,13 +12,13 @@ use crate::gpu::{draw_model, png};
 
 use super::cases::Evaluation;
 
-/// Width and height of a picture, pixels.
+/// Width and height of each picture, pixels.
 const SIZE: [u32; 2] = [720, 540];
 
-/// Angle by which the cage of figure 6 is bent from end to end, radians.
+/// Angle by which the cage of figure 6 is bent over its whole length, radians.
 const BEND_ANGLE: f32 = 0.9;
 
-/// All pictures as (file name, PNG).
+/// All pictures as (file name, PNG bytes) pairs.
 ///
 /// # Errors
 /// If the GPU fails.
@@ -38,7 +38,7 @@ pub(super) fn all(
         ..SceneOptions::default()
     };
     session.camera_mut().set_viewport(glam::Vec2::from(SIZE.map(|s| s as f32)));
-    // Framed before the cage is set, because figures 2 to 5 do not show it.
+    // Frame the mesh before the cage is set, because figures 2 to 5 do not show the cage.
     session.frame_all();
     block_on(session.set_cage(cage))?;
     let mut pictures = Vec::new();
@@ -48,7 +48,7 @@ pub(super) fn all(
         let rgba = block_on(session.picture(SIZE, 1.0))?;
         pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
     }
-    // The weights of the last reconstruction, by the embedded method, are still set.
+    // The session still has the weights of the last reconstruction, which the embedded method computed.
     session.set_scene(SceneOptions { cage_lines: true, handles: true, ..bare });
     session.pose(&bent_cage(cage));
     session.frame_all();

@@ -1,4 +1,4 @@
-//! The paper's plots as SVG.
+//! Draws the paper's plots as SVG.
 
 use plotters::prelude::*;
 
@@ -6,7 +6,7 @@ use crate::error::CliError;
 
 use super::cases::{ERROR_TAUS, Evaluation, Implementation, TIMED_TAUS};
 
-/// Width and height of a plot, pixels.
+/// Width and height of each plot, pixels.
 const SIZE: (u32, u32) = (960, 460);
 
 /// Colours that remain distinguishable with colour blindness (Okabe and Ito 2008).
@@ -25,7 +25,7 @@ const FONT: (&str, u32) = ("sans-serif", 15);
 
 type Plot = Result<String, Box<dyn std::error::Error>>;
 
-/// All plots as (file name, SVG).
+/// All plots as (file name, SVG text) pairs.
 ///
 /// # Errors
 /// If a plot cannot be drawn.
@@ -45,7 +45,7 @@ pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliE
     Ok(plots)
 }
 
-/// Figures 8 to 11: time to completion, logarithmic.
+/// Draws one of figures 8 to 11: time to completion of each implementation, on a logarithmic axis.
 fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
     let bars: Vec<(Implementation, f64)> = Implementation::ALL
         .into_iter()
@@ -94,7 +94,7 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
     Ok(svg)
 }
 
-/// Figure 7: delta over time, both axes logarithmic.
+/// Draws figure 7: delta over time, with both axes logarithmic.
 fn delta(evaluation: &Evaluation) -> Plot {
     let series: Vec<(Implementation, Vec<(f64, f64)>)> = Implementation::ALL
         .into_iter()
@@ -122,7 +122,7 @@ fn delta(evaluation: &Evaluation) -> Plot {
     )
 }
 
-/// Figure 12: mean error over g and tau.
+/// Draws figure 12: mean error over tau, with a line for each grid.
 fn error(evaluation: &Evaluation) -> Plot {
     let mut series = Vec::new();
     for grid in evaluation.grids.all() {
@@ -136,7 +136,7 @@ fn error(evaluation: &Evaluation) -> Plot {
     }
     for grid in evaluation.grids.all() {
         if let Some(error) = evaluation.mean_rel(Implementation::MultigridThreads, grid, 1e-5) {
-            // Measured at one tau only, so drawn as a horizontal line.
+            // The embedded method is measured at one tau only, so its error is drawn as a horizontal line.
             let points = ERROR_TAUS.map(|tau| (f64::from(tau), error)).to_vec();
             series.push((format!("embedded, g = {grid}"), points));
         }
@@ -202,7 +202,7 @@ fn lines(
     Ok(svg)
 }
 
-/// Powers of ten that enclose positive values.
+/// Powers of ten below and above all positive values.
 fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) =
         values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));

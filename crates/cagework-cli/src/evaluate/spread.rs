@@ -1,8 +1,8 @@
-//! Ranges of repeated time measurements, and when one is significantly shorter than another.
+//! Ranges of repeated time measurements, and comparisons of such ranges.
 
 use serde::Serialize;
 
-/// Range of repeated measurements.
+/// Shortest and longest of repeated time measurements, and their number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Spread {
     pub(super) n: u32,
@@ -10,21 +10,21 @@ pub(super) struct Spread {
     pub(super) max: f64,
 }
 
-/// Result of comparing two ranges.
+/// Result of comparing the range of one implementation with that of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Comparison {
-    /// All times are shorter, by a factor between `least` and `most`.
+    /// All its times are shorter than the other's, by a factor between `least` and `most`.
     Faster { least: f64, most: f64 },
-    /// All times are longer.
+    /// All its times are longer than the other's.
     Slower,
-    /// The ranges overlap.
+    /// The two ranges overlap.
     WithinSpread,
-    /// Fewer than two measurements on one side.
+    /// One of the ranges has fewer than two measurements.
     Unknown,
 }
 
 impl Spread {
-    /// Range of `values`; `None` if there are none.
+    /// Range of `values`; `None` if there are no values.
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         values.fold(None, |spread, value| {
             let Self { n, min, max } = spread.unwrap_or(Self { n: 0, min: value, max: value });
@@ -32,7 +32,7 @@ impl Spread {
         })
     }
 
-    /// Compares two ranges of times.
+    /// Compares this range of times with another.
     pub(super) fn against(self, other: Self) -> Comparison {
         if self.n < 2 || other.n < 2 {
             Comparison::Unknown

@@ -1,11 +1,12 @@
-//! The report: which findings of the paper hold in this run.
+//! Writes the report, which says which findings of the paper hold in this run.
 
 use std::fmt::Write as _;
 
 use super::cases::{ERROR_TAUS, Evaluation, Implementation, Run, TIMED_TAUS};
 use super::spread::{Comparison, Spread};
 
-/// The findings, one per line. A time is called shorter only if the ranges of times do not overlap.
+/// Findings about each claim of the paper, one per line. A time is called shorter only if the ranges of times do not
+/// overlap.
 pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     let mut out = String::new();
     for grid in evaluation.grids.timed() {
@@ -60,7 +61,7 @@ pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     out
 }
 
-/// Whether the paper's finding that `new` is slower than `old` holds.
+/// Says whether the paper's finding that `new` is slower than `old` holds.
 fn verdict_of_slower(new: &Run, old: &Run) -> &'static str {
     match new.total_ms.against(old.total_ms) {
         Comparison::Faster { .. } => "is reversed",
@@ -69,14 +70,14 @@ fn verdict_of_slower(new: &Run, old: &Run) -> &'static str {
     }
 }
 
-/// The median time, followed by the range.
+/// The median time, followed by the range if there are several measurements.
 fn times(run: &Run) -> String {
     let Spread { n, min, max } = run.total_ms;
     let median = run.report.timings_ms.total;
     if n < 2 { format!("{median:.1} ms") } else { format!("{median:.1} ms ({min:.1} to {max:.1})") }
 }
 
-/// How many times as fast `new` is, if the ranges do not overlap.
+/// Text that says how many times as fast as `old` `new` is; empty if the ranges of times overlap.
 fn factors(new: &Run, old: &Run) -> String {
     match new.total_ms.against(old.total_ms) {
         Comparison::Faster { least, most } => {
@@ -91,7 +92,7 @@ fn factors(new: &Run, old: &Run) -> String {
     }
 }
 
-/// A factor with two or three significant digits.
+/// Formats a factor: two decimals below 10, none from 10.
 fn digits(factor: f64) -> String {
     if factor < 10.0 { format!("{factor:.2}") } else { format!("{factor:.0}") }
 }
@@ -127,7 +128,7 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Two decay rates (logarithms of the factor per sweep) count as equal if their ratio is at most this.
+/// Two decay rates of delta (logarithms of its factor per sweep) count as equal if their ratio is below this.
 const MAX_DECAY_RATIO: f64 = 1.25;
 
 fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
@@ -153,7 +154,7 @@ fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Two binds with the same options give identical bits, so errors have no spread.
+/// Findings about errors. Binds with the same options give identical bits, so one bind per case is enough.
 fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
     let fine = evaluation.grids.fine;
     let paper = |tau| evaluation.mean_rel(Implementation::PaperThreads, fine, tau);
@@ -222,7 +223,7 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
     out
 }
 
-/// Describes a time in the report.
+/// Phrase of the report that says how a time was measured.
 fn measured(runs: u32) -> String {
     match runs {
         1 => "a single bind, without a range".to_owned(),

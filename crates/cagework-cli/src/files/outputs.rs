@@ -1,4 +1,4 @@
-//! Outputs: checks that they overwrite no input and no other output, and writes them.
+//! Checks that outputs overwrite no input and no other output, and writes them.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
@@ -15,16 +15,17 @@ use super::{INPUT_FILES, folder_of, read, read_beside, reason};
 use crate::error::{CliError, shown_path};
 use crate::signals;
 
-/// Largest number of symbolic links that are followed, as in Linux.
+/// Maximum number of symbolic links that are followed for one path, as in Linux.
 const MAX_LINKS: usize = 40;
 
-/// Folders whose entries are open file descriptors.
+/// Folders whose entries stand for open file descriptors.
 const DESCRIPTOR_FOLDERS: [&str; 2] = ["/proc", "/dev/fd"];
 
-/// Checks, before the work starts, that the folders of outputs exist and that no output is an input or another output.
+/// Checks, before the work starts, that the folders of all outputs exist and that no output is an input or another
+/// output.
 ///
 /// # Errors
-/// Names the missing folder or the conflicting file.
+/// If a check fails. The error names the missing folder or the conflicting file.
 pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
     let inputs: Vec<FileIdentity> = inputs.iter().map(|path| FileIdentity::new(path)).collect();
     let identities: Vec<FileIdentity> = outputs.iter().map(|path| FileIdentity::new(path)).collect();
@@ -54,19 +55,20 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
     Ok(())
 }
 
-/// Checks, after all inputs are read and before anything is written, that no output is a file that was read.
+/// Checks, after all inputs have been read and before anything is written, that no output is one of the files that were
+/// read.
 ///
 /// # Errors
-/// Names the output.
+/// If an output was read. The error names it.
 pub(crate) fn refuse_files_read(outputs: &[&Path]) -> Result<(), CliError> {
     let read = INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner);
     outputs.iter().try_for_each(|output| refuse_inputs(&FileIdentity::new(output), &read))
 }
 
-/// Checks, before anything is written, that no output is a file that one of the models names and that is read later.
+/// Checks, before anything is written, that no output is a file that a model names and that will be read later.
 ///
 /// # Errors
-/// Names the output and the model.
+/// If an output is such a file. The error names the output and the model.
 pub(crate) fn refuse_files_named(
     models: &[&Path],
     outputs: &[&Path],
@@ -74,7 +76,7 @@ pub(crate) fn refuse_files_named(
 ) -> Result<(), CliError> {
     let outputs: Vec<FileIdentity> = outputs.iter().map(|path| FileIdentity::new(path)).collect();
     for model in models {
-        // A model can name files in its own folder and below only.
+        // A model can only name files in its own folder and its subfolders.
         let folder = fs::canonicalize(folder_of(model)).unwrap_or_default();
         let is_below =
             |output: &&FileIdentity| output.place.as_ref().is_some_and(|place| place.starts_with(&folder));
@@ -82,7 +84,7 @@ pub(crate) fn refuse_files_named(
         if beside.is_empty() {
             continue;
         }
-        // Unreadable models fail later, when they are refitted.
+        // Skip unreadable models; their error is reported when they are refitted.
         let Ok(bytes) = read(model) else { continue };
         let mut resolve = |name: &str| read_beside(model, name);
         for name in Model::named_files(&model.to_string_lossy(), &bytes, &mut resolve, memory_limit) {
@@ -102,13 +104,13 @@ pub(crate) fn refuse_files_named(
     Ok(())
 }
 
-/// Replaces or creates a file atomically: on failure the previous file is kept. A symbolic link is followed and kept. Devices,
-/// pipes and open descriptors are appended to.
+/// Creates or replaces a file atomically; on failure, an existing file is unchanged. A symbolic link stays, and its
+/// target is written. Devices, pipes and open descriptors are appended to.
 ///
 /// # Errors
-/// If the file cannot be written or is an input, or the work was cancelled.
+/// If the file cannot be written or was an input, or the work was cancelled.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    // A signal may arrive after the work last polled.
+    // A signal may have arrived since the work last polled for cancellation.
     if signals::cancelled() {
         return Err(BindError::Cancelled(Cancelled).into());
     }
@@ -130,12 +132,13 @@ fn refuse_inputs(output: &FileIdentity, inputs: &[FileIdentity]) -> Result<(), C
     Ok(())
 }
 
-/// Identity of a file, which may not exist yet. Stored, because thousands of files are compared with each other.
+/// Identity of a file, which may not exist yet. It is computed once per file, because thousands of files are compared
+/// with each other.
 pub(super) struct FileIdentity {
     path: PathBuf,
-    /// Length and modification time; `None` unless it is an existing regular file.
+    /// Length and modification time; `None` unless the path is an existing regular file.
     state: Option<(u64, Option<SystemTime>)>,
-    /// Canonical path; `None` for devices, which may be used twice, and for open descriptors.
+    /// Canonical path; `None` for devices, which several outputs may use, and for open descriptors.
     place: Option<PathBuf>,
 }
 
@@ -146,17 +149,18 @@ impl FileIdentity {
         Self { path: path.into(), state, place: place(path).ok().flatten() }
     }
 
-    /// Whether both names refer to one regular file.
+    /// Whether the two paths lead to the same regular file.
     fn is_same(&self, other: &Self) -> bool {
-        // Hard links and descriptors have different paths. Equal lengths and times rule out most pairs cheaply.
+        // Hard links and descriptors of one file have different paths. Comparing lengths and times first rules out most
+        // pairs cheaply.
         let may_be_linked = self.state.is_some() && self.state == other.state;
         (self.place.is_some() && self.place == other.place)
             || (may_be_linked && same_file::is_same_file(&self.path, &other.path).unwrap_or(false))
     }
 }
 
-/// Opens a device or pipe for appending. A name such as `/dev/fd/3` yields a duplicate of that descriptor, because opening the
-/// name would truncate the file or start at its beginning.
+/// Opens a device or pipe for appending. For a name such as `/dev/fd/3`, returns a duplicate of that descriptor:
+/// opening the name would truncate the file, or write from its beginning.
 fn open_for_append(path: &Path) -> io::Result<File> {
     #[cfg(target_os = "linux")]
     if let Some(number) = descriptor(path) {
@@ -167,7 +171,7 @@ fn open_for_append(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).open(path)
 }
 
-/// Number of this process's descriptor that a name leads to through symbolic links.
+/// Number of the descriptor of this process that a path leads to through symbolic links; `None` for other paths.
 #[cfg(target_os = "linux")]
 fn descriptor(path: &Path) -> Option<i32> {
     let own = fs::canonicalize("/proc/self/fd").ok()?;
@@ -183,7 +187,8 @@ fn descriptor(path: &Path) -> Option<i32> {
     None
 }
 
-/// Resolves symbolic links; the final file need not exist. `None` for a device, a pipe or an open descriptor.
+/// Resolves symbolic links of a path; the file itself need not exist. `None` for a device, a pipe or an open
+/// descriptor.
 fn place(path: &Path) -> io::Result<Option<PathBuf>> {
     if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return Ok(None);

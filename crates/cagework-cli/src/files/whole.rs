@@ -1,4 +1,4 @@
-//! Atomic writes: to a temporary file in the same folder, which is then renamed.
+//! Atomic writes: the bytes go to a temporary file in the same folder, which is then renamed.
 
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
@@ -14,16 +14,16 @@ use super::folder_of;
 const PREFIX: &str = ".cagework-";
 const SUFFIX: &str = ".part";
 
-/// The temporary file that is being written. The lock is held while it is created, renamed or removed, so that the signal
-/// handler can delete it.
+/// Path of the temporary file that is being written. The lock is held while the file is created, renamed or removed, so
+/// that the signal handler can delete it.
 static TEMPORARY_FILE: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Replaces or creates a file. Keeps the permissions of an existing file.
+/// Creates or replaces a file. Keeps the permissions of an existing file.
 ///
 /// # Errors
-/// If that fails; an existing file is then unchanged.
+/// If the file cannot be written; an existing file is then unchanged.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // Renaming would replace a read-only file, so check first that the file can be opened for writing.
+    // Renaming would replace even a read-only file, so check first that the existing file can be opened for writing.
     let permissions = match OpenOptions::new().write(true).open(path) {
         Ok(older) => Some(older.metadata()?.permissions()),
         Err(e) if e.kind() == ErrorKind::NotFound => None,
@@ -40,29 +40,30 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         .as_file_mut()
         .write_all(bytes)
         .and_then(|()| permissions.map_or(Ok(()), |permissions| file.as_file().set_permissions(permissions)))
-        // Some file systems report a full disk only here.
+        // Some file systems report a full disk only when the file is synchronised.
         .and_then(|()| file.as_file().sync_all());
     let mut temporary = lock_temporary_file();
-    // On failure, dropping `file` removes it before the lock is released.
+    // On failure, dropping `file` deletes the temporary file before the lock is released.
     let renamed = written.and_then(|()| Ok(file.persist(path).map(drop)?));
     *temporary = None;
     renamed
 }
 
-/// Creates a temporary file and locks it, so that [`remove_stale_files`] in another process keeps it.
+/// Creates a temporary file and locks it, so that [`remove_stale_files`] in another process does not delete it.
 fn create_temporary_file(folder: &Path) -> io::Result<NamedTempFile<File>> {
     loop {
         // `File::create_new` applies the umask; tempfile's default would be private to the user.
         let part =
             Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, |path| File::create_new(path))?;
-        // Retry if another process removed it before it was locked. File systems without locks never remove any.
+        // Retry if another process deleted the file before it was locked. On file systems without locks, no process
+        // deletes such files.
         if part.as_file().lock().is_err() || part.path().exists() {
             return Ok(part);
         }
     }
 }
 
-/// Removes temporary files of killed processes, which hold no lock. Runs once per folder.
+/// Deletes temporary files that killed processes left behind; such files are not locked. Runs once per folder.
 fn remove_stale_files(folder: &Path) {
     static CLEANED_FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     if !CLEANED_FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_path_buf()) {
@@ -77,17 +78,17 @@ fn remove_stale_files(folder: &Path) {
             && let Ok(part) = OpenOptions::new().write(true).open(entry.path())
             && part.try_lock().is_ok()
         {
-            // Failure is harmless: the file is only litter.
+            // Ignore failures: a remaining temporary file does no harm.
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
-/// Deletes the temporary file, then calls `end`, which ends the process. Holding the lock prevents a rename in between.
+/// Deletes the temporary file, then calls `end`, which ends the process. The lock prevents a rename in between.
 pub(crate) fn abandon(end: &mut dyn FnMut()) {
     let temporary = lock_temporary_file();
     if let Some(path) = &*temporary {
-        // Ignored: the process ends anyway.
+        // Ignore failures, because the process ends anyway.
         let _ = std::fs::remove_file(path);
     }
     end();

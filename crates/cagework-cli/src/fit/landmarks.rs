@@ -1,4 +1,4 @@
-//! The JSON of `cagework fit --landmarks`.
+//! Reads the JSON file of `cagework fit --landmarks`.
 
 use std::path::Path;
 
@@ -13,16 +13,17 @@ use crate::error::CliError;
 use crate::files::read;
 use crate::pose::BoundModel;
 
-/// Largest number of landmarks: each `point` is searched for in all triangles.
+/// Maximum number of landmarks. The limit bounds the time, because each `point` is searched for in all triangles.
 const MAX_LANDMARKS: usize = 10_000;
 
-/// Landmarks, not all in one plane, that determine an affine map; with fewer the energy determines the rotation.
+/// Number of landmarks, not all in one plane, that determine an affine map. With fewer, the energy determines the
+/// rotation.
 const N_AFFINE_LANDMARKS: usize = 4;
 
-/// Tolerance of barycentric coordinates: below zero, and of their sum from 1.
+/// Amount by which a barycentric coordinate may be below 0, and their sum may differ from 1.
 const BARY_TOLERANCE: f64 = 1e-3;
 
-/// A landmark in the file, with the file's axes.
+/// A landmark as the file contains it, with positions in the file's axes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LandmarkJson {
@@ -39,10 +40,10 @@ fn one() -> f64 {
     1.0
 }
 
-/// A point of the surface: vertices, and their weights in its position.
+/// A point of the surface: three vertex indices, and the weight of each vertex in the point's position.
 type SurfacePoint = ([u32; 3], [f64; 3]);
 
-/// Reads landmarks of a model.
+/// Reads the landmarks of a model from a file.
 ///
 /// # Errors
 /// If the file cannot be read, its JSON is invalid, or an index or number is out of range.
@@ -137,13 +138,14 @@ fn surface_point(bound: &BoundModel, landmark: &LandmarkJson) -> Result<SurfaceP
     }
 }
 
-/// Closest point of the model's surface. `None` if the model has no triangles.
+/// Closest point on the model's surface. `None` if the model has no triangles.
 fn nearest(bound: &BoundModel, at: DVec3) -> Option<SurfacePoint> {
     let model = &bound.model;
     let mut best = (f64::INFINITY, None);
     for &triangle in &model.triangles {
         let corners = triangle.map(|v| model.positions[v as usize].as_dvec3());
-        // Lower bound of the distance: that of the first corner minus the longer edge at it.
+        // Lower bound of the distance from a triangle: the distance from its first corner minus the longer edge at that
+        // corner.
         let reach = corners[1].distance(corners[0]).max(corners[2].distance(corners[0]));
         if at.distance(corners[0]) - reach > best.0 {
             continue;

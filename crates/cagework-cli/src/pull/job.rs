@@ -1,4 +1,4 @@
-//! The JSON of `cagework pull --job`.
+//! Reads the JSON file of `cagework pull --job`.
 
 use std::path::{Path, PathBuf};
 
@@ -10,13 +10,13 @@ use serde::Deserialize;
 use crate::error::CliError;
 use crate::files::{read, shown_path};
 
-/// Largest job file, bytes; enough for thousands of grabs.
+/// Maximum size of a job file, bytes. It is enough for thousands of grabs.
 const MAX_JOB_BYTES: usize = 1 << 20;
 
-/// Largest number of frames of a drag.
+/// Maximum number of frames of a drag.
 const MAX_FRAMES: u32 = 10_000;
 
-/// The file's contents.
+/// Contents of a job file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JobJson {
@@ -57,26 +57,26 @@ fn thirty() -> u32 {
     30
 }
 
-/// A validated job.
+/// A job with validated values.
 pub(super) struct Job {
     pub(super) grabs: Vec<Handle>,
-    /// Target of each grab, in the file's axes. `[n_grabs]`, object units
+    /// Target position of each grab, in the file's axes. `[n_grabs]`, object units
     to: Vec<DVec3>,
     pub(super) pins: Vec<Handle>,
     pub(super) reach: Reach,
-    /// File of the initial pose.
+    /// File of the cage's initial pose; `None` for the rest pose.
     pub(super) start: Option<PathBuf>,
     pub(super) relax: f64,
     pub(super) frames: u32,
 }
 
 impl Job {
-    /// Target of each grab relative to an origin, in the file's axes. `[n_grabs]`, object units
+    /// Target position of each grab relative to `origin`, in the file's axes. `[n_grabs]`, object units
     pub(super) fn to(&self, origin: DVec3) -> Vec<Vec3> {
         self.to.iter().map(|&to| (to - origin).as_vec3()).collect()
     }
 
-    /// Reads a job. Indices are not checked here, because that needs the model.
+    /// Reads a job from a file. Vertex and triangle indices are not checked here, because that needs the model.
     ///
     /// # Errors
     /// If the file cannot be read or is larger than [`MAX_JOB_BYTES`], or its JSON or a value is invalid.
@@ -136,7 +136,7 @@ impl Job {
         }
         let pins =
             file.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;
-        // Relative to the job's folder if the file exists there, otherwise to the working directory.
+        // A relative path refers to the job's folder if the file exists there, otherwise to the working directory.
         let resolve = |start: PathBuf| {
             let beside = path.parent().unwrap_or(Path::new("")).join(&start);
             if beside.exists() { beside } else { start }

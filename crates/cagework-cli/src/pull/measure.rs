@@ -1,25 +1,25 @@
-//! Quality of a pull: edge stretch, and motion outside the reach.
+//! Measures the quality of a pull: stretch of the edges, and motion of vertices far from the grabs.
 
 use cagework_io::Model;
 use cagework_pose::pull::Drag;
 use glam::Vec3;
 use serde::Serialize;
 
-/// Edges shorter than this fraction of the model's size are ignored: their stretch is rounding noise.
+/// Edges shorter than this fraction of the model's size are ignored, because their stretch is rounding noise.
 const MIN_EDGE_RATIO: f32 = 1e-9;
-/// Vertices farther than this multiple of the reach should not move.
+/// Vertices whose distance along the surface from the grabs exceeds the reach by this factor should not move.
 const FAR_REACH_RATIO: f64 = 1.2;
 
-/// Edge lengths relative to the rest lengths.
+/// Stretch of edges: posed length over rest length.
 #[derive(Debug, Serialize)]
 pub(super) struct Stretches {
     pub(super) stretch_max: f64,
-    /// 99th and first percentile, interpolated linearly.
+    /// 99th percentile, interpolated linearly; `stretch_1` is the first percentile.
     pub(super) stretch_99: f64,
     pub(super) stretch_1: f64,
 }
 
-/// Stretch of a model's edges; each edge counts once.
+/// Stretch of all edges of a model. An edge of several triangles counts once.
 pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
@@ -46,7 +46,8 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     Stretches { stretch_max: at(1.0), stretch_99: at(0.99), stretch_1: at(0.01) }
 }
 
-/// Mean displacement of the vertices beyond the reach, object units; `None` if all vertices are within it.
+/// Mean displacement, object units, of the vertices farther than [`FAR_REACH_RATIO`] times the reach from the grabs
+/// along the surface; `None` if there are none.
 pub(super) fn far_mean(drag: &Drag, before: &[Vec3], after: &[Vec3]) -> Option<f64> {
     let limit = FAR_REACH_RATIO * drag.reach_length();
     let moves = drag.walks().iter().zip(before.iter().zip(after));

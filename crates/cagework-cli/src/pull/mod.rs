@@ -19,31 +19,31 @@ use crate::pose::{BoundModel, pull, write_pose};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
 
-/// Output of `--json`. Lengths are fractions of the model's size, except `lag` and `far_mean`.
+/// Output of `--json`. Lengths are fractions of the model's size, except `lag` and `far_mean`, which are fractions of
+/// the drag's length.
 #[derive(Debug, Serialize)]
 struct PullSummary {
     output: String,
     samples: usize,
     groups: usize,
     cage: usize,
-    /// Time of the precomputation for this model and cage, including the bind of the probes.
+    /// Time of the precomputation for this model and cage, ms. It includes binding the sample points.
     precompute_ms: f64,
-    /// Time to start a grab.
+    /// Time to start a grab, ms.
     grab_ms: f64,
-    /// Mean time of a frame.
+    /// Mean time of a frame, ms.
     frame_ms: f64,
-    /// Reach of the drag; null if the whole model follows.
+    /// Distance along the surface that the drag affects; null if it affects the whole model.
     reach: Option<f64>,
-    /// Largest distance of a grab or pin from its target.
+    /// Largest distance of a grab or pin from its target after the last frame.
     error: f64,
-    /// Largest motion after the targets have stopped, relative to the length of the drag.
+    /// Largest motion of a vertex after the targets have stopped.
     lag: f64,
-    /// Frames until the pose converged.
+    /// Number of frames after the targets have stopped until the pose converges.
     settle_frames: u32,
     #[serde(flatten)]
     stretches: Stretches,
-    /// Mean displacement of the vertices farther than 1.2 times the reach, relative to the length of the drag; null if there
-    /// are none.
+    /// Mean displacement of the vertices farther than 1.2 times `reach` from the grabs; null if there are none.
     far_mean: Option<f64>,
     notices: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `cagework refit`: deforms many models with one cage, which is solved once.
+//! `cagework refit`: deforms many models with one cage. The harmonic fields of the cage are solved once.
 
 mod report;
 
@@ -30,7 +30,7 @@ use crate::signals::{self, CancelGuard};
 
 use report::{ModelEntry, ModelReport, Outcome, RefitSummary, print_entry, text};
 
-/// A model to read, and the file to write.
+/// A model to read, and the file to write it to.
 struct Job {
     model: PathBuf,
     output: ModelOutput,
@@ -40,29 +40,30 @@ struct Job {
 struct Binder<'a> {
     args: &'a RefitArgs,
     controls: Controls<'a>,
-    /// Origin of the cage's positions.
+    /// Origin of the cage's positions, which the models get too.
     origin: DVec3,
-    /// Created for the first model that is not skipped; `None` if the fields do not fit in half of the memory limit.
+    /// Solved fields of the cage, computed for the first model that is not skipped; `None` if they do not fit in half
+    /// of the memory limit.
     solved: OnceCell<Option<SolvedCage<'a>>>,
-    /// Part names that no model has had so far.
+    /// Given part names that no model has had so far.
     unnamed: RefCell<Vec<String>>,
 }
 
-/// A deformed model, ready to be written.
+/// A deformed model that is ready to be written.
 struct DeformedModel<'a> {
     job: &'a Job,
     model: Model,
     deformation: Deformation,
     options: ReshapeOptions,
-    /// Complete except for the total time and the rig.
+    /// Report of the model. The total time and the rig are added after writing.
     report: ModelReport,
     started: Instant,
 }
 
-/// The model that another thread is writing.
+/// The job that another thread is writing, and this thread's handle; `None` if no job is being written.
 type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
 
-/// A model is written while the next one is read, unless it needs more than the memory limit divided by this.
+/// A model is written while the next one is read, unless writing it needs more than the memory limit divided by this.
 const PARALLEL_MEMORY_DIVISOR: u64 = 16;
 
 /// Runs `cagework refit`.
@@ -88,7 +89,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&outputs, &inputs)?;
     refuse_files_named(&named.collect::<Vec<_>>(), &outputs, args.read.memory.bytes())?;
 
-    // From here on Ctrl-C takes effect after the current write.
+    // From here on, Ctrl-C cancels after the write in progress.
     let _guard = CancelGuard::start();
     let (up, memory) = (args.read.axis(), args.read.memory);
     let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
@@ -104,7 +105,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let binder = Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), unnamed };
     let mut models = Vec::with_capacity(jobs.len());
     let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
-        // A cancelled model is not reported as failed.
+        // If a signal cancelled a model, do not report it as failed.
         if matches!(outcome, Outcome::Failed { .. }) && signals::cancelled() {
             return Ok(());
         }
@@ -145,7 +146,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
             message: format!("{} of {} models failed", summary.failed, jobs.len()),
             hint: "repair them and run the command again with --resume, which skips finished models",
         }),
-        // The parts of skipped models are unknown.
+        // A skipped model may have the part, because its parts are not read.
         Some(name) if summary.skipped == 0 => Err(CliError::Mismatch {
             message: format!("no model has a part called '{}'", shown(name)),
             hint: "all models were written without it: correct the name and run the command again, without --resume",
@@ -154,7 +155,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-/// All models and their outputs.
+/// All models to read, and the files to write them to.
 ///
 /// # Errors
 /// If the manifest cannot be read or names no model, or two models have the same output.
@@ -253,7 +254,7 @@ impl Binder<'_> {
         self.args.solve.options(self.args.grid, self.args.read.memory)
     }
 
-    /// Memory of the solved fields, bytes; 0 if they are not kept.
+    /// Memory of the solved fields, bytes; 0 if they are not stored.
     fn field_bytes(&self) -> u64 {
         self.solved.get().and_then(Option::as_ref).map_or(0, SolvedCage::bytes)
     }
@@ -300,7 +301,7 @@ impl Binder<'_> {
 }
 
 impl DeformedModel<'_> {
-    /// Memory of the model until it is written, bytes.
+    /// Memory that the model occupies until it has been written, bytes.
     fn bytes(&self) -> u64 {
         self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
     }
@@ -320,7 +321,7 @@ impl DeformedModel<'_> {
     }
 }
 
-/// Waits for the model that is being written, if any, and passes its outcome to `settle`.
+/// Waits until the model that is being written, if any, is finished, and passes its outcome to `settle`.
 fn settle_one<'a>(
     writing: &mut Writing<'_, 'a>,
     settle: &mut impl FnMut(&'a Job, Outcome) -> Result<(), CliError>,

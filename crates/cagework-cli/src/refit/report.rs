@@ -1,4 +1,4 @@
-//! Output of `refit`: a line per model as soon as it is done, and a summary at the end.
+//! Output of `cagework refit`: a line for each finished model, and a summary at the end.
 
 use std::path::Path;
 
@@ -12,11 +12,12 @@ use crate::files::{print, shown_path};
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
 pub(super) struct RefitSummary {
-    /// Folder of the outputs.
+    /// Folder that the outputs are written to.
     pub(super) output: String,
     pub(super) cage_vertices: usize,
     pub(super) inner_controls: usize,
-    /// Time to voxelise and solve; `None` if all models were skipped, or if the cage was solved again for each model.
+    /// Time to voxelise and solve, ms; null if all models were skipped, or if the cage was solved for each model
+    /// separately.
     pub(super) solve_ms: Option<f64>,
     pub(super) written: usize,
     pub(super) skipped: usize,
@@ -25,7 +26,7 @@ pub(super) struct RefitSummary {
     pub(super) models: Vec<ModelEntry>,
 }
 
-/// Result for one model.
+/// Result of refitting one model.
 #[derive(Debug, Serialize)]
 pub(super) struct ModelEntry {
     pub(super) input: String,
@@ -38,7 +39,7 @@ pub(super) struct ModelEntry {
 #[serde(tag = "state", rename_all = "snake_case")]
 pub(super) enum Outcome {
     Written(Box<ModelReport>),
-    /// With `--resume`: the output is newer than its inputs.
+    /// The model was skipped: with `--resume`, because its output is newer than its inputs.
     Skipped,
     Failed {
         error: String,
@@ -50,10 +51,10 @@ pub(super) enum Outcome {
 pub(super) struct ModelReport {
     pub(super) vertices: usize,
     pub(super) outside_vertices: usize,
-    /// Time to sample and assemble the weights, without the shared solve.
+    /// Time to sample and assemble the weights, ms. It excludes the shared solve.
     pub(super) bind_ms: f64,
     pub(super) deform_ms: f64,
-    /// Time for the model, including reading and writing.
+    /// Time of the whole model, including reading and writing, ms.
     pub(super) total_ms: f64,
     #[serde(flatten)]
     pub(super) rig: Option<ReshapeReport>,
@@ -66,13 +67,13 @@ impl Outcome {
     }
 }
 
-/// The error message, prefixed with the name of the model unless it contains it.
+/// The error message, with the model's path in front of it unless it already contains that.
 fn named(error: &CliError, model: &Path) -> String {
     let (message, name) = (error.message(), shown_path(model));
     if message.contains(&name) { message } else { format!("{name}: {message}") }
 }
 
-/// Prints the result for one model. With `--json`, prints errors only, on stderr.
+/// Prints the result of one model. With `--json`, prints only errors, on stderr.
 pub(super) fn print_entry(entry: &ModelEntry, as_json: bool) -> Result<(), CliError> {
     let output = shown_path(entry.output.as_ref());
     match &entry.outcome {

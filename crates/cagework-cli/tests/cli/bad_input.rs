@@ -1,4 +1,4 @@
-//! Invalid input ends with exit code 1 and a message that names the file, without a panic.
+//! Tests that invalid input ends with exit code 1 and a message that names the file, without a panic.
 
 use std::fs::File;
 
@@ -17,7 +17,7 @@ fn assert_refused(sandbox: &Sandbox, args: &str, words: &[&str]) {
     }
 }
 
-/// A GLB with one JSON chunk, whose length field is `claimed`.
+/// A GLB with one JSON chunk, whose header claims a length of `claimed` bytes.
 fn glb(json: &str, claimed: u32) -> Vec<u8> {
     let mut bytes = b"glTF".to_vec();
     bytes.extend(2_u32.to_le_bytes());
@@ -77,7 +77,7 @@ fn files_that_are_not_models_are_rejected() {
 #[test]
 fn file_above_the_size_limit_is_not_read() {
     let sandbox = Sandbox::new();
-    // A sparse file, which occupies no disk space.
+    // The file is sparse, so it occupies no disk space.
     File::create(sandbox.path("large.obj")).unwrap().set_len(3 << 30).unwrap();
     assert_refused(&sandbox, "info large.obj", &["large.obj", "3072 MiB", "2048 MiB"]);
 }
@@ -136,7 +136,7 @@ fn cage_that_contains_no_vertex_is_rejected_by_every_outside_policy() {
     sandbox.write("small.obj", box_obj(&CORNERS.map(|c| c.map(|x| 0.01 * x))));
     for policy in ["extend", "stay", "refuse"] {
         for (cage, message) in [
-            // The gap from 0.7 to 10,000.7.
+            // The distance is the gap between x = 0.7 and x = 10,000.7.
             ("far.obj", "none of the model's 178 vertices is inside the cage; the cage is 1e4 away from it"),
             ("small.obj", "the cage is 70 times smaller than the model"),
         ] {
@@ -150,7 +150,7 @@ fn cage_that_contains_no_vertex_is_rejected_by_every_outside_policy() {
     }
 }
 
-/// A cube with a vertex far away, and one with two corners of a face at the same position.
+/// The cages are a cube with one vertex far away, and a cube with two corners of a face at the same position.
 #[test]
 fn degenerate_cages_are_checked_and_repaired_without_a_panic() {
     let sandbox = Sandbox::with_sphere_in_box();
@@ -188,7 +188,8 @@ fn invalid_weights_files_are_rejected() {
 fn box_cage_that_overflows_is_rejected_and_a_far_one_is_valid() {
     let sandbox = Sandbox::with_sphere_in_box();
     assert_refused(&sandbox, "cage mesh.obj --kind box --margin 3e38 -o box.obj", &["box cage"]);
-    // Above 16,777,216 = 2^24, f32 represents whole numbers only, so positions are stored relative to an origin near the model.
+    // Above 2^24 = 16,777,216, f32 represents only whole numbers, so positions are stored relative to an origin near
+    // the model.
     let far: String = CORNERS.iter().map(|[x, y, z]| format!("v {} {y} {z}\n", x + 3e7)).collect();
     let closed = box_obj(&CORNERS);
     sandbox.write("far.obj", far + closed.split_at(closed.find('f').expect("a box has faces")).1);

@@ -4,10 +4,10 @@ use serde_json::Value;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, obj_positions, sphere_obj};
 
-/// Weights are `f32`: the sum of 8 weighted coordinates up to 1 is exact to this.
+/// Tolerance of rest positions. Weights are `f32`, and 8 of them multiply coordinates of at most 1.
 const REST_TOLERANCE: f64 = 1e-4;
 
-/// Keys of the report that are guaranteed to scripts.
+/// Keys that every bind report must contain, because scripts rely on them.
 const REPORT_KEYS: &[&str] = &[
     "/method",
     "/solver",
@@ -120,7 +120,7 @@ fn sparsify_removes_weights_and_keeps_the_rest_pose() {
 fn box_cage_is_generated_and_saved() {
     let sandbox = Sandbox::with_sphere_in_box();
     let report = sandbox.json("bind mesh.obj --cage box:3 --save-cage box.obj -g 8 --json");
-    // Lattice points on the surface of a cube with n divisions: (n + 1)^3 - (n - 1)^3, 56 for n = 3.
+    // A cube with n divisions has (n + 1)^3 - (n - 1)^3 lattice points on its surface: 56 for n = 3.
     assert_eq!(report["cage_vertices"], 56);
     assert_eq!(obj_positions(&sandbox.read("box.obj")).len(), 56);
     let again = sandbox.json("bind mesh.obj --cage box.obj -g 8 --json");
@@ -130,7 +130,7 @@ fn box_cage_is_generated_and_saved() {
 #[test]
 fn inside_out_cage_is_flipped_with_a_notice() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Reflected, so that the faces point inwards.
+    // Reflect the cage, so that its faces point inwards.
     sandbox.write("cage.obj", box_obj(&CORNERS.map(|[x, y, z]| [-x, y, z])));
     sandbox
         .run("bind mesh.obj --cage cage.obj -g 8")

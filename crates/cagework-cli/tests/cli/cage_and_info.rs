@@ -34,10 +34,12 @@ fn info_explains_why_a_model_is_not_a_valid_cage() {
 fn box_cage_keeps_its_margin() {
     let sandbox = Sandbox::with_sphere_in_box();
     let made = sandbox.json("cage mesh.obj -o box.obj --divisions 3 --margin 0.1 --json");
-    // Lattice points on the surface of a cube with n divisions: (n + 1)^3 - (n - 1)^3; n^2 quads on each of six sides.
+    // A cube with n divisions has (n + 1)^3 - (n - 1)^3 lattice points on its surface, and n^2 quads on each of its six
+    // sides.
     assert_eq!(made["vertices"], 56);
     assert_eq!(made["faces"], 54);
-    // The bounding box of a sphere of radius 0.7 has the diagonal 1.4 sqrt(3); a tenth of it is added on each side.
+    // The bounding box of a sphere of radius 0.7 has the diagonal 1.4 sqrt(3). The margin adds a tenth of it on each
+    // side.
     let half = 0.7 + 0.14 * 3.0_f64.sqrt();
     for p in obj_positions(&sandbox.read("box.obj")) {
         assert!(p.iter().any(|x| (x.abs() - half).abs() < 1e-6), "{p:?} is not on the box");

@@ -75,7 +75,7 @@ fn self_intersecting_cage_gives_the_same_warning_in_info_check_and_bind() {
     sandbox.run("cage mesh.obj -o box.obj --kind box --divisions 3").success();
     let text = String::from_utf8(sandbox.read("box.obj")).unwrap();
     let mut is_pushed = false;
-    // Push a vertex in the middle of one side through the opposite side.
+    // Push a vertex in the middle of one side of the cage through the opposite side.
     let pushed = text.lines().map(|line| {
         let p: Vec<f64> = line.split(' ').skip(1).filter_map(|x| x.parse().ok()).collect();
         if is_pushed || !line.starts_with("v ") || p[1].abs().max(p[2].abs()) > -0.5 * p[0] {

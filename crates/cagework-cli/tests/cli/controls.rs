@@ -1,10 +1,10 @@
-//! Smooth cages and inner controls.
+//! Tests of subdivided cages and inner controls.
 
 use predicates::str::contains;
 
 use crate::support::{Sandbox, assert_close, obj_positions, sphere_obj};
 
-/// A polyline of two segments and a point in front of it; then the same with the point moved.
+/// A polyline of two segments, and a point in front of it. In `SPINE_MOVED`, the point has moved.
 const SPINE: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.4\nl 1 2 3\np 4\n";
 const SPINE_MOVED: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.6\nl 1 2 3\np 4\n";
 
@@ -21,7 +21,7 @@ fn smooth_cage_keeps_the_rest_pose_and_reports_outside_vertices() {
     let report =
         sandbox.json("bind mesh.obj --cage cage.obj -g 16 --smooth 2 --weights w.npz -o rest.obj --json");
     assert_eq!((&report["smooth"], &report["cage_vertices"]), (&2.into(), &8.into()));
-    // The smooth surface of a cube cuts its corners, where the sphere is now outside.
+    // The subdivided surface cuts the corners of the cube, so parts of the sphere are outside.
     assert!(report["outside_vertices"].as_u64().unwrap() > 0);
     assert_close(&obj_positions(&sandbox.read("rest.obj")), &obj_positions(&sandbox.read("mesh.obj")), 1e-6);
     sandbox.run("check cage.obj --mesh mesh.obj --smooth 2").success().stdout(contains("outside"));
@@ -53,7 +53,7 @@ fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
     sandbox.write("moved.obj", SPINE_MOVED);
     sandbox.run(&format!("{deform} --pose-controls moved.obj")).success();
     let posed = obj_positions(&sandbox.read("out.obj"));
-    // The front, near the point, moves most; the back hardly moves.
+    // The front of the sphere, near the point, moves most; its back hardly moves.
     let motion = |front: f64| {
         let far = (0..rest.len()).max_by(|&a, &b| (front * rest[a][2]).total_cmp(&(front * rest[b][2])));
         let v = far.unwrap();
@@ -86,7 +86,7 @@ fn pull_moves_inner_controls() {
     sandbox.write("job.json", r#"{"grabs": [{"cage": 11, "to": [0, 0, 0.7]}], "reach": "all"}"#);
     let pull = "pull mesh.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj";
     sandbox.run(&format!("{pull} {controls} -g 16 --save-controls posed.obj")).success();
-    // Control 11 is the point: 8 cage vertices and 3 of the polyline precede it.
+    // Control 11 is the point, because 8 cage vertices and 3 vertices of the polyline precede it.
     let posed = obj_positions(&sandbox.read("posed.obj"));
     assert_eq!(posed.len(), 4);
     assert!((posed[3][2] - 0.7).abs() < 1e-2, "{:?}", posed[3]);

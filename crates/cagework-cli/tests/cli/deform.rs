@@ -3,10 +3,10 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, glb_json, obj_positions, sphere_obj};
 
-/// Weights are `f32`, and coordinates are below 10.
+/// Tolerance of positions. Weights are `f32`, and coordinates are below 10.
 const TOLERANCE: f64 = 1e-4;
 
-/// A general affine map: scale, shear and translation.
+/// An affine map with scale, shear and translation.
 fn affine([x, y, z]: [f64; 3]) -> [f64; 3] {
     [1.5 * x + 0.25 * y + 3.0, 0.75 * y - 0.5 * z, z + 0.1 * x - 2.0]
 }
@@ -21,7 +21,7 @@ fn bound() -> Sandbox {
 
 #[test]
 fn affine_map_of_the_cage_is_applied_to_the_mesh() {
-    // Linear precision: sum w = 1 and sum w c = v imply sum w A(c) = A(v).
+    // By linear precision, sum w = 1 and sum w c = v imply sum w A(c) = A(v).
     let sandbox = bound();
     sandbox
         .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
@@ -34,7 +34,7 @@ fn affine_map_of_the_cage_is_applied_to_the_mesh() {
 #[test]
 fn vertices_outside_follow_affine_maps() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // At most 4.3 % of the cage's diagonal outside.
+    // Vertices of this sphere are up to 4.3 % of the cage's diagonal outside the cage.
     sandbox.write("mesh.obj", sphere_obj(1.15));
     sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
     let moved = |[x, y, z]: [f64; 3]| [-1.5 * y + 1.0, x + 0.2 * z, z + 2.0];
@@ -77,7 +77,7 @@ fn one_pose_is_written_without_morph_targets() {
     let document = glb_json(&sandbox.read("out.glb"));
     assert!(document["meshes"][0]["primitives"][0].get("targets").is_none());
     assert!(document.get("animations").is_none());
-    // The output can be read, and has all vertices.
+    // The output is a readable GLB with all vertices.
     assert_eq!(sandbox.json("info out.glb --json")["unique_vertices"], 178);
 }
 
@@ -120,7 +120,7 @@ fn output_does_not_overwrite_a_pose() {
         .stderr(contains("affine.obj").and(contains("overwritten")));
 }
 
-/// `--up z` rotates inputs and rotates outputs back, so that the files agree with each other.
+/// With `--up z`, inputs are rotated when read and outputs are rotated back, so all files have the same axes.
 #[test]
 fn files_with_z_up_keep_their_axes() {
     let sandbox = bound();
@@ -145,7 +145,7 @@ fn files_with_z_up_keep_their_axes() {
     let expected: Vec<_> = mesh.iter().copied().map(affine).collect();
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
 
-    // The long side is vertical in `info`, and a generated cage has the axes of the file.
+    // The long side is vertical in `info`, and a generated cage is in the axes of the file.
     let bounds = &sandbox.json("info mesh.obj --up z --json")["bounds"];
     let y = |corner: &str| bounds[corner][1].as_f64().unwrap();
     assert!((y("min") - 3.6).abs() < TOLERANCE && (y("max") - 6.4).abs() < TOLERANCE, "{bounds}");
@@ -159,7 +159,7 @@ fn files_with_z_up_keep_their_axes() {
 #[test]
 fn pose_with_another_vertex_order_is_rejected() {
     let sandbox = bound();
-    // The same box, with the indices of two diagonally opposite corners of a face swapped.
+    // The posed cage is the same box, but with the indices of two diagonally opposite corners of a face swapped.
     let [a, b] = [
         0,
         CORNERS
@@ -191,7 +191,8 @@ fn pose_with_another_vertex_order_is_rejected() {
         .stderr(contains("its vertices are in another order"));
 }
 
-/// At map coordinates `f32` has steps of 0.5, so model, cage and poses are stored relative to an origin near the model.
+/// At map coordinates, `f32` has steps of 0.5, so model, cage and poses are stored relative to an origin near the
+/// model.
 #[test]
 fn models_far_from_the_origin_are_deformed_with_the_same_accuracy() {
     let place = |[x, y, z]: [f64; 3]| [x + 500_000.25, y + 100.0, z + 4_500_000.5];
@@ -216,7 +217,7 @@ fn models_far_from_the_origin_are_deformed_with_the_same_accuracy() {
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, 1e-5);
     sandbox.run("refit mesh.obj --cage cage.obj --pose affine.obj -g 16 -o fitted").success();
     assert_close(&obj_positions(&sandbox.read("fitted/mesh.obj")), &expected, 1e-5);
-    // Generated cages have the same origin.
+    // A generated cage has the model's origin too.
     sandbox.run("cage mesh.obj --kind box --divisions 1 -o box.obj").success();
     sandbox.run("check box.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
     let bounds = &sandbox.json("info box.obj --json")["bounds"];
@@ -225,12 +226,12 @@ fn models_far_from_the_origin_are_deformed_with_the_same_accuracy() {
     sandbox.run("check auto.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
 }
 
-/// Each keyframe in a pose file is a pose. Commands that accept one pose reject such a file.
+/// Each keyframe in a pose file is a pose. Commands that accept a single pose reject such a file.
 #[test]
 fn keyframes_of_a_pose_file_are_separate_poses() {
     let sandbox = bound();
     sandbox.run("bind mesh.obj --cage cage.obj -g 8 -o mesh.glb").success();
-    // The bound sphere serves as a cage, and its animated file as a pose.
+    // The bound sphere serves as the cage, and its animated file as the pose.
     sandbox
         .run(
             "deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o keys.glb",

@@ -1,4 +1,4 @@
-//! Runs every command in the code blocks of README.md and docs/cli.md.
+//! Runs every `cagework` command in the code blocks of README.md and docs/cli.md.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use cagework_io::write_mesh_glb;
 
 use crate::support::Sandbox;
 
-/// The files that the documents name; the humanoid sample stands for every model.
+/// A folder with the files that the documents name. The humanoid sample stands for every model.
 fn files() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
@@ -55,7 +55,7 @@ fn files() -> Sandbox {
     sandbox
 }
 
-/// A cage file of the folder, stretched along x.
+/// The text of a cage file in the folder, stretched along x.
 fn wider(sandbox: &Sandbox, cage: &str) -> String {
     let text = String::from_utf8(sandbox.read(cage)).unwrap();
     let stretch = |line: &str| match line.strip_prefix("v ").and_then(|xyz| xyz.split_once(' ')) {
@@ -65,7 +65,7 @@ fn wider(sandbox: &Sandbox, cage: &str) -> String {
     text.lines().map(stretch).collect()
 }
 
-/// Language and lines of each code block.
+/// Language and lines of each code block of a Markdown text.
 fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut blocks = Vec::new();
     let mut lines = text.lines();
@@ -90,7 +90,7 @@ fn commands_of_the_documents_run() {
             }
         }
         for (_, lines) in blocks(&text).into_iter().filter(|block| block.0 == "sh") {
-            // Each block runs in its own copy of the folder.
+            // Run each code block in its own copy of the folder.
             let sandbox = Sandbox::new();
             for name in files.names() {
                 sandbox.write(&name, files.read(&name));

@@ -1,4 +1,4 @@
-//! `cagework evaluate`: all files are written, and the findings of the report agree with its tables.
+//! Tests that `cagework evaluate` writes all its files, and that the findings of the report agree with its tables.
 
 use std::collections::HashMap;
 
@@ -6,10 +6,10 @@ use predicates::str::contains;
 
 use crate::support::{Sandbox, glb_json};
 
-/// Grids that `-g 32` runs.
+/// Grids that an evaluation with `-g 32` runs.
 const GRIDS: [u32; 3] = [8, 16, 32];
 
-/// Rows of a CSV file as maps from column name to value.
+/// Rows of a CSV file, each a map from column name to value.
 type Table = Vec<HashMap<String, String>>;
 
 fn csv(bytes: &[u8]) -> Table {
@@ -24,7 +24,7 @@ fn csv(bytes: &[u8]) -> Table {
         .collect()
 }
 
-/// The only row of an implementation at a grid and tau.
+/// The single row of an implementation for one grid and tau.
 fn row<'a>(table: &'a Table, implementation: &str, g: u32, tau: &str) -> &'a HashMap<String, String> {
     let g = g.to_string();
     let mut found =
@@ -43,14 +43,14 @@ fn lines<'a>(report: &'a str, words: &'a str) -> impl Iterator<Item = &'a str> {
     report.lines().filter(move |line| line.contains(words))
 }
 
-/// The first line of the report that contains both words.
+/// The first line of the report that contains both `words` and `also`.
 fn line<'a>(report: &'a str, words: &'a str, also: &str) -> &'a str {
     lines(report, words)
         .find(|line| line.contains(also))
         .unwrap_or_else(|| panic!("no line contains '{words}' and '{also}' in\n{report}"))
 }
 
-/// Asserts that every element of an SVG is closed, and that it has text.
+/// Asserts that every element of an SVG file is closed, and that the file has text.
 fn assert_well_formed(name: &str, bytes: &[u8]) {
     let text = std::str::from_utf8(bytes).unwrap();
     let mut open = Vec::new();
@@ -72,7 +72,7 @@ fn assert_well_formed(name: &str, bytes: &[u8]) {
 #[test]
 fn evaluation_writes_all_files_and_reports_what_it_measured() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Without a GPU: Jacobi on the software adapter would double the time of this file's tests.
+    // Run without a GPU: Jacobi sweeps on a software adapter would double the time of these tests.
     let mut command = sandbox.command("evaluate --mesh mesh.obj --cage cage.obj -g 32 --runs 3 -o out");
     command.env("CAGEWORK_ADAPTER", "no such adapter").assert().success().stdout(contains("out/report.md"));
     let report = String::from_utf8(sandbox.read("out/report.md")).unwrap();

@@ -2,7 +2,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj, obj_positions};
 
-/// A folder with a bound sphere, a bent cage, and the sphere deformed by it as the target.
+/// A folder with a bound sphere, a bent cage, and as the target the sphere deformed by this cage.
 fn bound() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
@@ -25,7 +25,7 @@ fn max_distance(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
 fn fit_recovers_the_pose_that_deformed_the_target() {
     let sandbox = bound();
     let done = sandbox.json(&format!("{FIT} --target target.obj --json"));
-    // The diagonal of the box is 3.46.
+    // The tolerance is small compared with the diagonal of the box, 3.46.
     assert!(max_distance(&sandbox, "pose.obj", "bent.obj") <= 1e-4, "{done}");
     assert_eq!(
         (&done["points"], &done["left_out"], &done["settled"]),
@@ -43,7 +43,7 @@ fn landmarks_recover_the_pose_and_a_single_one_translates_the_model() {
     let sandbox = bound();
     let [rest, target] = ["mesh.obj", "target.obj"].map(|name| obj_positions(&sandbox.read(name)));
     let json = |p: [f64; 3]| format!("[{}, {}, {}]", p[0], p[1], p[2]);
-    // Every third landmark is a vertex index, the others are points of the surface.
+    // Every third landmark names a vertex, the others name a point of the surface.
     let landmarks = (0..rest.len()).map(|v| {
         let named =
             if v % 3 == 0 { format!("\"vertex\": {v}") } else { format!("\"point\": {}", json(rest[v])) };
@@ -53,7 +53,7 @@ fn landmarks_recover_the_pose_and_a_single_one_translates_the_model() {
     let done = sandbox.json(&format!("{FIT} --landmarks all.json --json"));
     assert!(max_distance(&sandbox, "pose.obj", "bent.obj") <= 1e-3, "{done}");
 
-    // A single landmark is a translation.
+    // A single landmark leads to a translation.
     sandbox.write("one.json", format!("[{{\"vertex\": 7, \"to\": {}}}]", json(rest[7].map(|x| x + 0.5))));
     sandbox
         .run(&format!("{FIT} --landmarks one.json"))

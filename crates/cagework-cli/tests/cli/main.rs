@@ -1,4 +1,4 @@
-//! Runs the command as a user does: input files, output files, messages, exit codes.
+//! Runs the command as a user does, and checks output files, messages and exit codes.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 

@@ -1,4 +1,4 @@
-//! Outputs are written atomically and overwrite no input.
+//! Tests that outputs are written atomically and overwrite no input.
 
 use std::fs::{Permissions, hard_link, metadata, set_permissions};
 use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -11,13 +11,15 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::support::{Sandbox, sphere_obj};
 
-/// Length of the comment in `mesh.obj`, bytes. `-o out.obj` copies it, which makes the write slow enough to be interrupted.
+/// Length of the comment in `mesh.obj`, bytes. `-o out.obj` copies the comment, so writing takes long enough to be
+/// interrupted.
 const COMMENT: usize = 32 << 20;
 
-/// Number of times that the command is killed, at equal steps of the output's length.
+/// Number of times that the command is killed, each time when the output has grown by another equal share of its
+/// length.
 const N_KILLS: u64 = 10;
 
-/// A folder with a 32 MiB mesh that is bound quickly, and an older `out.obj`.
+/// A folder with a 32 MiB mesh that can be bound quickly, and an older `out.obj`.
 fn with_large_mesh() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     let line = format!("# {}\n", "large ".repeat(1000));
@@ -42,7 +44,7 @@ fn killed_command_leaves_the_old_or_the_complete_new_file_and_no_temporary_file(
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        // Size of the output or of a temporary file; 5 is the length of "older".
+        // Size of `out.obj` or of a new temporary file, ignoring the size 5 of the old content "older".
         let written = || {
             let sizes =
                 sandbox.names().into_iter().filter(|name| name == "out.obj" || !before.contains(name));
@@ -95,7 +97,7 @@ fn replaced_file_keeps_its_permissions_and_a_new_one_gets_the_default() {
     sandbox.run("cage mesh.obj --kind box -o new.obj").success();
     let mode = |name| metadata(sandbox.path(name)).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode("out.obj"), 0o604);
-    // The test created mesh.obj with the same umask.
+    // This test created mesh.obj with the same umask.
     assert_eq!(mode("new.obj"), mode("mesh.obj"));
 }
 
@@ -127,7 +129,7 @@ fn devices_and_stdout_are_written_to_and_not_replaced() {
         .run("bind mesh.obj --cage cage.obj -g 8 --report /dev/stdout")
         .success()
         .stdout(contains("\"grid\": 8"));
-    // If stdout is a file, the report must go to the open file, not to a new one of the same name.
+    // If stdout is a file, the report must go to that open file, not to a new file of the same name.
     let file = std::fs::File::create(sandbox.path("stdout.txt")).unwrap();
     let status = Command::new(cargo_bin!("cagework"))
         .args("bind mesh.obj --cage cage.obj -g 8 --report /dev/stdout --save-cage c.obj".split(' '))
@@ -171,7 +173,7 @@ fn open_descriptors_are_appended_to_unless_they_are_inputs() {
     }
 }
 
-/// Temporary files of killed commands are removed; that of a running command is locked and kept.
+/// Temporary files of killed commands are deleted. The file of a running command is locked, so it is kept.
 #[test]
 fn temporary_files_of_killed_commands_are_removed() {
     let sandbox = Sandbox::with_sphere_in_box();
@@ -233,7 +235,7 @@ fn outputs_that_an_input_refers_to_are_rejected() {
         ("check cage.obj --mesh mesh.obj --repair weld -o skin.obj", "skin.obj"),
     ] {
         sandbox.run(args).code(1).stderr(contains(format!("{output}: is an input")));
-        // Rejected before the first output was written.
+        // The command fails before it writes the first output.
         assert_eq!(sandbox.names(), before, "{args}");
     }
     assert_eq!(sandbox.read("buffer.obj"), triangle);

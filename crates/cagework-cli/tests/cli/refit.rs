@@ -1,4 +1,4 @@
-//! `cagework refit`: many models in one cage, with one solve.
+//! Tests of `cagework refit`, which deforms many models in one cage with one solve.
 
 use std::time::{Duration, SystemTime};
 
@@ -8,7 +8,7 @@ use predicates::str::contains;
 use crate::rigs;
 use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
 
-/// A folder with the spheres `a.obj` and `b.obj`, their cage `cage.obj`, and its pose `wide.obj`.
+/// A folder with the spheres `a.obj` and `b.obj`, their cage `cage.obj`, and a pose of it, `wide.obj`.
 fn spheres() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("a.obj", sphere_obj(0.7));
@@ -19,7 +19,7 @@ fn spheres() -> Sandbox {
 
 const REFIT: &str = "refit --cage cage.obj --pose wide.obj -g 8 -o out";
 
-/// Asserts that the files in `out` are identical to the outputs of `bind` and `deform` for each model.
+/// Asserts that the files in `out` are identical to what `bind` and `deform` write for each model.
 fn assert_same_as_deform(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) {
     for name in names {
         sandbox.run(&format!("bind {name} --cage cage.obj --weights w.npz {bind}")).success();
@@ -34,7 +34,7 @@ fn assert_same_as_deform(sandbox: &Sandbox, names: &[&str], bind: &str, deform: 
 
 #[test]
 fn refit_equals_bind_and_deform_of_each_model() {
-    // Two rigged models, one of them wider than the cage, and one without a rig.
+    // The models are two rigged ones, of which one is wider than the cage, and one without a rig.
     let sandbox = rigs::bound();
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox
@@ -58,7 +58,7 @@ fn parts_missing_in_some_models_are_notices_and_in_all_an_error() {
     sandbox
         .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o larger.glb")
         .success();
-    // A model without named parts.
+    // This model has no named parts.
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     let parts = "--mask joint:head=0.5 --rigid joint:spine";
     let refit = "refit humanoid.glb larger.glb shape.obj --cage cage.obj --pose wide.obj -g 24 -o out";
@@ -84,7 +84,8 @@ fn cage_is_solved_per_model_if_its_fields_exceed_half_of_the_memory_limit() {
     let sandbox = spheres();
     let refit = "refit a.obj b.obj --cage cage.obj --pose wide.obj -g 64 -o out --json";
     assert!(sandbox.json(refit)["solve_ms"].as_f64().is_some());
-    // The fields take 64^3 * 32 bytes = 8 MiB. With the memory of the solver they exceed half of 64 MiB; one bind stays below 64 MiB.
+    // The fields take 64^3 * 32 bytes = 8 MiB. With the solver's memory they exceed half of 64 MiB, but a single bind
+    // stays below 64 MiB.
     let done = sandbox.json(&format!("{refit} --memory-limit 64"));
     assert!(done["solve_ms"].is_null());
     assert!(done["notices"][0].as_str().unwrap().contains("do not fit in half of 64 MiB"), "{done}");
@@ -124,7 +125,7 @@ fn failed_models_are_reported_and_the_others_are_written() {
     assert_eq!(states, ["written", "failed", "failed", "failed", "written"]);
     assert_eq!(done["models"][1]["error"], "missing.obj: there is no such file");
 
-    // An invalid pose fails the command before any model is read.
+    // An invalid pose makes the command fail before it reads any model.
     sandbox.write("short.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     sandbox
         .run("refit a.obj b.obj --cage cage.obj --pose short.obj -o other")
@@ -149,7 +150,7 @@ fn models_with_the_same_output_are_rejected_before_the_work() {
         .run(&format!("{REFIT} a.obj --manifest list.txt"))
         .code(1)
         .stderr(contains("a.obj is given twice\nhint: give each model once"));
-    // A .gltf is written as .glb.
+    // A `.gltf` model is written as `.glb`.
     sandbox.run(&format!("{REFIT} x.gltf x.glb")).code(1).stderr(contains("both be written to out/x.glb"));
     assert!(!sandbox.path("out").exists());
     let in_place = REFIT.replace("-o out", "-o .");
@@ -157,7 +158,7 @@ fn models_with_the_same_output_are_rejected_before_the_work() {
     assert_eq!(sandbox.read("b.obj"), sphere_obj(0.5).as_bytes());
 }
 
-/// Writing the first model would destroy a buffer or material that the second model needs.
+/// Writing the first model would overwrite a buffer or material that the second model needs.
 #[test]
 fn outputs_that_later_models_refer_to_are_rejected_before_anything_is_written() {
     let sandbox = spheres();
@@ -186,7 +187,7 @@ fn outputs_that_later_models_refer_to_are_rejected_before_anything_is_written() 
         assert_eq!(sandbox.read("kit/out/a.obj"), named.as_bytes(), "{content}");
         std::fs::remove_file(sandbox.path(model)).unwrap();
     }
-    // A file of the same name in another folder is no conflict, but a link to the referenced file is.
+    // A file of the same name in another folder does not conflict, but a link to the referenced file does.
     sandbox.write("kit/b.obj", obj("textured.mtl"));
     sandbox.write("kit/textured.mtl", "newmtl m\nmap_Kd a.obj\n");
     sandbox.run(&format!("{REFIT} a.obj kit/b.obj")).success();
@@ -219,7 +220,7 @@ fn resume_skips_outputs_newer_than_their_inputs() {
     assert_eq!(states(), ["skipped", "skipped"]);
     let all_skipped = sandbox.json(&resume);
     assert!(all_skipped["solve_ms"].is_null(), "no model needed the solve");
-    // The outputs are 3 hours old. An input of the same age counts as newer, because clocks are coarse.
+    // The outputs are 3 hours old. An input of the same age counts as newer, because file times are coarse.
     let older = || ["out/a.obj", "out/b.obj"].map(|name| set_age(name, 3));
     for (name, hours, expected) in [
         ("b.obj", 2, ["skipped", "written"]),

@@ -3,7 +3,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj};
 
-/// Width and height in the IHDR chunk of a PNG (PNG specification, 11.2.2).
+/// Width and height that the IHDR chunk of a PNG contains (PNG specification, 11.2.2).
 fn png_size(bytes: &[u8]) -> [u32; 2] {
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
     let word = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -13,7 +13,7 @@ fn png_size(bytes: &[u8]) -> [u32; 2] {
 #[test]
 fn every_style_draws_a_different_picture() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Without `clay`, which equals `solid` for a model without materials.
+    // `clay` is omitted, because it equals `solid` for a model without materials.
     let kinds = ["solid", "edges", "wireframe", "weights", "error", "cells", "slice"];
     let pictures = kinds.map(|show| {
         let drawn = sandbox.json(&format!(
@@ -73,7 +73,7 @@ fn invalid_arguments_are_rejected_before_the_work() {
     sandbox.run(args).code(1).stderr(contains("the weights have 8 columns"));
 }
 
-/// 20,000 triangles that fill the picture take the software adapter minutes, so they are rejected.
+/// A software adapter would take minutes for 20,000 triangles that each fill the picture, so the command rejects them.
 #[test]
 fn too_many_overlapping_triangles_are_rejected() {
     let sandbox = Sandbox::new();
@@ -87,9 +87,10 @@ fn too_many_overlapping_triangles_are_rejected() {
     }
 }
 
-/// A C-shaped solid as OBJ: two arms along x with a gap between them. `room`: offset outwards; `lift`: motion of the upper arm's tip.
+/// A C-shaped solid as OBJ: two arms along x with a gap between them. `room`: distance by which it is offset outwards;
+/// `lift`: motion of the upper arm's tip.
 fn clamp_obj(room: f64, lift: f64) -> String {
-    // Corner in x and y, outward direction, and share of `lift`.
+    // x and y of each corner, its outward direction, and its share of `lift`.
     const OUTLINE: [([f64; 2], [f64; 2], f64); 8] = [
         ([0.0, 0.0], [-1.0, -1.0], 0.0),
         ([3.0, 0.0], [1.0, -1.0], 0.0),
@@ -106,7 +107,7 @@ fn clamp_obj(room: f64, lift: f64) -> String {
             text += &format!("v {} {} {z}\n", x + room * dx, y + room * dy + lift * share);
         }
     }
-    // Both caps, each in three convex quads, then the sides.
+    // Write both caps as three convex quads each, then the sides.
     for [a, b, c, d] in [[1, 2, 3, 4], [1, 4, 5, 8], [5, 6, 7, 8]] {
         text += &format!("f {d} {c} {b} {a}\nf {} {} {} {}\n", a + 8, b + 8, c + 8, d + 8);
     }
@@ -117,7 +118,8 @@ fn clamp_obj(room: f64, lift: f64) -> String {
     text
 }
 
-/// Largest number of pixels that differ between equal shapes, because `f32` rounding moves antialiased edges.
+/// Maximum number of pixels that differ between equal shapes. They differ because `f32` rounding moves antialiased
+/// edges.
 const MAX_ROUND_OFF_PIXELS: usize = 10;
 
 #[test]
@@ -133,7 +135,7 @@ fn compare_draws_both_coordinates_side_by_side() {
         assert_eq!(picture.dimensions(), (202, 120));
         (picture, done)
     };
-    // Number of pixels that differ between the halves, which have 100 columns each with two columns between them.
+    // Number of pixels that differ between the two halves, which are 100 columns wide with two columns between them.
     let differing = |picture: &image::RgbImage| {
         let differs = |x, y| {
             let pair = [picture.get_pixel(x, y), picture.get_pixel(x + 102, y)].map(|p| p.0);
@@ -141,11 +143,11 @@ fn compare_draws_both_coordinates_side_by_side() {
         };
         (0..100).flat_map(|x| (0..120).map(move |y| (x, y))).filter(|&(x, y)| differs(x, y)).count()
     };
-    // Both coordinates reproduce the rest shape.
+    // Both kinds of coordinates reproduce the rest shape.
     let (rest, done) = picture("--compare");
     assert_eq!(done["compared"], serde_json::json!(["harmonic coordinates", "mean value coordinates"]));
     assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{} pixels differ at rest", differing(&rest));
-    // Only mean value coordinates move the lower arm, because they act across the gap.
+    // Only mean value coordinates move the lower arm, because they are not zero across the gap.
     let (posed, _) = picture("--compare --pose pose.obj");
     assert!(differing(&posed) > 10 * MAX_ROUND_OFF_PIXELS, "{} pixels differ", differing(&posed));
     let (rest, done) = picture("--compare green");
@@ -153,7 +155,7 @@ fn compare_draws_both_coordinates_side_by_side() {
     assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{} pixels differ at rest", differing(&rest));
     let (green, _) = picture("--compare green --pose pose.obj");
     assert!(differing(&green) > 10 * MAX_ROUND_OFF_PIXELS && green != posed);
-    // Only the harmonic coordinates on the left have the control inside.
+    // Only the harmonic coordinates on the left use the inner control.
     sandbox.write("inner.obj", "v 0.5 1.3 0\np 1\n");
     for kind in ["mean-value", "green", "plain"] {
         let (rest, _) = picture(&format!("--compare {kind} --controls inner.obj --radius 0.2"));

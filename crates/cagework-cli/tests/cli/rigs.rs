@@ -1,4 +1,4 @@
-//! Commands on a rigged and animated model: the humanoid sample.
+//! Tests of the commands on a rigged and animated model: the humanoid sample.
 
 use cagework_cage::samples;
 use cagework_io::{Model, write_mesh_glb};
@@ -48,7 +48,7 @@ fn rig_is_kept_and_an_unmoved_model_is_byte_identical() {
     assert_eq!((&stay["joints_moved"], &stay["tracks"]), (&0.into(), &0.into()));
     let plain = sandbox.json(&format!("{DEFORM} --pose wide.obj --static -o plain.glb --json"));
     assert!(plain.get("joints").is_none());
-    // The rest shape is the same in all three.
+    // The rest shape is the same in all three outputs.
     let shapes = [wide, sandbox.read("stay.glb"), sandbox.read("plain.glb")].map(|bytes| read(&bytes));
     for other in &shapes[1..] {
         let pairs = shapes[0].positions.iter().zip(&other.positions);
@@ -68,7 +68,7 @@ fn missing_parts_clips_and_rig_points_are_reported() {
         .failure()
         .stderr(contains("there is no clip 'Run'; the model has Walk"));
     sandbox.run("cage humanoid.glb --around-clip Walk -o walk.obj").success();
-    // Weights without the points of the rig.
+    // These weights lack the rows of the rig's points.
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox.run("bind shape.obj --cage cage.obj -g 24 --weights w.npz").success();
     sandbox
@@ -117,13 +117,13 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
     let sandbox = bound();
     const DYNAMIC: &str = "deform humanoid.glb --cage cage.obj --dynamic";
     let done = sandbox.json(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.glb --json"));
-    // The clip of 2 s has 60 frames (the maximum, 30 per second) and the last one.
+    // At 30 frames per second, the maximum, the clip of 2 s has 60 frames and the last one.
     assert_eq!((&done["frames"], &done["clip"]), (&61.into(), &"Walk".into()));
     let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
     let (model, bent) = (read("humanoid.glb"), read("bent.glb"));
     assert_eq!((bent.clips().len(), bent.clips()[0].seconds), (1, 2.0));
     let (before, after) = (model.frames(0).unwrap(), bent.frames(0).unwrap());
-    // The chest is 1.3 times as wide in every frame, as in the posed cage.
+    // In every frame the chest is 1.3 times as wide, as in the posed cage.
     let chest = |p: &&glam::Vec3| p.y > 1.2 && p.y < 1.4 && p.x.abs() > 0.05 && p.x.abs() < 0.12;
     for (old, new) in before.iter().zip(&after).step_by(20) {
         let pairs = old.iter().zip(new).filter(|(old, _)| chest(old));

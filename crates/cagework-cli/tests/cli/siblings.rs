@@ -1,4 +1,5 @@
-//! Files that a model refers to: only regular files in its folder are read, and only images are embedded as textures.
+//! Tests of files that a model refers to: only regular files in its folder are read, and only images are embedded as
+//! textures.
 
 use std::fmt::Write as _;
 use std::os::unix::fs::symlink;
@@ -11,12 +12,12 @@ use serde_json::{Value, json};
 
 use crate::support::{Sandbox, glb_json};
 
-/// Content that must not reach the output, with a PNG signature so that it passes as an image.
+/// Content that must not reach the output. It starts with a PNG signature, so that it passes as an image.
 const SECRET: &[u8] = b"\x89PNG\r\n\x1a\nTOP-SECRET";
-/// Time limit of a command that must not block on a pipe.
+/// Time limit of commands that must not wait for a pipe.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
-/// A tetrahedron with an embedded buffer, and these image URIs.
+/// A glTF tetrahedron with an embedded buffer, and images with these URIs.
 fn gltf(images: &[&str]) -> Value {
     let positions = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let corners = [0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
@@ -40,7 +41,7 @@ fn gltf(images: &[&str]) -> Value {
     })
 }
 
-/// An empty folder `model`, and the file `secret.png` outside it.
+/// A folder that contains an empty folder `model` and, outside of it, the file `secret.png`.
 fn with_secret() -> Sandbox {
     let sandbox = Sandbox::new();
     std::fs::create_dir(sandbox.path("model")).unwrap();
@@ -96,7 +97,7 @@ fn images_in_the_models_folder_are_embedded_even_through_links() {
     }
 }
 
-/// The content decides, not the `mimeType` in the model.
+/// The content of a file decides whether it is an image, not the `mimeType` in the model.
 #[test]
 fn files_that_are_not_images_are_not_embedded() {
     let sandbox = with_secret();
@@ -179,7 +180,7 @@ fn pipes_devices_and_folders_are_rejected_without_blocking() {
     }
 }
 
-/// Escape sequences could set the terminal's title, clear the screen or fake a message.
+/// Unescaped control characters could set the terminal title, clear the screen or fake a message.
 #[test]
 fn control_characters_in_files_are_printed_as_escapes() {
     let sandbox = with_secret();
@@ -212,11 +213,11 @@ fn control_characters_in_files_are_printed_as_escapes() {
 #[test]
 fn file_that_exceeds_the_memory_is_not_reported_as_missing() {
     let sandbox = with_secret();
-    // A sparse file, which occupies no disk space.
+    // The file is sparse, so it occupies no disk space.
     std::fs::File::create(sandbox.path("model/large.png")).unwrap().set_len(2 << 30).unwrap();
     sandbox.write("model/m.gltf", gltf(&["large.png"]).to_string());
     let command = sandbox.command("info model/m.gltf");
-    // In KiB: half of the memory that the texture needs.
+    // The limit in KiB is half of the memory that the texture needs.
     let limited = Command::new("sh")
         .args(["-c", "ulimit -v 1048576; exec \"$0\" info model/m.gltf"])
         .arg(command.get_program())

@@ -1,4 +1,4 @@
-//! Folders of generated files in which tests run the command.
+//! Folders of generated files in which the tests run the command.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Corners of a box cage from -1 to 1, x fastest, then y, then z.
+/// Corners of a box cage from -1 to 1. x varies fastest, then y, then z.
 pub(crate) const CORNERS: [[f64; 3]; 8] = [
     [-1.0, -1.0, -1.0],
     [1.0, -1.0, -1.0],
@@ -21,21 +21,21 @@ pub(crate) const CORNERS: [[f64; 3]; 8] = [
     [1.0, 1.0, 1.0],
 ];
 
-/// Faces of that box, counter-clockwise seen from outside, numbered from 1 as in OBJ.
+/// Faces of the box with these corners, counter-clockwise seen from outside, numbered from 1 as in OBJ.
 const QUADS: &str = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
-/// A temporary folder, deleted on drop.
+/// A temporary folder, which is deleted on drop.
 pub(crate) struct Sandbox {
     folder: TempDir,
 }
 
 impl Sandbox {
-    /// An empty folder.
+    /// Creates an empty folder.
     pub(crate) fn new() -> Self {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
-    /// A folder with `mesh.obj`, a sphere, and `cage.obj`, a box around it.
+    /// Creates a folder with a sphere, `mesh.obj`, and a box around it, `cage.obj`.
     pub(crate) fn with_sphere_in_box() -> Self {
         let sandbox = Self::new();
         sandbox.write("mesh.obj", sphere_obj(0.7));
@@ -67,14 +67,15 @@ impl Sandbox {
         names
     }
 
-    /// `cagework` in the folder, not yet started. `args` are separated by whitespace.
+    /// The command `cagework` with the folder as its working directory, not yet started. `args` are separated by
+    /// whitespace.
     pub(crate) fn command(&self, args: &str) -> Command {
         let mut command = cargo_bin_cmd!("cagework");
         command.current_dir(self.folder.path()).args(args.split_whitespace());
         command
     }
 
-    /// Runs `cagework` in the folder. `args` are separated by whitespace.
+    /// Runs `cagework` in the folder until it ends. `args` are separated by whitespace.
     pub(crate) fn run(&self, args: &str) -> Assert {
         self.command(args).assert()
     }
@@ -86,7 +87,7 @@ impl Sandbox {
     }
 }
 
-/// A sphere of quads, with triangles at both poles.
+/// A sphere of quads, with triangles at both poles, as OBJ.
 pub(crate) fn sphere_obj(radius: f64) -> String {
     const RINGS: usize = 12;
     const SEGMENTS: usize = 16;
@@ -113,13 +114,13 @@ pub(crate) fn sphere_obj(radius: f64) -> String {
     text
 }
 
-/// A box with these corners, in the order of [`CORNERS`].
+/// A box with these corners, in the order of [`CORNERS`], as OBJ.
 pub(crate) fn box_obj(corners: &[[f64; 3]; 8]) -> String {
     let vertices = corners.map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
     vertices + QUADS
 }
 
-/// Positions of the `v` lines of an OBJ.
+/// Positions in the `v` lines of an OBJ file.
 pub(crate) fn obj_positions(bytes: &[u8]) -> Vec<[f64; 3]> {
     std::str::from_utf8(bytes)
         .unwrap()
@@ -132,7 +133,7 @@ pub(crate) fn obj_positions(bytes: &[u8]) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The JSON chunk of a GLB.
+/// The JSON chunk of a GLB file.
 pub(crate) fn glb_json(bytes: &[u8]) -> Value {
     assert_eq!(&bytes[..4], b"glTF");
     let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
