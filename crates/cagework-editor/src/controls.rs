@@ -107,7 +107,7 @@ impl RestCage {
         Ok(Self { mesh, controls, set, notices: Vec::new() })
     }
 
-    /// Another cage with those of the current controls that fit into it.
+    /// Returns `cage` with those interior controls of this cage that fit into `cage`.
     ///
     /// # Errors
     /// If a position is not finite.

@@ -13,7 +13,7 @@ use crate::surface::SurfacePoint;
 pub struct NamedPose {
     /// Name of the pose.
     pub name: Arc<str>,
-    /// Positions of cage vertices and interior controls. `[n_controls]` of the cage it was saved for
+    /// Positions of the vertices and interior controls of the cage that the pose was saved for. `[n_controls]`
     pub positions: Arc<[Vec3]>,
     /// Surface points that pulls keep in place; `None` if unknown.
     pub pins: Option<Arc<[SurfacePoint]>>,

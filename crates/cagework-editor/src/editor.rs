@@ -47,7 +47,7 @@ pub struct Editor {
     pub element: Element,
     /// Centre of rotation and scaling.
     pub pivot: Pivot,
-    /// Whether mirror images of the selection move with it.
+    /// Whether gestures also move the mirror images of the selected vertices.
     pub is_mirrored: bool,
     /// Radius of proportional editing, in diagonals of the cage; 0 turns it off.
     pub radius: f32,

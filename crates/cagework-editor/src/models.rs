@@ -55,7 +55,7 @@ pub struct MemberSettings {
 pub struct Member {
     /// Identifier, unique in the document.
     pub id: u32,
-    /// The model as it was read.
+    /// The model as read from its file.
     pub model: Arc<Model>,
     /// Visibility and parts.
     pub options: PartOptions,
@@ -285,7 +285,7 @@ impl Models {
         self.origin
     }
 
-    /// Notice about the origin, if it is not the world origin.
+    /// Notice for the user if the origin is not the world origin.
     #[must_use]
     pub fn origin_notice(&self) -> Option<String> {
         let [x, y, z] = self.up().vector_turned(self.origin).to_array();

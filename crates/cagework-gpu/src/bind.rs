@@ -58,9 +58,8 @@ pub async fn bind_gpu<'a>(
 
 /// Like [`bind_gpu`], without leaving the weights on the GPU.
 ///
-/// # Errors
-/// Those of a bind; [`crate::PlanError`] if it does not fit into memory; [`GpuError::Solver`] for conjugate
-/// gradients; errors of the GPU.
+/// # Errors Those of a bind; [`crate::PlanError`] if the bind does not fit into memory; [`GpuError::Solver`] for
+/// conjugate gradients; errors of the GPU.
 pub async fn bind_on<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,

@@ -122,7 +122,7 @@ pub struct Readback {
 }
 
 impl Readback {
-    /// Maps the first `bytes`, copied here by `submission`, and passes them to `take`.
+    /// Waits for `submission`, which copies results into this buffer, and passes the first `bytes` to `take`.
     pub(crate) async fn read<T>(
         &self,
         context: &GpuContext,

@@ -55,7 +55,7 @@ struct Fault {
 }
 
 impl Fault {
-    /// Stores the first report only; later ones are consequences.
+    /// Stores the reason of a device loss. Only the first report counts, because later reports are its consequences.
     fn lose(&self, message: &str) {
         let _ = self.lost.set(message.to_owned());
         if let Ok(mut waiting) = self.waiting.lock() {
@@ -198,7 +198,8 @@ impl GpuContext {
         Ok(())
     }
 
-    /// Waits for the value sent by a callback of `submission`. Polls natively; on the web it returns to the event loop.
+    /// Waits for the value sent by a callback of `submission`. Natively, polls the device; on the web, returns to the
+    /// event loop.
     pub(crate) async fn wait<T>(
         &self,
         submission: &wgpu::SubmissionIndex,

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use crate::kernels::{ALL, Binding, Kernel};
 use crate::layout::Work;
 
-/// Pipelines of all kernels, in the table's order, created on first use. Clones share them.
+/// Pipelines of all kernels, in the order of the kernel table, created on first use. Clones share the pipelines.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipelines(Arc<[OnceLock<Pipeline>; ALL.len()]>);
 

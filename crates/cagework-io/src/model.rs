@@ -47,7 +47,7 @@ pub enum ReadError {
     Obj {
         /// Name given by the caller.
         name: String,
-        /// Cause.
+        /// What is wrong in the file.
         source: ObjError,
     },
     /// Error in a PLY, STL or OFF file.
@@ -55,7 +55,7 @@ pub enum ReadError {
     Polygons {
         /// Name given by the caller.
         name: String,
-        /// Cause.
+        /// What is wrong in the file.
         source: PolygonsError,
     },
     /// Error in a glTF file.
@@ -63,7 +63,7 @@ pub enum ReadError {
     Gltf {
         /// Name given by the caller.
         name: String,
-        /// Cause.
+        /// What is wrong in the file.
         source: GltfError,
     },
 }
@@ -109,8 +109,8 @@ impl Model {
         }
     }
 
-    /// Names of the external files that the model refers to: buffers, images, material libraries. Those of an OBJ name
-    /// textures in turn, for which `resolve` is called. Empty if the file cannot be read.
+    /// Names of the external files that the model refers to: buffers, images, material libraries. Libraries of an OBJ
+    /// name textures in turn, so they are read by calling `resolve`. Empty if the file cannot be read.
     pub fn named_files(
         name: &str,
         bytes: &[u8],
@@ -133,8 +133,8 @@ impl Model {
         Self::read_within(name, bytes, resolve, u64::MAX)
     }
 
-    /// Like [`Self::read`], using at most `memory_limit` bytes. The estimate covers `bytes`, the model and
-    /// the table that welds positions.
+    /// Like [`Self::read`], using at most `memory_limit` bytes. The estimate covers `bytes`, the model and the table
+    /// for welding positions.
     ///
     /// # Errors
     /// [`ReadError`]. The memory limit is checked before allocating.
@@ -151,7 +151,7 @@ impl Model {
     /// mesh as an OBJ file.
     ///
     /// # Errors
-    /// [`ReadError`] when it has no vertices.
+    /// [`ReadError`] if the mesh has no vertices.
     pub fn of_mesh(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Self, ReadError> {
         let text = obj::write_cage_obj(mesh, DVec3::ZERO);
         let model = Self::read_from(name, &text, &mut |_| None, u64::MAX, false)?;
@@ -178,7 +178,7 @@ impl Model {
     /// Approximate additional memory while exporting to `format`, bytes.
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
-        /// Old and new normals, new positions and the output.
+        /// Memory per vertex: old and new normals, new positions and the output.
         const VERTEX_BYTES: u64 = 300;
         const TRIANGLE_BYTES: u64 = 60;
         let n = |count: usize| count as u64;

@@ -249,7 +249,8 @@ fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Opti
     Some((cosine * direction.dot(between) - axis.dot(between)) / sine_squared)
 }
 
-/// Intersection of the pointer's ray with the plane; `None` if it grazes the plane or meets it behind the eye.
+/// Intersection of the pointer's ray with a plane; `None` if the ray is almost parallel to the plane or meets the plane
+/// behind the eye.
 fn in_plane(view: &dyn View, pointer: Vec2, through: Vec3, normal: Vec3) -> Option<Vec3> {
     let (origin, direction) = view.ray(pointer);
     let towards = direction.dot(normal);

@@ -21,7 +21,7 @@ pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, s
 pub struct CageEdit {
     /// The new mesh.
     pub mesh: PolygonMesh,
-    /// New index of every old vertex; `None` if it was removed. `[n_old]`
+    /// New index of every old vertex; `None` for removed vertices. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
     /// New or moved vertices, to be selected next.
     pub touched: Vec<u32>,
@@ -47,7 +47,7 @@ pub enum RestEditError {
     Breaks {
         /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
-        /// The fault; indices are those of the result.
+        /// Why the result is not a cage. Indices refer to the result.
         source: CageError,
     },
     /// The result would be inverted.
@@ -63,7 +63,7 @@ pub enum RestEditError {
         operation: &'static str,
         /// A face of the result.
         first: u32,
-        /// The face that it intersects.
+        /// A face of the result that intersects the first one.
         second: u32,
     },
     /// The hole has too many edges.

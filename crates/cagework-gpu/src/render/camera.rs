@@ -240,7 +240,7 @@ impl Camera {
         self.pitch = (self.pitch + delta.y).clamp(-FRAC_PI_2, FRAC_PI_2);
     }
 
-    /// Moves the target so that points at its depth follow the pointer. `delta`: pixels.
+    /// Moves the target so that points at the target's depth follow the pointer. `delta`: pixels.
     pub fn pan(&mut self, delta: Vec2) {
         let size = self.units_per_pixel(self.target);
         self.target += size * (delta.y * self.up() - delta.x * self.right());
@@ -330,7 +330,7 @@ impl Camera {
         };
     }
 
-    /// Projects a point into the picture. `None` if it is in front of the near plane.
+    /// Projects a point into the picture. `None` if the point is nearer to the eye than the near plane.
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<ImagePoint> {
         let clip = self.clip_from_world() * point.extend(1.0);

@@ -109,7 +109,7 @@ impl Renderer {
         }
     }
 
-    /// Sets the model at rest. `normals`: of its vertices.
+    /// Sets the model at rest. `normals`: normals of the model's vertices.
     pub(crate) async fn set_model(
         &mut self,
         context: &GpuContext,

@@ -13,7 +13,7 @@ use super::scene::{Marks, SceneOptions, Theme};
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
-/// State of segments; [`Style::widths`] has their line width there.
+/// State of segments, and index of their line width in [`Style::widths`].
 const SEGMENT_STATE: u32 = 4;
 
 /// GPU data of [`Marks`].

@@ -11,8 +11,8 @@ pub const CLAY: [f32; 4] = [0.52, 0.505, 0.485, 1.0];
 
 /// A drawable model.
 ///
-/// Vertices (`positions`) are bound and deformed, corners (`vertices`) are drawn. They differ because an OBJ
-/// vertex can have several texture coordinates, and seams of a glTF must not show in the shading.
+/// Vertices (`positions`) are bound and deformed, corners (`vertices`) are drawn. Vertices and corners differ because
+/// an OBJ vertex can have several texture coordinates, and seams of a glTF must not show in the shading.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DrawModel {
     /// Rest positions of the vertices. `[n_vertices]`, object units.
@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(all.fault(), None);
         assert_eq!(all.copies, [0, 2, 4, 7]);
         let sources: Vec<u32> = all.vertices.iter().map(|v| v.source).collect();
-        // Nine vertices, then copies: two of the first model, one of each of the others.
+        // The sources are nine vertices, then copies: two of the first model, and one of each of the other two models.
         assert_eq!(sources, [0, 1, 2, 9, 10, 3, 4, 5, 11, 6, 7, 8, 12]);
         assert_eq!(all.triangles[2..], [[5, 6, 7], [9, 10, 11]]);
         let groups: Vec<_> = all.groups.iter().map(|g| (g.triangles.clone(), g.texture)).collect();

@@ -10,8 +10,7 @@ impl Session {
     /// A session on the same GPU with the same model, cage and pose, for comparing other weights. The new session has
     /// no controls inside the cage, which closed forms do not support.
     ///
-    /// # Errors
-    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
+    /// # Errors [`GpuError::NotReady`] without model or cage; otherwise as the calls that set model and cage.
     pub async fn twin(&self) -> Result<Self, GpuError> {
         let (_, controls) = self.parts()?;
         let cage = controls.cage();
@@ -29,8 +28,7 @@ impl Session {
     /// Copies this session to another device after its own device was lost. `self` stays unchanged, so the call can be
     /// repeated if the new device is out of memory.
     ///
-    /// # Errors
-    /// As the calls that set them.
+    /// # Errors As the calls that set model, cage, weights and parts.
     pub async fn recover(&self, context: GpuContext) -> Result<Self, GpuError> {
         let mut session = Self::new(context);
         session.camera = self.camera;

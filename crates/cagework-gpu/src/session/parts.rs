@@ -11,7 +11,7 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Sets held and rigid parts of the model. They are kept when weights change.
+    /// Sets held and rigid parts of the model. New weights do not change the parts.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without a model, [`GpuError::Model`] if a vertex does not exist; otherwise as

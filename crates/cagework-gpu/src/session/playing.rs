@@ -8,8 +8,8 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Makes the mesh follow a skin instead of the cage until [`Self::stop_playing`]. [`Self::play`] sets its
-    /// pose. `skin`: of the model's vertices. `field`: displacements added after skinning.
+    /// Makes the mesh follow a skin instead of the cage until [`Self::stop_playing`]. [`Self::play`] sets the pose of
+    /// the skin. `skin`: of the model's vertices. `field`: displacements added after skinning.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] if the skin's size does not match; otherwise

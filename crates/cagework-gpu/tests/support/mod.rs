@@ -53,7 +53,7 @@ impl Rng {
 pub(crate) fn assert_close(gpu: &[f32], cpu: &[f32], tolerance: f32) {
     assert_eq!(gpu.len(), cpu.len(), "lengths");
     let worst = (0..gpu.len()).max_by(|&a, &b| {
-        // The total order puts NaN last, so it is reported.
+        // The total order puts NaN last, so a NaN is reported.
         (gpu[a] - cpu[a]).abs().total_cmp(&(gpu[b] - cpu[b]).abs())
     });
     if let Some(i) = worst {

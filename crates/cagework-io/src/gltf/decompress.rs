@@ -284,7 +284,7 @@ fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
     Some((kind, attribute.data_type().byte_length() * usize::from(attribute.num_components())))
 }
 
-/// Makes an accessor refer to `bytes`. `count`: its number of elements.
+/// Makes an accessor refer to `bytes`. `count`: number of elements of the accessor.
 fn fill(
     json: &mut Value,
     buffers: &mut Buffers,

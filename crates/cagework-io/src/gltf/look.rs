@@ -165,7 +165,8 @@ fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], 
 }
 
 impl Images<'_> {
-    /// Index of an image in the output; `None` if it is missing or not an image. Images without bytes overlap others.
+    /// Index of an image in the output; `None` if it is missing or not an image. An image that overlaps others in the
+    /// file gets no bytes.
     fn number(&mut self, image: usize) -> Option<u32> {
         let document = self.document;
         let is_view = document.images.get(image)?.is_none();

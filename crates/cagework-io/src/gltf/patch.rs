@@ -118,7 +118,7 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
     let mut places: Vec<MeshPlacement> = Vec::with_capacity(document.instances.len());
     for instance in &document.instances {
         let m = instance.mesh as usize;
-        // The first user keeps the mesh, unless a node outside the scene also shows it.
+        // The first instance keeps the mesh, unless a node outside the scene also shows the mesh.
         let keeps = users[m] == 0 && !std::mem::replace(&mut kept[m], true);
         let mesh = if keeps {
             instance.mesh as usize

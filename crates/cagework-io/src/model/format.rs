@@ -14,27 +14,28 @@ use crate::{gltf, obj, off, ply, stl};
 /// Facts about a format, and its functions.
 #[derive(Debug)]
 pub struct FormatFacts {
-    /// Extensions of readable files, lower case, without the dot. The usual one of written files comes first.
+    /// Extensions of readable files, lower case, without the dot. The first one is the extension of exported files.
     pub endings: &'static [&'static str],
-    /// Those that are not written.
+    /// Extensions among `endings` that exports cannot have.
     read_only: &'static [&'static str],
-    /// MIME types, for file choosers that know them better than extensions.
+    /// MIME types, for file choosers that support MIME types better than extensions.
     pub mime_types: &'static [&'static str],
-    /// Extensions of files that refer to others: buffers, textures, materials.
+    /// Extensions of files that refer to other files: buffers, textures, materials.
     pub naming: &'static [&'static str],
-    /// Extensions of the files that these refer to.
+    /// Extensions of the other files that files of this format refer to.
     pub companions: &'static [&'static str],
     /// Whether a file is of this format beyond doubt.
     is: fn(&[u8]) -> bool,
     /// Whether a text is of this format, without byte order mark and leading space.
     is_text: fn(&[u8]) -> bool,
-    /// Extensions that require `is` or `is_text`: otherwise the file is `[_, this, because of this]`.
+    /// Extensions whose files must satisfy `is` or `is_text`. Each entry is an extension, what a file that does not is,
+    /// and why.
     marked: &'static [[&'static str; 3]],
     pub(super) read: fn(Source<'_, '_>) -> Result<Model, ReadError>,
     pub(super) write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
     /// Names of the files that a file refers to.
     pub(super) named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
-    /// Approximate memory for writing, bytes; given the part that depends on vertices and triangles.
+    /// Approximate memory for writing a model, bytes. The number is the part that depends on vertices and triangles.
     pub(super) bytes_to_write: fn(&Model, u64) -> u64,
     /// What written files keep of a model of another format.
     keeps: &'static [Kept],
@@ -122,7 +123,7 @@ formats! {
         read: |source| source.gltf(),
         named_files: |bytes, _, memory_limit| gltf::named_files(bytes, memory_limit),
         write: Model::write_glb,
-        // JSON of new accessors and buffer views.
+        // Each primitive adds the JSON of new accessors and buffer views.
         bytes_to_write: |model, shape| shape + 6000 * model.counts.primitives as u64 + model.bytes,
         keeps: &[Kept::Digits, Kept::Colors, Kept::Texcoords, Kept::Materials, Kept::Rig, Kept::Poses],
     };
@@ -132,7 +133,7 @@ formats! {
         naming: &["obj"],
         companions: &["mtl"],
         named_files: obj::named_files,
-        // Without normals it needs a third.
+        // Without normals, writing an OBJ needs a third of the memory per vertex.
         bytes_to_write: |model, shape| shape / 3 + model.bytes,
         keeps: &[Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
         ..PLAIN

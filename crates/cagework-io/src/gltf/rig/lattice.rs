@@ -142,7 +142,8 @@ impl Rig<'_> {
         first - self.n_vertices..first - self.n_vertices + target.moved.len()
     }
 
-    /// Points to bind after the vertices: all extras or, with a lattice, its nodes instead of the ends.
+    /// Points to bind after the vertices: all extras or, with a lattice, the extras without the ends, then the
+    /// lattice's nodes.
     pub(crate) fn bound(&self) -> Vec<DVec3> {
         let Some(lattice) = &self.lattice else { return self.extras.clone() };
         let (mut bound, mut next) = (Vec::new(), 0);
@@ -156,7 +157,8 @@ impl Rig<'_> {
         bound
     }
 
-    /// Displacements of all points from those of the vertices and [`Self::bound`] points.
+    /// Computes the displacements of all points from the displacements of the vertices and of the [`Self::bound`]
+    /// points.
     pub(crate) fn all_moved(&self, by: Vec<DVec3>) -> Vec<DVec3> {
         self.spread(by, Lattice::at, |own, at_rest, at_end| own + (at_end - at_rest))
     }
@@ -169,8 +171,8 @@ impl Rig<'_> {
         self.spread(is_outside, read, |_, _, at_end| at_end)
     }
 
-    /// Values of all points from those of the bound ones. `read`: interpolates nodal values at a position.
-    /// `of_end`: combines the value of the rest vertex with the interpolated values at rest and at the end.
+    /// Computes the values of all points from the values of the bound points. `read`: interpolates nodal values at a
+    /// position. `of_end`: combines the value of the rest vertex with the interpolated values at rest and at the end.
     fn spread<T: Copy>(
         &self,
         mut bound: Vec<T>,

@@ -84,9 +84,9 @@ pub(crate) struct Rig<'a> {
 struct RigPrimitive {
     instance: Instance,
     primitive: u32,
-    /// Point index of its first vertex.
+    /// Point index of the primitive's first vertex.
     first: usize,
-    /// Index of the document's slot, if it has triangles and is shown.
+    /// Index of the document's slot; `None` if the primitive has no triangles or is not visible.
     slot: Option<usize>,
     frame: Frame,
     /// Positions in mesh space, as in the file.

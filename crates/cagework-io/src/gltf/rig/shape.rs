@@ -47,7 +47,7 @@ impl<'a> SurfaceGradients<'a> {
         Self { triangles, by, gradients: OnceCell::new() }
     }
 
-    /// Gradients at the vertices of a primitive at rest; `None` if it is not visible.
+    /// Gradients at the vertices of a primitive at rest; `None` if the primitive is not visible.
     fn of(&self, rig: &Rig<'_>, part: &RigPrimitive) -> Option<&[Option<DMat3>]> {
         part.slot?;
         let all = self.gradients.get_or_init(|| {
@@ -81,7 +81,7 @@ struct Directions {
 }
 
 impl Rig<'_> {
-    /// The deformed primitive; `None` if it is unchanged. `frame`: its new skinning matrices.
+    /// A primitive after the deformation; `None` if it is unchanged. `frame`: new skinning matrices of the primitive.
     pub(super) fn shape(
         &self,
         part: &RigPrimitive,
