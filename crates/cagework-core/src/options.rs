@@ -85,7 +85,7 @@ impl Method {
 choice! {
     /// Preconditioner of conjugate gradients.
     Preconditioner {
-        /// None.
+        /// No preconditioner.
         #[default]
         None = "none",
         /// One multigrid V-cycle.
@@ -105,7 +105,7 @@ choice! {
 }
 
 choice! {
-    /// Interpretation of Eq. 2.
+    /// Norm of the change of a cell in Eq. 2 of the paper.
     DeltaNorm {
         /// Euclidean norm of a cell's change: `sqrt(sum_i (w_i^n - w_i^(n-1))^2)`.
         #[default]
@@ -122,9 +122,9 @@ choice! {
         /// from 15 % on they stay in place.
         #[default]
         Extend = "extend",
-        /// They stay in place.
+        /// Vertices outside the cage stay in place.
         Stay = "stay",
-        /// The bind fails.
+        /// The bind fails if a vertex is outside the cage.
         Refuse = "refuse",
     }
 }

@@ -8,9 +8,9 @@ use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solv
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindReport {
-    /// Classic (as published) or embedded.
+    /// Discretisation of the cage: classic (as published) or embedded.
     pub method: Method,
-    /// Jacobi, multigrid, or conjugate gradients.
+    /// Solver of Laplace's equation: Jacobi, multigrid, or conjugate gradients.
     pub solver: Solver,
     /// Preconditioner of conjugate gradients.
     #[serde(default)]
@@ -29,9 +29,9 @@ pub struct BindReport {
     pub dims: [u32; 3],
     /// Edge lengths of a cell, object units.
     pub cell_size: [f32; 3],
-    /// Rectangular (as published) or cubic cells.
+    /// Shape of the cells: rectangular (as published) or cubic.
     pub cell_shape: CellShape,
-    /// Interpretation of Eq. 2.
+    /// Norm of the change of a cell in Eq. 2 of the paper.
     pub delta_norm: DeltaNorm,
     /// Convergence threshold for delta.
     pub tau: f32,
@@ -59,7 +59,7 @@ pub struct BindReport {
     pub memory_bytes: MemoryBytes,
     /// Rest error: distance of `sum_i w_i c_i` from the mesh vertex (Eq. 3), over vertices inside the cage.
     pub rest_error: RestError,
-    /// Error of the rows before correction: that of the solver alone.
+    /// Error of the rows of weights before correction, which is the error of the solver alone.
     #[serde(default)]
     pub raw_error: RawError,
     /// Statistics of the stored weights.
@@ -76,10 +76,10 @@ pub struct BindReport {
     pub smooth: u32,
     /// Number of mesh vertices outside the cage.
     pub outside_vertices: u64,
-    /// Number of vertices outside that stay in place.
+    /// Number of mesh vertices outside the cage that stay in place.
     #[serde(default)]
     pub staying_vertices: u64,
-    /// Largest distance of a vertex from the cage, object units.
+    /// Largest distance from the cage of a mesh vertex outside it, object units.
     #[serde(default)]
     pub outside_distance: f32,
     /// Number of mesh vertices inside balls and tubes.
@@ -99,7 +99,7 @@ fn one() -> u32 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CellCounts {
-    /// Unknowns.
+    /// Cells inside the cage, whose weights are the unknowns.
     pub interior: u64,
     /// Cells that the cage's surface intersects.
     pub boundary: u64,
@@ -141,20 +141,20 @@ pub struct RestError {
     pub p99: f64,
     /// Largest, object units.
     pub max: f64,
-    /// Mean over the diagonal of the cage's bounding box.
+    /// Mean, as a fraction of the diagonal of the cage's bounding box.
     pub mean_rel: f64,
-    /// Largest over the diagonal of the cage's bounding box.
+    /// Largest, as a fraction of the diagonal of the cage's bounding box.
     pub max_rel: f64,
 }
 
 /// Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
-/// exactly, so with the embedded method it is that of the solver.
+/// exactly, so with the embedded method this error is that of the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RawError {
     /// `|sum_i w_i - 1|`.
     pub sum: MeanMax,
-    /// Distance of `sum_i w_i c_i` from the vertex over the diagonal of the cage's bounding box.
+    /// Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
     pub point_rel: MeanMax,
     /// Smallest value, before negative values are clamped to 0.
     pub min_weight: f32,

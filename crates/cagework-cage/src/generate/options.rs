@@ -59,7 +59,7 @@ pub const DIVISIONS: Number = Number {
 choice! {
     /// Shape that the cage follows.
     Shape {
-        /// The model with its limbs.
+        /// The surface of the model, including its limbs.
         #[default]
         Follow = "follow",
         /// Approximate convex hull of the model (26 planes).
@@ -70,18 +70,18 @@ choice! {
 choice! {
     /// Mirror symmetry of the cage about a plane through the centre of the model's box.
     Symmetry {
-        /// Symmetric if the model is, to within a voxel.
+        /// Symmetric if the model is symmetric up to about a voxel.
         #[default]
         Auto = "auto",
         /// Not symmetric.
         #[serde(alias = "off")]
         None = "none",
-        /// Mirror across x.
+        /// Symmetric about a plane of constant x.
         #[serde(alias = "on")]
         X = "x",
-        /// Mirror across y.
+        /// Symmetric about a plane of constant y.
         Y = "y",
-        /// Mirror across z.
+        /// Symmetric about a plane of constant z.
         Z = "z",
     }
 }
@@ -90,11 +90,11 @@ choice! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mirror {
-    /// Left and right, if y is up.
+    /// Inverts x: left and right, if y is up.
     X,
-    /// Up and down, if y is up.
+    /// Inverts y: up and down, if y is up.
     Y,
-    /// Front and back, if y is up.
+    /// Inverts z: front and back, if y is up.
     Z,
 }
 

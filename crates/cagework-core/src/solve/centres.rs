@@ -11,8 +11,8 @@ use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE, Transfer};
 
 use super::rows::{LANES, Rhs, Row, ZERO, split, sum_around};
 
-/// Total weight that full weighting gives to the red cells around a coarse cell: one centre and twelve cells beside
-/// edges.
+/// Total weight that full weighting gives to the red cells around a coarse cell: its centre and twelve edge
+/// neighbours.
 pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 
 /// A red fine cell at the centre of a coarse cell.

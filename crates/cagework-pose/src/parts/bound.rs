@@ -13,8 +13,8 @@ use cagework_core::weights::Weights;
 /// Fixed vertices and rigid pieces of a bound model, ready for any pose.
 #[derive(Clone, Debug)]
 pub struct BoundParts {
-    /// Rest position, object units, and in the fourth component the share of the displacement that is suppressed, 0 to
-    /// 1. `[n_vertices]`
+    /// Rest position, object units. The fourth component is the share of the displacement that is suppressed, 0 to 1.
+    /// `[n_vertices]`
     pub rest: Vec<Vec4>,
     /// Rigid piece of each vertex, counted from 1; 0 if the vertex belongs to none. `[n_vertices]`
     pub piece_of: Vec<u32>,

@@ -42,7 +42,7 @@ const MIN_FRAME_MOVE: f64 = 2e-5;
 /// Distance along the surface, from the grabs, up to which a drag moves the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Reach {
-    /// The distance that encloses 15 % of the model's area per grab.
+    /// The distance within which 15 % of the model's area lies, per grab.
     #[default]
     Automatic,
     /// A multiple of the model's size.

@@ -25,7 +25,7 @@ export type Backend = "cpu" | "gpu";
  */
 export type CellShape = "box" | "cubic";
 /**
- * Interpretation of Eq. 2.
+ * Norm of the change of a cell in Eq. 2 of the paper.
  */
 export type DeltaNorm = "euclidean" | "literal";
 /**
@@ -114,7 +114,7 @@ plain: Array<[number, number, number, number]>, };
  */
 export type OutsideVertex = {
 /**
- * Mesh vertex.
+ * Index of the mesh vertex.
  */
 vertex: number,
 /**
@@ -122,7 +122,7 @@ vertex: number,
  */
 distance: number,
 /**
- * Share of the cage's motion that it follows: 1 near the cage, 0 if it stays in place.
+ * Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
  */
 share: number, };
 /**
@@ -142,11 +142,11 @@ outside: Array<OutsideVertex>, };
  */
 export type BindReport = {
 /**
- * Classic (as published) or embedded.
+ * Discretisation of the cage: classic (as published) or embedded.
  */
 method: Method,
 /**
- * Jacobi, multigrid, or conjugate gradients.
+ * Solver of Laplace's equation: Jacobi, multigrid, or conjugate gradients.
  */
 solver: Solver,
 /**
@@ -178,11 +178,11 @@ dims: [number, number, number],
  */
 cell_size: [number, number, number],
 /**
- * Rectangular (as published) or cubic cells.
+ * Shape of the cells: rectangular (as published) or cubic.
  */
 cell_shape: CellShape,
 /**
- * Interpretation of Eq. 2.
+ * Norm of the change of a cell in Eq. 2 of the paper.
  */
 delta_norm: DeltaNorm,
 /**
@@ -235,7 +235,7 @@ memory_bytes: MemoryBytes,
  */
 rest_error: RestError,
 /**
- * Error of the rows before correction: that of the solver alone.
+ * Error of the rows of weights before correction, which is the error of the solver alone.
  */
 raw_error: RawError,
 /**
@@ -263,11 +263,11 @@ smooth: number,
  */
 outside_vertices: number,
 /**
- * Number of vertices outside that stay in place.
+ * Number of mesh vertices outside the cage that stay in place.
  */
 staying_vertices: number,
 /**
- * Largest distance of a vertex from the cage, object units.
+ * Largest distance from the cage of a mesh vertex outside it, object units.
  */
 outside_distance: number,
 /**
@@ -287,7 +287,7 @@ notices: Array<string>, };
  */
 export type CellCounts = {
 /**
- * Unknowns.
+ * Cells inside the cage, whose weights are the unknowns.
  */
 interior: number,
 /**
@@ -347,16 +347,16 @@ p99: number,
  */
 max: number,
 /**
- * Mean over the diagonal of the cage's bounding box.
+ * Mean, as a fraction of the diagonal of the cage's bounding box.
  */
 mean_rel: number,
 /**
- * Largest over the diagonal of the cage's bounding box.
+ * Largest, as a fraction of the diagonal of the cage's bounding box.
  */
 max_rel: number, };
 /**
  * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
- * exactly, so with the embedded method it is that of the solver.
+ * exactly, so with the embedded method this error is that of the solver.
  */
 export type RawError = {
 /**
@@ -364,7 +364,7 @@ export type RawError = {
  */
 sum: MeanMax,
 /**
- * Distance of `sum_i w_i c_i` from the vertex over the diagonal of the cage's bounding box.
+ * Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
  */
 point_rel: MeanMax,
 /**
