@@ -32,7 +32,7 @@ const COMPARISONS_PER_TRIANGLE_TEST: u64 = 40;
 pub struct Corners {
     /// Vertex indices, distinct.
     pub index: [u32; 3],
-    /// Their positions.
+    /// Positions of these vertices.
     pub at: [DVec3; 3],
 }
 

@@ -132,7 +132,7 @@ mod tests {
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
-    /// f32 rounding of weights, and the solver's tolerance.
+    /// Tolerance for f32 rounding of weights, and the solver's tolerance.
     const ROUNDING: f32 = 2e-5;
 
     /// Trilinear coordinates of a point in the unit cube: 8 corners, x fastest.

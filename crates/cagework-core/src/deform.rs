@@ -118,7 +118,7 @@ pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
 mod tests {
     use super::*;
 
-    /// f32 rounding of rotated positions of size 1.
+    /// Tolerance for f32 rounding of rotated positions of size 1.
     const ROUNDING: f32 = 1e-6;
 
     fn weights() -> Weights {

@@ -112,7 +112,7 @@ mod tests {
     use crate::geometry;
     use crate::mesh::PolygonMesh;
 
-    /// f64 rounding of sums of a few hundred angles.
+    /// Tolerance for f64 rounding of sums of a few hundred angles.
     const ROUNDING: f64 = 1e-9;
 
     fn box_cage() -> Cage {

@@ -33,7 +33,7 @@ pub enum WeightsError {
     /// A column index is not below the number of columns.
     #[error("row {row} names column {column}, but there are {n_columns} columns")]
     Column {
-        /// The row.
+        /// Index of the row.
         row: usize,
         /// The invalid index.
         column: u32,
@@ -43,15 +43,15 @@ pub enum WeightsError {
     /// A row has two weights in one column.
     #[error("row {row} names column {column} twice; sum them with matrix.sum_duplicates()")]
     Duplicate {
-        /// The row.
+        /// Index of the row.
         row: usize,
-        /// The column.
+        /// Index of the column.
         column: u32,
     },
     /// A weight is not a finite number.
     #[error("row {row} has a weight that is not a finite number")]
     NotFinite {
-        /// The row.
+        /// Index of the row.
         row: usize,
     },
 }

@@ -14,7 +14,7 @@ use cagework_core::options::{BindOptions, OutOfRange};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::smooth::subdivide;
 
-/// f32 rounding of positions of size 1 after mirroring.
+/// Tolerance for f32 rounding of positions of size 1 after mirroring.
 const ROUNDING: f32 = 1e-6;
 
 type Soup = (Vec<Vec3>, Vec<[u32; 3]>);

@@ -53,7 +53,7 @@ pub enum BindError {
     /// A coordinate of a mesh vertex is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: u32,
     },
     /// The bind exceeds the memory limit.
@@ -62,9 +62,9 @@ pub enum BindError {
         needed >> 20, limit >> 20
     )]
     Memory {
-        /// Bytes needed.
+        /// Memory needed, bytes.
         needed: u64,
-        /// Bytes allowed.
+        /// Memory limit, bytes.
         limit: u64,
     },
     /// The bind exceeds the memory limit, mostly by the weights, which do not depend on the grid.
@@ -74,19 +74,19 @@ pub enum BindError {
         needed >> 20, limit >> 20, grouped(*points)
     )]
     WeightsMemory {
-        /// Bytes needed.
+        /// Memory needed, bytes.
         needed: u64,
-        /// Bytes allowed.
+        /// Memory limit, bytes.
         limit: u64,
-        /// Distinct points.
+        /// Number of distinct positions.
         points: usize,
-        /// Cage vertices.
+        /// Number of controls.
         columns: usize,
     },
     /// No cell centre lies inside the cage.
     #[error("no cell of the {grid}-cell grid lies inside the cage: use a finer grid")]
     NoInterior {
-        /// Cells along the longest side.
+        /// Number of cells along the cage's longest side.
         grid: u32,
     },
     /// Vertices are outside, and the policy is to fail.
@@ -94,13 +94,13 @@ pub enum BindError {
     Outside {
         /// Number of vertices outside.
         count: u32,
-        /// The first of them.
+        /// Index of the first of these vertices.
         first: u32,
     },
     /// All vertices are outside the cage.
     #[error("none of the model's {} vertices is inside the cage; {misfit}", grouped(*vertices))]
     NoneInside {
-        /// Vertices of the model.
+        /// Number of vertices of the model.
         vertices: usize,
         /// Relative position and size of cage and model.
         misfit: Misfit,

@@ -43,7 +43,7 @@ pub struct Solution {
 /// Solves all columns and samples them.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if a progress report is answered by a cancellation.
 pub(super) fn solve_and_sample(
     hierarchy: &Hierarchy,
     stencils: &Stencils,
@@ -69,7 +69,7 @@ pub(super) fn solve_and_sample(
 /// Solves all columns and returns their fields, `[n_batches][n_rows]`, for [`sample_fields`].
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if a progress report is answered by a cancellation.
 pub(super) fn solve_fields(
     hierarchy: &Hierarchy,
     options: &BindOptions,

@@ -19,7 +19,7 @@ pub enum CageError {
     /// A face has one or two corners.
     #[error("cage face {face} has {}; it needs at least 3", counted(*corners, "corner", "corners"))]
     TooFewCorners {
-        /// The face.
+        /// Index of the face.
         face: u32,
         /// Number of its corners.
         corners: usize,
@@ -27,7 +27,7 @@ pub enum CageError {
     /// A face has the index of a vertex that does not exist.
     #[error("cage face {face} names vertex {vertex}, but there are only {n} vertices (0 to {})", n - 1)]
     Index {
-        /// The face.
+        /// Index of the face.
         face: u32,
         /// The invalid index.
         vertex: u32,
@@ -37,7 +37,7 @@ pub enum CageError {
     /// A coordinate is infinite or not a number.
     #[error("cage vertex {vertex} has a coordinate that is not a finite number")]
     NotFinite {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: u32,
     },
     /// The cage is too small or too large for f32 and f64 arithmetic.
@@ -51,7 +51,7 @@ pub enum CageError {
     /// A face is not a simple polygon with an area.
     #[error("cage face {face} is degenerate: {why}")]
     DegenerateFace {
-        /// The face.
+        /// Index of the face.
         face: u32,
         /// The defect.
         why: FaceDefect,
@@ -59,17 +59,17 @@ pub enum CageError {
     /// Two faces have the same outline.
     #[error("cage faces {first} and {second} have the same corners: delete one of them")]
     DuplicateFace {
-        /// The first of the two.
+        /// Index of the first of the two faces.
         first: u32,
-        /// The second of the two.
+        /// Index of the second of the two faces.
         second: u32,
     },
     /// Two components coincide face by face.
     #[error("cage component {second} lies on component {first}, face on face: delete one of them")]
     DoubledPart {
-        /// The first component, in order of first faces.
+        /// Index of the first component, in the order of first faces.
         first: u32,
-        /// The second component.
+        /// Index of the second component.
         second: u32,
     },
     /// The cage has too many faces.
@@ -84,7 +84,7 @@ pub enum CageError {
          the faces there", edge[0], edge[1]
     )]
     Open {
-        /// The first open edge, lower vertex first.
+        /// Vertex indices of the first open edge, the lower one first.
         edge: [u32; 2],
         /// Number of open edges.
         count: usize,
@@ -95,7 +95,7 @@ pub enum CageError {
         edge[0], edge[1]
     )]
     NonManifoldEdge {
-        /// The edge, lower vertex first.
+        /// Vertex indices of the edge, the lower one first.
         edge: [u32; 2],
         /// Number of faces that share it.
         faces: usize,
@@ -114,9 +114,9 @@ pub enum CageError {
         "cage component {component} (with face {face}) encloses no volume: it is flat or folded onto itself"
     )]
     Flat {
-        /// The component, in order of first faces.
+        /// Index of the component, in the order of first faces.
         component: u32,
-        /// Its first face.
+        /// Index of its first face.
         face: u32,
     },
 }
@@ -127,7 +127,7 @@ pub enum FaceDefect {
     /// A vertex occurs more than once.
     #[error("vertex {vertex} is a corner of it more than once")]
     RepeatedVertex {
-        /// The vertex.
+        /// Index of the vertex.
         vertex: u32,
     },
     /// All corners lie on a line, or areas cancel.
@@ -156,7 +156,7 @@ pub enum CageNotice {
     },
     /// Inverted faces were flipped.
     Flipped {
-        /// The component, in order of first faces.
+        /// Index of the component, in the order of first faces.
         component: u32,
         /// Number of flipped faces.
         faces: usize,
@@ -165,21 +165,21 @@ pub enum CageNotice {
     },
     /// A component lies inside another one.
     Cavity {
-        /// The component, in order of first faces.
+        /// Index of the component, in the order of first faces.
         component: u32,
     },
     /// Vertices without faces: their weights are zero.
     UnusedVertices {
         /// Number of vertices.
         vertices: usize,
-        /// The first of them.
+        /// Index of the first of these vertices.
         first: u32,
     },
     /// Parts of the surface meet only in a vertex.
     TouchingVertices {
         /// Number of such vertices.
         vertices: usize,
-        /// The first of them.
+        /// Index of the first of these vertices.
         first: u32,
     },
 }

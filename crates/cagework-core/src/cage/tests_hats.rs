@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::shapes::*;
 use super::*;
 
-/// f64 rounding of coordinates of size 1 after a few dozen operations.
+/// Tolerance for f64 rounding of coordinates of size 1 after a few dozen operations.
 const ROUNDING: f64 = 1e-12;
 
 fn hats(cage: &Cage, triangle: u32, barycentric: [f64; 3]) -> Vec<f64> {

@@ -15,7 +15,7 @@ pub struct Side {
     pub lo: u32,
     /// The larger vertex index.
     pub hi: u32,
-    /// The face.
+    /// Index of the face.
     pub face: u32,
     /// Whether the face traverses the edge from `lo` to `hi`.
     pub forward: bool,

@@ -56,9 +56,9 @@ pub enum ClosedFormError {
         limit.div_ceil(1 << 20)
     )]
     Memory {
-        /// Bytes needed.
+        /// Memory needed, bytes.
         needed: u64,
-        /// Bytes allowed.
+        /// Memory limit, bytes.
         limit: u64,
     },
     /// The work was cancelled.

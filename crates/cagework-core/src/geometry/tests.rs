@@ -6,7 +6,7 @@ use super::*;
 use crate::cage::Cage;
 use crate::cage::shapes;
 
-/// f64 rounding of coordinates of size 1 to 4.
+/// Tolerance for f64 rounding of coordinates of size 1 to 4.
 const ROUNDING: f64 = 1e-13;
 
 fn point() -> impl Strategy<Value = DVec3> {

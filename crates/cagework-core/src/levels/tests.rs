@@ -3,7 +3,7 @@
 use super::plain::{cells, linear, on_two_levels};
 use super::*;
 
-/// f32 rounding of sums of at most six arm weights up to 1,000, relative to the diagonal.
+/// Tolerance for f32 rounding of sums of at most six arm weights up to 1,000, relative to the diagonal.
 const ROUNDING: f64 = 1e-6;
 
 /// Neighbours that are unknowns, and the diagonal, of each row, from runs and cut cells.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::cage::shapes::{cube, prism, tetrahedron};
 
-/// f32 rounding of rows.
+/// Tolerance for f32 rounding of rows.
 const ROUNDING: f64 = 1e-6;
 
 /// One subdivision step on quads by an independent formulation. Faces are split bilinearly; then each vertex moves

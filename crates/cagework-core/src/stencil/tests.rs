@@ -13,7 +13,7 @@ use crate::solve::stop::StopRule;
 use crate::team::Team;
 use crate::{Cage, deform};
 
-/// f32 rounding of values in [0, 1]: CPU twins add neighbours one by one, fast kernels add them in pairs.
+/// Tolerance for f32 rounding of values in [0, 1]: CPU twins add neighbours one by one, fast kernels add them in pairs.
 const TOLERANCE: f32 = 2e-6;
 
 fn prepared<T>(use_it: impl FnOnce(&PreparedBind<'_>) -> T) -> T {

@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use cagework_core::deform::deform_bound;
 
-    /// f32 rounding of positions of size 1 after sums of 64 terms.
+    /// Tolerance for f32 rounding of positions of size 1 after sums of 64 terms.
     const ROUNDING: f32 = 2e-6;
 
     fn hashed(n: u32, seed: u32) -> impl Iterator<Item = f32> {

@@ -29,7 +29,7 @@ const REACH_PER_GRAB_DISTANCE: f64 = 1.2;
 /// Radius of the patch that a pin fixes, as a fraction of the model's size. With a single point pinned, the model would
 /// roll about it.
 const PIN_RADIUS: f64 = 0.05;
-/// Weight of a pin's patch.
+/// Weight of the samples in a pin's patch.
 const PIN_WEIGHT: f64 = 2e4;
 /// Stiffness of grabs and pins, as a multiple of the mean diagonal of the whole matrix.
 const HANDLE_STIFFNESS: f64 = 1e3;

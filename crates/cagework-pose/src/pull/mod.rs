@@ -54,13 +54,13 @@ pub enum PullError {
      bind this model to this cage"
     )]
     Shape {
-        /// Rows of the weights.
+        /// Number of rows of the weights.
         rows: usize,
-        /// Columns of the weights.
+        /// Number of columns of the weights.
         columns: usize,
-        /// Vertices of the model.
+        /// Number of vertices of the model.
         vertices: usize,
-        /// Vertices of the cage.
+        /// Number of vertices of the cage.
         cage: usize,
     },
     /// The cage is too large.
@@ -69,12 +69,12 @@ pub enum PullError {
         /// Number of its vertices.
         cage: usize,
     },
-    /// A handle that does not exist.
+    /// A handle does not exist.
     #[error("there is no {what} {index}: indices run from 0 to {last}")]
     Missing {
         /// Kind of handle: vertex, triangle or cage vertex.
         what: &'static str,
-        /// The index.
+        /// The invalid index.
         index: u32,
         /// The largest valid index.
         last: usize,
@@ -91,11 +91,11 @@ pub enum PullError {
     /// A value that is not finite or out of range.
     #[error("{what} is {value}; it must be {range}")]
     Value {
-        /// The quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// The value.
         value: f64,
-        /// The valid range.
+        /// The valid range, in words.
         range: &'static str,
     },
     /// Targets and points differ in number.

@@ -6,7 +6,7 @@ use super::*;
 use crate::cage::Cage;
 use crate::cage::shapes;
 
-/// f32 rounding of a row of about ten weights.
+/// Tolerance for f32 rounding of a row of about ten weights.
 const ROUNDING: f64 = 1e-6;
 
 /// Rows of the C-shape's 16 columns.

@@ -7,7 +7,7 @@ use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
 use crate::options::DeltaNorm;
 use crate::solve::operator;
 
-/// f32 rounding of reordered sums of six values in [0, 1), over a diagonal of at least 3.
+/// Tolerance for f32 rounding of reordered sums of six values in [0, 1), over a diagonal of at least 3.
 const ROUNDING: f32 = 1e-6;
 
 /// Tolerance for f32 rounding of residuals, in which diagonals of up to a few thousand multiply values in [0, 1).

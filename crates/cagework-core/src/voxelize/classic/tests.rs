@@ -9,7 +9,7 @@ use crate::cage::shapes;
 use crate::geometry::winding_number;
 use crate::mesh::PolygonMesh;
 
-/// f32 rounding of sums of up to eight values.
+/// Tolerance for f32 rounding of sums of up to eight values.
 const SUM_TOLERANCE: f32 = 1e-6;
 
 fn voxelized(mesh: &PolygonMesh, grid: u32, shape: CellShape) -> (Cage, ClassicCells) {
