@@ -115,7 +115,7 @@ fn field_and_gradient_match_points_that_are_bound() {
     let points = points_in_bar();
     let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
     let field = weights.pose(cage.positions(), &posed);
-    // The gradient of bound points, by central differences over 1e-3 of the diagonal on a finer grid.
+    // Compare with the gradient of bound points, by central differences over 1e-3 of the diagonal on a finer grid.
     let step = 1e-3 * cage.diagonal();
     let around = |p: Vec3| {
         let [x, y, z] = Vec3::AXES.map(|axis| step * axis);

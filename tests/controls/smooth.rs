@@ -120,7 +120,8 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
     }
 }
 
-/// Before rows are restored, both sides are the same linear map of the same fields, so they agree to 1e-5 for any bend of the quads.
+/// Before rows are restored, the samples on both sides of the comparison are the same linear map of the same fields, so
+/// they agree to 1e-5 for any bend of the quads.
 #[test]
 fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in

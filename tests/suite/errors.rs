@@ -1,4 +1,4 @@
-//! Invalid input gives an error that names it.
+//! Invalid input gives an error that names the input at fault.
 
 use cagework_core::bind::BindError;
 use cagework_core::options::BindOptions;

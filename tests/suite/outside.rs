@@ -13,8 +13,9 @@ use super::BackEnd;
 /// Tolerance for affine maps: 1e-5 relative to positions of size 5.
 const AFFINE_TOLERANCE: f32 = 5e-5;
 
-/// Points inside the C, points within 5 % of its diagonal (5.1) outside, some of them in its gap, and corners of a box beyond 15 %.
-/// Returns all points, and the indices of the near and the far ones.
+/// Points inside the C-shaped cage, points outside within 5 % of the cage's diagonal (5.1), some of them in the gap of
+/// the C, and corners of a box beyond 15 %. Returns all points, and the indices of the near and of the far points
+/// outside.
 fn some_outside(n_inside: usize) -> (Vec<Vec3>, Vec<u32>, Vec<u32>) {
     let mut vertices = points::inside(&cage(&c_shape()), n_inside, 40);
     let near = [[-0.2, 1.5, 0.5], [2.0, -0.1, 0.4], [2.5, 1.2, 0.5], [3.0, 1.9, 0.7], [1.5, 0.3, 1.2]]

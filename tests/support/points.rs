@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::Random;
 
-/// Whether a point is inside, by its winding number.
+/// Whether a point is inside a cage, by its winding number.
 #[must_use]
 pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
     let facets = (0..cage.facets().len() as u32).map(|f| cage.facet_corners(f));

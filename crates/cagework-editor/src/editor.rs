@@ -133,7 +133,7 @@ impl Editor {
     /// Adds models; keeps cage and pose. Returns the ids of the models.
     pub fn add_models(&mut self, models: impl IntoIterator<Item = NewModel>) -> std::ops::Range<u32> {
         let first = self.document.models.next_id();
-        // Adding never fails.
+        // Adding models never fails.
         let _ = self.change_models(|all| {
             all.add(models);
             Ok(())

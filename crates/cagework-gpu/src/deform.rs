@@ -258,7 +258,7 @@ impl Deformer {
         let submission = context.queue.submit([encoder.finish()]);
         let (sender, done) = oneshot::channel();
         context.queue.on_submitted_work_done(move || {
-            // The receiver exists until the wait below returns.
+            // Sending cannot fail, because the receiver exists until the wait below returns.
             let _ = sender.send(());
         });
         context.wait(&submission, done).await

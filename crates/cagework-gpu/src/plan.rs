@@ -145,8 +145,8 @@ impl Sizes {
             .sum();
         let rows = match solver {
             Solver::Jacobi => 2 * n_rows + n_cut,
-            // Field, red residuals and right-hand side; two fields per coarse level. A single level also
-            // keeps the previous field.
+            // Count field, red residuals and right-hand side of the finest level, and two fields per coarse level. A
+            // single level also keeps the previous field.
             _ if coarse_rows == 0 => 2 * n_rows + n_cut,
             _ => n_rows + red_rows + n_cut + 2 * coarse_rows,
         };

@@ -174,7 +174,7 @@ fn constants_equal_those_of_rust() {
     same(&shaders::MESH, "BLENDED", f64::from(surface_mode::BLENDED));
     same(&shaders::LINES, "STATE_SHIFT", f64::from(STATE_SHIFT));
     same(&shaders::LINES, "HIDDEN", f64::from(HIDDEN));
-    // Compared as f32: the shader's constant is parsed as f64.
+    // Compare as f32, because the shader's constant is parsed as f64.
     assert_eq!(constant(&shaders::MESH, "NEGATIVE_THRESHOLD") as f32, colormap::NEGATIVE_THRESHOLD);
 }
 

@@ -10,7 +10,7 @@
 use cagework_core::mesh::weld;
 use glam::{DVec3, Quat, Vec3};
 
-/// Cosine of 2.5 degrees: normals within it differ only by rounding or 8-bit quantisation.
+/// Cosine of 2.5 degrees. Normals with a smaller angle between them differ only by rounding or 8-bit quantisation.
 const MIN_SAME_NORMAL_COS: f32 = 0.999;
 /// Limit on normals compared per position. Without it, n vertices at one point cost O(n²).
 const MAX_CLUSTERS_AT_ONE_PLACE: usize = 64;
@@ -34,8 +34,8 @@ impl Shading {
 
     /// Groups shading vertices into smooth surfaces.
     ///
-    /// `positions`: model vertices at rest. `vertex`: model vertex of each shading vertex. `normal`: its
-    /// original unit normal, zero if there is none. `surface`: smooth surface of a shading vertex without
+    /// `positions`: model vertices at rest. `vertex`: model vertex of each shading vertex. `normal`: original unit
+    /// normal of each shading vertex, zero if there is none. `surface`: smooth surface of a shading vertex without
     /// normal; may be empty. `triangles`: indices of shading vertices.
     pub(crate) fn new(
         positions: &[Vec3],

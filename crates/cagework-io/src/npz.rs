@@ -149,10 +149,10 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
     zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
 }
 
-/// Writes a field as an `.npz` file: `origin` (float64, `[3]`) of the first node, `spacing` (float64) of the nodes, `u` (float32,
-/// `[nx, ny, nz, 3]`), the displacements, `F` (float32, `[nx, ny, nz, 3, 3]`), the deformation gradients (`F @ d` maps a small
-/// vector), and `bound` (bool, `[nx, ny, nz]`), whether a node is inside the cage or within two cells of it. `origin`:
-/// added to all positions.
+/// Writes a field as an `.npz` file: `origin` (float64, `[3]`) of the first node, `spacing` (float64) of the nodes, `u`
+/// (float32, `[nx, ny, nz, 3]`), the displacements, `F` (float32, `[nx, ny, nz, 3, 3]`), the deformation gradients (`F
+/// @ d` maps a small vector), and `bound` (bool, `[nx, ny, nz]`), whether a node is inside the cage or at most two
+/// cells from the cage. `origin`: added to the position of the first node.
 #[must_use]
 pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     let lattice = &field.lattice;
@@ -173,10 +173,9 @@ pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     zip.finish()
 }
 
-/// Reads points from an `.npy` file, `[n, 3]`, and whether they have 64 bits.
+/// Reads points from an `.npy` file, `[n, 3]`. Also returns whether the file's numbers have 64 bits.
 ///
-/// # Errors
-/// [`NpzError`] if it is not such an array.
+/// # Errors [`NpzError`] if the file is not an array of this shape.
 pub(crate) fn npy_points(mut bytes: &[u8]) -> Result<(Vec<DVec3>, bool), NpzError> {
     let mut unpacked = 0;
     NpyArray::read("points", &mut bytes, (&mut unpacked, u64::MAX))?.wide_points()

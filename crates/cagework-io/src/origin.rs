@@ -17,7 +17,8 @@ pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
     let (center, extent) = (bounds.center(), bounds.extent().max_element());
     let of_axis = |x: f32| if x.is_finite() && x.abs() > MAX_COORDINATE_TO_EXTENT * extent { x } else { 0.0 };
-    // A single point, or a model that rounding collapsed to one, has extent 0 and gets its position.
+    // A single point, or a model that rounding collapsed to one point, has extent 0, and its position becomes the
+    // origin.
     Vec3::from_array(center.to_array().map(of_axis)).as_dvec3()
 }
 

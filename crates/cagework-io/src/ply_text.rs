@@ -105,8 +105,8 @@ pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     out.into()
 }
 
-/// The header in the parser's grammar: `\n` line ends, no empty lines, ASCII only. Property names with other
-/// characters are replaced; none of them is read.
+/// The header in the parser's grammar: `\n` line ends, no empty lines, ASCII only. Property names with other characters
+/// are replaced; the reader ignores such properties.
 fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     let mut out = Vec::with_capacity(header.len());
     for (number, line) in header.split(|&b| b == line_end).enumerate() {

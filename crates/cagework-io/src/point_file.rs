@@ -8,7 +8,7 @@ use thiserror::Error;
 use crate::memory::MemoryError;
 use crate::npz::{NpzError, npy_points, write_npy_points};
 
-/// Bytes of memory per byte of a text file: its text, positions, and the places of its numbers.
+/// Memory per byte of a text file, bytes: the text, its positions, and the places of its numbers.
 const MEMORY_PER_BYTE: u64 = 6;
 
 /// Error of reading a file of points.
@@ -17,13 +17,13 @@ pub enum PointFileError {
     /// The file is not UTF-8.
     #[error("not a text file: its bytes are not UTF-8")]
     Encoding,
-    /// A line that does not begin with three numbers, after lines that do.
+    /// A line after the first point does not contain three numbers x, y and z.
     #[error("line {line} has no three numbers x, y and z")]
     Line {
         /// Line number, from 1.
         line: usize,
     },
-    /// A number that is not finite.
+    /// A coordinate of a point is not finite.
     #[error("point {point} is not finite")]
     NotFinite {
         /// Number of the point, from 1.
@@ -35,7 +35,7 @@ pub enum PointFileError {
     /// Error in an array.
     #[error(transparent)]
     Array(#[from] NpzError),
-    /// More memory than is allowed.
+    /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
 }
@@ -50,9 +50,9 @@ pub struct PointFile {
 
 #[derive(Clone, Debug)]
 enum Source {
-    /// The text, and where the three numbers of each point are in it.
+    /// A text, with the byte ranges of the three numbers of each point.
     Text { text: String, places: Vec<[Range<usize>; 3]> },
-    /// Whether the values have 64 bits.
+    /// A NumPy array. `is_wide`: whether its values have 64 bits.
     Array { is_wide: bool },
 }
 
@@ -111,7 +111,7 @@ impl PointFile {
         Ok(Self { positions, source: Source::Text { text: text.to_owned(), places } })
     }
 
-    /// The file with other positions; everything else is unchanged, and so is the text of positions that are equal.
+    /// Writes the file with other positions. All other text is unchanged, as are numbers that have not changed.
     ///
     /// # Panics
     /// If there are fewer positions than points.
@@ -124,7 +124,7 @@ impl PointFile {
         let mut out = String::with_capacity(text.len());
         let mut end = 0;
         for (point, places) in places.iter().enumerate() {
-            // In the order of the line.
+            // Replace the numbers in the order in which the line contains them.
             let mut axes = [0, 1, 2];
             axes.sort_by_key(|&axis| places[axis].start);
             for axis in axes.into_iter().filter(|&axis| positions[point][axis] != self.positions[point][axis])

@@ -27,7 +27,8 @@ pub fn shown(text: &str) -> String {
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        // Marks, embeddings, overrides and isolates of the Unicode Bidirectional Algorithm (UAX 9, section 2).
+        // These are the marks, embeddings, overrides and isolates of the Unicode Bidirectional Algorithm (UAX 9,
+        // section 2).
         let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
         if c.is_control() || turns { out.extend(c.escape_default()) } else { out.push(c) }
     }
@@ -119,7 +120,7 @@ mod tests {
             shown("\u{1b}[31mred\r\n\u{9b}\u{202e}gnp.exe"),
             r"\u{1b}[31mred\r\n\u{9b}\u{202e}gnp.exe"
         );
-        // German, a combining accent, Devanagari, a quote and a backslash stay.
+        // German, a combining accent, Devanagari, a quote and a backslash are not escaped.
         let plain = "Größe e\u{301} हिन्दी 'C:\\a b'";
         assert_eq!(shown(plain), plain);
     }

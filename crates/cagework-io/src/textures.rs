@@ -90,7 +90,8 @@ fn scaled(size: [u32; 2], side: u32) -> [u32; 2] {
 }
 
 impl LookImage {
-    /// The size if the image may be decoded; its pixels are subtracted from `left`.
+    /// Size of the image if it may be decoded. Subtracts its pixels from `left`, the number of pixels that may still be
+    /// decoded.
     fn admit(&self, left: &mut u64) -> Result<[u32; 2], TextureError> {
         if self.bytes.is_empty() {
             return Err(TextureError::Overlap);

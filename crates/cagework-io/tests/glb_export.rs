@@ -101,7 +101,7 @@ fn normals_and_tangents_turn_with_the_surface() {
     let mut b = textured_square();
     b.json["nodes"] = json!([{ "mesh": 0 }]);
     let model = read("x.glb", &b.glb()).unwrap();
-    // A rotation by 90 degrees about x: y becomes z.
+    // The vertices rotate by 90 degrees about x: y becomes z.
     let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect();
     let glb = model.write_glb(&turned).unwrap();
     for (normal, tangent) in attribute(&glb, "NORMAL", 3).iter().zip(attribute(&glb, "TANGENT", 4)) {
@@ -279,7 +279,7 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     assert_eq!(materials, ["red", "blue"]);
     assert!(primitives.iter().all(|p| p["attributes"]["TEXCOORD_0"].is_u64()));
     let again = read("y.glb", &glb).unwrap();
-    // Four vertices per face, with the face's normal.
+    // The GLB has four vertices per face, with the face's normal.
     assert_eq!((again.positions.len(), again.triangles.len()), (24, 12));
     assert!(again.positions.iter().all(|p| expected.contains(p)));
     let mut before = model.clone();

@@ -229,7 +229,7 @@ fn deep_trees_need_no_stack() {
     nodes.push(json!({ "mesh": 0 }));
     b.json["nodes"] = nodes.clone().into();
     assert_eq!(read("x.glb", &b.glb()).unwrap().positions.len(), 8);
-    // Linear time: walking from each node to the root would take a minute.
+    // Reading takes linear time: walking from each node to the root would take a minute.
     for node in &mut nodes {
         node["mesh"] = 0.into();
     }
@@ -281,7 +281,7 @@ fn missing_buffer_file_is_an_error() {
     assert!(short.contains("buffer 0 is cut off: it has 10 of 100 bytes"), "{short}");
 }
 
-/// Found by fuzzing.
+/// Found by fuzzing, with an empty list of scenes.
 #[test]
 fn empty_lists_are_treated_as_missing() {
     let mut b = skinned();

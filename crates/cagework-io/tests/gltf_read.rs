@@ -90,13 +90,14 @@ fn strips_and_fans_keep_their_winding() {
     let indices = b.indices(&[0, 1, 3, 2]);
     b.primitive(0)["indices"] = indices.into();
     b.primitive(0)["mode"] = 6.into();
-    // glTF 2.0, section 3.7.2.1: p_i = (v_(i + 1), v_(i + 2), v_0).
+    // Triangle i of a fan is (v_(i + 1), v_(i + 2), v_0), see glTF 2.0, section 3.7.2.1.
     assert_eq!(read_glb(&b).triangles, [[1, 3, 0], [3, 2, 0]]);
     let mut b = plain_cube();
     let indices = b.indices(&[0, 1, 2, 3, 3, 5]);
     b.primitive(0)["indices"] = indices.into();
     b.primitive(0)["mode"] = 5.into();
-    // glTF 2.0, section 3.7.2.1: p_i = (v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)). The degenerate triangle is dropped.
+    // Triangle i of a strip is (v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)), see glTF 2.0, section 3.7.2.1. The
+    // degenerate triangle is dropped.
     assert_eq!(read_glb(&b).triangles, [[0, 1, 2], [1, 3, 2]]);
 }
 

@@ -49,7 +49,7 @@ fn points_of_a_rig_are_the_last_rows() {
 
 #[test]
 fn field_is_written_with_z_as_the_fastest_axis() {
-    // u = (0.1 y, 0.2 z, 0.3 x) at every node.
+    // The displacement at every node is u = (0.1 y, 0.2 z, 0.3 x).
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 4.0, 8.0) };
     let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
     let lattice = Lattice::new(&cage, 32);
@@ -81,7 +81,7 @@ fn field_is_written_with_z_as_the_fastest_axis() {
     let (x, y, z) = (1, 2, 3);
     let node = z + nz * (y + ny * x);
     assert_eq!(u[3 * node..3 * node + 3], by(place(x, y, z)).to_array());
-    // F[i][j]: change of component i along axis j.
+    // F[i][j] is the change of component i along axis j.
     let expected = [1.0, 0.1, 0.0, 0.0, 1.0, 0.2, 0.3, 0.0, 1.0];
     let close =
         gradients[9 * node..][..9].iter().zip(expected).all(|(a, b): (&f32, f32)| (a - b).abs() < 1e-5);
@@ -129,7 +129,8 @@ fn headers_are_what_numpy_writes() {
     let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut data = Vec::new();
     zip.by_name("indptr.npy").unwrap().read_to_end(&mut data).unwrap();
-    // numpy.lib.format, version 1.0: magic, version, header length, a dict padded to 64 bytes with a newline.
+    // The header has the format of numpy.lib.format, version 1.0: magic, version, header length, and a dict padded to
+    // 64 bytes with a newline.
     let header = b"{'descr': '<i4', 'fortran_order': False, 'shape': (4,), }";
     assert_eq!(&data[..8], b"\x93NUMPY\x01\0");
     assert_eq!(u16::from_le_bytes([data[8], data[9]]), 118);

@@ -227,7 +227,7 @@ fn patched_file_moves_vertices_and_keeps_the_rest() {
 #[test]
 fn patched_normals_rotate_with_the_surface() {
     let model = read("x.obj", CUBE_OBJ.as_bytes()).unwrap();
-    // A rotation by 90 degrees about z: x becomes y, y becomes -x.
+    // The vertices rotate by 90 degrees about z: x becomes y, y becomes -x.
     let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(-p.y, p.x, p.z)).collect();
     let out = String::from_utf8(model.write_obj(&turned).unwrap()).unwrap();
     let normals: Vec<Vec3> = out
@@ -276,7 +276,7 @@ fn model_with_z_up_is_rotated_to_y_up_and_exported_with_z_up() {
         let lying = read("x", &bytes).unwrap();
         let mut upright = lying.clone();
         upright.set_up(UpAxis::Z);
-        // A rotation by -90 degrees about x: up becomes y, and behind becomes -z.
+        // Setting the up axis rotates by -90 degrees about x: up becomes y, and behind becomes -z.
         for (p, q) in lying.positions.iter().zip(&upright.positions) {
             assert_eq!(*q, Vec3::new(p.x, p.z, -p.y));
         }

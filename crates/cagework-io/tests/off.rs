@@ -57,7 +57,7 @@ fn off_files_are_read_with_polygons_and_colours() {
             "{text}"
         );
         assert_eq!(model.notices, notices, "{text}");
-        // sRGB to linear (IEC 61966-2-1).
+        // The expected colour is converted from sRGB to linear (IEC 61966-2-1).
         let expected = color.map_or([1.0; 3], |c| {
             c.map(|x: f32| if x == 0.0 { 0.0 } else { ((x + 0.055) / 1.055).powf(2.4) })
         });

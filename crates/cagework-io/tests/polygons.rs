@@ -41,7 +41,7 @@ fn ply_is_read_with_polygons_and_colours_and_lists_ignored_data() {
     assert_eq!(model.positions, cube());
     assert_eq!(model.cage_mesh().faces, obj().cage_mesh().faces);
     assert!((volume(&model) - volume(&obj())).abs() < 1e-6);
-    // The seventh vertex has red 60 / 255 and blue 51 / 255; linear by the sRGB curve (IEC 61966-2-1).
+    // The seventh vertex has red 60 / 255 and blue 51 / 255, which are converted from sRGB to linear (IEC 61966-2-1).
     let look = model.look();
     let corner = look.vertices.iter().find(|v| v.source == 6).unwrap();
     let linear = |c: f32| ((c + 0.055) / 1.055).powf(2.4);
@@ -71,7 +71,7 @@ fn written_ply_and_stl_can_be_read() {
         if format == ModelFormat::Ply {
             assert_eq!(again.positions, moved);
         } else {
-            // STL orders corners by triangle; positions agree.
+            // STL numbers vertices by their first use in a triangle, so compare the positions of all triangle corners.
             let places = |model: &Model| -> Vec<Vec3> {
                 model.triangles.iter().flatten().map(|&v| model.positions[v as usize]).collect()
             };

@@ -154,7 +154,7 @@ impl Gesture {
         if let Some(amount) = self.typed {
             return match self.constraint {
                 Constraint::Axis(axis) => amount * Vec3::AXES[axis],
-                // The first axis of the plane.
+                // A typed amount moves along the first axis of the plane.
                 Constraint::Plane(axis) => amount * Vec3::AXES[if axis == 0 { 1 } else { 0 }],
                 Constraint::Free => amount * view.right(),
             };
@@ -167,7 +167,7 @@ impl Gesture {
                 let from = along_axis(view, self.pointer_start, self.pivot, axis);
                 match from.zip(along_axis(view, self.pointer, self.pivot, axis)) {
                     Some((from, to)) => (to - from) * axis,
-                    // The axis points at the eye: up on the screen moves away from the eye.
+                    // The axis points at the eye, so moving the pointer up moves vertices away from the eye.
                     None => -free.dot(view.up()) * axis.dot(view.backward()).signum() * axis,
                 }
             }
@@ -209,7 +209,7 @@ impl Gesture {
         }
         let Some((center, _)) = view.project(self.pivot) else { return 1.0 };
         let from = self.pointer_start - center;
-        // Projection on the initial direction, so that crossing the centre mirrors.
+        // Project the pointer's movement on the initial direction, so that crossing the centre mirrors the selection.
         let reach = from.length().max(MIN_SCALE_DISTANCE);
         let direction = if from == Vec2::ZERO { Vec2::X } else { from.normalize() };
         1.0 + (self.pointer - self.pointer_start).dot(direction) / reach

@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn vertex_in_front_hides_the_one_behind_it() {
-        // Cube vertices are x + 2 y + 4 z; 7 is in front of 3.
+        // The cube's vertices have indices x + 2 y + 4 z; vertex 7 is in front of vertex 3.
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);

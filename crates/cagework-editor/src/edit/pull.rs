@@ -126,7 +126,7 @@ mod tests {
     fn share_falls_smoothly_with_the_distance() {
         let line: Vec<Vec3> = (0..5).map(|k| k as f32 * Vec3::X).collect();
         let pull = Pull::new(&selection(5, &[0]), &line, &line, SharedPull { radius: 4.0, symmetry: None });
-        // Smoothstep at 1, 3/4, 1/2, 1/4 and 0.
+        // The shares are the values of smoothstep at 1, 3/4, 1/2, 1/4 and 0.
         assert_eq!(pull.share, [1.0, 0.84375, 0.5, 0.15625, 0.0]);
         let alone = Pull::new(&selection(5, &[0]), &line, &line, SharedPull::default());
         assert_eq!(alone.share, [1.0, 0.0, 0.0, 0.0, 0.0]);

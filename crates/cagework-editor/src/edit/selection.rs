@@ -106,7 +106,7 @@ impl Selection {
 
     /// Extends the selection to whole connected parts.
     pub fn linked(&mut self, topology: &Topology) {
-        // Iterate over all edges to a fixed point: a cage has a few hundred.
+        // Iterate over all edges to a fixed point: a cage has a few hundred edges.
         loop {
             let mut changed = false;
             for [a, b] in topology.edges.iter().map(|e| e.map(|i| i as usize)) {

@@ -131,7 +131,8 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<CageEdit, RestE
     if edited.mesh.faces.is_empty() {
         return Err(RestEditError::NothingLeft);
     }
-    // Boundary: sides of deleted faces whose neighbour stays. The filling has the deleted faces' orientation.
+    // The boundary consists of the sides of deleted faces whose neighbouring face is not deleted. The filling has the
+    // orientation of the deleted faces.
     let sides = |f: usize| {
         let face = &mesh.faces[f];
         (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])

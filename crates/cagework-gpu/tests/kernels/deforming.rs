@@ -70,7 +70,7 @@ fn skin_vertices_matches_cpu() {
     let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
     for v in 0..n {
         skin.positions.push(rng.point());
-        // One to five joints; every third vertex has morph targets.
+        // Each vertex has one to five joints, and every third vertex has morph targets.
         let weights: Vec<f32> = rng.values(1 + v % 5).iter().map(|w| w.abs() + 0.1).collect();
         let total: f32 = weights.iter().sum();
         skin.joints.extend((0..).zip(weights).map(|(k, w)| ((v as u32 + 3 * k) % n_joints, w / total)));

@@ -33,7 +33,7 @@ const PRIMITIVE_BYTES: u64 = 300;
 /// Additional memory per vertex while reading: local and world position, and entry in the weld table, bytes.
 const VERTEX_READ_BYTES: u64 = 52;
 
-/// Additional memory per triangle while reading: its indices, bytes.
+/// Additional memory per triangle while reading, for the triangle's indices, bytes.
 const TRIANGLE_READ_BYTES: u64 = 12;
 
 /// Memory for playing and reshaping, bytes: per vertex of a mesh with morph targets or skin, and additionally

@@ -37,7 +37,7 @@ impl NpzWriter {
     pub(super) fn new(bytes: usize, longest: usize) -> Self {
         Self {
             zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + HEADERS_BYTES))),
-            // A fixed time, the zip epoch 1980.
+            // Use a fixed time, the zip epoch 1980, so that equal values give equal bytes.
             options: SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Stored)
                 .last_modified_time(DateTime::default())
@@ -163,8 +163,8 @@ fn lengths(text: &str) -> Option<Vec<usize>> {
 }
 
 impl NpyArray {
-    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `unpacked`: bytes
-    /// of memory so far, and their limit.
+    /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `unpacked`:
+    /// bytes of the arrays read so far, and limit on these bytes.
     pub(super) fn read(
         name: &'static str,
         from: &mut impl std::io::Read,

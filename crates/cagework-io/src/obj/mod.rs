@@ -1,8 +1,8 @@
 //! Wavefront OBJ.
 //!
-//! Not read with `tobj`, which renumbers vertices per group, drops unused ones and either splits polygons or
-//! loses their line numbers. Here row `v` of the weights is the `v`-th vertex line, cages keep their
-//! polygons, errors name a line, and an export patches the original file.
+//! The crate `tobj` is not used: it renumbers vertices per group, drops unused vertices and either splits polygons or
+//! loses their line numbers. Here row `v` of the weights is the `v`-th vertex line, cages keep their polygons, errors
+//! name a line, and an export patches the original file.
 
 mod error;
 mod inner;

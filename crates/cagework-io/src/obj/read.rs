@@ -278,7 +278,7 @@ impl<'a> Reader<'a> {
             (24 + WELD_BYTES, self.positions.len()),
             (16, document.texcoords.len()),
             (24, document.normals.len()),
-            // One triangle per corner, stored as corners and as vertices.
+            // Count one triangle per corner, stored as corner indices and as vertex indices.
             (24 + 24, document.corners.len()),
             (24, document.face_materials.len()),
             (80, document.colors.len()),

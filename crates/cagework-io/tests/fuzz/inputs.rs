@@ -61,7 +61,7 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         &[Vec3::ONE],
         &[Vec3::ONE],
     ));
-    // Eight controls, frames of a joint with a bone, and entries in all kinds of columns.
+    // Weights of eight controls, with frames of a joint with a bone, and entries in all kinds of columns.
     let frames = Frames {
         joints: vec![6, 7],
         bones: vec![[0, 1]],
@@ -72,7 +72,7 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     let weights = Weights::new(n, vec![0, 3, 5], vec![0, 8, 11, 7, n - 1], vec![0.5, 0.25, 1.0, 0.75, 0.5]);
     samples.push(write_weights_npz(&weights.expect("the matrix is valid"), &frames, &[outside], &[], &[]));
     samples.push(encode_pose(&cube(), &bent));
-    // Controls inside the cube.
+    // A file of controls inside the cube: a polyline, a point and a face.
     samples.push(
         b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
             .to_vec(),

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
 use super::{ROUNDED, assert_near, assert_targets, by, f, player, read, reshaped, shown};
 
-/// The column with a cube attached to its tip by a matrix.
+/// The column of [`rigged`] with a cube attached to the column's tip by a matrix.
 fn with_hat() -> Builder {
     let mut rig = rigged();
     let cube = rig.cube_mesh("cube");
@@ -280,7 +280,7 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
     assert!(top(&model).distance(top(&straight)) > 0.9, "it is bent at rest");
     for joints in [Joints::Follow, Joints::Stay] {
         let bytes = reshaped(&model, joints).0;
-        // The target with default weight 0, at weights 0 and 1.
+        // Compare the states of the target with default weight 0, at weights 0 and 1.
         assert_targets(&model, &bytes, &[1], 2.0 * ROUNDED);
         let [before, after] = [&model, &read(&bytes)].map(|m| player(m).at(None, 0.0, &[]).palette);
         for (a, b) in before.iter().zip(&after) {

@@ -146,7 +146,7 @@ fn joints_follow_the_cage_and_keep_skinning_matrices() {
     let model = read(&rigged().glb());
     let (bytes, _) = reshaped(&model, Joints::Follow);
     let (before, after) = (player(&model), player(&read(&bytes)));
-    // Skinning matrix `G B` of each joint.
+    // The palettes contain the skinning matrix `G B` of each joint.
     let [old, new] = [&before, &after].map(|player| player.at(None, 0.0, &[]).palette);
     for (a, b) in old.iter().zip(&new) {
         assert!(a.abs_diff_eq(*b, ROUNDED), "{a} {b}");
@@ -304,7 +304,7 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     let number = |v: &serde_json::Value| v.as_f64().unwrap() as f32;
     let array = |v: &serde_json::Value| vec3(number(&v[0]), number(&v[1]), number(&v[2]));
     let object = |v: &serde_json::Value| vec3(number(&v["x"]), number(&v["y"]), -number(&v["z"]));
-    // Joints at heights 1 and 2. The armature scales by two; joints do not rotate.
+    // The joints are at heights 1 and 2. The armature scales by two; joints do not rotate.
     let expected = |y: f32, offset: Vec3| {
         let joint = vec3(0.0, y, 0.0);
         (f(joint + 2.0 * offset) - f(joint)) / 2.0

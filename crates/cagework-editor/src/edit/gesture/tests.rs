@@ -42,7 +42,8 @@ fn grab_is_restricted_to_an_axis_or_a_plane() {
     assert_eq!(grab.label(&Flat), "Move 0.3 along X");
     grab.constrain(Constraint::Plane(2));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.3, 0.6, 1.0)));
-    // A plane seen edge-on, and the axis that points at the eye: up on the screen moves away from the eye.
+    // In a plane seen edge-on, only the vertical part of the drag counts. Along an axis that points at the eye,
+    // dragging up moves away from the eye.
     grab.constrain(Constraint::Plane(0));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.0, 0.6, 1.0)));
     grab.constrain(Constraint::Axis(2));
@@ -66,13 +67,13 @@ fn rotation_follows_the_pointer() {
     let middle = ORIGIN - Vec2::new(0.0, 100.0);
     let mut turn = gesture(GestureKind::Rotate, &[6, 7], middle + Vec2::new(50.0, 0.0));
     turn.drag(middle - Vec2::new(0.0, 50.0));
-    // From the right to the top: a quarter turn counter-clockwise about +z.
+    // The pointer moves from the right to the top: a quarter turn counter-clockwise about +z.
     let moved = turn.positions(&Flat);
     assert!(close(moved[7], Vec3::new(0.0, 2.0, 1.0)) && close(moved[6], Vec3::new(0.0, 0.0, 1.0)));
     assert_eq!(turn.label(&Flat), "Rotate 90°");
     turn.constrain(Constraint::Axis(1));
     turn.type_amount(Some(90.0));
-    // About y, x turns to -z.
+    // A quarter turn about y maps x to -z.
     assert!(close(turn.positions(&Flat)[7], Vec3::new(0.0, 1.0, 0.0)));
     assert_eq!(turn.label(&Flat), "Rotate 90° around Y");
 }

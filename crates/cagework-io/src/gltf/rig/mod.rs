@@ -172,7 +172,7 @@ impl<'a> Rig<'a> {
             rig.vrm_points[k].bound_index = rig.n_vertices + rig.extras.len();
             rig.anchor(rig.vrm_points[k].at);
         }
-        // Bind non-finite points at the origin.
+        // Replace non-finite points, which cannot be bound, by the origin.
         for point in &mut rig.extras {
             if !point.as_vec3().is_finite() {
                 *point = origin;

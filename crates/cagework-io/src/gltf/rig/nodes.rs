@@ -249,7 +249,7 @@ impl Rig<'_> {
                 node.translation = Some(translation);
                 let turned = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
                     || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
-                // Rotation of the change only, since the node's own scale can mirror.
+                // Use the rotation of the change only, since the node's own scale can mirror.
                 let change = DMat3::from_mat4(to) * DMat3::from_mat4(from).inverse();
                 if let Some(m) = rotation(change).filter(|_| turned) {
                     let before = node

@@ -32,7 +32,7 @@ pub(super) fn append(
     if poses.is_empty() {
         return Ok(());
     }
-    // Number of targets of each mesh. All primitives of a mesh must have the same number.
+    // Number of targets of each mesh. All primitives of a mesh must have the same number of targets.
     let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
     for part in &rig.parts {
         let most = meshes.entry(edit.mesh_of(&part.instance)).or_insert(0);

@@ -12,13 +12,13 @@ pub struct ReshapeReport {
     pub joints: usize,
     /// Nodes among `joints` with a changed transform.
     pub joints_moved: usize,
-    /// Joints outside the cage that have vertices; they move as points outside the cage.
+    /// Joints outside the cage that carry vertices. They move like vertices outside the cage.
     pub joints_outside: usize,
     /// Joints outside the cage that have no vertices; they follow their parent.
     pub joints_loose: usize,
     /// Ends of morph targets: vertices with one target at weight 0 or 1.
     pub morph_ends: usize,
-    /// Ends outside the cage. They move as points outside the cage.
+    /// Ends outside the cage. They move like vertices outside the cage.
     pub morph_ends_outside: usize,
     /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
     pub lattice_points: usize,

@@ -17,7 +17,7 @@ pub(super) struct VrmPoint {
     node: usize,
     /// Position of the point in world space.
     pub(super) at: DVec3,
-    /// Index of the first of its bound points: the point itself, then its neighbours for the deformation gradient.
+    /// Index of the first bound point of this offset: the point itself, then the six points around it.
     pub(super) bound_index: usize,
     what: VrmField,
 }
