@@ -8,6 +8,7 @@ mod arrays;
 mod bind;
 mod cage;
 mod error;
+mod field;
 mod files;
 mod options;
 mod pull;
@@ -24,6 +25,8 @@ mod native {
     use crate::bind::{bind, bind_many, deform};
     #[pymodule_export]
     use crate::cage::{Cage, check_cage, generate_cage};
+    #[pymodule_export]
+    use crate::field::Field;
     #[pymodule_export]
     use crate::files::read_model;
     #[pymodule_export]

@@ -14,6 +14,7 @@ Lengths are in the model's own units. For many files on many machines see cagewo
 from cagework._errors import ArrayError, BindError, CageError, Error, ModelError, OptionError, PullError
 from cagework._native import (
     Cage,
+    Field,
     __version__,
     bind,
     bind_many,
@@ -31,6 +32,7 @@ __all__ = [
     "Cage",
     "CageError",
     "Error",
+    "Field",
     "ModelError",
     "OptionError",
     "PullError",

@@ -1,0 +1,125 @@
+//! The class `Field`: the deformation of the space in and around a cage.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use cagework_core::bind::BindError;
+use cagework_core::field::{CELLS, CELLS_RANGE, Field as CoreField, FieldWeights, InverseField};
+use cagework_io::write_field_npz;
+use glam::Vec3;
+use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::bind::bind_options;
+use crate::cage::Cage;
+use crate::{arrays, error, files, work};
+
+/// The deformation of a posed cage as a field, for points that are not bound.
+///
+/// Field(cage, posed, *, cells=64, **options)
+///
+/// Binds the nodes of a lattice in and around the cage once, with `cells` cells along its longest side (8 to 256), and
+/// interpolates between them. Outside the cage the deformation fades to nothing within a quarter of the longest side.
+///
+/// posed: [n_cage, 3] float32 or float64, object units; options: those of bind except `outside`.
+///
+/// Raises BindError, OptionError, ArrayError. Ctrl-C cancels.
+#[pyclass(frozen, module = "cagework")]
+pub(crate) struct Field {
+    weights: Arc<FieldWeights>,
+    field: CoreField,
+    cage: Py<Cage>,
+}
+
+#[pymethods]
+impl Field {
+    #[new]
+    #[pyo3(signature = (cage, posed, *, cells = f64::from(CELLS), **options))]
+    fn new(
+        py: Python<'_>,
+        cage: &Bound<'_, Cage>,
+        posed: &Bound<'_, PyAny>,
+        cells: f64,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        CELLS_RANGE.check(cells).map_err(error::option)?;
+        let (options, controls) = (bind_options(options)?, cage.get().controls());
+        let posed = arrays::points("posed", posed, Some(controls.n_controls()), cage.get().origin())?;
+        let posed = posed.as_slice();
+        let made = work::run(py, move |progress| -> Result<_, BindError> {
+            let weights = FieldWeights::bind(controls, cells as u32, &options, progress)?;
+            let field = weights.pose(controls.rest(), posed);
+            Ok((Arc::new(weights), field))
+        })?;
+        let (weights, field) = made.map_err(error::bind)?;
+        Ok(Self { weights, field, cage: cage.clone().unbind() })
+    }
+
+    /// The field of another pose of the same cage. Nothing is bound again.
+    ///
+    /// Raises ArrayError.
+    fn pose(&self, py: Python<'_>, posed: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (cage, weights) = (self.cage.get(), self.weights.clone());
+        let controls = cage.controls();
+        let posed = arrays::points("posed", posed, Some(controls.n_controls()), cage.origin())?;
+        let posed = posed.as_slice();
+        let field = work::run(py, |_| weights.pose(controls.rest(), posed))?;
+        Ok(Self { weights, field, cage: self.cage.clone_ref(py) })
+    }
+
+    /// Positions of points after the deformation: [n, 3] -> [n, 3], object units.
+    ///
+    /// Raises ArrayError.
+    fn map<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.each(py, points, |p| self.field.map(p))
+    }
+
+    /// The points that `map` moves to the given ones: [n, 3] -> [n, 3], object units. NaN where there is none, for example
+    /// where the deformation folds.
+    ///
+    /// Raises ArrayError.
+    fn inverse<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let inverse = InverseField::new(&self.field);
+        self.each(py, points, |p| inverse.find(p).unwrap_or(Vec3::NAN))
+    }
+
+    /// Deformation gradients at points: [n, 3] -> [n, 3, 3] float32. F[k] @ d is where a small vector d at point k goes.
+    ///
+    /// Raises ArrayError.
+    fn gradient<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let points = arrays::points("points", points, None, self.cage.get().origin())?;
+        let (n, points) = (points.as_slice().len(), points.as_slice());
+        let of_point = |&p: &Vec3| self.field.gradient(p).transpose().to_cols_array();
+        let flat = work::run(py, |_| points.iter().flat_map(of_point).collect::<Vec<f32>>())?;
+        PyArray1::from_vec(py, flat).reshape([n, 3, 3])
+    }
+
+    /// Writes the lattice as an .npz file, as `cagework deform --lattice` does.
+    ///
+    /// Raises OSError.
+    #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        files::write(&path, &write_field_npz(&self.field, self.cage.get().origin()))
+    }
+}
+
+impl Field {
+    /// Applies a map to points, `[n, 3]`.
+    fn each<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        map: impl Fn(Vec3) -> Vec3 + Send + Sync,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let origin = self.cage.get().origin();
+        let points = arrays::points("points", points, None, origin)?;
+        let points = points.as_slice();
+        let mapped = work::run(py, |_| points.iter().map(|&p| map(p)).collect())?;
+        arrays::array_of(py, mapped, origin)
+    }
+}

@@ -1,0 +1,86 @@
+import cagework as cw
+import numpy as np
+import pytest
+from support import bent, box, command
+
+AFFINE = np.array([[1.5, 0.25, 0.0], [0.0, 0.75, -0.5], [0.1, 0.0, 1.0]])
+SHIFT = np.array([0.3, 0.0, -0.2])
+
+
+@pytest.fixture(scope="module")
+def cage():
+    return cw.Cage(*box(2))
+
+
+@pytest.fixture(scope="module")
+def points():
+    return np.random.default_rng(3).uniform(-0.9, 0.9, (500, 3))
+
+
+def test_affine_motions_are_exact(cage, points):
+    field = cw.Field(cage, cage.vertices @ AFFINE.T + SHIFT, cells=24)
+    assert np.allclose(field.map(points), points @ AFFINE.T + SHIFT, atol=1e-5)
+    assert np.allclose(field.gradient(points), AFFINE, atol=1e-3)
+    assert np.allclose(field.inverse(field.map(points)), points, atol=1e-5)
+    # Far outside, nothing moves.
+    far = np.full((1, 3), 50.0)
+    assert (field.map(far) == far).all() and (field.gradient(far) == np.eye(3)).all()
+
+
+def test_bent_points_agree_with_bound_points_and_are_mapped_back(cage, points):
+    field = cw.Field(cage, cage.vertices).pose(bent(cage))
+    weights, report = cw.bind(points, cage)
+    exact = cw.deform(weights, bent(cage), report)
+    assert np.abs(field.map(points) - exact).max() < 1e-3
+    assert np.abs(field.inverse(field.map(points)) - points).max() < 1e-5
+    assert (np.linalg.det(field.gradient(points)) > 0).all()
+
+
+def test_other_arrays_are_accepted(cage, points):
+    field = cw.Field(cage, cage.vertices + SHIFT, cells=16)
+    moved = field.map(points.astype(np.float32))
+    assert np.allclose(np.from_dlpack(moved), points + SHIFT, atol=1e-5)
+    for module in ("torch", "jax.numpy"):
+        try:
+            other = __import__(module, fromlist=["asarray"])
+        except ImportError:
+            continue
+        assert np.allclose(field.map(other.asarray(points)), points + SHIFT, atol=1e-5)
+
+
+def test_tetrahedra_keep_their_orientation(cage):
+    # A grid of 6 x 6 x 6 cubes, each cut into six tetrahedra around a diagonal.
+    n = 7
+    nodes = np.stack(np.meshgrid(*[np.linspace(-0.9, 0.9, n)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    orders = [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)]
+    steps = np.eye(3, dtype=int)
+    first = np.stack(np.meshgrid(*[np.arange(n - 1)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
+    paths = np.array([np.cumsum([np.zeros(3, int), *steps[list(order)]], axis=0) for order in orders])
+    tetrahedra = (first[:, None] + paths[None]).reshape(-1, 4, 3) @ [n * n, n, 1]
+
+    def volumes(at):
+        a, b, c, d = (at[tetrahedra[:, k]] for k in range(4))
+        return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)
+
+    moved = cw.Field(cage, bent(cage)).map(nodes)
+    assert (np.sign(volumes(moved)) == np.sign(volumes(nodes))).all()
+
+
+def test_saved_lattice_is_that_of_the_command(cage, tmp_path):
+    cage.save(tmp_path / "cage.obj")
+    cage.save(tmp_path / "pose.obj", bent(cage))
+    command(tmp_path, "deform cage.obj --cage cage.obj --pose pose.obj --lattice command.npz --lattice-cells 12")
+    cw.Field(cage, bent(cage), cells=12).save(tmp_path / "python.npz")
+    own, other = np.load(tmp_path / "python.npz"), np.load(tmp_path / "command.npz")
+    assert sorted(own) == sorted(other) == ["F", "bound", "origin", "spacing", "u"]
+    for name in own:
+        assert own[name].shape == other[name].shape and np.allclose(own[name], other[name], atol=1e-6), name
+
+
+def test_wrong_input_is_refused(cage, points):
+    with pytest.raises(cw.OptionError, match="cells is 4"):
+        cw.Field(cage, cage.vertices, cells=4)
+    with pytest.raises(cw.ArrayError, match="posed"):
+        cw.Field(cage, cage.vertices[1:])
+    with pytest.raises(cw.ArrayError, match="points"):
+        cw.Field(cage, cage.vertices, cells=8).map(points[:, :2])
