@@ -52,7 +52,7 @@ pub enum Command {
     ResetPose,
     /// Saves the pose under a name.
     SavePose {
-        /// The name.
+        /// Name of the new saved pose.
         name: String,
     },
     /// Moves the cage to a saved pose, with its pins.
@@ -64,7 +64,7 @@ pub enum Command {
     RenamePose {
         /// Index of the pose.
         index: usize,
-        /// The name.
+        /// New name of the pose.
         name: String,
     },
     /// Deletes a saved pose.
@@ -92,7 +92,7 @@ pub enum Command {
     },
     /// Sets the points that pulls leave in place.
     SetPins {
-        /// The points.
+        /// Points on the surfaces of the models.
         pins: Vec<SurfacePoint>,
     },
     /// Replaces the cage by another cage or a draft, at rest.
@@ -109,7 +109,7 @@ pub enum Command {
     MoveRest,
     /// Edits the selected elements of the cage, and selects the result.
     EditRest {
-        /// The edit.
+        /// Kind of edit.
         edit: RestEdit,
     },
     /// Subdivides the cage before values are prescribed on its surface.

@@ -22,7 +22,7 @@ pub enum EditError {
     /// The command works on a selection.
     #[error("select {what} first")]
     NothingSelected {
-        /// What the command needs.
+        /// What must be selected, such as "a vertex".
         what: &'static str,
     },
     /// There is no saved pose with this number.
@@ -44,7 +44,7 @@ pub enum EditError {
     /// A number is not finite.
     #[error("{what} must be finite numbers")]
     NotFinite {
-        /// The quantity.
+        /// The numbers that are not finite, such as "positions of a cage".
         what: &'static str,
     },
     /// The mesh is not a valid cage.

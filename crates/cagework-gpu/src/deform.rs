@@ -25,7 +25,7 @@ const WEIGHTS_PER_UPLOAD: u32 = 1 << 19;
 /// Weights of a bind on the GPU.
 #[derive(Debug)]
 pub struct GpuWeights {
-    /// Chunks of whole slices.
+    /// Chunks of the weights, each of whole slices.
     chunks: Vec<WeightChunk>,
     frames: Frames,
     n_vertices: u32,
@@ -82,7 +82,7 @@ impl GpuWeights {
         })
     }
 
-    /// Allocated GPU memory.
+    /// Allocated GPU memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

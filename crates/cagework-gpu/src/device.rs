@@ -32,9 +32,9 @@ pub struct ContextOptions {
 pub struct GpuContext {
     /// Entry point of wgpu, for creating surfaces.
     pub instance: wgpu::Instance,
-    /// The GPU.
+    /// The GPU as wgpu's adapter.
     pub adapter: wgpu::Adapter,
-    /// Logical device.
+    /// Logical device of the adapter.
     pub device: wgpu::Device,
     /// Queue for submitting work.
     pub queue: wgpu::Queue,

@@ -44,7 +44,7 @@ pub enum GpuError {
     OutOfMemory {
         /// Name of the allocation.
         what: String,
-        /// Size of the allocation.
+        /// Size of the allocation, bytes.
         bytes: u64,
     },
     /// Validation error: a bug in this crate.
@@ -60,7 +60,7 @@ pub enum GpuError {
         "the GPU did not answer within {seconds} s: its driver hangs, or it is too slow for this grid; use a smaller grid, or the CPU"
     )]
     Timeout {
-        /// Time limit.
+        /// Time limit, seconds.
         seconds: u64,
     },
     /// The input is inconsistent.

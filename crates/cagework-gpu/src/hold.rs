@@ -60,7 +60,7 @@ impl Holder {
         }
     }
 
-    /// Records the kernel.
+    /// Records the kernel that applies the parts.
     pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
         pass.set_pipeline(&self.launch.pipeline);
         pass.set_bind_group(0, &self.launch.bind_group, &[0]);

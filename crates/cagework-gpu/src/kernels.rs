@@ -20,7 +20,7 @@ pub struct Kernel {
     /// Name of the file, the entry point, and the CPU implementation in `cagework_core::stencil`, `parts`,
     /// `skin` or `dynamic`.
     pub name: &'static str,
-    /// Complete source.
+    /// Complete source in WGSL.
     pub wgsl: &'static str,
     /// Invocations per workgroup. All kernels are one-dimensional.
     pub workgroup: u32,
@@ -54,21 +54,21 @@ macro_rules! kernels {
 kernels! {
     /// Gauss-Seidel on one colour, in place.
     RELAX_CELLS = "relax_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// The paper's smoothing step.
+    /// Jacobi smoothing: the paper's smoothing step.
     JACOBI_CELLS = "jacobi_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
-    /// Inner sum of Eq. 2.
+    /// Sums the changes of each cell over columns: the inner sum of Eq. 2.
     CHANGE_NORMS = "change_norms" + ["work"], 64, 64, &[Uniform, Read, Read, ReadWrite];
-    /// Residual of the red rows.
+    /// Computes the residual of the red rows.
     RESIDUAL = "residual" + ["work"], 64, 44, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
     /// Restricts the residual to the coarse right-hand side.
     RESTRICT_RESIDUAL = "restrict_residual" + ["work"], 64, 69, &[Uniform, Read, Read, ReadWrite];
     /// Prolongs the coarse correction.
     PROLONG_CORRECTION = "prolong_correction" + ["work"], 64, 24, &[Uniform, Read, Read, ReadWrite];
-    /// Partial sums of squares.
+    /// Computes partial sums of squares.
     SUM_SQUARES = "sum_squares" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
     /// Partial sums of roots: outer sum of Eq. 2.
     SUM_ROOTS = "sum_roots" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Sums partial sums.
+    /// Adds partial sums up.
     REDUCE_SUM = "reduce_sum" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
     /// Samples weights at mesh vertices.
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];

@@ -6,9 +6,9 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Work {
-    /// First item.
+    /// First item of the dispatch.
     pub first: u32,
-    /// Number of items.
+    /// Number of items of the dispatch.
     pub count: u32,
     /// Invocations per row of workgroups; further rows are along y.
     pub stride: u32,
@@ -28,10 +28,10 @@ pub struct Work {
 
 /// Values of [`Work::mode`]. The shaders define constants with the same names.
 pub mod mode {
-    /// `change_norms`: absolute values instead of squares.
+    /// Mode of `change_norms`: add absolute values instead of squares.
     pub const CHANGE_ABSOLUTE: u32 = 1;
-    /// `change_norms`: overwrite instead of add.
+    /// Mode of `change_norms`: overwrite sums instead of adding to them.
     pub const CHANGE_FIRST: u32 = 2;
-    /// `prolong_correction`: overwrite by the mean.
+    /// Mode of `prolong_correction`: overwrite values by the mean of their coarse neighbours.
     pub const PROLONG_REPLACE: u32 = 1;
 }

@@ -43,7 +43,7 @@ pub struct Session {
     bound: Option<SessionBind>,
     /// Parts of the model that are held in place or rigid.
     parts: Parts,
-    /// Skinning, while a clip plays.
+    /// Skinning of the model while a clip plays.
     playing: Option<Skinner>,
     /// Whether the cage moved since the last deformation.
     moved: bool,

@@ -45,7 +45,7 @@ pub struct SkinTables {
 }
 
 impl SkinTables {
-    /// Converts a skin.
+    /// Converts a skin to the layout of the kernel.
     #[must_use]
     pub fn new(skin: &Skin) -> Self {
         let starts = skin.joint_starts.iter().zip(&skin.delta_starts);

@@ -42,7 +42,7 @@ pub enum ProjectError {
     /// The model in the project cannot be read.
     #[error(transparent)]
     Model(#[from] ReadError),
-    /// Written by a newer version.
+    /// The project was written by a newer version of the program.
     #[error(
         "{} is a project of version {found}, but this program reads versions up to {VERSION_FAR_ORIGIN}: update the program",
         shown(name)

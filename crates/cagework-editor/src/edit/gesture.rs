@@ -32,7 +32,7 @@ pub enum Constraint {
     /// The view plane (grab), the view axis (rotate), or all axes equally (scale).
     #[default]
     Free,
-    /// One axis, 0 to 2.
+    /// One axis: 0 is x, 1 is y, 2 is z.
     Axis(usize),
     /// The plane normal to an axis, 0 to 2; for a rotation, the axis.
     Plane(usize),

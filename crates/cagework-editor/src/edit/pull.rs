@@ -62,7 +62,7 @@ impl Pull {
         pull
     }
 
-    /// Whether any vertex moves.
+    /// Whether no vertex moves.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.share.iter().all(|&s| s == 0.0)

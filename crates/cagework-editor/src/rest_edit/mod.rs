@@ -39,7 +39,7 @@ pub enum RestEditError {
     /// A value is not finite.
     #[error("{what} is not a finite number")]
     NotFinite {
-        /// The quantity.
+        /// The value that is not finite, such as "the new position".
         what: &'static str,
     },
     /// The result would not be a valid cage.

@@ -41,17 +41,17 @@ pub enum Projection {
 /// Axis-aligned views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisView {
-    /// From +z, x to the right.
+    /// View from +z, with x to the right.
     Front,
-    /// From -z.
+    /// View from -z.
     Back,
-    /// From +x.
+    /// View from +x.
     Right,
-    /// From -x.
+    /// View from -x.
     Left,
-    /// From +y, x to the right.
+    /// View from +y, with x to the right.
     Top,
-    /// From -y.
+    /// View from -y.
     Bottom,
 }
 

@@ -56,15 +56,15 @@ pub struct Surface {
 
 /// Values of [`Surface::mode`]. The shader defines constants with the same names.
 pub mod surface_mode {
-    /// Material, opaque.
+    /// The material's colour, opaque.
     pub const MATERIAL: u32 = 0;
-    /// Weights of a control.
+    /// The colour map of the weights of a control.
     pub const WEIGHTS: u32 = 1;
-    /// Errors, as base 10 logarithms.
+    /// The colour map of errors, which are base 10 logarithms.
     pub const ERRORS: u32 = 2;
     /// A single colour, without texture and vertex colours.
     pub const CLAY: u32 = 3;
-    /// Material, blended by its alpha.
+    /// The material's colour, blended by its alpha.
     pub const BLENDED: u32 = 4;
 }
 
@@ -82,9 +82,9 @@ pub struct Style {
     pub rim: f32,
     /// Offset towards the eye, as a fraction of the depth: draws lines on a surface in front of it.
     pub lift: f32,
-    /// Factor of all alphas.
+    /// Factor of the alpha of all colours.
     pub opacity: f32,
-    /// Factor of all widths.
+    /// Factor of the widths in all states.
     pub size: f32,
 }
 
@@ -107,11 +107,11 @@ pub struct SliceView {
     pub high: f32,
     /// Edge of a cell along u, object units.
     pub u: [f32; 3],
-    /// Cells along u.
+    /// Number of cells along u.
     pub n_u: u32,
     /// Edge of a cell along v, object units.
     pub v: [f32; 3],
-    /// Cells along v.
+    /// Number of cells along v.
     pub n_v: u32,
     /// Colour of each cell type (untyped, boundary, interior, exterior), linear, straight alpha.
     pub kinds: [[f32; 4]; 4],

@@ -51,11 +51,11 @@ pub struct DrawGroup {
     pub base_color: [f32; 4],
     /// Base colour texture, an index into [`DrawModel::textures`].
     pub texture: Option<u32>,
-    /// Use of alpha.
+    /// How the material's alpha is used.
     pub alpha: Alpha,
 }
 
-/// Use of a material's alpha.
+/// How a material's alpha is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Alpha {
     /// Alpha is ignored.
@@ -63,7 +63,7 @@ pub enum Alpha {
     Opaque,
     /// Fragments with less alpha than the cutoff are discarded.
     Mask {
-        /// The cutoff.
+        /// Alpha cutoff, 0 to 1.
         cutoff: f32,
     },
     /// Fragments are blended with the colour behind them.
@@ -87,7 +87,7 @@ pub enum Wrap {
 pub struct DrawTexture {
     /// Pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
     /// sRGB with straight alpha, rows from the top. `[height, width, 4]`
     pub rgba: Vec<u8>,

@@ -127,12 +127,12 @@ pub struct Selection {
 /// Operation of a gizmo, with the shape of its handles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GizmoMode {
-    /// Move: arrows.
+    /// Move the selection; handles are arrows.
     #[default]
     Move,
-    /// Rotate: rings.
+    /// Rotate the selection; handles are rings.
     Rotate,
-    /// Scale: boxes.
+    /// Scale the selection; handles are boxes.
     Scale,
 }
 
@@ -150,9 +150,9 @@ pub enum GizmoPart {
 /// A transform gizmo. Its size in the picture is constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gizmo {
-    /// Operation.
+    /// Operation of the gizmo.
     pub mode: GizmoMode,
-    /// Origin, world space.
+    /// Origin of the gizmo, world space.
     pub center: Vec3,
     /// Orientation of the axes.
     pub rotation: Quat,

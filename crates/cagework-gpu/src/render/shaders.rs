@@ -65,23 +65,23 @@ macro_rules! shaders {
 }
 
 shaders! {
-    /// Background gradient.
+    /// Draws the background gradient.
     BACKGROUND = "draw_background" + ["camera"], &[];
-    /// Mesh.
+    /// Draws the mesh.
     MESH = "draw_mesh" + ["camera", "colormap", "light"] + ("mesh_buffers", "mesh_textures"),
         &[&[Table(Entry::Point), Table(Entry::Point), Table(Entry::Value)], &[Uniform, Texture, Sampler]];
     /// Edges of cage and mesh, segments of marks.
     LINES = "draw_lines" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
-    /// Handles and marks.
+    /// Draws handles and marks.
     POINTS = "draw_points" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
-    /// Selected faces.
+    /// Draws selected faces.
     FACES = "draw_faces" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
-    /// Floor grid.
+    /// Draws the floor grid.
     FLOOR = "draw_floor" + ["camera"], &[];
-    /// Slice of the grid.
+    /// Draws a slice of the grid.
     SLICE = "draw_slice" + ["camera", "colormap"] + ("slice_buffers", "slice_textures"),
         &[&[Uniform, Table(Entry::Pair)]];
-    /// Transform gizmo.
+    /// Draws the transform gizmo.
     GIZMO = "draw_gizmo" + ["camera"], &[&[Uniform]];
     /// A texture on a part of a canvas; without camera.
     PART = "draw_part" + [], &[&[Texture]];

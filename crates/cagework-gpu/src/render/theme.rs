@@ -5,15 +5,15 @@ use super::scene::Theme;
 
 /// States of handles, edges and faces: indices into [`Style::colors`].
 pub(super) mod state {
-    /// Neither selected nor hovered.
+    /// State of elements that are neither selected nor hovered.
     pub(in crate::render) const NORMAL: u32 = 0;
-    /// Hovered.
+    /// State of hovered elements.
     pub(in crate::render) const HOVERED: u32 = 1;
-    /// Selected.
+    /// State of selected elements.
     pub(in crate::render) const SELECTED: u32 = 2;
-    /// Selected and hovered.
+    /// State of elements that are selected and hovered.
     pub(in crate::render) const BOTH: u32 = 3;
-    /// Without a mirror image, in symmetric editing.
+    /// State of vertices without a mirror image, in symmetric editing.
     pub(in crate::render) const UNMATCHED: u32 = 4;
 }
 
@@ -30,9 +30,9 @@ pub(super) struct Palette {
     pub(super) selected: Color,
     pub(super) both: Color,
     pub(super) unmatched: Color,
-    /// Lines on the cage's smooth surface.
+    /// Colour of lines on the cage's smooth surface.
     pub(super) curves: Color,
-    /// Controls inside.
+    /// Colour of controls inside the cage.
     pub(super) inner: Color,
     pub(super) wire: Color,
     pub(super) mesh_edges: Color,

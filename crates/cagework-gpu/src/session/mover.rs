@@ -25,7 +25,7 @@ use crate::table::{Entry, Table};
 pub(super) enum Mover {
     /// On the GPU: only the cage is uploaded.
     Kernels { deformer: Box<Deformer>, tables: [Table; 2] },
-    /// On the CPU: all vertices are uploaded.
+    /// Deforms on the CPU and uploads all vertices.
     Processor { model: Arc<DrawModel>, triangles: Vec<[u32; 3]>, tables: [Table; 2] },
 }
 

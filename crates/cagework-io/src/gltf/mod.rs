@@ -120,7 +120,7 @@ pub enum GltfError {
         from: String,
         /// Kind of the referenced object.
         what: &'static str,
-        /// The index.
+        /// Index as written.
         index: u64,
         /// Number of objects of that kind.
         count: usize,
@@ -174,11 +174,11 @@ pub enum GltfError {
     /// A count exceeds its limit.
     #[error("{what}: {count}, more than the limit of {limit}: use a smaller model")]
     TooLarge {
-        /// Elements counted.
+        /// Kind of the counted elements.
         what: &'static str,
         /// Number of elements.
         count: u64,
-        /// Maximum number.
+        /// Maximum number of these elements.
         limit: u64,
     },
 }

@@ -64,7 +64,7 @@ impl NpzWriter {
         shape: &[usize],
         values: impl IntoIterator<Item = [u8; N]>,
     ) {
-        /// Values converted at a time.
+        /// Number of values converted at a time.
         const VALUES_PER_WRITE: usize = 1 << 14;
         let name = format!("{name}.npy");
         self.zip.start_file(name, self.options).expect("names are distinct, memory does not fail");

@@ -46,7 +46,7 @@ pub enum ObjError {
     Materials {
         /// Line number, from 1.
         line: usize,
-        /// Maximum number.
+        /// Maximum number of materials.
         limit: usize,
     },
     /// Indices exceed 32 bits.
@@ -54,7 +54,7 @@ pub enum ObjError {
     TooLarge {
         /// Line number, from 1.
         line: usize,
-        /// Maximum number.
+        /// Maximum number of vertices or corners.
         limit: u32,
     },
 }

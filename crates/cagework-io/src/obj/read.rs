@@ -32,7 +32,7 @@ pub(crate) struct Group {
     pub(crate) is_object: bool,
     /// Text after the keyword. A `g` line can contain several names.
     pub(crate) name: String,
-    /// First face after the line.
+    /// Index of the first face after the line.
     pub(crate) first_face: u32,
 }
 
@@ -45,7 +45,7 @@ impl Group {
 /// Parsed OBJ file, as far as exports need it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObjDocument {
-    /// Original file.
+    /// Bytes of the original file.
     pub(crate) bytes: Vec<u8>,
     /// `vt` lines as written, v upwards.
     pub(crate) texcoords: Vec<[f32; 2]>,

@@ -154,9 +154,9 @@ fn line_end(line: &[u8]) -> &[u8] {
 
 /// A group of a new OBJ file: contiguous vertices from `start` and their faces.
 pub(crate) struct ObjGroup {
-    /// `o` line.
+    /// Name in the group's `o` line.
     pub(crate) name: String,
-    /// `usemtl` line.
+    /// Material in the group's `usemtl` line, if any.
     pub(crate) material: Option<String>,
     /// Index of the first vertex.
     pub(crate) start: u32,

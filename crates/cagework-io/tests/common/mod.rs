@@ -155,7 +155,7 @@ pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Model, ReadError> {
     Model::read(name, bytes, &mut |_| None)
 }
 
-/// Little-endian f32 bytes.
+/// Bytes of f32 numbers, little-endian.
 pub(crate) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }

@@ -637,7 +637,7 @@ export type Command = { "do": "set_pose",
  */
 positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
 /**
- * The name.
+ * Name of the new saved pose.
  */
 name: string, } | { "do": "apply_pose",
 /**
@@ -649,7 +649,7 @@ index: number, } | { "do": "rename_pose",
  */
 index: number,
 /**
- * The name.
+ * New name of the pose.
  */
 name: string, } | { "do": "remove_pose",
 /**
@@ -677,7 +677,7 @@ positions: readonly (readonly [number, number, number])[],
  */
 shares: Array<number>, } | { "do": "set_pins",
 /**
- * The points.
+ * Points on the surfaces of the models.
  */
 pins: Array<SurfacePoint>, } | { "do": "replace_cage",
 /**
@@ -693,7 +693,7 @@ controls: CageControls | null,
  */
 notices: Array<string>, } | { "do": "move_rest" } | { "do": "edit_rest",
 /**
- * The edit.
+ * Kind of edit.
  */
 edit: RestEdit, } | { "do": "subdivide",
 /**

@@ -18,7 +18,7 @@ const ALIGN: usize = 4;
 pub(super) struct Edit<'a> {
     document: &'a GltfDocument,
     pub(super) json: Value,
-    /// All buffers, concatenated.
+    /// Bytes of all buffers, concatenated.
     bin: Vec<u8>,
     /// Whether any accessor was written.
     has_written: bool,

@@ -38,7 +38,7 @@ const MIN_RIGID_VERTICES: usize = 3;
 /// Range of the scale factor of clip translations.
 const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
-/// All nodes after the deformation.
+/// State of all nodes after the deformation.
 pub(super) struct NodeUpdate {
     /// Change of each node; `None` for unchanged nodes. `[n_nodes]`
     pub(super) changes: Vec<Option<NodeChange>>,

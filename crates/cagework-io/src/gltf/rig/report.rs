@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::lattice::MAX_ENDS;
 
-/// Results of reshaping.
+/// Counts and measures of reshaping a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ReshapeReport {
     /// Nodes that follow the cage: joints, animated nodes, nodes with meshes, and their descendants.
