@@ -60,13 +60,13 @@ export interface App {
   chooseCage(): void;
   /** Chooses an OBJ file of inner controls. */
   chooseControls(): void;
-  /** Opens the first sample. The open work stays kept. */
+  /** Opens the first sample. The open work stays saved in the browser. */
   startFresh(): void;
   /** Reloads the page with the open work. */
   reload(): Promise<void>;
-  /** Last position of the pointer, CSS pixels in the view. */
+  /** Returns the last position of the pointer, CSS pixels in the view. */
   pointer: () => { x: number; y: number };
-  /** Shortcut of a command as text, for example "Ctrl+Z". */
+  /** Text of the shortcut of a command, for example "Ctrl+Z". */
   key(command: Command): string;
 }
 
@@ -75,7 +75,7 @@ const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MO
 
 export interface Needs {
   store: Store;
-  /** Throws until the session is open. */
+  /** Returns the session. Throws until it is open. */
   session: () => Session;
   tell: Tell;
   /** Rectangle of the view in the window. */
@@ -139,7 +139,8 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   };
   const reload = async () => {
     await works.flush();
-    // A link would be opened instead of the kept work.
+    // Remove a link from the address once the work is saved: after reloading, the page would open the link instead of
+    // the work.
     if (store.get().savedAt !== null) history.replaceState(null, "", location.pathname + location.search);
     location.reload();
   };

@@ -35,7 +35,7 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
   let isSettled = before === undefined;
   let isDead = false;
   const hear = (error: unknown) => {
-    // After the first failure every call fails.
+    // After the first crash, every call of the module fails; ignore these errors.
     if (isDead || !isFatal(error)) return;
     isDead = true;
     const during = sayDuring(store.get());
@@ -62,7 +62,7 @@ export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): st
   return model ? T.crash.with(model.name) : T.crash.nothing;
 }
 
-/** English, because developers read it. */
+/** The report of a crash as text. It is always English, because developers read it. */
 function reportOf(error: Error, during: string, state: AppState): string {
   const { model, cage, adapter, bindOptions } = state;
   return [

@@ -25,7 +25,7 @@ export function drawn(state: AppState): SceneOptions {
   };
 }
 
-/** Vertices of the cage and controls inside. */
+/** Number of vertices and inner controls of the cage. */
 export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
@@ -43,7 +43,7 @@ export function hasUnmadeCage(state: AppState): boolean {
   return state.cage !== null && state.cageMade !== cageKey(state);
 }
 
-/** Below this share of the requested vertices, the panel explains why a generated cage has so few. */
+/** Fraction of the requested vertices below which the panel explains why a generated cage has so few. */
 const FEW = 0.9;
 
 /** Whether a generated cage has far fewer vertices than requested, because it follows the shape as closely as requested. */

@@ -1,11 +1,11 @@
-/** Time left, in words. */
+/** Formats the remaining time. */
 
 import { inUnit } from "./format";
 import { T } from "./words";
 
 export { createEta, type Eta } from "@cagework/core/eta";
 
-/** Time left, rounded to the precision of the estimate. */
+/** The remaining time in words, rounded to the precision of the estimate. */
 export function timeLeft(ms: number): string {
   if (ms < 1500) return T.eta.second;
   const isShort = ms < 60_000;

@@ -18,7 +18,7 @@ export function setLocale(locale: string): void {
   format = formats();
 }
 
-/** 3, "minute" -> "3 min". */
+/** Formats a number with its unit: 3, "minute" -> "3 min". */
 export function inUnit(value: number, unit: string, maximumFractionDigits = 0): string {
   return new Intl.NumberFormat(LOCALE, {
     style: "unit",
@@ -28,12 +28,12 @@ export function inUnit(value: number, unit: string, maximumFractionDigits = 0): 
   }).format(value);
 }
 
-/** 12345 -> "12,345". */
+/** Formats an integer: 12345 -> "12,345". */
 export function count(value: number): string {
   return format.integer.format(value);
 }
 
-/** 1 -> "1 vertex", 2 -> "2 vertices". */
+/** Formats a count with its noun: 1 -> "1 vertex", 2 -> "2 vertices". */
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${format.plural.select(value) === "one" ? one : many}`;
 }
@@ -43,7 +43,7 @@ export function endings(type: "conjunction" | "disjunction"): string {
   return new Intl.ListFormat(LOCALE, { type }).format(MODEL_ENDINGS.map((ending) => `.${ending}`));
 }
 
-/** "a, b, and c". */
+/** Joins names with commas and "and": "a, b, and c". */
 export function list(names: readonly string[]): string {
   return format.list.format(names);
 }

@@ -48,7 +48,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
   const client = createClient(module, openWorker);
-  // Identifier, name and description of each.
+  // `samples()` returns identifier, label and description of each sample; keep the identifiers.
   const samples = pkg.Binder.samples().filter((_, k) => k % 3 === 0);
   const buildSample = prepareSample(client, samples[0], fresh);
   const frames = createFrames();

@@ -30,7 +30,7 @@ export interface Shared {
   controls?: SharedControls;
 }
 
-/** Longest fragment that is read. A pose of 400 cage vertices takes about 3 kB. */
+/** Maximum length of a fragment that is decoded, characters. A pose of 400 cage vertices takes about 3 kB. */
 const LONGEST = 16_384;
 
 /** The fragment of a link, including the #. */
@@ -70,14 +70,14 @@ async function read(what: "pose" | "view" | "controls", text: string): Promise<U
   }
 }
 
-/** Checks the structure only; the engine validates camera and scene. */
+/** Decodes camera and scene. Checks only the structure of the JSON; the engine checks the values. */
 function parse(json: Uint8Array): Seen {
   const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
   if (!seen?.camera || !Array.isArray(seen.selected)) throw new PageError(T.link.unreadable.view);
   return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
 }
 
-/** Checks the structure only. */
+/** Decodes inner controls. Checks only the structure of the JSON; the engine checks the values. */
 function parseControls(json: Uint8Array): SharedControls {
   const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
   if (!said?.controls || !Array.isArray(said.inner)) throw new PageError(T.link.unreadable.controls);

@@ -32,7 +32,7 @@ export interface BindRun {
   revision: number;
   options: BindOptions;
   stage: Stage;
-  /** Share of the pass done, 0 to 1. */
+  /** Finished fraction of the pass, 0 to 1. */
   fraction: number;
   etaMs: number | null;
   iteration: number;
@@ -43,7 +43,7 @@ export interface BindRun {
 
 export interface Slice {
   axis: 0 | 1 | 2;
-  /** Along the cage's box, 0 to 1. */
+  /** Position of the slice along its axis, as a fraction of the cage's bounding box, 0 to 1. */
   position: number;
   busy: boolean;
 }
@@ -58,15 +58,15 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   adapter: string;
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
   lack: Lack | null;
-  /** Identifiers. */
+  /** Identifiers of the built-in samples. */
   samples: readonly string[];
   /** Describes the operation that blocks the page; null without one. */
   busy: string | null;
-  /** Its progress, in words. */
+  /** Progress of the operation that blocks the page, in words. */
   busyStep: string;
-  /** Cancels it; null if it cannot be cancelled. */
+  /** Cancels the operation that blocks the page; null if it cannot be cancelled. */
   cancelBusy: (() => void) | null;
-  /** Confirms it while it waits for confirmation; otherwise null. */
+  /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */
   goOn: (() => void) | null;
   model: ModelInfo | null;
   cage: CageState | null;
@@ -79,9 +79,9 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Name of a clip whose frames generated cages also enclose; null for none. */
   cageClip: string | null;
   boxDivisions: number;
-  /** Share of the cage generation done; null when none runs. */
+  /** Finished fraction of the cage generation, 0 to 1; null if no generation runs. */
   cageProgress: number | null;
-  /** As shown in the Bind panel. */
+  /** Bind options chosen in the Bind panel. */
   bindOptions: BindOptions;
   /** Options of the last finished bind; null before the first. */
   appliedOptions: BindOptions | null;
@@ -89,7 +89,7 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   report: BindReport | null;
   /** Reports of earlier binds of this cage, for comparison, latest first. */
   earlier: readonly BindReport[];
-  /** Bytes the next bind needs, or why it cannot run. */
+  /** Number of bytes that the next bind needs, or a message why it cannot run. */
   memory: number | Message;
   scene: SceneOptions;
   seeOpen: boolean;
@@ -101,7 +101,7 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Radius as a share of the cage's diagonal; kept while `proportionalOn` is false. */
   proportional: number;
   proportionalOn: boolean;
-  /** Clicks and taps add to the selection. */
+  /** Whether clicks and taps add to the selection. */
   additive: boolean;
   /** Centre of rotation and scaling. */
   pivot: Pivot;
@@ -263,9 +263,9 @@ export interface TourState {
 /** The brush and the model that it paints. */
 export interface Painting {
   readonly id: number;
-  /** Relative to the model's size. */
+  /** Radius of the brush, as a fraction of the model's size. */
   readonly radius: number;
-  /** Whether it removes paint. */
+  /** Whether the brush removes paint. */
   readonly erase: boolean;
 }
 

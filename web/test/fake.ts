@@ -95,7 +95,7 @@ export const MODEL: ModelInfo = {
   members: [memberOf(0, "cube.obj")],
 };
 
-/** A cage of `n` vertices at the same height. */
+/** A checked cage without faults: `n` vertices at x = y = z = `height`, and placeholder corners. */
 export function cageOf(n: number, height = 0): CheckedCage {
   const check = {
     problems: [],

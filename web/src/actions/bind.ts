@@ -11,7 +11,10 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface BindActions {
-  /** Binds. Resolves with true if there are weights. `unasked`: started by the page, so errors on screen stay. */
+  /**
+   * Binds. Resolves with true if there are weights. `unasked`: the page started the bind, so errors on screen are not
+   * removed.
+   */
   start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
   /** Changes options and binds. */
   again(patch: Partial<BindOptions>): Promise<boolean>;
@@ -19,7 +22,7 @@ export interface BindActions {
   /** Whether the current cage is bound, has cached weights or is being bound. */
   covers(): boolean;
   setOptions(patch: Partial<BindOptions>): void;
-  /** Computes coordinates for comparison, once per cage. Resolves with false on failure. */
+  /** Computes coordinates of these kinds for comparison, once for each cage. Resolves with false on failure. */
   prepareCompare(kinds: readonly Coordinates[]): Promise<boolean>;
 }
 
@@ -171,10 +174,10 @@ export function sameWay(a: BindReport, b: BindReport): boolean {
   );
 }
 
-/** Largest number of points of a curve. Beyond it, every second point is dropped; the plot is only 300 pixels wide. */
+/** Maximum number of points of a curve. Above it, every second point is dropped; the plot is only 300 pixels wide. */
 const LONGEST = 600;
 
-/** Appends a point, unless its delta is not positive or its iteration is already there. */
+/** Appends a point to a curve, unless its delta is not positive or its iteration equals that of the last point. */
 export function grown(curve: BindRun["curve"], iteration: number, delta: number | null): BindRun["curve"] {
   if (delta === null || !(delta > 0) || curve.at(-1)?.[0] === iteration) return curve;
   const next = [...curve, [iteration, delta] as const];

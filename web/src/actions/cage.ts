@@ -33,7 +33,7 @@ export interface CageActions {
   mend(fix: Mend): void;
 }
 
-/** Vertices of a hull: few, because it does not follow limbs. */
+/** Maximum number of vertices of a hull cage. It is small, because a hull does not follow limbs. */
 const HULL_VERTICES = 24;
 
 export interface CageNeeds {
@@ -55,7 +55,7 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
     return true;
   };
 
-  /** Sets a new cage as an undo step. The first cage of a model adds no step. */
+  /** Replaces the cage and adds an undo step, except for the first cage of a model. */
   const take = (label: string, cage: CheckedCage) => {
     edit.settle();
     const before = carriableOf(ctx);

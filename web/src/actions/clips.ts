@@ -23,7 +23,7 @@ export interface ClipActions {
   stop(): void;
 }
 
-/** Computes the lattice by which the cage deforms the moving model, if it is needed and missing. */
+/** Computes the lattice for deforming a moving model by the cage, if the options need it and it is missing. */
 export async function loadLattice(ctx: Context): Promise<void> {
   const { engine } = ctx.session();
   if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;

@@ -19,7 +19,7 @@ export interface ControlActions {
   load(files: readonly NamedFile[]): Promise<boolean>;
   /** Sets the radius of points and bones, object units; null for the default, a share of the cage's size. */
   setRadius(radius: number | null): boolean;
-  /** Removes the selected ones. */
+  /** Removes the selected inner controls. */
   remove(): boolean;
   clear(): boolean;
   /** Chooses the kind of control that clicks add, and shows the rest cage. Null ends adding. */
@@ -35,7 +35,7 @@ export interface ControlActions {
   takeShared(shared: SharedControls): void;
 }
 
-/** A click within this distance of the previous one ends the bone, CSS pixels. */
+/** Maximum distance between two clicks, CSS pixels, at which the second click ends the bone. */
 const SAME_PX = 6;
 
 export function createControls(

@@ -16,12 +16,15 @@ export interface Edit {
   end(keep: boolean): void;
   active(): boolean;
   nudge(right: number, up: number): void;
-  /** Completes the step of nudges or of a released pull, and ends an animation. */
+  /** Adds the undo step of nudges or of a released pull, and ends an animation. */
   settle(): void;
   /** Adds a function that `settle` calls. */
   alsoSettles(write: () => void): void;
   moveTo(x: number, y: number, z: number): void;
-  /** Runs a command as one step. If it throws, the error is shown under the title `failed`. Returns whether it worked. */
+  /**
+   * Runs a command as one undo step. If it throws, shows the error under the title `failed`. Returns whether the
+   * command succeeded.
+   */
   apply(command: Command, label: string, failed?: string): boolean;
   /** Like `apply`, for a method of the engine that adds an undo step itself. */
   step(work: () => void, failed: string): boolean;
@@ -40,7 +43,7 @@ export function createEdit(ctx: Context): Edit {
   let typed = "";
   let nudging: ReturnType<typeof setTimeout> | undefined;
 
-  /** Adds an undo step for the live change. */
+  /** Adds an undo step with the changes of the gesture. */
   const keep = (label: string) => {
     if (!store.get().editingRest) {
       engine().commit(label);

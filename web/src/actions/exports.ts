@@ -38,7 +38,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   const engine = () => ctx.session().engine;
   const rig = () => rigOf(ctx.store.get());
 
-  /** Exports with one file per model. */
+  /** Exports that write one file for each model. */
   const own = {
     glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
     shape: (id: number) => engine().exportShape(id, format),
@@ -145,7 +145,7 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   picture: ".png",
 };
 
-/** A name that is not in `taken`: models from different folders may have the same name. */
+/** A file name that is not in `taken`, because models from different folders may have the same name. */
 function other(name: string, taken: readonly string[]): string {
   const again = (n: number) => name.replace(/(?=\.\w+$)/, `-${n}`);
   let n = 2;

@@ -43,7 +43,7 @@ export interface FileNeeds {
   overtaken(sample: string | null): void;
 }
 
-/** What is opened together with a model. */
+/** Further models, and options, that are opened together with a model. */
 interface Along {
   readonly others: readonly Named[];
   readonly cageFiles: readonly NamedFile[] | undefined;
@@ -93,7 +93,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     if (from.includes(store.get().step)) store.set({ step });
   };
 
-  /** Makes the cage and binds, as far as possible without the user. */
+  /** Makes the cage and binds, unless the user has to act first. */
   const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     if (cageFiles) {
       if (!(await needs.cage.load(cageFiles, true))) return;

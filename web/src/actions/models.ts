@@ -8,7 +8,7 @@ import { attempt, type Context, waitFor } from "./context";
 import type { Edit } from "./edit";
 import { modelsOf, type Named, readModels } from "./read";
 
-/** What a part may do instead of following the cage. */
+/** Treatment of a part that does not follow the cage: it keeps its shape, or it stays in place. */
 export type How = "rigid" | "stays";
 
 export interface Models {
@@ -42,7 +42,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
   const members = (): readonly MemberInfo[] => store.get().model?.members ?? [];
   const memberOf = (id: number) => members().find((member) => member.id === id);
 
-  /** Generates a cage if there is only one in progress, which is for the previous models. */
+  /** Generates a cage if the model has none yet, because a cage in progress is for the previous models. */
   const remakeCage = () => {
     if (!store.get().cage) void cage.regenerate();
   };

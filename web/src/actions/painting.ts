@@ -24,9 +24,9 @@ export interface PaintActions {
 
 /** Largest distance between the dabs of a stroke, CSS pixels. */
 const DAB_PX = 6;
-/** Initial radius of the brush, over the model's size. */
+/** Initial radius of the brush, as a fraction of the model's size. */
 const RADIUS = 0.05;
-/** Painted amounts: follows the cage completely, or stays completely. */
+/** Painted amounts of a vertex that follows the cage completely, and of one that stays in place. */
 const [FOLLOWS, STAYS] = [0, 255];
 
 /** `settle` ends playback and operations in progress. */

@@ -17,7 +17,7 @@ export interface Pins {
   removeAll(): void;
 }
 
-/** A grab and a pin within this distance are the same point, CSS pixels. */
+/** Maximum distance between a grab and a pin that count as the same point, CSS pixels. */
 const SAME_PX = 14;
 
 export function createPins(ctx: Context, apply: Edit["apply"]): Pins {

@@ -26,7 +26,7 @@ export interface PoseActions {
   stop(): void;
 }
 
-/** A cage and its poses, before the cage is replaced. */
+/** A cage and its poses, stored before the cage is replaced. */
 export interface Carriable {
   readonly cage: CageArrays;
   /** The pose, then each saved pose that fits. `[1 + n_poses, n_controls, 3]` */
@@ -129,7 +129,10 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   };
 }
 
-/** "Pose 3", or the next unused number. */
+/**
+ * The default name of a new pose: "Pose" and one more than the number of poses, or the next number whose name is
+ * unused.
+ */
 export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));
   let number = poses.length + 1;

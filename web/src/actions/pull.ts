@@ -15,7 +15,7 @@ export interface Pulling {
   hover(x: number, y: number): boolean;
   /** Removes the mark of `hover`. */
   leave(): void;
-  /** Grabs the model at a position of the view. False if it is not there. */
+  /** Grabs the model at a position of the view. False if the model is not there. */
   begin(x: number, y: number): boolean;
   /** Grabs a vertex of the cage. */
   beginCage(vertex: number, x: number, y: number): boolean;
@@ -33,13 +33,13 @@ export interface Pulling {
   whole(on: boolean): void;
 }
 
-/** Error of a grab, over the model's size, above which its target is shown. */
+/** Error of a grab, as a fraction of the model's size, above which its target is shown. */
 const OFF = 0.01;
 /** Maximum number of frames solved after release. */
 const SETTLING = 30;
-/** Reach above which the whole model moves. */
+/** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
 const WIDEST = 1.2;
-/** Arrow keys with shorter pauses are one pull, ms. */
+/** Presses of arrow keys with shorter pauses than this are one pull, ms. */
 const NUDGE_PAUSE_MS = 600;
 /** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
 const ON_CAGE = 0xffffffff;
@@ -56,7 +56,7 @@ interface Drag {
   to: Float32Array;
   /** Number of targets so far, to recognise answers for an older one. */
   wanted: number;
-  /** Over the model's size; null until the solver has chosen it. */
+  /** Reach of the pull as a fraction of the model's size; null until the solver has chosen it. */
   reach: number | null;
   letGo: boolean;
   by: { right: number; up: number };

@@ -63,7 +63,7 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
   );
 }
 
-/** One dot per stop. */
+/** Buttons for all stops, drawn as dots. */
 function Stops({ now, go }: { now: number; go: (stop: number) => void }) {
   return (
     <nav class="tour-stops" aria-label={TOUR.all}>

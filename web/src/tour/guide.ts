@@ -36,7 +36,7 @@ export interface GuideNeeds {
   readonly works: Pick<WorkActions, "flush" | "open" | "restore">;
 }
 
-/** Settings that are restored. */
+/** Keys of the settings that are restored when the tour ends. */
 const KEPT = ["step", "bindOptions", "seeOpen", "slice"] as const;
 
 interface Before {
@@ -154,7 +154,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
   const guide: Guide = {
     async start(stop = loadStop()) {
       if (!before) {
-        // Save pending changes first.
+        // Save pending changes of the work before the tour replaces it.
         await works.flush();
         const state = store.get();
         const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
@@ -204,7 +204,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       if (isStill) rest(undefined);
       guide.overtaken(null);
       if (was.link.includes("sample=") && !was.work) {
-        // Reopens the shared link.
+        // Setting the fragment reopens the shared link.
         location.hash = was.link;
         return;
       }

@@ -23,14 +23,14 @@ export interface Stop {
   /** Index of the sample's pose; the rest pose if undefined. */
   readonly pose?: number;
   readonly step: StepName;
-  /** Options of each bind that differ from the defaults, in order. The last bind stays. */
+  /** Options of the stop's binds, run in this order. The weights of the last bind remain in use. */
   readonly binds: readonly Partial<BindOptions>[];
   readonly scene?: Partial<SceneOptions>;
-  /** The selected cage vertex. */
+  /** Index of the cage vertex that is selected. */
   readonly vertex?: number;
   readonly slice?: Partial<Slice>;
   readonly compare?: readonly Coordinates[];
-  /** Rotation of the view from the right side, as a drag in CSS pixels. */
+  /** Rotation of the view, starting from the right side of the model, as a pointer movement in CSS pixels. */
   readonly turn?: readonly [x: number, y: number];
 }
 
@@ -45,7 +45,7 @@ const paper = (grid: number, tau: number): Partial<BindOptions> => {
 /** The view of the paper's figures: the model as wireframe, its reconstruction from the weights as solid. */
 const FIGURE: Partial<SceneOptions> = { base_wireframe: true, cage: false, colour: "clay" };
 
-/** The paper's equations, solved by each solver. */
+/** Bind options of the classic method with each solver. */
 export const solvers = (grid: number): Partial<BindOptions>[] =>
   (["jacobi", "cg", "multigrid"] as const).map((solver) => ({ ...paper(grid, 1e-5), solver }));
 export const ofPaper = (grid: number, tau: number) => [paper(grid, tau)];
@@ -109,7 +109,7 @@ export const BONE = [
   [0.85, -0.3, 0],
 ] as const;
 
-/** Options by which the binds of a stop differ. */
+/** Bind options in which the binds of a stop differ. */
 const WAY = ["grid", "tau", "method", "solver", "backend"] as const;
 
 /** Whether a report belongs to a bind with these options. Numbers are compared as f32, because Rust's tau has 24 bits. */

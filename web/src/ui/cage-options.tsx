@@ -7,7 +7,9 @@ import { count, percent } from "../format";
 import { T } from "../words";
 import { Segments, Slider, Toggle } from "./controls";
 
-/** Lowest position of the voxel slider. It stands for 0: the vertex count determines the resolution. */
+/**
+ * Lowest position of the voxel slider. It stands for 0, with which the number of vertices determines the resolution.
+ */
 const COARSEST = SLIDERS.voxels.min;
 /** Gaps narrower than this many voxels are closed. */
 const GAP_VOXELS = 3;

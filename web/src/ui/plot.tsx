@@ -10,7 +10,7 @@ export interface Curve {
   kind: (typeof KINDS)[number];
 }
 
-/** The current bind, and two to compare it with. */
+/** Class names of the curves: the current bind, and two earlier binds to compare with it. */
 export const KINDS = ["now", "before", "earlier"] as const;
 
 /**
@@ -25,7 +25,7 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
-/** Height of a text line, and mean width of a letter. */
+/** Height of a text line, and mean width of a letter, in units of the drawing. */
 const LABEL = 11;
 const LETTER = 5.2;
 

@@ -77,7 +77,7 @@ export function ReportCard({ report }: { report: BindReport }) {
   );
 }
 
-/** Mean and largest solver error. */
+/** Rows with the mean and the largest solver error. */
 function rawFacts(name: string, error: MeanMax): [string, string][] {
   return [
     [T.report.mean(name), scientific(error.mean)],

@@ -11,7 +11,7 @@ export interface Entry {
   readonly when: number;
   /** Size of the project file, bytes. */
   readonly size: number;
-  /** The page crashed twice with this work open; it is not opened automatically. */
+  /** Set if the page has crashed twice with this work open; it is then not opened automatically. */
   readonly stopped?: true;
 }
 
