@@ -92,7 +92,7 @@ export function coordinate(value: number, size = 0): string {
   return rounded.find((text) => text.length <= FIELD) ?? scientific(value);
 }
 
-/** A file name without its extension; of a project, without both of them. */
+/** The name of a file without its extension. The extension of a project, `.cagework.glb`, is removed as a whole. */
 export function stem(name: string): string {
   const base = (name.split(/[\\/]/).at(-1) ?? name).replace(/\.cagework(\.glb)?$/i, "");
   const dot = base.lastIndexOf(".");

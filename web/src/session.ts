@@ -18,7 +18,7 @@ declare global {
   var cagework: Session | undefined;
 }
 
-/** Without a model, drawing starts after this time, ms. */
+/** Time after which drawing starts even if no model has been opened, ms. */
 const LONGEST_EMPTY = 3000;
 
 /** Fields of a sample file, which has no companion files and no notices. */
@@ -64,7 +64,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     client.close();
     throw error;
   });
-  // After a failure, the first frame tries again and reports the error.
+  // If preparing the pipelines fails, the first frame tries again and reports the error.
   engine.warm().catch(() => undefined);
   /** Starts drawing, with the first model: on a slow GPU, an empty frame would delay it. */
   const begin = once(() =>
@@ -107,7 +107,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     puller ??= openApart();
     return puller;
   };
-  /** Discards the result if model or cage have changed since the job started. */
+  /** Discards the job's result if model or cage have changed since the job started. */
   const ofNow = <T>(job: Job<T>): Job<T> => {
     const { revision } = engine;
     return chain(job, (result) => {

@@ -20,7 +20,7 @@ pub(crate) enum Points<'py> {
 }
 
 impl Points<'_> {
-    /// The points relative to the origin they were read with. `[n]`
+    /// The points, relative to the origin that was subtracted when they were read. `[n]`
     pub(crate) fn as_slice(&self) -> &[Vec3] {
         match self {
             Self::Borrowed(array) => {
@@ -75,7 +75,8 @@ pub(crate) fn points<'py>(
     }
 }
 
-/// Reads points `[n, 3]` relative to an origin near them, and returns that origin: zero unless they are far away.
+/// Reads points `[n, 3]` relative to an origin near them. Also returns this origin, which is zero unless the points are
+/// far away.
 ///
 /// # Errors
 /// Those of [`points`].

@@ -10,7 +10,7 @@ use std::time::Duration;
 use cagework_core::{Progress, ProgressEvent};
 use pyo3::{PyResult, Python};
 
-/// Interval of checks for Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Runs `work` in another thread and releases the interpreter lock. This thread polls for signals, which Python delivers
@@ -28,7 +28,7 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
         thread::scope(|scope| {
             let (working, ended) = channel::<()>();
             let worker = scope.spawn(|| {
-                // Dropped when the work ends or panics.
+                // Dropping this value tells the other thread that the work has ended or panicked.
                 let _working = working;
                 work(&progress)
             });

@@ -6,7 +6,7 @@ import { controlCount, elementInUse } from "../derived";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 
-/** Distance of an arrow key, CSS pixels; the second one with Shift. */
+/** Movement of the selection by an arrow key, CSS pixels. `NUDGE_FAR` is the movement with Shift. */
 const NUDGE = 2;
 const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };

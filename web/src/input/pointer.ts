@@ -160,7 +160,7 @@ export function attachPointer(stage: Stage, app: App): void {
     }
   };
 
-  /** A click on the background. */
+  /** Handles a click on the background. */
   const selectNothing = () => {
     if (store.get().cage) engine().select(new Uint32Array(), "replace");
   };
@@ -268,7 +268,7 @@ export function attachPointer(stage: Stage, app: App): void {
   const up = (event: PointerEvent, keep: boolean) => {
     if (event.pointerType === "touch" && touch.up(event.pointerId)) return;
     release(place(event), keep);
-    // A finger that was lifted points at nothing.
+    // After a finger is lifted, no point of the model is hovered.
     if (event.pointerType === "touch") pull.leave();
   };
   viewport.addEventListener("pointerup", (event) => up(event, true));

@@ -4,7 +4,9 @@
  */
 
 const SCOPE = registration.scope;
-/** Other copies of the page on this origin have other scopes. */
+/**
+ * Prefix of this page's cache names. It contains the scope, because other copies of the page may be on the same origin.
+ */
 const PREFIX = `cagework ${SCOPE} `;
 const CACHE = PREFIX + BUILD.id;
 /** The key of index.html, whose own name some servers redirect. */
@@ -20,7 +22,7 @@ addEventListener("fetch", (event) => {
   event.respondWith(answer(request));
 });
 
-/** Downloads the build. Fails if the server has another one by now. */
+/** Downloads the files of the build. Fails if the server now has another build. */
 async function install() {
   const cache = await caches.open(CACHE);
   // Names of hashed files never change their content, so the browser's HTTP cache may answer.
