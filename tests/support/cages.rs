@@ -69,14 +69,15 @@ pub fn icosahedron() -> PolygonMesh {
     PolygonMesh { positions: positions.into_iter().map(Vec3::normalize).collect(), faces }
 }
 
-/// An octahedron with its faces split in four `times` times, projected onto the unit sphere: 6, 18, 66, 258, 1,026 vertices.
+/// An octahedron, subdivided `times` times (each face into four) and projected onto the unit sphere: 6, 18, 66, 258,
+/// 1,026 vertices for 0 to 4.
 #[must_use]
 pub fn sphere(times: u32) -> PolygonMesh {
     rounded(octahedron(), times)
 }
 
-/// An icosahedron with its faces split in four `times` times, projected onto the unit sphere: 12, 42, 162, 642, 2,562
-/// vertices.
+/// An icosahedron, subdivided `times` times (each face into four) and projected onto the unit sphere: 12, 42, 162, 642,
+/// 2,562 vertices for 0 to 4.
 #[must_use]
 pub fn icosphere(times: u32) -> PolygonMesh {
     rounded(icosahedron(), times)

@@ -28,7 +28,7 @@ const DROPS: readonly (readonly string[])[] = [
   // A cage around triangles that all intersect, and around none.
   ["all_meet.obj"],
   ["far.obj"],
-  // A small texture of 67 million pixels.
+  // A texture whose file is small, but which decodes to 67 million pixels.
   ["texture_large.obj", "large.mtl", "large.png"],
 ];
 

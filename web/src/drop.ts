@@ -36,7 +36,7 @@ export function planDrop(names: readonly string[]): DropPlan {
     return { kind: "controls", main: 0, sentence: T.opening.asControls(base(only)) };
   }
   const all = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
-  // A controls file is opened only alone; next to a model it is ignored.
+  // A controls file that is dropped together with a model is ignored.
   const plain = all.filter(({ name }) => !CONTROLS_NAME.test(base(name)));
   const models = oneFormatEach(plain.length > 0 ? plain : all);
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];

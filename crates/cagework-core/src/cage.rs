@@ -87,11 +87,11 @@ impl Cage {
         Ok(Self::assembled(mesh.positions.clone(), faces, polygons, component, bounds, notices))
     }
 
-    /// This cage with walls inside it: additional faces that are not checked and need not enclose anything. A wall with
-    /// values on both sides consists of pairs of opposite faces.
+    /// This cage with walls inside it: additional faces that are not checked and need not enclose a volume. A face has
+    /// values on its outer side only. A wall with values on both sides has each face twice, with opposite orientations.
     ///
-    /// `positions`, `faces`: additional vertices and faces, whose indices count from the cage's first vertex; `parts`:
-    /// number of the connected part of each face.
+    /// `positions`: additional vertices, appended to those of the cage; `faces`: vertex indices into the combined list;
+    /// `parts`: index of the connected component of each face.
     ///
     /// # Errors
     /// [`CageError`] if there are too many faces, or one has no area.

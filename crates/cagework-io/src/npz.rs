@@ -175,7 +175,8 @@ pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
 
 /// Reads points from an `.npy` file, `[n, 3]`. Also returns whether the file's numbers have 64 bits.
 ///
-/// # Errors [`NpzError`] if the file is not an array of this shape.
+/// # Errors
+/// [`NpzError`] if the file is not an array of this shape.
 pub(crate) fn npy_points(mut bytes: &[u8]) -> Result<(Vec<DVec3>, bool), NpzError> {
     let mut unpacked = 0;
     NpyArray::read("points", &mut bytes, (&mut unpacked, u64::MAX))?.wide_points()

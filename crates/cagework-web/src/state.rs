@@ -66,7 +66,7 @@ pub(crate) struct State {
     pub(crate) revision: u32,
     /// Keys of the document that the derived state belongs to.
     derived: DerivedKeys,
-    /// Keys of the data on the GPU.
+    /// Keys of the data on the GPU. Where the document has other keys, an upload is needed.
     pub(crate) on_gpu: GpuKeys,
     /// Whether an upload is in progress. When it finishes, it compares document and GPU again.
     pub(crate) is_uploading: bool,

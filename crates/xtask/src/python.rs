@@ -9,7 +9,8 @@ use crate::wasm::target_folder;
 const PACKAGE: &str = "crates/cagework-py";
 /// Licences of everything compiled into the wheel; ignored by git.
 const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
-/// Python compiles modules when they are first imported. Compiling all of SciPy would double the time of the installation.
+/// Arguments of Python that install packages. `--no-compile`: compiling all of SciPy would double the time of the
+/// installation, and Python compiles each module when it is first imported.
 const INSTALL: [&str; 6] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"];
 
 /// Tests the wheel. Needs the command built by `cargo test` for comparisons.

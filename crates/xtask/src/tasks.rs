@@ -81,7 +81,7 @@ fn check_rust() -> Result<(), String> {
     prose::check()?;
     deny::check()?;
     one_version()?;
-    // Fails if a package lacks metadata or files. `cargo publish --dry-run` also builds them, once before a release.
+    // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a release.
     let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
     for name in ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-gpu"] {
         package.extend(["-p", name]);

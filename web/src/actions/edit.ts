@@ -29,7 +29,7 @@ export interface Edit {
   /** Like `apply`, for a method of the engine that adds an undo step itself. */
   step(work: () => void, failed: string): boolean;
   restEdit(edit: RestEdit): void;
-  /** Settles, and starts or ends reshaping. */
+  /** Finishes the gesture in progress, then turns editing of the cage at rest on or off. */
   setEditingRest(on: boolean): void;
 }
 

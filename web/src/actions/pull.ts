@@ -140,7 +140,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     }
   };
 
-  /** Whether model or cage have changed during the drag. */
+  /** Whether the model or the cage has changed since the drag began. */
   const isStale = (drag: Drag) => drag.revision !== engine().revision;
 
   const finish = (drag: Drag) => {

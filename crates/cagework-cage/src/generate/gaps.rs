@@ -89,9 +89,9 @@ pub(super) struct NarrowGaps {
     pub(super) voxels: usize,
 }
 
-/// Finds the large gaps that a lattice of `base` voxels closes or nearly closes, and a lattice of at most `most` voxels
-/// that leaves them open. A distance of `clearance` to each wall (object units) closes gaps of less than twice that
-/// width on any lattice; these gaps are left out.
+/// Finds the large gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a
+/// lattice with at most `most` voxels along that side that leaves them open. Gaps narrower than twice the `clearance` of
+/// the cage from the model (object units) are left out, because they close on any lattice.
 ///
 /// # Errors
 /// If `go_on` cancels.

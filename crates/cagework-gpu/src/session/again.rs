@@ -7,10 +7,12 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 impl Session {
-    /// A session on the same GPU with the same model, cage and pose, for comparing other weights. The new session has
-    /// no controls inside the cage, which closed forms do not support.
+    /// A second session on the same GPU with the same model, cage and pose, for comparing the weights of this session
+    /// with coordinates of another kind. It leaves out controls inside the cage, because mean value and Green
+    /// coordinates do not support them.
     ///
-    /// # Errors [`GpuError::NotReady`] without model or cage; otherwise as the calls that set model and cage.
+    /// # Errors
+    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set model and cage.
     pub async fn twin(&self) -> Result<Self, GpuError> {
         let (_, controls) = self.parts()?;
         let cage = controls.cage();

@@ -87,7 +87,7 @@ macro_rules! formats {
         }
 
         impl ModelFormat {
-            /// All formats, in the order of listings.
+            /// All formats, in the order in which they are shown to users.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$format),+];
 
             /// Short name, lower case.

@@ -95,7 +95,7 @@ impl Model {
         }
     }
 
-    /// The model with new positions, for formats of polygons.
+    /// The model with new positions, as input for the writers of PLY, STL and OFF.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite position per vertex.

@@ -37,7 +37,7 @@ export interface ReadModel extends Bytes {
   /** The cage of a project. */
   readonly cage: CheckedCage | undefined;
   readonly notices: readonly string[];
-  /** Time that the module needed, ms: an estimate of how long the page will freeze. */
+  /** Time that the worker took to read the file, ms. The page freezes for about as long when it reads the file again. */
   readonly took: number;
   /** Number of vertices of all models. */
   readonly vertices: number;

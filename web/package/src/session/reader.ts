@@ -88,7 +88,7 @@ async function pause(): Promise<void> {
   paused = performance.now();
 }
 
-/** Reads a file again that a worker has read: its model, then further models of a project. */
+/** Reads, on this thread, a file that a worker has already read. Returns its model, then the other models of a project. */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.packed) loaded.setPacked(read.packed);

@@ -22,7 +22,7 @@ cagework_core::choice! {
         Follow = "follow",
         /// The skeleton stays unchanged, for skeletons shared between files.
         Stay = "stay",
-        /// Joints move and rotate with the shape.
+        /// Joints move with the cage, and rotate with the deformation around them.
         Turn = "turn",
     }
 }
