@@ -52,7 +52,11 @@ export function followDocument(ctx: Context): DocumentMirror {
     const isAlone = info.members.length === 1 && model?.members.length === 1;
     const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
     return {
-      model: { ...info, name: isAlone ? model.name : info.name, notices },
+      model: {
+        ...info,
+        name: isAlone ? model.name : T.models.several(info.name, info.members.length - 1),
+        notices,
+      },
       cageClip: info.clips.some(({ name }) => name === cageClip) ? cageClip : null,
     };
   };

@@ -8,6 +8,11 @@ export let LOCALE = "en";
 const formats = () => ({
   integer: new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 }),
   digits: new Intl.NumberFormat(LOCALE, { maximumSignificantDigits: 3, useGrouping: false }),
+  decimals: new Intl.NumberFormat(LOCALE, {
+    maximumFractionDigits: 3,
+    useGrouping: false,
+    signDisplay: "negative",
+  }),
   list: new Intl.ListFormat(LOCALE),
   plural: new Intl.PluralRules(LOCALE),
 });
@@ -71,6 +76,11 @@ export function scientific(value: number): string {
   if (size >= 0.01 && size < 10_000) return format.digits.format(value);
   const [mantissa, exponent] = value.toExponential(2).split("e");
   return `${format.digits.format(Number(mantissa))}e${Number(exponent)}`;
+}
+
+/** At most three decimals: -0.00012 -> "0". */
+export function decimals(value: number): string {
+  return format.decimals.format(value);
 }
 
 /** A fraction as percent, clamped to 0 and 100. */

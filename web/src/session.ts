@@ -48,8 +48,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
   const client = createClient(module, openWorker);
-  // `samples()` returns identifier, label and description of each sample; keep the identifiers.
-  const samples = pkg.Binder.samples().filter((_, k) => k % 3 === 0);
+  const samples = pkg.Binder.samples();
   const buildSample = prepareSample(client, samples[0], fresh);
   const frames = createFrames();
   /** Reports errors of `changed` here, because Rust ignores errors of its callbacks. */
@@ -133,7 +132,11 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     };
     const notices = await engine.open(models, contents);
     const info = engine.modelInfo();
-    const model = { ...info, notices: [...info.notices, ...read.notices] };
+    const model = {
+      ...info,
+      name: T.models.several(info.name, info.members.length - 1),
+      notices: [...info.notices, ...read.notices],
+    };
     return { model, check: cage?.check ?? null, settings, notices };
   }
 

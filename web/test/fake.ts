@@ -70,9 +70,7 @@ export function memberOf(id: number, name: string, triangles = 12): MemberInfo {
 
 /** The engine's description of these models. */
 export function modelOf(members: readonly MemberInfo[]): ModelInfo {
-  const [first, ...more] = members.map(({ name }) => name);
-  const name = more.length > 0 ? `${first} and ${more.length} more` : (first ?? "");
-  return { ...MODEL, name, members: [...members] };
+  return { ...MODEL, name: members[0]?.name ?? "", members: [...members] };
 }
 
 export const MODEL: ModelInfo = {
@@ -288,7 +286,7 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
-    transformLabel: () => "Move 0.25 along X",
+    gestureView: () => ({ kind: "grab", amounts: [0.25], axis: 0, plane: false }),
   };
   const engine = new Proxy({} as Engine, {
     get: (_, name: keyof Engine) => known[name] ?? (() => calls.push(String(name))),

@@ -1,5 +1,6 @@
 import { afterEach, describe, expect, it } from "vitest";
-import { duration, scientific, setLocale } from "../src/format";
+import { sayGesture } from "../src/actions/edit";
+import { decimals, duration, scientific, setLocale } from "../src/format";
 import { PSEUDO, pseudo } from "../src/words/pseudo";
 
 describe("the pseudo-locale", () => {
@@ -32,5 +33,19 @@ describe("another language", () => {
     expect(scientific(0.5)).toBe("0,5");
     expect(scientific(0.000123)).toBe("1,23e-4");
     expect(duration(1234)).toBe("1,2 Sek.");
+    expect(decimals(-0.25)).toBe("-0,25");
+  });
+});
+
+describe("the status line of a gesture", () => {
+  const say = (kind: "grab" | "rotate" | "scale", amounts: number[], axis: number | null, plane = false) =>
+    sayGesture({ kind, amounts, axis, plane });
+  it("gives amounts with at most three decimals, and the restriction", () => {
+    expect(say("grab", [0.30001, -0.4, -0.0001], null)).toBe("Move (0.3, -0.4, 0)");
+    expect(say("grab", [0.25], 0)).toBe("Move 0.25 along X");
+    expect(say("grab", [0, 1, 2], 0, true)).toBe("Move (0, 1, 2) in YZ");
+    expect(say("rotate", [90], null)).toBe("Rotate 90°");
+    expect(say("rotate", [90], 1, true)).toBe("Rotate 90° around Y");
+    expect(say("scale", [2], 2, true)).toBe("Scale × 2 in XY");
   });
 });

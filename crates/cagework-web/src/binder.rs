@@ -259,10 +259,10 @@ impl Binder {
         Ok(repaired.mesh.into())
     }
 
-    /// Identifier, label and description of each sample, as a flat list. `[n_samples, 3]`
+    /// Identifiers of the samples.
     #[must_use]
     pub fn samples() -> Vec<String> {
-        samples::all().iter().flat_map(|s| [s.id, s.label, s.sentence]).map(str::to_owned).collect()
+        samples::all().iter().map(|sample| sample.id.to_owned()).collect()
     }
 
     /// Builds the sample with this identifier.

@@ -14,7 +14,7 @@ use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
 use cagework_core::{BindOptions, Coordinates, Frames, InnerElement, Stage};
-use cagework_editor::edit::{Element, GestureKind, Pivot, SelectMode};
+use cagework_editor::edit::{Element, GestureKind, GestureView, Pivot, SelectMode};
 use cagework_editor::{
     CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
     SelectionView, SurfacePoint,
@@ -33,8 +33,8 @@ use crate::options::{
 };
 use crate::settings::{NUMBERS, Settings};
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, MemberInfo,
-    Mend, ModelInfo, Problem, TargetView, View,
+    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Grip, Largest, Legend, MemberInfo, Mend,
+    ModelInfo, Problem, TargetView, View,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
@@ -106,7 +106,6 @@ fn generated_types_are_up_to_date() {
         Severity,
         Repair,
         Mend,
-        Fix,
         Problem,
         ModelFormat,
         UpAxis,
@@ -144,6 +143,7 @@ fn generated_types_are_up_to_date() {
         Pivot,
         SelectMode,
         GestureKind,
+        GestureView,
         GizmoHandle,
         RestEdit,
     ] {

@@ -1,6 +1,6 @@
 //! Faults of a cage: their messages, fixes and marks for the page.
 
-use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
+use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Severity, check_smooth};
 use cagework_core::PolygonMesh;
 use cagework_gpu::render::Marks;
 use glam::Vec3;
@@ -19,31 +19,18 @@ pub(crate) fn find(mesh: &PolygonMesh, model: &[Vec3], smooth: u32) -> CageCheck
 
 /// Converts a problem to the message and fix that the page shows.
 fn view(problem: &Problem) -> views::Problem {
-    let n = problem.count;
-    let label = |repair| match repair {
-        Repair::Weld => "Join them".to_owned(),
-        Repair::DropDegenerate if n == 1 => "Drop it".to_owned(),
-        Repair::DropDegenerate => format!("Drop all {n}"),
-        Repair::Mirror => "Mirror this half".to_owned(),
-        Repair::FillHoles => "Fill the holes".to_owned(),
-        Repair::Flip => "Turn them outward".to_owned(),
-        Repair::Grow => "Grow the cage".to_owned(),
-    };
     // Fixes are sorted: the first is the best.
     let fix = problem.fixes.first().map(|fix| match *fix {
-        Fix::Repair { repair } => views::Fix { label: label(repair), mend: Mend::Repair { repair } },
-        Fix::Grid { cells } => {
-            views::Fix { label: format!("Bind with {cells} cells"), mend: Mend::Grid { cells } }
-        }
+        Fix::Repair { repair } => Mend::Repair { repair },
+        Fix::Grid { cells } => Mend::Grid { cells },
     });
     let has_no_repair = problem.severity == Severity::Error || problem.code == Code::SelfIntersection;
-    let regenerate = || views::Fix { label: "Make a new cage".to_owned(), mend: Mend::Regenerate };
     views::Problem {
         code: problem.code,
         severity: problem.severity,
         message: problem.message.clone(),
-        count: n,
-        fix: fix.or_else(|| has_no_repair.then(regenerate)),
+        count: problem.count,
+        fix: fix.or(has_no_repair.then_some(Mend::Regenerate)),
     }
 }
 

@@ -69,6 +69,7 @@ pub(crate) struct View {
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ModelInfo {
+    /// Name of the first model.
     name: String,
     format: ModelFormat,
     up: UpAxis,
@@ -99,9 +100,8 @@ impl ModelInfo {
         let first = &*models.first()?.model;
         let all = || models.iter().map(|member| &*member.model);
         let sum = |of: fn(&Model) -> usize| all().map(of).sum();
-        let more = all().count() - 1;
         Ok(Self {
-            name: if more == 0 { first.name.clone() } else { format!("{} and {more} more", first.name) },
+            name: first.name.clone(),
             format: first.format(),
             up: first.up(),
             vertices: sum(|model| model.positions.len()),
@@ -253,16 +253,7 @@ pub(crate) struct Problem {
     /// Message of one or more complete sentences.
     pub(crate) message: String,
     pub(crate) count: usize,
-    pub(crate) fix: Option<Fix>,
-}
-
-/// A fix for a fault, with the label of its button.
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct Fix {
-    pub(crate) label: String,
-    #[serde(flatten)]
-    pub(crate) mend: Mend,
+    pub(crate) fix: Option<Mend>,
 }
 
 /// What the button of a fix does.

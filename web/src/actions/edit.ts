@@ -1,7 +1,8 @@
 /** Moves and reshapes the cage. Gestures change it live and become one undo step when they end. */
 
 import { nextAmount } from "../amount";
-import type { Command, Gesture, GizmoHandle, RestEdit } from "../contract";
+import type { Command, Gesture, GestureView, GizmoHandle, RestEdit } from "../contract";
+import { decimals } from "../format";
 import { T } from "../words";
 import { type Context, report } from "./context";
 
@@ -91,7 +92,8 @@ export function createEdit(ctx: Context): Edit {
 
   /** Shows the gesture's label and, while reshaping, how many sampled vertices are outside the cage. */
   const showLabel = () => {
-    const label = engine().transformLabel();
+    const view = engine().gestureView();
+    const label = view ? sayGesture(view) : "";
     store.set({
       gesture: typed === "" ? label : `${label}  [${typed}]`,
       strays: store.get().editingRest ? engine().strays() : 0,
@@ -150,4 +152,14 @@ export function createEdit(ctx: Context): Edit {
       if (store.get().editingRest !== on) engine().setEditingRest(on, T.did.reset);
     },
   };
+}
+
+/** The status line of a gesture, such as "Move 0.25 along X". */
+export function sayGesture({ kind, amounts, axis, plane }: GestureView): string {
+  const by = amounts.map(decimals).join(", ");
+  const what = T.gesture[kind](amounts.length > 1 ? `(${by})` : by);
+  if (axis === null) return what;
+  if (kind === "rotate") return T.gesture.around(what, T.axes[axis] ?? "");
+  if (!plane) return T.gesture.along(what, T.axes[axis] ?? "");
+  return T.gesture.within(what, `${T.axes[(axis + 1) % 3]}${T.axes[(axis + 2) % 3]}`);
 }

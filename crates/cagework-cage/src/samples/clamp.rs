@@ -6,12 +6,7 @@ use super::sdf::{Body, Solid};
 use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use cagework_core::mesh::PolygonMesh;
 
-pub(super) const INFO: SampleInfo = SampleInfo {
-    id: "clamp",
-    label: "Clamp",
-    sentence: "The lower jaw opens and the upper one, a finger's breadth away, keeps its place; mean value \
-               coordinates measure straight across the gap and would drag it along. Grab the tip of a jaw.",
-};
+pub(super) const INFO: SampleInfo = SampleInfo { id: "clamp", label: "Clamp" };
 
 const STEEL: [u8; 3] = [84, 104, 128];
 const BRASS: [u8; 3] = [198, 156, 76];

@@ -10,12 +10,7 @@ use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 use cagework_core::skin::Rig;
 
-pub(super) const INFO: SampleInfo = SampleInfo {
-    id: "humanoid",
-    label: "Legs close together",
-    sentence: "One leg steps forward and the other, a hand's breadth beside it, does not follow: harmonic \
-               coordinates follow the body, not the gap. Grab a knee and lift it.",
-};
+pub(super) const INFO: SampleInfo = SampleInfo { id: "humanoid", label: "Legs close together" };
 
 const SKIN: [u8; 3] = [224, 178, 148];
 const SHIRT: [u8; 3] = [58, 108, 158];

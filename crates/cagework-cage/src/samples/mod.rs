@@ -1,8 +1,7 @@
 //! Built-in sample models, made by formula: no download and no third-party licence.
 //!
 //! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and projected onto
-//! the zero level. A cage, poses of that cage and a sentence on what to try belong to it. Building one takes a few
-//! hundred milliseconds.
+//! the zero level. A cage and poses of that cage belong to it. Building one takes a few hundred milliseconds.
 
 mod clamp;
 mod humanoid;
@@ -29,8 +28,6 @@ pub struct SampleInfo {
     pub id: &'static str,
     /// Display name.
     pub label: &'static str,
-    /// What the sample demonstrates and what to try.
-    pub sentence: &'static str,
 }
 
 /// A built sample.

@@ -7,12 +7,7 @@ use super::skeleton::Skeleton;
 use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 
-pub(super) const INFO: SampleInfo = SampleInfo {
-    id: "rat",
-    label: "Rat",
-    sentence: "The paper's model: the tail curls and the head turns while the feet stay where they are. \
-               Grab the nose and turn the rat's head.",
-};
+pub(super) const INFO: SampleInfo = SampleInfo { id: "rat", label: "Rat" };
 
 const FUR: [u8; 3] = [142, 126, 116];
 const BELLY: [u8; 3] = [196, 184, 172];

@@ -7,12 +7,7 @@ use super::skeleton::Skeleton;
 use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 
-pub(super) const INFO: SampleInfo = SampleInfo {
-    id: "strider",
-    label: "Strider",
-    sentence: "Legs as thin as a cell of the grid: each bends with its own part of the cage, and the rest pose stays \
-               exact. Grab a foot and lift it.",
-};
+pub(super) const INFO: SampleInfo = SampleInfo { id: "strider", label: "Strider" };
 
 const SHELL: [u8; 3] = [176, 84, 52];
 const BACK: [u8; 3] = [96, 44, 40];

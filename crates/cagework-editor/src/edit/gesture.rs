@@ -14,7 +14,7 @@ const MIN_PLANE_SINE: f32 = 0.05;
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
 /// Kind of gesture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Gesture"))]
 pub enum GestureKind {
@@ -36,6 +36,20 @@ pub enum Constraint {
     Axis(usize),
     /// The plane normal to an axis, 0 to 2; for a rotation, the axis.
     Plane(usize),
+}
+
+/// How far a gesture has moved, for a status line.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct GestureView {
+    /// Kind of the gesture.
+    pub kind: GestureKind,
+    /// Movement along the axis or along x, y and z, object units; the angle in degrees; or the factor.
+    pub amounts: Vec<f32>,
+    /// Axis of the restriction, 0 to 2.
+    pub axis: Option<usize>,
+    /// Whether the gesture is restricted to the plane normal to `axis`.
+    pub plane: bool,
 }
 
 /// A gesture in progress. Positions are always computed from its start, so that errors do not accumulate.
@@ -126,28 +140,23 @@ impl Gesture {
         }
     }
 
-    /// Current state for a status line: `Move 0.25 along X`.
+    /// Current state for a status line.
     #[must_use]
-    pub fn label(&self, view: &dyn View) -> String {
-        const NAMES: [&str; 3] = ["X", "Y", "Z"];
-        let along = match self.constraint {
-            Constraint::Free => String::new(),
-            Constraint::Axis(axis) if self.kind == GestureKind::Rotate => format!(" around {}", NAMES[axis]),
-            Constraint::Axis(axis) => format!(" along {}", NAMES[axis]),
-            Constraint::Plane(axis) if self.kind == GestureKind::Rotate => format!(" around {}", NAMES[axis]),
-            Constraint::Plane(axis) => format!(" in {}{}", NAMES[(axis + 1) % 3], NAMES[(axis + 2) % 3]),
+    pub fn view(&self, view: &dyn View) -> GestureView {
+        let (axis, plane) = match self.constraint {
+            Constraint::Free => (None, false),
+            Constraint::Axis(axis) => (Some(axis), false),
+            Constraint::Plane(axis) => (Some(axis), true),
         };
-        match self.kind {
+        let amounts = match self.kind {
             GestureKind::Grab => {
-                let movement = self.movement(view);
-                match self.constraint {
-                    Constraint::Axis(axis) => format!("Move {}{along}", shown(movement[axis])),
-                    _ => format!("Move ({}){along}", movement.to_array().map(shown).join(", ")),
-                }
+                let movement = self.movement(view).to_array();
+                axis.filter(|_| !plane).map_or_else(|| movement.to_vec(), |axis| vec![movement[axis]])
             }
-            GestureKind::Rotate => format!("Rotate {}°{along}", shown(self.turn(view).1.to_degrees())),
-            GestureKind::Scale => format!("Scale × {}{along}", shown(self.factor(view))),
-        }
+            GestureKind::Rotate => vec![self.turn(view).1.to_degrees()],
+            GestureKind::Scale => vec![self.factor(view)],
+        };
+        GestureView { kind: self.kind, amounts, axis, plane }
     }
 
     fn movement(&self, view: &dyn View) -> Vec3 {
@@ -227,13 +236,6 @@ impl Gesture {
             }
         }
     }
-}
-
-/// Formats a number with at most three decimals, without trailing zeros.
-fn shown(value: f32) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// Coordinate on the axis through `through` that is nearest to the pointer's ray; `None` if axis and ray are almost

@@ -9,7 +9,7 @@ mod playback;
 mod pull;
 mod selection;
 
-pub use gesture::{Constraint, Gesture, GestureKind};
+pub use gesture::{Constraint, Gesture, GestureKind, GestureView};
 pub use pick::{
     Element, Topology, pick_edge, pick_face, pick_middle, pick_surface, pick_vertex, vertices_in_box,
 };

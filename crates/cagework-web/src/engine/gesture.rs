@@ -113,11 +113,13 @@ impl Engine {
         self.change(|state| state.editor.set_radius(radius, &state.camera));
     }
 
-    /// Status text of the gesture in progress, such as `Move 0.25 along X`.
-    #[wasm_bindgen(js_name = transformLabel)]
-    #[must_use]
-    pub fn transform_label(&self) -> String {
-        self.read(|state| state.editor.gesture().as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
+    /// State of the gesture for the status line; null without one.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = gestureView, unchecked_return_type = "GestureView | null")]
+    pub fn gesture_view(&self) -> Result<JsValue, JsValue> {
+        Ok(object(&self.read(|state| state.editor.gesture().as_ref().map(|g| g.view(&state.camera))))?)
     }
 
     /// Ends the gesture, and reverts it unless `keep` is set. Returns true if `keep` is set and a vertex has moved.

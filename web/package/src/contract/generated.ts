@@ -512,17 +512,13 @@ export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "fli
  */
 export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
 /**
- * A fix for a fault, with the label of its button.
- */
-export type Fix = { label: string, } & ({ "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" });
-/**
  * Faults of one kind in a cage: their number, and the best fix.
  */
 export type Problem = { code: Code, severity: Severity,
 /**
  * Message of one or more complete sentences.
  */
-message: string, count: number, fix: Fix | null, };
+message: string, count: number, fix: Mend | null, };
 /**
  * File format of a model.
  */
@@ -579,7 +575,11 @@ painted: Array<[number, number]>, };
 /**
  * Properties of all models in the cage.
  */
-export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
+export type ModelInfo = {
+/**
+ * Name of the first model.
+ */
+name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
 /**
  * Morph targets of all models, and their weights at rest.
  */
@@ -1052,6 +1052,26 @@ export type SelectMode = "replace" | "add" | "remove" | "toggle";
  * Kind of gesture.
  */
 export type Gesture = "grab" | "rotate" | "scale";
+/**
+ * How far a gesture has moved, for a status line.
+ */
+export type GestureView = {
+/**
+ * Kind of the gesture.
+ */
+kind: Gesture,
+/**
+ * Movement along the axis or along x, y and z, object units; the angle in degrees; or the factor.
+ */
+amounts: Array<number>,
+/**
+ * Axis of the restriction, 0 to 2.
+ */
+axis: number | null,
+/**
+ * Whether the gesture is restricted to the plane normal to `axis`.
+ */
+plane: boolean, };
 /**
  * Handle of the gizmo: one axis, the plane normal to an axis, or all axes.
  */

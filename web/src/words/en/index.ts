@@ -8,7 +8,7 @@ import { crash, failed, fixes, link, lost, offline } from "./errors";
 import { exports } from "./exports";
 import { model, opening, samples } from "./model";
 import { models } from "./models";
-import { did, pose, pull } from "./pose";
+import { did, gesture, pose, pull } from "./pose";
 import { legend, see } from "./see";
 import { sheet } from "./sheet";
 import { eta, hints, status, toast, view } from "./view";
@@ -46,6 +46,7 @@ const words = {
   pose,
   pull,
   did,
+  gesture,
   exports,
   see,
   legend,

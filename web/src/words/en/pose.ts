@@ -71,6 +71,16 @@ export const pull = {
   nothingThere: "No model in the middle of the view. Point at the model and press an arrow key again.",
 };
 
+/** Status line during a gesture. `by`: formatted numbers. */
+export const gesture = {
+  grab: (by: string) => `Move ${by}`,
+  rotate: (by: string) => `Rotate ${by}°`,
+  scale: (by: string) => `Scale × ${by}`,
+  along: (what: string, axis: string) => `${what} along ${axis}`,
+  around: (what: string, axis: string) => `${what} around ${axis}`,
+  within: (what: string, plane: string) => `${what} in ${plane}`,
+};
+
 /** Undo steps. */
 export const did = {
   forgotten: "The oldest steps can no longer be undone: the history is limited to 256 MB.",

@@ -23,6 +23,13 @@ fn close(a: Vec3, b: Vec3) -> bool {
     a.abs_diff_eq(b, ROUNDING)
 }
 
+/// Amounts, axis and plane of the status line. The amounts have three decimals, as on the page.
+fn shown(gesture: &Gesture) -> (Vec<f32>, Option<usize>, bool) {
+    let GestureView { kind, amounts, axis, plane } = gesture.view(&Flat);
+    assert_eq!(kind, gesture.kind());
+    (amounts.into_iter().map(|x| (1000.0 * x).round() / 1000.0).collect(), axis, plane)
+}
+
 #[test]
 fn grab_follows_the_pointer_in_the_view_plane() {
     let mut grab = gesture(GestureKind::Grab, &[7], ORIGIN);
@@ -30,7 +37,7 @@ fn grab_follows_the_pointer_in_the_view_plane() {
     let moved = grab.positions(&Flat);
     assert!(close(moved[7], Vec3::new(1.3, 0.6, 1.0)));
     assert_eq!(moved[..7], grab.start()[..7]);
-    assert_eq!(grab.label(&Flat), "Move (0.3, -0.4, 0)");
+    assert_eq!(shown(&grab), (vec![0.3, -0.4, 0.0], None, false));
 }
 
 #[test]
@@ -39,7 +46,7 @@ fn grab_is_restricted_to_an_axis_or_a_plane() {
     grab.drag(ORIGIN + Vec2::new(30.0, 40.0));
     grab.constrain(Constraint::Axis(0));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.3, 1.0, 1.0)));
-    assert_eq!(grab.label(&Flat), "Move 0.3 along X");
+    assert_eq!(shown(&grab), (vec![0.3], Some(0), false));
     grab.constrain(Constraint::Plane(2));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.3, 0.6, 1.0)));
     // In a plane seen edge-on, only the vertical part of the drag counts. Along an axis that points at the eye,
@@ -70,12 +77,12 @@ fn rotation_follows_the_pointer() {
     // The pointer moves from the right to the top: a quarter turn counter-clockwise about +z.
     let moved = turn.positions(&Flat);
     assert!(close(moved[7], Vec3::new(0.0, 2.0, 1.0)) && close(moved[6], Vec3::new(0.0, 0.0, 1.0)));
-    assert_eq!(turn.label(&Flat), "Rotate 90°");
+    assert_eq!(shown(&turn), (vec![90.0], None, false));
     turn.constrain(Constraint::Axis(1));
     turn.type_amount(Some(90.0));
     // A quarter turn about y maps x to -z.
     assert!(close(turn.positions(&Flat)[7], Vec3::new(0.0, 1.0, 0.0)));
-    assert_eq!(turn.label(&Flat), "Rotate 90° around Y");
+    assert_eq!(shown(&turn), (vec![90.0], Some(1), false));
 }
 
 #[test]
@@ -86,7 +93,7 @@ fn scale_follows_the_pointers_distance_from_the_centre() {
     assert!(close(scale.positions(&Flat)[7], Vec3::splat(2.0)));
     scale.constrain(Constraint::Axis(0));
     assert!(close(scale.positions(&Flat)[7], Vec3::new(2.0, 1.0, 1.0)));
-    assert_eq!(scale.label(&Flat), "Scale × 2 along X");
+    assert_eq!(shown(&scale), (vec![2.0], Some(0), false));
     scale.constrain(Constraint::Plane(0));
     assert!(close(scale.positions(&Flat)[7], Vec3::new(1.0, 2.0, 2.0)));
     // A drag across the centre mirrors the selection.
