@@ -135,8 +135,8 @@ function deletion(edit: RestEdit, element: CageElement): RestEdit {
 function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
   return (
     <div class="card stack tight">
-      <div class="row">
-        <strong class="grow">{T.cage.vertices(cage.info.vertices)}</strong>
+      <div class="row wrap">
+        <strong>{T.cage.vertices(cage.info.vertices)}</strong>
         <CageBadge cage={cage} check={check} />
       </div>
       <Facts

@@ -25,9 +25,9 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
-/** Height of a text line, and mean width of a letter, in units of the drawing. */
+/** Height of a text line, and width of a letter that also suffices for accents, in units of the drawing. */
 const LABEL = 11;
-const LETTER = 5.2;
+const LETTER = 5.8;
 
 export interface Scale {
   lowest: number;
