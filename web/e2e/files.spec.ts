@@ -51,7 +51,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
     const document = JSON.parse(Buffer.from(files[0]?.bytes ?? []).toString());
     // The texture and the buffer are in a subfolder; other files are next to it.
     for (const part of [...document.buffers, ...document.images]) part.uri = `parts/${part.uri}`;
-    writeFileSync(join(model, "worm.gltf"), JSON.stringify(document));
+    writeFileSync(join(model, "garden.gltf"), JSON.stringify(document));
     for (const { name, bytes } of files.slice(1)) writeFileSync(join(model, "parts", name), bytes);
     writeFileSync(join(model, "notes.txt"), "drawn on a rainy day");
     writeFileSync(join(model, ".hidden.gltf"), "not a model");
@@ -59,7 +59,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
     const data = { items: [], files: [model], dragOperationsMask: 1 };
     for (const type of ["dragEnter", "dragOver", "drop"] as const)
       await cdp.send("Input.dispatchDragEvent", { type, x: 200, y: 250, data });
-    await expect(page).toHaveTitle(/worm/);
+    await expect(page).toHaveTitle(/garden/);
     await bound(page);
     const [triangles, textures] = [2 * 40 * 32, 1];
     await page.getByRole("button", { name: "Model", exact: false }).first().click();
