@@ -10,11 +10,12 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::{CageSource, ControlArgs, DeformArgs, MapArgs, MemoryArgs, ModelOutput, SmoothArgs};
-use crate::bind::{bind_positions, export};
+use crate::bind::export;
 use crate::controls::with_inner;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{LoadedCage, load_any, load_cage, load_cage_file};
+use crate::progress::Bar;
 
 /// Points that one thread maps at a time.
 const POINTS_PER_RUN: usize = 4096;
@@ -52,7 +53,8 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
         let file = PointFile::read(&read(&args.points)?, memory.bytes())
             .map_err(|e| CliError::file(&args.points, e))?;
         let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
-        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), args.cells)?;
+        let held = (file.bytes, args.cells);
+        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), held)?;
         let origin = cage.origin();
         let local = |p: &DVec3| up.vector_turned(*p - origin).as_vec3();
         let points: Vec<Vec3> = file.positions.iter().map(local).collect();
@@ -67,7 +69,8 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
         let output: ModelOutput = args.output.display().to_string().parse().map_err(wrong)?;
         let model = load_any(&args.points, up, memory)?;
         let cage = load_cage(&CageSource::File(args.cage.clone()), &model, memory, &args.controls)?;
-        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), args.cells)?;
+        let held = (model.bytes(), args.cells);
+        let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), held)?;
         let mapped = map(&field, &model.positions, args.inverse);
         let bytes = export(&model, &mapped.points, &output)?;
         let mut notices = model.notices.clone();
@@ -132,28 +135,28 @@ pub(crate) fn write_lattice(
     }
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, model, args.read.memory, &controls)?;
-    let field = field_of(&cage, pose, None, (model.up(), args.read.memory), args.lattice_cells)?;
+    let held = (model.bytes(), args.lattice_cells);
+    let field = field_of(&cage, pose, None, (model.up(), args.read.memory), held)?;
     write(output, &write_field_npz(&field, model.origin()))?;
     let Lattice { dims, cell, .. } = field.lattice;
     Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
 }
 
-/// The field of a pose of a cage.
+/// The field of a pose of a cage. `held`: memory in use, bytes; `cells`: those of the lattice along the longest side.
 fn field_of(
     cage: &LoadedCage,
     pose: &Path,
     pose_controls: Option<&Path>,
     (up, memory): (UpAxis, MemoryArgs),
-    cells: u32,
+    (held, cells): (u64, u32),
 ) -> Result<Field, CliError> {
     let rest = cage.controls().rest();
     let inner = &rest[cage.cage.n_vertices()..];
     let files: Vec<_> = pose_controls.map(Path::to_path_buf).into_iter().collect();
     let poses = with_inner(vec![cage.load_pose(pose)?], &files, inner, (up, cage.origin()), memory)?;
-    let lattice = Lattice::new(cage.controls().surface(), cells);
-    let options = BindOptions { memory_limit: memory.bytes(), ..BindOptions::default() };
-    let binding = bind_positions(&lattice.points(), cage.controls(), false, &options)?;
-    Ok(FieldWeights::new(lattice, binding.weights, binding.frames).pose(rest, &poses[0]))
+    let options = BindOptions { memory_limit: memory.bytes(), held, ..BindOptions::default() };
+    let bar = Bar::start();
+    Ok(FieldWeights::bind(cage.controls(), cells, &options, &bar)?.pose(rest, &poses[0]))
 }
 
 /// Mapped points, and the numbers of those without an inverse.

@@ -23,13 +23,16 @@ pub const CELLS: u32 = 64;
 /// Number of cells along the longest side of the cage's box in the lattice that deforms animation clips. It is smaller
 /// than [`CELLS`] because the page computes this lattice when a clip starts.
 pub const CLIP_CELLS: u32 = 48;
-/// Allowed numbers of cells. At 256, a lattice may have 57 million nodes; the bind's memory limit applies before.
+/// Allowed numbers of cells. At 256, a lattice may have 57 million nodes, which the memory limit of the bind refuses.
 pub const CELLS_RANGE: Number = Number {
     name: "cells",
     allowed: "a whole number from 8 to 256",
     is_allowed: |n| n.fract() == 0.0 && (8.0..=256.0).contains(&n),
     slider: None,
 };
+/// Memory of a lattice and its field, bytes per node: flags and index while the lattice is built (6), displacement (16),
+/// gradient (36), and the arrays of a file of the field (49).
+const NODE_BYTES: u64 = 107;
 /// Margin of the lattice on each side of the cage's box, as a fraction of the box's longest side.
 const MARGIN: f32 = 0.25;
 /// Distance from the cage, in lattice cells, up to which nodes outside the cage are bound.
@@ -66,16 +69,20 @@ impl Lattice {
     /// The lattice around a cage in its rest pose, with `cells` cells along the longest side of its box.
     #[must_use]
     pub fn new(cage: &Cage, cells: u32) -> Self {
-        let bounds = cage.bounds();
-        let size = bounds.max - bounds.min;
+        let (cell, margin, dims) = Self::size(cage, cells);
+        let mut lattice = Self { origin: cage.bounds().min - margin * cell, cell, dims, bound: Vec::new() };
+        lattice.bound = lattice.around(cage);
+        lattice
+    }
+
+    /// Edge of a cell, cells of the margin on each side, and nodes along each axis.
+    fn size(cage: &Cage, cells: u32) -> (f32, f32, UVec3) {
+        let size = cage.bounds().extent();
         let cell = size.max_element() / cells as f32;
         let margin = (MARGIN * cells as f32).ceil();
         // Round up to a multiple of the coarsest stride.
         let inner = (size / cell).ceil().as_uvec3() + 2 * margin as u32;
-        let dims = inner.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1;
-        let mut lattice = Self { origin: bounds.min - margin * cell, cell, dims, bound: Vec::new() };
-        lattice.bound = lattice.around(cage);
-        lattice
+        (cell, margin, inner.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1)
     }
 
     /// Positions of the nodes to bind to the cage.
@@ -176,7 +183,7 @@ impl FieldWeights {
     /// weights outside the cage are always extended.
     ///
     /// # Errors
-    /// As [`bind`].
+    /// As [`bind`]; [`BindError::Memory`] also if the lattice itself exceeds the memory limit.
     pub fn bind<'a>(
         controls: impl Into<Controls<'a>>,
         cells: u32,
@@ -184,8 +191,13 @@ impl FieldWeights {
         progress: &dyn Progress,
     ) -> Result<Self, BindError> {
         let controls = controls.into();
+        let dims = Lattice::size(controls.surface(), cells).2.to_array();
+        let needed = options.held + dims.into_iter().map(u64::from).product::<u64>() * NODE_BYTES;
+        if needed > options.memory_limit {
+            return Err(BindError::Memory { needed, limit: options.memory_limit });
+        }
         let lattice = Lattice::new(controls.surface(), cells);
-        let options = BindOptions { outside: OutsidePolicy::Extend, ..*options };
+        let options = BindOptions { outside: OutsidePolicy::Extend, held: needed, ..*options };
         let binding = bind(&lattice.points(), controls, &options, progress)?;
         Ok(Self::new(lattice, binding.weights, binding.frames))
     }
@@ -262,9 +274,13 @@ impl Field {
         Mat3::IDENTITY + self.interpolated(point, |node| self.gradients[node])
     }
 
-    /// Deformation gradients of all nodes. `[dims.z, dims.y, dims.x]`
-    pub fn gradients(&self) -> impl ExactSizeIterator<Item = Mat3> {
-        self.gradients.iter().map(|&g| Mat3::IDENTITY + g)
+    /// Deformation gradient F of a node.
+    ///
+    /// # Panics
+    /// If the lattice has no such node.
+    #[must_use]
+    pub fn node_gradient(&self, node: usize) -> Mat3 {
+        Mat3::IDENTITY + self.gradients[node]
     }
 
     /// Position of a point after the deformation.

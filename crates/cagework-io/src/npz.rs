@@ -157,7 +157,6 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
 pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     let lattice = &field.lattice;
     let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
-    let gradients: Vec<_> = field.gradients().collect();
     // z is the fastest axis of the arrays, x that of the field.
     let nodes =
         || (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| x + nx * (y + ny * z))));
@@ -167,7 +166,7 @@ pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     zip.put("spacing", "<f8", &[], [f64::from(lattice.cell).to_le_bytes()]);
     let of_node = |k: usize| field.values[k].truncate().to_array();
     zip.put("u", "<f4", &[nx, ny, nz, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
-    let of_node = |k: usize| gradients[k].transpose().to_cols_array();
+    let of_node = |k: usize| field.node_gradient(k).transpose().to_cols_array();
     zip.put("F", "<f4", &[nx, ny, nz, 3, 3], nodes().flat_map(of_node).map(f32::to_le_bytes));
     zip.put("bound", "|b1", &[nx, ny, nz], nodes().map(|k| [u8::from(field.values[k].w > 0.0)]));
     zip.finish()

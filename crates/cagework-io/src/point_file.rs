@@ -8,8 +8,11 @@ use thiserror::Error;
 use crate::memory::MemoryError;
 use crate::npz::{NpzError, npy_points, write_npy_points};
 
-/// Memory per byte of a text file, bytes: the text, its positions, and the places of its numbers.
-const MEMORY_PER_BYTE: u64 = 6;
+/// Memory per byte of a file, bytes: the file, its text, and the written text.
+const MEMORY_PER_BYTE: u64 = 3;
+/// Memory per point, bytes: position (24), places of its numbers (48), the mapped point in three forms (64) and its
+/// written digits (60), with room for vectors that grow by doubling.
+const MEMORY_PER_POINT: u64 = 300;
 
 /// Error of reading a file of points.
 #[derive(Debug, Error)]
@@ -45,6 +48,8 @@ pub enum PointFileError {
 pub struct PointFile {
     /// Positions in the axes of the file. `[n_points]`
     pub positions: Vec<DVec3>,
+    /// Memory for reading, mapping and writing the points, bytes.
+    pub bytes: u64,
     source: Source,
 }
 
@@ -71,12 +76,17 @@ impl PointFile {
     /// # Errors
     /// [`PointFileError`]
     pub fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PointFileError> {
-        MemoryError::check(MEMORY_PER_BYTE * bytes.len() as u64, memory_limit)?;
-        let file = if bytes.starts_with(b"\x93NUMPY") {
+        let is_array = bytes.starts_with(b"\x93NUMPY");
+        // A point of an array takes at least 12 bytes, one of a text a line.
+        let lines = || 1 + bytes.iter().filter(|&&b| b == b'\n').count();
+        let points = if is_array { bytes.len() / 12 } else { lines() };
+        let needed = MEMORY_PER_BYTE * bytes.len() as u64 + MEMORY_PER_POINT * points as u64;
+        MemoryError::check(needed, memory_limit)?;
+        let file = if is_array {
             let (positions, is_wide) = npy_points(bytes)?;
-            Self { positions, source: Source::Array { is_wide } }
+            Self { positions, bytes: needed, source: Source::Array { is_wide } }
         } else {
-            Self::read_text(std::str::from_utf8(bytes).map_err(|_| PointFileError::Encoding)?)?
+            Self::read_text(std::str::from_utf8(bytes).map_err(|_| PointFileError::Encoding)?, needed)?
         };
         match file.positions.iter().position(|p| !p.is_finite()) {
             Some(point) => Err(PointFileError::NotFinite { point: point + 1 }),
@@ -85,7 +95,7 @@ impl PointFile {
         }
     }
 
-    fn read_text(text: &str) -> Result<Self, PointFileError> {
+    fn read_text(text: &str, bytes: u64) -> Result<Self, PointFileError> {
         let (mut positions, mut places) = (Vec::new(), Vec::new());
         let mut columns = [0, 1, 2];
         let mut start = 0;
@@ -108,7 +118,7 @@ impl PointFile {
             }
             start += line.len();
         }
-        Ok(Self { positions, source: Source::Text { text: text.to_owned(), places } })
+        Ok(Self { positions, bytes, source: Source::Text { text: text.to_owned(), places } })
     }
 
     /// Writes the file with other positions. All other text is unchanged, as are numbers that have not changed.
@@ -197,6 +207,9 @@ mod tests {
         assert!(fault(b"1 2 3\nnan 0 0\n").contains("point 2 is not finite"));
         assert!(fault(b"\xff\xfe1").contains("UTF-8"));
         assert!(fault(b"\x93NUMPY\x01\x00").contains(".npy"));
-        assert!(PointFile::read(&[b' '; 100], 10).is_err());
+        // 6 bytes per line, but 300 per point.
+        let many = "1 2 3\n".repeat(10_000);
+        let message = PointFile::read(many.as_bytes(), 1 << 20).unwrap_err().to_string();
+        assert!(message.contains("about 4 MiB of memory, more than the limit of 1 MiB"), "{message}");
     }
 }

@@ -48,8 +48,8 @@ pub(crate) struct PoseContents {
 }
 
 impl OpenContents {
-    /// Contents for the editor, settings of the project, and notices (none at present). `first`: the first model.
-    pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings, Vec<String>)> {
+    /// Contents for the editor, and settings of the project. `first`: the first model.
+    pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
         let of_project = self.poses.is_empty();
         let given: Vec<(String, Vec<Vec3>)> = if of_project {
@@ -72,6 +72,6 @@ impl OpenContents {
             pins: settings.pins.clone(),
             sample: settings.sample.clone().or(self.sample).filter(is_known),
         };
-        Ok((contents, settings, Vec::new()))
+        Ok((contents, settings))
     }
 }

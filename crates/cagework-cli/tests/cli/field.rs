@@ -109,5 +109,9 @@ fn wrong_points_are_refused() {
         .code(1)
         .stderr(contains("mesh.obj"));
     sandbox.run("map probes.csv --cage cage.obj --pose posed.obj --cells 7 -o out.csv").code(2);
+    sandbox
+        .run("map probes.csv --cage cage.obj --pose posed.obj --cells 256 --memory-limit 500 -o out.csv")
+        .code(1)
+        .stderr(contains("binding needs about").and(contains("limit of 500 MiB")));
     assert!(!sandbox.names().iter().any(|name| name.starts_with("out")));
 }

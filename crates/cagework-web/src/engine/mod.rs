@@ -96,7 +96,8 @@ impl Engine {
         let Some(first) = models.first_mut() else {
             return Err(Fault::missing("model", "open one first").into());
         };
-        let (contents, settings, mut notices) = contents.read(first)?;
+        let (contents, settings) = contents.read(first)?;
+        let mut notices = Vec::new();
         let (up, origin) = (first.model.up(), first.model.origin());
         let mut draws = Vec::new();
         for (k, loaded) in models.iter_mut().enumerate() {
