@@ -1,6 +1,6 @@
 // Adds the cage's displacement field to skinned positions: x += u(x). u is given at the nodes of a lattice and
-// interpolated linearly. One invocation per vertex, in place, after skin_vertices. The field is in a storage buffer,
-// because 16-bit textures are too coarse and 32-bit textures cannot be filtered everywhere. CPU:
+// interpolated trilinearly. Runs in place after skin_vertices, one invocation per vertex. The field is in a storage
+// buffer, because 16-bit textures are too coarse and not every device can filter 32-bit textures. CPU:
 // cagework_core::field::bend_vertices.
 
 struct Field {
@@ -8,8 +8,9 @@ struct Field {
     origin: vec3f,
     /// Edge of a cell, object units.
     cell: f32,
-    /// Nodes along each axis, x fastest.
+    /// Number of nodes along each axis.
     dims: vec3u,
+    /// Displacement at each node, object units; x varies fastest.
     values: array<vec4f>,
 }
 
@@ -32,7 +33,7 @@ fn bend_vertices(@builtin(global_invocation_id) id: vec3u) {
     if v >= work.count { return; }
     let at = (positions[v].xyz - field.origin) / field.cell;
     let first = clamp(floor(at), vec3f(0.0), vec3f(field.dims - 2u));
-    // Outside the lattice, use its boundary values, which are zero.
+    // A vertex outside the lattice gets the displacement of the lattice's boundary, which is zero.
     let share = clamp(at - first, vec3f(0.0), vec3f(1.0));
     let corner = vec3u(first);
     let by = mix(along_y(corner, share), along_y(corner + vec3u(0u, 0u, 1u), share), share.z);

@@ -1,4 +1,4 @@
-// The camera, which all draw shaders use. Mirrored by cagework_gpu::render::layout::Camera.
+// Camera parameters and colour conversions of all draw shaders. Mirrored by cagework_gpu::render::layout::Camera.
 
 struct Camera {
     clip_from_world: mat4x4f,
@@ -11,21 +11,22 @@ struct Camera {
     viewport: vec2f,
     /// Pixels of the target per CSS pixel.
     scale: f32,
-    /// 1 if shaders must encode sRGB, because the target's format does not.
+    /// 1 if shaders must convert colours to sRGB, because the render target stores values unchanged; otherwise 0.
     encode: u32,
     /// Colours of the background at the top and the bottom, linear.
     background_top: vec4f,
     background_bottom: vec4f,
     /// Colour of the floor grid, linear, straight alpha.
     floor_color: vec4f,
-    /// Centre of the floor, world space, and its radius, object units.
+    /// Centre of the floor, world space.
     floor_center: vec3f,
+    /// Distance from the centre at which the floor has faded out, object units.
     floor_radius: f32,
     /// Spacing of the grid lines, object units.
     floor_spacing: f32,
-    /// Decrease of clip depth per relative decrease of view depth, see `lifted`.
+    /// Decrease of a position's clip z per relative decrease of its view depth, see `lifted` in overlay.wgsl.
     lift: f32,
-    /// Size of a pixel of the target, clip space.
+    /// Width and height of a pixel of the render target, clip space.
     pixel: vec2f,
 }
 
@@ -47,7 +48,7 @@ fn linear_from_srgb(srgb: vec3f) -> vec3f {
     return select(high, srgb / 12.92, srgb <= vec3f(0.04045));
 }
 
-/// Colour for the target: premultiplied, and in sRGB if the target's format does not encode.
+/// Colour to write to the render target: multiplied by alpha, and converted to sRGB if the target does not do that.
 fn to_target(linear: vec3f, alpha: f32) -> vec4f {
     var color = clamp(linear, vec3f(0.0), vec3f(1.0));
     if camera.encode == 1u { color = srgb_from_linear(color); }

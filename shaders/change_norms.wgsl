@@ -1,10 +1,12 @@
-// Inner sum of Eq. 2: change of each cell's weights between two fields, summed over the columns of a batch.
-// One invocation per row; batches add to `changes`. CPU: cagework_core::stencil::change_norms.
+// Inner sum of Eq. 2 in Joshi et al. 2007: for each cell, sums the squared changes of its weights between two fields
+// over the columns of a batch, and adds the sum to `changes`. One invocation per row of the fields. CPU:
+// cagework_core::stencil::change_norms.
 
-/// Bits of `mode`: sum absolute values instead of squares; overwrite `changes`, for the first batch.
+/// Bits of `mode`. CHANGE_ABSOLUTE: sum absolute values instead of squares. CHANGE_FIRST, for the first batch:
+/// overwrite `changes` instead of adding to them.
 const CHANGE_ABSOLUTE = 1u;
 const CHANGE_FIRST = 2u;
-/// Changes of a weight below this are ignored, because their squares would be denormal.
+/// Smaller changes of a weight are counted as 0, because their squares would be denormal numbers.
 const CHANGE_NEGLIGIBLE = 1e-18f;
 
 @group(0) @binding(0) var<uniform> work: Work;

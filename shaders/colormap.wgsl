@@ -1,4 +1,5 @@
-// Cividis (Nuñez et al. 2018) at ten equidistant values. Same values as cagework_gpu::render::colormap.
+// The colour map cividis (Nuñez et al. 2018) at ten equidistant values, sRGB, 0 to 255. The same values are in
+// cagework_gpu::render::colormap.
 
 const STOPS = array<vec3f, 10>(
     vec3f(0.0, 34.0, 78.0), vec3f(18.0, 53.0, 112.0), vec3f(59.0, 73.0, 108.0), vec3f(87.0, 93.0, 109.0),
@@ -6,12 +7,12 @@ const STOPS = array<vec3f, 10>(
     vec3f(195.0, 179.0, 105.0), vec3f(225.0, 204.0, 85.0), vec3f(254.0, 232.0, 56.0),
 );
 
-/// Colour of negative weights: magenta, which is not in cividis. Linear.
+/// Colour of negative weights, linear: magenta, which does not occur in cividis.
 const NEGATIVE_COLOR = vec3f(0.68, 0.02, 0.28);
-/// Weights below this value are drawn as negative; smaller deviations are rounding.
+/// Weights below this value are drawn in NEGATIVE_COLOR. Negative weights closer to zero are rounding errors.
 const NEGATIVE_THRESHOLD = -1e-5f;
 
-/// Colour of a value in [0, 1], linear.
+/// Linear colour of a value; values outside 0 to 1 are clamped.
 fn cividis(value: f32) -> vec3f {
     var stops = STOPS;
     let at = clamp(value, 0.0, 1.0) * 9.0;

@@ -1,6 +1,7 @@
-// Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), into the vertex buffer that is drawn. One invocation
-// per bundle of 4 vertices, so that each control vertex is read once for four. Slices of 8 bundles store their entries
-// column by column, so that adjacent invocations read adjacent entries. CPU: cagework_core::stencil::deform_vertices.
+// Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), written to the vertex buffer that is drawn. One
+// invocation per bundle of 4 vertices, so that a control vertex is read once for all four. Bundles are stored in slices
+// of 8: first entry of each bundle, second entry of each bundle, and so on, so that adjacent invocations read adjacent
+// entries. CPU: cagework_core::stencil::deform_vertices.
 
 /// Vertices per bundle: the components of a vec4f.
 const BUNDLE = 4u;
@@ -10,7 +11,7 @@ const SLICE = 8u;
 @group(0) @binding(0) var<uniform> work: Work;
 /// First entry of each slice in `columns` and `weights`, divided by 8.
 @group(0) @binding(1) var<storage, read> slices: array<u32>;
-/// Control vertices of the bundles' entries. Padding entries have the weight 0.
+/// Control vertex of each entry. Entries that pad a bundle to the length of its slice have the weight 0.
 @group(0) @binding(2) var<storage, read> columns: array<u32>;
 /// Weights of the bundle's four vertices, one vec4f per entry.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;

@@ -1,4 +1,4 @@
-// Vertical background gradient, dithered by half a colour step against banding. One triangle.
+// Vertical background gradient. Noise of half an 8-bit colour step prevents visible bands. Draws one triangle.
 
 struct Varying {
     @builtin(position) clip: vec4f,

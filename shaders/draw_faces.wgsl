@@ -1,5 +1,5 @@
-// Selected faces of the cage, translucent. Each triangle has two items: (state and first corner, second corner) and
-// (third corner, unused). One instance per triangle, three vertices each.
+// Draws the selected faces of the cage as translucent triangles. A triangle has two items: (state and first corner,
+// second corner) and (third corner, unused). One instance of three vertices per triangle.
 
 struct Varying {
     @builtin(position) clip: vec4f,

@@ -1,4 +1,5 @@
-// Floor grid that fades out with distance. Every tenth line is stronger, and the x and z axes are coloured. One quad.
+// Draws the floor grid as one quad. The grid fades out with the distance from its centre. Every tenth line is stronger,
+// and the x and z axes are coloured.
 
 /// Colours of the x and z axes, linear.
 const X_COLOR = vec3f(0.55, 0.07, 0.09);
@@ -19,7 +20,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return Varying(camera.clip_from_world * vec4f(world, 1.0), world);
 }
 
-/// Coverage of a pixel by grid lines at whole numbers. `width`: width of the lines, pixels.
+/// Coverage of a pixel, 0 to 1, by the lines at integer x and by those at integer y. `slope`: change of `at` per pixel;
+/// `width`: width of the lines, pixels.
 fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
     let distance = abs(fract(at - 0.5) - 0.5) / max(slope, vec2f(1e-6));
     let cover = clamp(vec2f(0.5 * width + 0.5) - distance, vec2f(0.0), vec2f(1.0));

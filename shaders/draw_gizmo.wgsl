@@ -1,7 +1,7 @@
-// Transform gizmo, with simple shading.
+// Draws the transform gizmo. Faces seen at a grazing angle are darker.
 
 struct GizmoView {
-    /// Gizmo to world space. In gizmo space the axes have length 1.
+    /// Transformation from gizmo space, in which the axes have length 1, to world space.
     world_from_gizmo: mat4x4f,
 }
 

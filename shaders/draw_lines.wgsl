@@ -1,8 +1,8 @@
-// Anti-aliased segments with round ends and constant width in pixels. One instance per segment, six vertices each.
+// Draws anti-aliased segments with round ends and a constant width in pixels. One instance of six vertices per segment.
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// Distance along and across the segment from its first point, pixels.
+    /// Offset from the segment's first point along and across the segment, pixels.
     @location(0) place: vec2f,
     @location(1) @interpolate(flat) length: f32,
     @location(2) @interpolate(flat) half_width: f32,
@@ -18,7 +18,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     if state == HIDDEN || (a.z < 0.0 && b.z < 0.0) {
         return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), 0.0, 0.0, vec4f(0.0));
     }
-    // Clip at the near plane.
+    // Clip the segment at the near plane.
     if a.z < 0.0 { a = mix(a, b, a.z / (a.z - b.z)); }
     if b.z < 0.0 { b = mix(b, a, b.z / (b.z - a.z)); }
     let pixels = 0.5 * camera.viewport;
@@ -27,7 +27,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let along = select(vec2f(1.0, 0.0), from_a / max(length, 1e-6), length > 1e-6);
     let across = vec2f(-along.y, along.x);
     let half_width = 0.5 * state_width(state);
-    // Add half a pixel for the anti-aliased edge.
+    // Extend the quad by half a pixel on each side for the anti-aliased edge.
     let reach = half_width + 0.5;
     let is_b = index == 1u || index == 3u || index == 5u;
     let up = select(-reach, reach, index == 2u || index == 3u || index == 4u);
@@ -45,6 +45,6 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let distance = length(vec2f(in.place.x - nearest, in.place.y));
     let cover = clamp(in.half_width + 0.5 - distance, 0.0, 1.0);
     if cover <= 0.0 { discard; }
-    // Fade lines thinner than a pixel, to avoid gaps.
+    // Lines thinner than a pixel keep some coverage everywhere, so they have no gaps, but are drawn more transparent.
     return to_target(in.color.rgb, in.color.a * cover * min(1.0, 2.0 * in.half_width));
 }

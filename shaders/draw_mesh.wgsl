@@ -1,16 +1,16 @@
-// Draws the mesh with its material, or coloured by weights or errors, in studio light. The vertices come from
-// mesh_buffers.wgsl or mesh_textures.wgsl.
+// Draws the mesh with its material, in plain clay, or coloured by weights or errors, in studio light. mesh_buffers.wgsl
+// or mesh_textures.wgsl provides the vertices.
 
 struct Surface {
-    /// Factor of the base colour, linear RGBA.
+    /// Factor of vertex colour and texture, linear RGBA. For CLAY, the colour itself.
     base_color: vec4f,
     /// Source of the colour: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
     mode: u32,
     /// Fragments with an alpha below this are discarded.
     alpha_cutoff: f32,
-    /// Values of the first and last colour of the map. With materials, `high` is the strength of greying by `value`, 0
-    /// or 1.
+    /// WEIGHTS: weight of the colour map's first colour. ERRORS: its error, as a base-10 logarithm.
     low: f32,
+    /// WEIGHTS and ERRORS: the same for the last colour. Other modes: 1 to grey each vertex by its value, otherwise 0.
     high: f32,
 }
 
@@ -20,7 +20,8 @@ const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
 
-/// Factors of brightness and desaturation for greying.
+/// At full strength, greying replaces the share GREY_DESATURATION of a colour by grey of GREY_BRIGHTNESS times the
+/// colour's luminance.
 const GREY_BRIGHTNESS = 0.7;
 const GREY_DESATURATION = 0.8;
 
@@ -30,7 +31,7 @@ const GREY_DESATURATION = 0.8;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    // Centroid interpolation: normals that are extrapolated at outlines would face away from the eye.
+    // Without centroid interpolation, normals are extrapolated at outlines and may face away from the eye.
     @location(0) @interpolate(perspective, centroid) world: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) uv: vec2f,
@@ -45,7 +46,7 @@ fn vertex(@location(0) source: u32, @location(1) uv: vec2f, @location(2) color: 
     return Varying(clip, world, normal_at(source), uv, color, value_at(source));
 }
 
-/// Base colour of a value.
+/// Colour of a weight or an error, linear.
 fn value_color(value: f32) -> vec3f {
     if surface.mode == ERRORS {
         let digits = log(max(value, 1e-20)) / log(10.0);
@@ -72,12 +73,13 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
         base = vec4f(mix(base.rgb, vec3f(GREY_BRIGHTNESS * grey), strength), base.a);
     }
     var normal = in.normal;
-    // Light both sides. If the vertex normal is zero (triangles without area), use the normal from derivatives.
+    // Light both sides of a triangle. The vertex normal is zero if all triangles of a vertex have no area: use the
+    // normal of the drawn triangle instead.
     if !is_front { normal = -normal; }
     if dot(normal, normal) < 1e-6 { normal = faceForward(flat_normal, -to_eye(in.world), flat_normal); }
     if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }
     var lit = studio_light(base.rgb, in.world, normalize(normal));
-    // Shade heat maps weakly, so that colours match the legend.
+    // Shade colours of values weakly, so that they match the legend.
     if is_value { lit = mix(lit, base.rgb, 0.35); }
     return to_target(lit, base.a);
 }

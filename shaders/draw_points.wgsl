@@ -1,8 +1,8 @@
-// Round points of constant size in pixels, with a rim. One instance per point, six vertices each.
+// Draws round points of constant size in pixels, with a rim. One instance of six vertices per point.
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// Offset from the centre, pixels. Interpolation is linear: all corners have the same depth.
+    /// Offset from the centre, pixels. Interpolated linearly on the screen, because all corners have the same w.
     @location(0) place: vec2f,
     @location(1) @interpolate(flat) radius: f32,
     @location(2) @interpolate(flat) color: vec4f,

@@ -1,20 +1,22 @@
-// A layer of the grid, coloured by cell type or by a control's weights, with lines between cells. One quad. The cells
-// come from slice_buffers.wgsl or slice_textures.wgsl.
+// Draws one layer of the grid's cells, coloured by cell type or by a control's weights, with lines between cells. Draws
+// one quad. slice_buffers.wgsl or slice_textures.wgsl provides the cells.
 
 struct SliceView {
-    /// Outer corner of the first cell, world space.
+    /// Corner of the first cell that is a corner of the whole layer, world space.
     corner: vec3f,
-    /// Value of the last colour; 0 to colour by cell type.
+    /// Weight that the last colour of the colour map stands for; 0 to colour by cell type.
     high: f32,
-    /// Edge vector of a cell along u, object units; `v` is that along v.
+    /// Edge vector of a cell along the layer's first axis, object units.
     u: vec3f,
-    /// Number of cells along u; `n_v` is that along v.
+    /// Number of cells along the first axis.
     n_u: u32,
+    /// Edge vector of a cell along the layer's second axis, object units.
     v: vec3f,
+    /// Number of cells along the second axis.
     n_v: u32,
     /// Colour of each cell type (untyped, boundary, interior, exterior), linear, straight alpha.
     kinds: array<vec4f, 4>,
-    /// Lines between cells, linear, straight alpha.
+    /// Colour of the lines between cells, linear, straight alpha.
     line_color: vec4f,
 }
 
@@ -55,7 +57,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     // Fade out the lines if cells are only a few pixels wide.
     let visible = clamp(1.5 - 6.0 * max(slope.x, slope.y), 0.0, 1.0);
     let line = max(covers.x, covers.y) * visible * slice.line_color.a;
-    // Exterior cells are discarded, so they do not hide what is behind them.
+    // Discard exterior cells, so that the model and the cage behind them are visible.
     if content.x == EXTERIOR { discard; }
     return to_target(mix(color.rgb, slice.line_color.rgb, line), color.a);
 }

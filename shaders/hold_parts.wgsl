@@ -1,12 +1,13 @@
-// Fixed vertices and rigid pieces: moves fixed vertices back towards rest, and rigid pieces by their rigid motion. One
-// invocation per vertex, in place, after deform_vertices. CPU: cagework_pose::parts::hold_parts.
+// Replaces deformed positions of fixed vertices and rigid pieces: a fixed vertex moves back towards its rest position,
+// and a vertex of a rigid piece moves by the rigid motion of the piece. Runs in place after deform_vertices, one
+// invocation per vertex. CPU: cagework_pose::parts::hold_parts.
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// Rest position of each vertex, and the share of its displacement that is suppressed, 0 to 1.
+/// Rest position of each vertex, and the fraction of its displacement that is suppressed, 0 to 1.
 @group(0) @binding(1) var<storage, read> rest: array<vec4f>;
 /// Piece of each vertex, counted from 1; 0 for none.
 @group(0) @binding(2) var<storage, read> piece_of: array<u32>;
-/// Three rows of a matrix per piece: a vertex of the piece at x moves by rows * (x, 1).
+/// Three rows of a matrix for each piece. The displacement of its vertex with rest position x is rows * (x, 1).
 @group(0) @binding(3) var<storage, read> motions: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> positions: array<vec4f>;
 

@@ -1,17 +1,19 @@
-// Studio light, fixed to the camera: key light from the upper left, weak fill from the right, sky and ground.
+// Studio lighting. The key light from the upper left and the weak fill light from the right are fixed to the camera.
+// The light from sky and ground is fixed to the world.
 
+/// Directions to the two lights, view space, and colours, linear.
 const KEY_DIRECTION = vec3f(-0.43, 0.56, 0.71);
 const FILL_DIRECTION = vec3f(0.81, 0.05, 0.58);
 const KEY_COLOR = vec3f(0.90, 0.88, 0.84);
 const FILL_COLOR = vec3f(0.14, 0.16, 0.20);
 const SKY_COLOR = vec3f(0.26, 0.28, 0.32);
 const GROUND_COLOR = vec3f(0.10, 0.095, 0.09);
-/// Blinn-Phong exponent, and strength of highlight and rim.
+/// Blinn-Phong exponent of the highlight, and strengths of highlight and rim light.
 const HIGHLIGHT_EXPONENT = 28.0;
 const HIGHLIGHT_STRENGTH = 0.07;
 const RIM_STRENGTH = 0.10;
 
-/// Light reflected to the eye by a surface of `color`. `normal`: unit, world space, facing the eye.
+/// Light that a surface of this colour reflects to the eye, linear. `normal`: unit, world space, facing the eye.
 fn studio_light(color: vec3f, point: vec3f, normal: vec3f) -> vec3f {
     let view = to_eye(point);
     let in_view = (camera.view_from_world * vec4f(normal, 0.0)).xyz;

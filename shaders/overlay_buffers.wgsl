@@ -1,4 +1,4 @@
-// Tables of overlay.wgsl in buffers, which kernels can write. See also overlay_textures.wgsl.
+// Positions and items of overlays in storage buffers, which kernels can write. See also overlay_textures.wgsl.
 
 @group(1) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(2) var<storage, read> items: array<vec2u>;

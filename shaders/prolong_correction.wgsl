@@ -1,11 +1,12 @@
-// Prolongation to black rows with two or eight coarse neighbours: adds the interpolated correction, which is zero
-// outside the cage. For the initial guess of full multigrid, overwrites the rows by the mean of the neighbours that are
-// unknowns. One invocation per table entry and quad. CPU: cagework_core::stencil::prolong_correction.
+// Prolongation: adds to each black row the mean correction of its two or eight coarse neighbours, which is zero outside
+// the cage. With PROLONG_REPLACE, for the initial guess of full multigrid, replaces the row by the mean of those coarse
+// neighbours that are unknowns. One invocation per table entry and quad of columns. CPU:
+// cagework_core::stencil::prolong_correction.
 
 /// Value of `mode` that replaces values instead of adding corrections.
 const PROLONG_REPLACE = 1u;
-/// Words of an entry before the rows of its `n_sources` coarse neighbours: fine row, 1 / (number of coarse
-/// unknowns) as bits.
+/// Number of words in an entry before the rows of its `n_sources` coarse neighbours. They are the fine row, and the
+/// bits of 1 / (number of coarse neighbours that are unknowns).
 const ENTRY_HEAD = 2u;
 
 @group(0) @binding(0) var<uniform> work: Work;

@@ -1,12 +1,12 @@
-// Sums in a fixed order, so results are reproducible. An invocation adds every 256th of the workgroup's 4096 values,
-// then the workgroup adds the sums of its invocations as a tree. CPU: cagework_core::stencil::reduce.
+// Sums in a fixed order, so that results are reproducible. Each invocation adds every 256th of the workgroup's 4096
+// values, then the workgroup adds the 256 sums pairwise. CPU: cagework_core::stencil::reduce.
 
 const REDUCE_LANES = 256u;
 const REDUCE_VALUES = 4096u;
 
 var<workgroup> sums: array<f32, 256>;
 
-/// Sum over the workgroup, returned to every invocation.
+/// Returns to every invocation the sum of `value` over the workgroup.
 fn tree_sum(lane: u32, value: f32) -> f32 {
     sums[lane] = value;
     workgroupBarrier();

@@ -1,5 +1,5 @@
-// Sums all partial sums into the slot `first_row` of `numbers`, which is read back. One workgroup. CPU:
-// cagework_core::stencil::reduce_sum.
+// Adds all partial sums and stores the total in `numbers[first_row]`, which the CPU reads back. Runs as one workgroup.
+// CPU: cagework_core::stencil::reduce_sum.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> partials: array<f32>;

@@ -1,6 +1,6 @@
-// Gauss-Seidel on the rows of one colour, in place: u += omega ((f + sum of neighbours) / diagonal - u). One invocation
-// per row and quad of columns. Neighbours have the other colour, so no invocation reads what another invocation writes.
-// CPU: cagework_core::stencil::relax_cells.
+// Gauss-Seidel or over-relaxation sweep over the rows of one colour, in place: u += omega ((f + sum of neighbours) /
+// diagonal - u). One invocation per row and quad of columns. Neighbours have the other colour, so no invocation reads
+// what another invocation writes. CPU: cagework_core::stencil::relax_cells.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> neighbours: array<u32>;
@@ -26,7 +26,7 @@ fn relax_cells(@builtin(global_invocation_id) id: vec3u) {
     sum += field[neighbours[6u * row + 4u] * work.n_quads + quad];
     sum += field[neighbours[6u * row + 5u] * work.n_quads + quad];
     let own = row * work.n_quads + quad;
-    // Divide instead of multiplying by 1/6, which f32 rounds up: the sums over columns would drift away from 1.
+    // Divide instead of multiplying by 1/6. f32 rounds 1/6 up, so the sums of weights over columns would drift from 1.
     let mean = sum / diagonal[row];
     if work.omega == 1.0 {
         field[own] = mean;

@@ -1,5 +1,5 @@
-// Residual f + sum of neighbours - diagonal u of the red rows and of their zero row, which stays zero. One
-// invocation per row and quad. CPU: cagework_core::stencil::residual.
+// Residual f + sum of neighbours - diagonal u of the red rows, and of the zero row after them, whose residual is zero.
+// One invocation per row and quad of columns. CPU: cagework_core::stencil::residual.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> neighbours: array<u32>;

@@ -1,5 +1,6 @@
-// Restriction: coarse right-hand side from 13 red residuals around each coarse cell, its centre and twelve
-// edge neighbours. One invocation per coarse row and quad. CPU: cagework_core::stencil::restrict_residual.
+// Restriction: the right-hand side of a coarse row is a weighted sum of 13 red residuals of the fine level, at the
+// centre of the coarse cell and at its twelve edge neighbours. One invocation per coarse row and quad of columns. CPU:
+// cagework_core::stencil::restrict_residual.
 
 /// Number of fine rows per coarse row.
 const N_AROUND = 13u;

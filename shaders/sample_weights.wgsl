@@ -1,12 +1,13 @@
-// Weights of mesh vertices for the columns of a batch, from the solved field and boundary values. One
-// invocation per vertex and quad. CPU: cagework_core::stencil::sample_weights.
+// Weights of mesh vertices for the columns of a batch. A vertex's interpolation stencil combines values of the solved
+// field and boundary values. One invocation per vertex and quad of columns. CPU:
+// cagework_core::stencil::sample_weights.
 
 @group(0) @binding(0) var<uniform> work: Work;
 /// First entry of each vertex in `nodes` and `hats`.
 @group(0) @binding(1) var<storage, read> starts: array<vec2u>;
 /// Field entries of the stencils: (row of the field, weight as bits).
 @group(0) @binding(2) var<storage, read> nodes: array<vec2u>;
-/// Dirichlet entries of the stencils: (control vertex, weight as bits).
+/// Boundary entries of the stencils: (control vertex, weight as bits). Each control's boundary value is 1 at itself.
 @group(0) @binding(3) var<storage, read> hats: array<vec2u>;
 @group(0) @binding(4) var<storage, read> field: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> block: array<vec4f>;

@@ -1,5 +1,5 @@
-// Skinning: v' = sum of w_j M_j (p + sum of t_k d_k) (glTF 2.0, sections 3.7.2.2 and 3.7.3.3), into the
-// vertex buffer that is drawn. One invocation per vertex. CPU: cagework_core::skin::skin_vertices.
+// Skinning: v' = sum of w_j M_j (p + sum of t_k d_k) (glTF 2.0, sections 3.7.2.2 and 3.7.3.3), written to the vertex
+// buffer that is drawn. One invocation per vertex. CPU: cagework_core::skin::skin_vertices.
 
 struct Influence { joint: u32, weight: f32 }
 struct Delta { target_index: u32, x: f32, y: f32, z: f32 }
@@ -7,11 +7,11 @@ struct Delta { target_index: u32, x: f32, y: f32, z: f32 }
 @group(0) @binding(0) var<uniform> work: Work;
 /// Rest positions in mesh space, without morph targets.
 @group(0) @binding(1) var<storage, read> rest: array<vec4f>;
-/// First influence and first delta of each vertex. `[n_vertices + 1]`
+/// Index of each vertex's first entry in `influences` and in `deltas`. `[n_vertices + 1]`
 @group(0) @binding(2) var<storage, read> starts: array<vec2u>;
 @group(0) @binding(3) var<storage, read> influences: array<Influence>;
 @group(0) @binding(4) var<storage, read> deltas: array<Delta>;
-/// Matrix from mesh to world space for each joint.
+/// For each joint, the matrix from mesh space to world space.
 @group(0) @binding(5) var<storage, read> palette: array<mat4x4f>;
 /// Weights of the morph targets.
 @group(0) @binding(6) var<storage, read> targets: array<f32>;

@@ -1,4 +1,4 @@
-// Sums of squares of a field's values, one partial sum per workgroup. CPU: cagework_core::stencil::sum_squares.
+// Adds the squares of a field's values, one partial sum per workgroup. CPU: cagework_core::stencil::sum_squares.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> field: array<vec4f>;

@@ -1,10 +1,10 @@
-// Area-weighted vertex normals. One invocation per vertex gathers its triangles: no atomics, fixed order of
-// additions. Vertices without triangles get zero. CPU: cagework_core::stencil::vertex_normals.
+// Area-weighted vertex normals. Each invocation adds the normals of one vertex's triangles in a fixed order, without
+// atomics. The normal of a vertex without triangles is zero. CPU: cagework_core::stencil::vertex_normals.
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// First entry of each vertex in `others`.
+/// Index of each vertex's first entry in `others`. `[n_vertices + 1]`
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
-/// The other two vertices of each triangle, counter-clockwise.
+/// For each vertex and each of its triangles, the triangle's other two vertices, counter-clockwise.
 @group(0) @binding(2) var<storage, read> others: array<vec2u>;
 @group(0) @binding(3) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> normals: array<vec4f>;

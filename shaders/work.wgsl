@@ -1,22 +1,23 @@
-// Parameters common to all kernels. Mirrored by cagework_gpu::layout::Work.
+// Parameters that all kernels share. Mirrored by cagework_gpu::layout::Work.
 
-/// Parameters of a dispatch. Each kernel defines its items (row and quad, vertex, ...); one invocation per item.
+/// Parameters of a dispatch. Each invocation handles one item. The kernel defines what an item is, such as a vertex or
+/// a row and quad. A quad is four columns of a batch, one vec4f.
 struct Work {
-    /// First item.
+    /// Index of the first item.
     first: u32,
     /// Number of items.
     count: u32,
-    /// Number of invocations per row of workgroups; further rows are along y.
+    /// Number of invocations in one row (y) of the dispatch's two-dimensional grid of workgroups.
     stride: u32,
-    /// Quads per row of a field: columns of the batch / 4.
+    /// Number of quads per row of a field: the number of the batch's columns / 4.
     n_quads: u32,
-    /// First row of the field, or first slot of the result, from which items are counted.
+    /// Row of the field, or slot of the result, that belongs to item 0.
     first_row: u32,
-    /// First quad of the batch.
+    /// Number of quads in all batches before this one.
     first_quad: u32,
-    /// Variant of the kernel; the kernel defines the values as constants.
+    /// Variant of the kernel. Kernels with variants define the values as constants.
     mode: u32,
-    /// Number of coarse rows from which a fine row is interpolated.
+    /// Number of coarse rows from which prolongation interpolates a fine row.
     n_sources: u32,
     /// Over-relaxation factor; 1 is Gauss-Seidel. Dimensionless.
     omega: f32,
@@ -25,7 +26,7 @@ struct Work {
 /// Value that stands for "no row" in tables.
 const NONE = 0xffffffffu;
 
-/// Index of an invocation in its dispatch. Invocations with an index from `work.count` on have no item.
+/// Index of an invocation in its dispatch. Invocations whose index is `work.count` or more have no item.
 fn invocation(id: vec3u, stride: u32) -> u32 {
     return id.x + id.y * stride;
 }
