@@ -91,7 +91,7 @@ impl Lattice {
         self.bound.iter().map(|&index| self.position(index)).collect()
     }
 
-    fn position(&self, index: u32) -> Vec3 {
+    pub(crate) fn position(&self, index: u32) -> Vec3 {
         self.origin + self.cell * self.node(index).as_vec3()
     }
 
@@ -101,6 +101,13 @@ impl Lattice {
         let at = (point - self.origin) / self.cell;
         let first = at.floor().clamp(Vec3::ZERO, (self.dims - 2).as_vec3());
         (self.index(first.as_uvec3()), (at - first).clamp(Vec3::ZERO, Vec3::ONE))
+    }
+
+    /// As [`Self::place`]; `None` outside the lattice.
+    pub(crate) fn cell_of(&self, point: Vec3) -> Option<(usize, Vec3)> {
+        let at = (point - self.origin) / self.cell;
+        let is_inside = at.cmpge(Vec3::ZERO).all() && at.cmple((self.dims - 1).as_vec3()).all();
+        is_inside.then(|| self.place(point))
     }
 
     /// Nodes inside the cage or near it, ascending. A flood fill from the first node spreads over nodes that are
@@ -150,7 +157,7 @@ impl Lattice {
     }
 
     /// The eight nodes of a cell, given the first one, x fastest.
-    fn corners(&self, first: usize) -> [usize; 8] {
+    pub(crate) fn corners(&self, first: usize) -> [usize; 8] {
         let (y, z) = (self.stride_of(1), self.stride_of(2));
         [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1].map(|step| first + step)
     }
@@ -267,8 +274,7 @@ impl Field {
     /// Deformation gradient F at a point, which maps small vectors at the point. The identity outside the lattice.
     #[must_use]
     pub fn gradient(&self, point: Vec3) -> Mat3 {
-        let at = (point - self.lattice.origin) / self.lattice.cell;
-        if at.cmplt(Vec3::ZERO).any() || at.cmpgt((self.lattice.dims - 1).as_vec3()).any() {
+        if self.lattice.cell_of(point).is_none() {
             return Mat3::IDENTITY;
         }
         Mat3::IDENTITY + self.interpolated(point, |node| self.gradients[node])
@@ -281,6 +287,14 @@ impl Field {
     #[must_use]
     pub fn node_gradient(&self, node: usize) -> Mat3 {
         Mat3::IDENTITY + self.gradients[node]
+    }
+
+    /// Displacement and columns of F - I of a node, each with a fourth component of no meaning.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, node: usize) -> [f32; 16] {
+        let Mat3 { x_axis, y_axis, z_axis } = self.gradients[node];
+        let columns = [self.values[node], x_axis.extend(0.0), y_axis.extend(0.0), z_axis.extend(0.0)];
+        std::array::from_fn(|lane| columns[lane / 4][lane % 4])
     }
 
     /// Position of a point after the deformation.

@@ -30,6 +30,7 @@ pub mod skin;
 pub mod slice;
 pub mod smooth;
 pub mod solve;
+pub mod splats;
 pub mod stencil;
 pub mod team;
 pub mod transfer;

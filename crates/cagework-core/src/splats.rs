@@ -1,0 +1,258 @@
+//! Gaussian splats (Kerbl et al. 2023, "3D Gaussian Splatting for Real-Time Radiance Field Rendering") and their
+//! deformation by a [`Field`]: the centre moves by u, the covariance becomes F S F^T, and the spherical harmonics turn
+//! with the rotation in F.
+
+mod harmonics;
+mod sorted;
+
+use glam::{Mat3, Quat, Vec3};
+
+use crate::field::Field;
+use crate::rotation::nearest_rotation;
+use crate::team::map_indices;
+
+pub use harmonics::{MAX_DEGREE, harmonic_basis, n_harmonics, rotate_harmonics};
+pub use sorted::{SortedSplats, deform_splats};
+
+/// Length of a splat's half axis at which the error of its first-order deformation is measured, standard deviations:
+/// the mean of the Gaussian over two points at this distance has the same variance.
+const AXIS_SIGMAS: f32 = 1.732_050_8;
+/// Error of the first-order deformation above which a splat is counted, as a fraction of its half axis.
+pub const MAX_FIRST_ORDER_ERROR: f32 = 0.1;
+/// Half diagonal of the octahedra that stand for splats when a cage is made, standard deviations.
+const SHELL_SIGMAS: f32 = 1.5;
+/// Opacity below which a splat does not belong to the captured object.
+const MIN_SHELL_OPACITY: f32 = 0.1;
+/// Share of the splats, the largest ones, that do not belong to the captured object.
+const LARGEST_SHARE: f64 = 0.01;
+
+/// Gaussian splats. All arrays have one entry per splat, unless stated otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Splats {
+    /// Centres, object units.
+    pub positions: Vec<Vec3>,
+    /// Standard deviations along the three axes, object units, not negative.
+    pub scales: Vec<Vec3>,
+    /// Rotations of the axes, unit quaternions.
+    pub rotations: Vec<Quat>,
+    /// Opacities at the centre, 0 to 1.
+    pub opacities: Vec<f32>,
+    /// Colours without spherical harmonics, sRGB; 0 to 1 is displayable.
+    pub colors: Vec<Vec3>,
+    /// Degree of the spherical harmonics, 0 to [`MAX_DEGREE`].
+    pub degree: u8,
+    /// Red, green and blue coefficients of bands 1 to `degree`, in the order of [`harmonic_basis`].
+    /// `[n_splats, n_harmonics(degree)]`
+    pub harmonics: Vec<Vec3>,
+}
+
+/// Positions and covariances of splats, as they are drawn.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SplatPose {
+    /// Centres, object units.
+    pub positions: Vec<Vec3>,
+    /// xx, xy, xz, yy, yz and zz of the covariance matrix, square object units.
+    pub covariances: Vec<[f32; 6]>,
+}
+
+impl Splats {
+    /// Memory of a splat with spherical harmonics of a degree, bytes.
+    #[must_use]
+    pub fn bytes_per_splat(degree: u8) -> u64 {
+        (size_of::<[Vec3; 3]>() + size_of::<Quat>() + size_of::<f32>()) as u64
+            + (n_harmonics(degree) * size_of::<Vec3>()) as u64
+    }
+
+    /// Number of splats.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are no splats.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Axes of a splat: columns with the lengths of the standard deviations.
+    #[must_use]
+    pub fn axes(&self, splat: usize) -> Mat3 {
+        Mat3::from_quat(self.rotations[splat]) * Mat3::from_diagonal(self.scales[splat])
+    }
+
+    /// Spherical harmonics of a splat, bands 1 to `degree`.
+    #[must_use]
+    pub fn harmonics_of(&self, splat: usize) -> &[Vec3] {
+        let n = n_harmonics(self.degree);
+        &self.harmonics[splat * n..][..n]
+    }
+
+    /// Positions and covariances at rest.
+    #[must_use]
+    pub fn rest_pose(&self) -> SplatPose {
+        let covariances = map_indices(self.len(), |splat| splat_covariance(self.axes(splat)));
+        SplatPose { positions: self.positions.clone(), covariances }
+    }
+
+    /// The splats after a rotation about the origin.
+    #[must_use]
+    pub fn rotated(&self, by: Quat) -> Self {
+        let matrix = Mat3::from_quat(by);
+        let mut turned = self.clone();
+        turned.positions.iter_mut().for_each(|p| *p = matrix * *p);
+        turned.rotations.iter_mut().for_each(|q| *q = (by * *q).normalize());
+        if self.degree > 0 {
+            for of_splat in turned.harmonics.chunks_mut(n_harmonics(self.degree)) {
+                rotate_harmonics(matrix, of_splat);
+            }
+        }
+        turned
+    }
+
+    /// The splats after the deformation, in the form that files store. Splats that the field does not change keep all
+    /// their bits.
+    #[must_use]
+    pub fn deformed(&self, field: &Field) -> Self {
+        struct Bent {
+            position: Vec3,
+            shape: Option<(Vec3, Quat, Mat3)>,
+        }
+        let of_splat = |splat: usize| {
+            let (position, gradient) = (self.positions[splat], field.gradient(self.positions[splat]));
+            let shape = (gradient != Mat3::IDENTITY).then(|| {
+                let (scale, rotation) = decompose(gradient * self.axes(splat));
+                let turn = if self.degree > 0 {
+                    nearest_rotation(gradient.as_dmat3()).as_mat3()
+                } else {
+                    Mat3::IDENTITY
+                };
+                (scale, rotation, turn)
+            });
+            Bent { position: position + field.displacement(position), shape }
+        };
+        let mut deformed = self.clone();
+        let n = n_harmonics(self.degree);
+        for (splat, bent) in map_indices(self.len(), of_splat).into_iter().enumerate() {
+            deformed.positions[splat] = bent.position;
+            if let Some((scale, rotation, turn)) = bent.shape {
+                (deformed.scales[splat], deformed.rotations[splat]) = (scale, rotation);
+                rotate_harmonics(turn, &mut deformed.harmonics[splat * n..][..n]);
+            }
+        }
+        deformed
+    }
+
+    /// Error of the first-order deformation of each splat: distance of the true images of both ends of its longest half
+    /// axis from the linear ones, at most, as a fraction of the half axis.
+    #[must_use]
+    pub fn first_order_errors(&self, field: &Field) -> Vec<f32> {
+        map_indices(self.len(), |splat| {
+            let (center, axes) = (self.positions[splat], self.axes(splat));
+            let squared = |a: &Vec3| a.length_squared();
+            let longest = [axes.x_axis, axes.y_axis, axes.z_axis]
+                .into_iter()
+                .max_by(|a, b| squared(a).total_cmp(&squared(b)))
+                .unwrap_or_default();
+            let half = AXIS_SIGMAS * longest;
+            let linear = field.gradient(center) * half;
+            let u = field.displacement(center);
+            let error =
+                |side: f32| (field.displacement(center + side * half) - u + side * (half - linear)).length();
+            if half == Vec3::ZERO { 0.0 } else { error(1.0).max(error(-1.0)) / half.length() }
+        })
+    }
+
+    /// Number of splats whose first-order error exceeds [`MAX_FIRST_ORDER_ERROR`].
+    #[must_use]
+    pub fn n_inexact(&self, field: &Field) -> usize {
+        self.first_order_errors(field).into_iter().filter(|&error| error > MAX_FIRST_ORDER_ERROR).count()
+    }
+
+    /// A triangle soup with an octahedron per splat, from which a cage can be generated. Transparent splats and the
+    /// largest ones are left out, unless nothing remains: captures contain haze and background.
+    #[must_use]
+    pub fn shells(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        const FACES: [[u32; 3]; 8] =
+            [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let mut sizes: Vec<f32> = self.scales.iter().map(|s| s.max_element()).collect();
+        let last = sizes.len().saturating_sub(1);
+        let rank = ((1.0 - LARGEST_SHARE) * last as f64).ceil() as usize;
+        let largest =
+            if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(rank, f32::total_cmp).1 };
+        let solid =
+            |&s: &usize| self.opacities[s] >= MIN_SHELL_OPACITY && self.scales[s].max_element() <= largest;
+        let mut kept: Vec<usize> = (0..self.len()).filter(solid).collect();
+        if kept.is_empty() {
+            kept = (0..self.len()).collect();
+        }
+        let corners = |&splat: &usize| {
+            let [x, y, z] = (SHELL_SIGMAS * self.axes(splat)).to_cols_array_2d().map(Vec3::from_array);
+            [x, -x, y, -y, z, -z].map(|axis| self.positions[splat] + axis)
+        };
+        let positions = kept.iter().flat_map(corners).collect();
+        let of_splat = |k: u32| FACES.map(|face| face.map(|corner| 6 * k + corner));
+        (positions, (0..kept.len() as u32).flat_map(of_splat).collect())
+    }
+}
+
+/// Covariance matrix A A^T of a splat with axes A: xx, xy, xz, yy, yz, zz.
+#[must_use]
+pub fn splat_covariance(axes: Mat3) -> [f32; 6] {
+    let Mat3 { x_axis, y_axis, z_axis } = axes * axes.transpose();
+    [x_axis.x, x_axis.y, x_axis.z, y_axis.y, y_axis.z, z_axis.z]
+}
+
+/// Scales and rotation of the splat with the covariance A A^T.
+///
+/// These are the singular values and left singular vectors of A, by one-sided Jacobi rotations of its columns
+/// (Hestenes 1958). A is not squared, so that thin splats keep the digits of their smallest scale, and the axes keep
+/// their order.
+#[must_use]
+pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
+    /// Limit on the sweeps; three or four suffice.
+    const SWEEPS: usize = 8;
+    /// Cosine of the angle between two columns that are orthogonal up to rounding.
+    const ORTHOGONAL: f32 = 1e-7;
+    let largest = axes.to_cols_array().iter().fold(0.0_f32, |a, x| a.max(x.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        return (Vec3::ZERO, Quat::IDENTITY);
+    }
+    let mut columns = (axes * largest.recip()).to_cols_array_2d().map(Vec3::from_array);
+    for _ in 0..SWEEPS {
+        let mut is_done = true;
+        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+            let (a, b) = (columns[i], columns[j]);
+            let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
+            if ab.abs() <= ORTHOGONAL * (aa * bb).sqrt() {
+                continue;
+            }
+            is_done = false;
+            let half_cotangent = (bb - aa) / (2.0 * ab);
+            let tangent = half_cotangent.signum() / (half_cotangent.abs() + half_cotangent.hypot(1.0));
+            let cos = tangent.mul_add(tangent, 1.0).sqrt().recip();
+            let sin = cos * tangent;
+            (columns[i], columns[j]) = (cos * a - sin * b, sin * a + cos * b);
+        }
+        if is_done {
+            break;
+        }
+    }
+    let scales = Vec3::from_array(columns.map(Vec3::length));
+    // The two longest columns define the rotation; the third axis completes it, also for a flat splat.
+    let third = scales.min_position();
+    let [first, second] = [(third + 1) % 3, (third + 2) % 3];
+    let (long, short) = if scales[first] >= scales[second] { (first, second) } else { (second, first) };
+    let u = columns[long].normalize();
+    let v = (columns[short] - u * u.dot(columns[short]))
+        .try_normalize()
+        .unwrap_or_else(|| u.any_orthonormal_vector());
+    let mut unit = [Vec3::ZERO; 3];
+    (unit[long], unit[short]) = (u, v);
+    unit[third] = unit[first].cross(unit[second]);
+    let rotation = Quat::from_mat3(&Mat3::from_cols(unit[0], unit[1], unit[2])).normalize();
+    (scales * largest, rotation)
+}
+
+#[cfg(test)]
+mod tests;
