@@ -1,5 +1,5 @@
-// Draws a texture into the viewport as one triangle. Composes pictures on WebGL2 canvases, into which textures cannot be
-// copied.
+// Draws a texture into the viewport as one triangle. Composes pictures on WebGL2 canvases, to which textures cannot
+// be copied.
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
 

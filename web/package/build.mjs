@@ -1,7 +1,7 @@
 // Builds the npm package into web/package/dist, from its sources and the output of `cargo xtask wasm`.
 //
-// Modules are not bundled, and refer to workers and wasm files in the form that browsers, Node and bundlers all understand. Only
-// the decoders of compressed files are bundled, so that the package has no dependencies.
+// Modules are not bundled. They refer to workers and wasm files in a form that browsers, Node and bundlers understand.
+// Only the decoders of compressed files are bundled, so that the package has no dependencies.
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -24,12 +24,12 @@ for (const [folder, name] of [
   }
 }
 
-/** Adds the file extensions that browsers and Node need and TypeScript's sources omit. */
+/** Adds to imports the file extensions that browsers and Node need but TypeScript's sources omit. */
 const whole = (text) =>
   text
     .replace(/(\bfrom |\bimport\(|\bimport )"(\.{1,2}\/[^"]+?)(?:\.js)?"/g, '$1"$2.js"')
     .replace(/(new URL\("\.{1,2}\/[^"]+)\.ts"/g, '$1.js"');
-/** Only types of the public interface are published. */
+/** Whether a file declares types of the public interface. Other declarations are not published. */
 const isPublic = (path) => /^(index|element|types|contract\/(generated|work))\.d\.ts$/.test(path);
 for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true })) {
   if (!/\.(js|d\.ts)$/.test(entry.name)) continue;

@@ -1,6 +1,6 @@
 import { defineConfig } from "@playwright/test";
 
-/** Serves the blank project in which the package is installed. */
+/** Address of the server that serves the project in which the package is installed. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4181}/`;
 
 export default defineConfig({

@@ -14,7 +14,7 @@ import type { Api, Cage, CallOptions, File, Named, Weights } from "./types";
 export interface Runtime {
   readonly pkg: Package;
   openClient(): Client;
-  /** Limit of parallel jobs. */
+  /** Maximum number of jobs that run in parallel. */
   readonly most: number;
   readonly hasGpu: boolean;
 }
@@ -28,8 +28,8 @@ export function createApi(open: () => Promise<Runtime>): Api {
     return createPool(openClient, most);
   });
   /**
-   * Runs a job in a worker. An abort rejects at once, even while the job is queued or the module loads; so does an error thrown
-   * by `onProgress`.
+   * Runs a job in a worker. Rejects at once if `signal` aborts, even while the job is queued or the module loads, or if
+   * `onProgress` throws an error.
    */
   const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: CallOptions) =>
     new Promise<Jobs[K]["output"]>((resolve, reject) => {
@@ -123,7 +123,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
   };
 }
 
-/** Opens once. After a failure, such as a failed download, the next call tries again. */
+/** Returns a function that calls `open` once. After a failure, such as a failed download, its next call tries again. */
 function once<T>(open: () => Promise<T>): () => Promise<T> {
   let opening: Promise<T> | undefined;
   return () => {
@@ -137,7 +137,7 @@ function once<T>(open: () => Promise<T>): () => Promise<T> {
 
 const BIND_ON_CPU: BindOptions = { ...BIND_DEFAULTS, backend: "cpu" };
 
-/** The classic method defaults to the Jacobi solver, as in the command. */
+/** Adds default options. The classic method defaults to the Jacobi solver, as in the `cagework` command. */
 function bindOptions(given: Partial<BindOptions>): BindOptions {
   const solver = given.method === "classic" ? "jacobi" : BIND_ON_CPU.solver;
   return optionsOf({ ...BIND_ON_CPU, solver }, given);

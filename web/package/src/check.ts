@@ -1,4 +1,4 @@
-/** Checks the arguments of the package's functions. Errors name the argument, its value and the expected one. */
+/** Checks and converts the arguments of the package's functions. Errors name the argument and its value. */
 
 import { named } from "./session/client";
 
@@ -15,19 +15,19 @@ function lengthOf(name: string, given: unknown): number {
   throw wrong(`${name} is ${given === null ? "null" : typeof given}; it must be an array of numbers`);
 }
 
-/** Points, three numbers each, flattened. */
+/** Checks that an array has three numbers per point, and converts it to 32-bit floats. */
 export function pointsOf(name: string, given: ArrayLike<number>): Float32Array {
   requireTriples(name, lengthOf(name, given), "point");
   return given instanceof Float32Array ? given : Float32Array.from(given);
 }
 
-/** Triangles, three indices each, flattened. */
+/** Checks that an array has three indices per triangle, and converts it to 32-bit integers. */
 export function trianglesOf(name: string, given: ArrayLike<number>): Uint32Array {
   requireTriples(name, lengthOf(name, given), "triangle");
   return indicesOf(name, given);
 }
 
-/** Non-negative integers. */
+/** Checks that an array contains integers from 0 to 2^32 - 1, and converts it to 32-bit integers. */
 export function indicesOf(name: string, given: ArrayLike<number>): Uint32Array {
   lengthOf(name, given);
   if (given instanceof Uint32Array) return given;
@@ -44,14 +44,14 @@ function requireTriples(name: string, length: number, what: string): void {
   throw wrong(`${name} has ${length} numbers; three for each ${what} are needed, so ${next - 3} or ${next}`);
 }
 
-/** Three finite numbers. */
+/** Checks that an array contains three finite numbers, and converts it to 64-bit floats. */
 export function originOf(name: string, given: ArrayLike<number>): Float64Array {
   if (lengthOf(name, given) === 3 && Array.from(given).every(Number.isFinite))
     return Float64Array.from(given);
   throw wrong(`${name} is ${Array.from(given).join(", ")}; it must be three finite numbers`);
 }
 
-/** A pose: as many points as the cage has. */
+/** Checks that a pose has as many points as the cage and that they are finite, and converts it to 32-bit floats. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);
   if (posed.length !== cage.length) {
@@ -62,7 +62,9 @@ export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Arr
   throw wrong(`posed has ${posed[wrongOne]} at ${wrongOne}; it must contain finite 32-bit numbers`);
 }
 
-/** The given options that `defaults` contains, over `defaults`. Checks their types only; Rust checks values. */
+/**
+ * `defaults` with the values of given options of the same name. Checks the types of values; Rust checks their ranges.
+ */
 export function optionsOf<T extends object>(defaults: T, given: object): T {
   const known = Object.entries(given).filter(([name, value]) => name in defaults && value !== undefined);
   for (const [name, value] of known) {
@@ -72,7 +74,7 @@ export function optionsOf<T extends object>(defaults: T, given: object): T {
   return { ...defaults, ...Object.fromEntries(known) };
 }
 
-/** Rejects option names that none of the sets contains. */
+/** Throws an error if an option is not a key of any of the `sets`. */
 export function requireKnown(given: object, ...sets: readonly object[]): void {
   const names = sets.flatMap((set) => Object.keys(set));
   const unknown = Object.keys(given).find((name) => !names.includes(name));

@@ -1,4 +1,4 @@
-/** Decompresses GLBs with Draco or meshopt. Loaded when the first such file is opened. */
+/** Decompresses glTF files with Draco or meshopt compression. The module is downloaded when the first one is opened. */
 
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";
@@ -27,7 +27,7 @@ export async function decompress(
   });
   try {
     const document = await readDocument(io, renamed(bytes), sibling);
-    // A GLB has one buffer; meshopt's fallback is a second one.
+    // Merge the buffers, because a GLB has only one and meshopt's fallback data is in a second one.
     await document.transform(dequantize(), unpartition());
     normaliseWeights(document);
     for (const extension of document.getRoot().listExtensionsUsed()) {
@@ -43,7 +43,10 @@ export async function decompress(
   }
 }
 
-/** Restores what quantisation changed: scales each vertex's weights to sum to 1, and sets the joints of zero weights to 0. */
+/**
+ * Restores what quantisation changed: scales each vertex's weights to sum to 1, and sets the joints of zero weights to
+ * 0.
+ */
 function normaliseWeights(document: Document): void {
   for (const primitive of document
     .getRoot()
@@ -97,7 +100,7 @@ function mentions(bytes: Uint8Array, word: string): boolean {
   return new TextDecoder().decode(bytes.subarray(...head)).includes(word);
 }
 
-/** Byte range of the JSON. */
+/** Byte range of the JSON in a GLB or glTF file. */
 function jsonRange(bytes: Uint8Array): [number, number] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const isGlb =
@@ -106,8 +109,8 @@ function jsonRange(bytes: Uint8Array): [number, number] {
 }
 
 /**
- * Renames KHR_meshopt_compression to EXT_meshopt_compression, the only name that the library knows. Both names have the same
- * length and the streams are the same.
+ * Renames KHR_meshopt_compression to EXT_meshopt_compression, the only name that the library knows. Both names have the
+ * same length and the streams are the same.
  */
 function renamed(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
   const copy = new Uint8Array(bytes);

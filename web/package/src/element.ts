@@ -1,5 +1,6 @@
 /**
- * `<cage-deformer src="fox.glb">`: shows a model in a cage whose vertices can be dragged. Documented in custom-elements.json.
+ * `<cage-deformer src="fox.glb">`: shows a model in a cage whose vertices can be dragged. Documented in
+ * custom-elements.json.
  */
 
 import { poseOf } from "./check";
@@ -8,7 +9,7 @@ import { attachPointer } from "./element/pointer";
 import { openView, type Ready, sceneOf, type View } from "./element/view";
 import { named } from "./session/client";
 
-/** Limit of the device pixel ratio: higher ratios are hardly visible and cost four times the pixels. */
+/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a hardly visible difference. */
 const MOST_SHARP = 2;
 /** Default number of cells along the cage's longest side. */
 const GRID = 64;
@@ -23,16 +24,16 @@ const STYLE = `
     pointer-events: none; text-align: center; text-wrap: balance; }
 `;
 
-// Servers lack HTMLElement: there the module can be imported, but defines no element.
+// Servers have no HTMLElement. They can import this module, but it defines no element there.
 const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 
 export class CageDeformer extends Base {
   static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
 
   #view: Promise<View> | undefined;
-  /** The view, once it is open. */
+  /** The view that `#view` resolves with; undefined until then. */
   #shown: View | undefined;
-  /** Incremented whenever something is opened or closed. Results with an older value are dropped. */
+  /** Number of calls of `#open` and `#close`. A result that belongs to an earlier call is ignored. */
   #asked = 0;
   #bound: Promise<Ready> | undefined;
   #canvas: HTMLCanvasElement | undefined;
@@ -61,7 +62,7 @@ export class CageDeformer extends Base {
     if (before === now) return;
     if (name === "theme") this.#shown?.engine.setScene(sceneOf(now));
     else if (this.isConnected && this.shadowRoot) this.#open();
-    // The element is not connected yet, or is being moved; connecting it opens the model.
+    // The element is not connected yet, or is being moved: `connectedCallback` will open the model.
     else this.#bound = undefined;
   }
 
@@ -88,7 +89,10 @@ export class CageDeformer extends Base {
     engine.setCagePositions(posed === null ? rest : poseOf(posed, rest));
   }
 
-  /** The posed model as a GLB, with its rig, clips, morph targets and materials. */
+  /**
+   * Returns the posed model as a GLB, with its rig, clips, morph targets and materials. Of a project with several
+   * models, returns the first. Waits until the model is bound.
+   */
   async export(): Promise<Uint8Array<ArrayBuffer>> {
     if (!this.#bound) throw named("Missing", "there is nothing to export: the element has no src");
     await this.#bound;
@@ -102,7 +106,7 @@ export class CageDeformer extends Base {
     const root = this.attachShadow({ mode: "open" });
     const style = new CSSStyleSheet();
     style.replaceSync(STYLE);
-    // A constructed style sheet: a Content-Security-Policy may forbid style elements.
+    // Use a constructed style sheet, because a Content-Security-Policy may forbid style elements.
     root.adoptedStyleSheets = [style];
     this.#said = document.createElement("p");
     this.#said.setAttribute("role", "status");
@@ -193,7 +197,7 @@ export class CageDeformer extends Base {
     const view = this.#view;
     this.#view = this.#shown = this.#bound = undefined;
     view?.then((view) => view.close()).catch(() => undefined);
-    // A canvas cannot be used with a second device.
+    // Replace the canvas, because it cannot be used with another GPU device.
     this.#freshCanvas();
   }
 

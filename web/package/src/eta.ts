@@ -1,10 +1,10 @@
 /** Estimates the time left from the fraction done. */
 
-/** Weight of a new speed measurement in the moving average. Stages differ in speed, so that old measurements must fade. */
+/** Weight of a new speed measurement in the moving average, which follows changes of speed between stages. */
 const SMOOTHING = 0.25;
-/** No estimate below this fraction: the first steps vary too much. */
+/** No time is estimated below this fraction, because the speed varies too much at first. */
 const FIRST_SHARE = 0.04;
-/** No estimate before this time, ms. */
+/** No time is estimated before this time since the start, ms. */
 const FIRST_MS = 250;
 
 export interface Eta {

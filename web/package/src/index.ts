@@ -6,7 +6,7 @@ import { createClient } from "./session/client";
 import { loadPart } from "./session/parts";
 import type { Api } from "./types";
 
-/** Limit of parallel workers: each bind uses a core, and more of them would only use memory. */
+/** Maximum number of parallel workers. A bind keeps one core busy, and each worker takes memory. */
 const MOST = 4;
 
 const api = /* @__PURE__ */ createApi(async () => {
@@ -18,10 +18,10 @@ const api = /* @__PURE__ */ createApi(async () => {
   return { pkg: WEBGPU.pkg, openClient, most, hasGpu: "gpu" in navigator };
 });
 
-// Documented here, because editors show the comment of the imported name.
+// The functions are documented here and not at `Api`, because editors show the comment of the imported name.
 /**
- * Binds points, `[n, 3]`, to a cage by harmonic coordinates. Runs on the processor, or with `backend: "gpu"` through WebGPU.
- * Rejects with an error whose `name` is an `ErrorName`, or with the signal's reason.
+ * Binds points, `[n, 3]`, to a cage by harmonic coordinates. Runs on the processor, or with `backend: "gpu"` through
+ * WebGPU. Rejects with an error whose `name` is an `ErrorName`, or with the signal's reason.
  */
 export const bind: Api["bind"] = api.bind;
 /** Generates a cage that strictly encloses a model. The model may be any triangle soup. */
@@ -29,13 +29,13 @@ export const generateCage: Api["generateCage"] = api.generateCage;
 /** Positions of the points in a pose of the cage, `[n_points, 3]`. Runs on the calling thread. */
 export const deform: Api["deform"] = api.deform;
 /**
- * Deforms the file of a model with a posed cage. A glTF keeps its rig, clips, morph targets and materials and is returned as a
- * GLB.
+ * Deforms the file of a model with a posed cage. A glTF keeps its rig, clips, morph targets and materials and is
+ * returned as a GLB.
  */
 export const reshape: Api["reshape"] = api.reshape;
 /**
- * Vertices and triangles of a file, in the order in which `reshape` binds them. With `states`, also the vertices of its morph
- * targets, for a cage that encloses them.
+ * Vertices and triangles of a file, in the order in which `reshape` binds them. With `states`, also the vertices of its
+ * morph targets, for a cage that encloses them.
  */
 export const readModel: Api["readModel"] = api.readModel;
 

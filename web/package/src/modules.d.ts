@@ -1,4 +1,4 @@
-// Types of packages that ship none; only the parts used here.
+// Types of packages that publish none. Only functions used here are declared.
 
 declare module "draco3dgltf/draco_decoder_gltf_nodejs.js" {
   export default function createDecoder(options: { wasmBinary: ArrayBuffer }): Promise<unknown>;

@@ -2,14 +2,14 @@
 
 import { MODEL_ENDINGS } from "./contract/generated";
 
-/** Lower-case extension without the dot, or "". */
+/** Lower-case extension of a file name without the dot; "" if the name has none. */
 export function extension(name: string): string {
   const base = name.split("/").at(-1) ?? name;
   const dot = base.lastIndexOf(".");
   return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
 }
 
-/** Rank of a model format, 0 for the one that keeps most; -1 if the file is not a model. */
+/** Rank of a file's model format, 0 for the format that can store most information; -1 if the file is not a model. */
 export function rankOf(name: string): number {
   return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));
 }

@@ -19,7 +19,7 @@ const { bind, generateCage, deform, reshape, readModel } = api;
 
 export { bind, deform, generateCage, readModel, reshape };
 
-/** Gives a thread the interface of a browser's worker. It keeps the process alive only while it runs jobs. */
+/** Gives a thread the interface of a browser's worker. The thread keeps the process alive only while it runs jobs. */
 function openThread(): Worker {
   const thread = new Thread(new URL("./worker-node.ts", import.meta.url));
   const target = new EventTarget();

@@ -12,7 +12,7 @@ import type {
 } from "./contract/generated";
 import type { Reading } from "./contract/work";
 
-/** Options of every long call. */
+/** Options of all functions that run in a worker. */
 export interface CallOptions {
   /** Cancels the call at once; the promise is rejected with the signal's reason. */
   readonly signal?: AbortSignal | undefined;
@@ -20,8 +20,9 @@ export interface CallOptions {
 }
 
 /**
- * Origin to which 32-bit positions are relative, `[3]`, object units. It is not zero for models far from the world's origin,
- * such as those in map coordinates. A model, its cage, poses and points must have the same origin. Default `[0, 0, 0]`.
+ * Origin to which 32-bit positions are relative, `[3]`, object units. It is not zero for models far from the world's
+ * origin, such as those in map coordinates. A model, its cage, poses and points must have the same origin. Default `[0,
+ * 0, 0]`.
  */
 export interface WithOrigin {
   readonly origin?: ArrayLike<number> | undefined;
@@ -46,7 +47,7 @@ export interface Cage extends WithOrigin {
   readonly positions: ArrayLike<number>;
   /** For each face, the number of its corners and then its vertices, counter-clockwise seen from outside. */
   readonly corners: ArrayLike<number>;
-  /** Subdivision steps, and controls inside the cage, whose positions follow those of the cage. */
+  /** Subdivision steps, and controls inside the cage. Their positions come after the cage vertices in `positions`. */
   readonly controls?: CageControls | undefined;
 }
 
@@ -78,15 +79,16 @@ export interface Bound {
   readonly report: BindReport;
 }
 
-/** A file; the extension of `name` determines its type. Default "model.glb". */
+/** Content of a file. */
 export type File = Uint8Array | ArrayBuffer | Blob;
 export interface Named {
+  /** Name of the file, whose extension determines the format. Default "model.glb". */
   readonly name?: string | undefined;
 }
 
 /**
- * `states`: append the vertices of each morph target and, with the name of a `clip`, of its frames, for a cage that encloses
- * them all.
+ * `states`: append the vertices of each morph target and, with the name of a `clip`, of its frames, for a cage that
+ * encloses them all.
  */
 export interface ReadCallOptions extends CallOptions, Named {
   readonly states?: boolean | undefined;

@@ -1,4 +1,4 @@
-/** Worker entry point in Node: gives the thread the globals of a browser's worker. */
+/** Entry point of workers in Node. Defines the globals of a browser's worker that `serve` uses. */
 
 import { parentPort, type TransferListItem } from "node:worker_threads";
 import * as pkg from "./pkg/cagework";
@@ -11,7 +11,7 @@ Object.assign(globalThis, {
   postMessage(message: unknown, { transfer }: { transfer: TransferListItem[] }) {
     parentPort?.postMessage(message, transfer);
   },
-  // A panic ends in a trap, which the job reports as its error.
+  // A panic of the module calls reportError. It then traps, and the job reports the trap as its error.
   reportError: (error: unknown) => console.error(error),
 });
 serve(pkg);

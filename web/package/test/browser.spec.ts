@@ -1,4 +1,4 @@
-/** The installed package in Chromium: a three.js page and the element, as they are and bundled. */
+/** Tests the installed package in Chromium: a three.js page and the element, both unbundled and bundled. */
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -25,7 +25,7 @@ interface Browsers {
   webgl: Browser;
 }
 
-/** Opens pages and fails if one writes to its console. */
+/** Opens pages, and fails if one writes an error or a warning to its console. */
 const test = base.extend<{ visit: (how: keyof Browsers, address: string) => Promise<Page> }, Browsers>({
   // biome-ignore lint/correctness/noEmptyPattern: Playwright reads what a fixture needs from its pattern.
   webgpu: [async ({}, use) => opened(WITH_WEBGPU, use), { scope: "worker" }],
@@ -203,14 +203,14 @@ test("an element opens compressed files, reports unreadable ones and frees its m
   });
   await expect.poll(() => page.workers().length).toBe(0);
   await page.waitForFunction(() => "freed" in globalThis);
-  // Reconnected, it opens the model again.
+  // An element that is connected again opens its model.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.src = "model.glb";
     document.body.append(element);
   });
   await ready(page);
-  // Moved within the page, it keeps its model and pose.
+  // An element that is moved within the page keeps its model and pose.
   const [pose, kept] = await page.evaluate(async () => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.pose = element.pose?.map((x) => x + 1) ?? null;
@@ -220,7 +220,7 @@ test("an element opens compressed files, reports unreadable ones and frees its m
     return [pose?.join(), element.pose?.join()];
   });
   expect(kept).toBe(pose);
-  // Without src it shows nothing. Removed while it opens, it frees everything too.
+  // An element without src shows nothing. One that is removed while it opens a model frees its memory and worker.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.src = null;

@@ -1,4 +1,4 @@
-/** Compiled in the blank project, against the package's published types. */
+/** Code of a user of the package. The tests compile it against the published types. */
 
 import { type Bound, bind, deform, generateCage, reshape } from "@cagework/core";
 import type { CageDeformer } from "@cagework/core/element";

@@ -1,4 +1,5 @@
-// The installed package in Node gives the same weights and files as the command. Runs in the blank project.
+// Compares results of the installed package in Node with those of the `cagework` command. Runs in the empty project in
+// which the package is installed.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -12,7 +13,10 @@ import { sample } from "./sample.mjs";
 
 /** Rounding of 32-bit sums, over the model's size. */
 const ROUNDING = 1e-6;
-/** Largest difference of weights between wasm and native code: the solver stops at tau = 1e-5, and sums differ in their last bits. */
+/**
+ * Largest difference of weights between wasm and native code. The solver stops at tau = 1e-5, and sums differ in their
+ * last bits.
+ */
 const WEIGHTS = 1e-6;
 
 const { glb, cage, posed } = await sample(import.meta.dirname, "humanoid");
@@ -28,7 +32,7 @@ function command(line) {
   });
 }
 
-/** A cage as OBJ, with all digits of each number. */
+/** Writes a cage as OBJ, with all digits of each number. */
 function obj(positions, corners) {
   const lines = [];
   for (let k = 0; k < positions.length; k += 3) lines.push(`v ${positions.slice(k, k + 3).join(" ")}`);
@@ -38,7 +42,7 @@ function obj(positions, corners) {
   return `${lines.join("\n")}\n`;
 }
 
-/** An array of an NPZ file: an NPY file in a ZIP archive. */
+/** Reads an array of an NPZ file, which is a ZIP archive of NPY files. */
 function npz(path, name) {
   const zip = readFileSync(path);
   const view = new DataView(zip.buffer, zip.byteOffset, zip.byteLength);

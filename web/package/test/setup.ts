@@ -1,11 +1,14 @@
-/** Writes the models of all tests and the webpack bundles into the blank project. The Node tests, which run later, read the same models. */
+/**
+ * Writes models and webpack bundles into the empty project in which the package is installed. The Node tests, which run
+ * later, read the same models.
+ */
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import webpack from "webpack";
 import { dracoGlb, meshoptGlb, torus } from "../../e2e/models";
 
-/** Few vertices, because the tests draw on the processor. */
+/** Number of vertices of the torus. It is small, because the tests draw on the processor. */
 const VERTICES = 1500;
 
 export default async function setup(): Promise<void> {

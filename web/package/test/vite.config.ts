@@ -1,7 +1,7 @@
 import { join } from "node:path";
 import { defineConfig } from "vite";
 
-/** Bundles the blank project with Vite. */
+/** The project in which the package is installed. Vite bundles its pages. */
 const project = process.env.NPM_PROJECT ?? "";
 
 export default defineConfig({

@@ -11,9 +11,12 @@ const SLOP = 4;
 const LONG_PRESS_MS = 500;
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
-/** Zoom per wheel unit. A wheel notch is about 100 units and zooms in by a seventh. */
+/** Logarithm of the zoom factor per wheel unit. A wheel notch is about 100 units, which enlarges the view by 16 %. */
 const WHEEL_RATE = 0.0015;
-/** Zoom per unit of a trackpad pinch. Browsers send pinches as wheel events with Ctrl, in much smaller units. */
+/**
+ * Logarithm of the zoom factor per unit of a trackpad pinch. Browsers send pinches as wheel events with Ctrl and much
+ * smaller amounts.
+ */
 const PINCH_RATE = 0.01;
 
 type Drag =

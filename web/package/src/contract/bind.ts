@@ -7,13 +7,13 @@ export type BindEvent =
       readonly kind: "progress";
       readonly pass: "coarse" | "fine";
       readonly stage: Stage;
-      /** Within this pass, 0 to 1. */
+      /** Finished fraction of this pass, 0 to 1. */
       readonly fraction: number;
       readonly etaMs: number | null;
       readonly iteration: number;
       readonly delta: number | null;
     }
-  /** New weights are in use: the model can be dragged (coarse) or the result is final (fine). */
+  /** The engine uses new weights. Those of the coarse pass are replaced by those of the fine pass, which are final. */
   | { readonly kind: "adopted"; readonly pass: "coarse" | "fine"; readonly report: BindReport }
-  /** The GPU failed and the CPU continues; `reason` is a sentence. */
+  /** The GPU failed, and the bind continues on the CPU. `reason` is the error message. */
   | { readonly kind: "fallback"; readonly reason: string };

@@ -3,19 +3,19 @@
 import type { CageControls, Problem } from "./generated";
 
 /**
- * `positions` is `[n_controls, 3]`: cage vertices, then controls inside. `corners` lists, for each face, the number of its
- * corners and then their vertices.
+ * `positions` is `[n_controls, 3]`: cage vertices, then controls inside. `corners` lists, for each face, the number of
+ * its corners and then their vertices.
  */
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
-  /** Undefined for a new cage, which keeps the current controls. */
+  /** Undefined for a new cage: the document then keeps the current controls inside that fit into it. */
   readonly controls?: CageControls | undefined;
 }
 
 /**
- * Result of a cage check: the problems, and the vertices, edges, faces and points to mark. `outside` lists model vertices
- * outside the cage.
+ * Result of a cage check: the problems, and the vertices, edges, faces and points to mark in the view. `outside` lists
+ * the model vertices outside the cage.
  */
 export interface Check {
   readonly problems: readonly Problem[];
@@ -26,11 +26,13 @@ export interface Check {
   readonly outside: Uint32Array;
 }
 
-/** A cage with the result of its check; `check` is null before it. */
+/** A cage with the result of its check; `check` is null if it has not been checked. */
 export interface CheckedCage extends CageArrays {
   readonly check: Check | null;
-  /** For a generated cage: the number of separate parts of the model that it joins. */
+  /**
+   * For a generated cage that joins separate parts of the model, the number of these parts; otherwise 0 or undefined.
+   */
   readonly bridged?: number;
-  /** For a generated cage: gaps of the model that it closes, and the settings that would keep them open. */
+  /** For a generated cage, sentences about gaps of the model that it closes and settings that would keep them open. */
   readonly notices?: readonly string[];
 }

@@ -5,29 +5,32 @@ import type { ErrorName, PullOptions } from "./generated";
 /** Start of a pull. `start` is the current pose of the cage and of the controls inside, `[n_controls, 3]`. */
 export interface GrabInput {
   readonly start: Float32Array;
-  /** Weights of the grabs, followed by those of the pins. `[n_grips, n_controls]` */
+  /** Weights of the grabbed points, then of the pinned points. `[n_grabs + n_pins, n_controls]` */
   readonly rows: Float64Array;
-  /** The model vertex nearest to each grip. */
+  /**
+   * For each of these points, the nearest model vertex; 2^32 - 1 if the point is a cage vertex. `[n_grabs + n_pins]`
+   */
   readonly seeds: Uint32Array;
+  /** Number of grabbed points. */
   readonly grabs: number;
   readonly options: PullOptions;
 }
 
 export interface Grabbed {
-  /** Positions of the grabs. `[n_grabs, 3]` */
+  /** Positions of the grabbed points in the pose `start`. `[n_grabs, 3]` */
   readonly place: Float32Array;
-  /** How strongly each model vertex is kept in place. `[n_vertices]` */
+  /** How strongly the pull keeps each model vertex in place, 0 to 1. `[n_vertices]` */
   readonly stays: Float32Array;
-  /** Radius of the pull, relative to the model's size. */
+  /** Distance along the surface within which the pull moves the model, as a fraction of the model's size. */
   readonly reach: number;
 }
 
 export interface PullFrame {
-  /** `[n_controls, 3]` */
+  /** Pose of the cage. `[n_controls, 3]` */
   readonly cage: Float32Array;
   /** True once further frames would not change the pose. */
   readonly settled: boolean;
-  /** Distance of grabs and pins from their targets, relative to the model's size. */
+  /** Largest distance of a grabbed or pinned point from its target, as a fraction of the model's size. */
   readonly error: number;
 }
 
@@ -48,6 +51,6 @@ export interface NamedFile {
 /** Progress of reading a file. */
 export interface Reading {
   readonly stage: "bytes" | "decompress" | "geometry" | "textures" | "check";
-  /** Within the stage, 0 to 1; 0 if unknown. */
+  /** Finished fraction of the stage, 0 to 1; 0 if unknown. */
   readonly fraction: number;
 }

@@ -1,13 +1,15 @@
 /**
- * Pointer input of the element: a drag on a cage handle moves it, other drags turn the view, two fingers and the wheel zoom.
+ * Pointer input of the element. Dragging a cage vertex moves it, dragging elsewhere turns the view, and the wheel or
+ * two fingers zoom.
  */
 
 import type { Engine } from "../contract";
 import { createTouch } from "../session/touch";
 
+/** Distance from a cage vertex within which a press grabs it, CSS pixels. */
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
-/** Zoom per wheel unit. A wheel notch is about 100 units and zooms in by a seventh. */
+/** Logarithm of the zoom factor per wheel unit. A wheel notch is about 100 units, which enlarges the view by 16 %. */
 const WHEEL_RATE = 0.0015;
 
 /** Calls `posed` after every change of the pose. Returns a function that cancels the drag in progress. */
@@ -36,7 +38,9 @@ export function attachPointer(
     },
     interrupt: () => release(false),
   });
-  /** Selects the handle under the pointer and starts to drag it. Returns false if it misses. */
+  /**
+   * Selects the cage vertex under the pointer and starts to drag the selection. Returns false if there is no vertex.
+   */
   const hold = (engine: Engine, event: PointerEvent): boolean => {
     const { x, y } = last;
     const radius = event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS;

@@ -15,6 +15,7 @@ export interface Wanted {
   readonly file: Blob;
   /** Maximum number of cage vertices. */
   readonly vertices: number;
+  /** Number of cells along the cage's longest side. */
   readonly grid: number;
 }
 
@@ -28,7 +29,7 @@ export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: num
 
 export interface View {
   readonly engine: Engine;
-  /** Opens a model, makes a cage and binds; projects bring their own cage. Cancels a previous `open`. */
+  /** Opens a model, generates a cage unless the file is a project with one, and binds. Cancels a previous `open`. */
   open(wanted: Wanted, hear: Hear): Promise<Ready>;
   close(): Promise<void>;
 }
@@ -63,7 +64,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   let work: Promise<unknown> = Promise.resolve();
   let isClosed = false;
 
-  /** Recovers from a lost device on a new canvas; a canvas cannot be used with a second device. */
+  /** Recovers from a lost GPU device on a new canvas, because a canvas cannot be used with another device. */
   const watch = async (canvas: HTMLCanvasElement): Promise<void> => {
     canvas.addEventListener("webglcontextlost", () => engine.lose());
     await engine.lost();
@@ -118,7 +119,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     engine,
     open(wanted, hear) {
       current?.cancel();
-      // The engine holds one model: wait until the previous call has stopped.
+      // The engine can open one model at a time: wait until the previous call has stopped.
       const opening = work.then(() => {
         if (isClosed) throw named("Cancelled", "the element was removed from the page");
         frames.start(
@@ -135,7 +136,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       frames.stop();
       current?.cancel();
       client.close();
-      // Free the engine only when no call is running; losing the device ends pending ones.
+      // Free the engine only when none of its methods is running. Losing the device ends those that wait for the GPU.
       engine.lose();
       await work;
       engine.lose();
@@ -145,7 +146,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   };
 }
 
-/** Scene options of the element: drags move handles of the cage, and do not pull the model. */
+/** Scene options of the element. Drags move vertices of the cage and do not pull the model. */
 export function sceneOf(theme: string | null): SceneOptions {
   return { ...SCENE_DEFAULTS, theme: theme === "light" ? "light" : "dark", pull: false };
 }

@@ -3,7 +3,7 @@
 import type { Lack } from "../contract";
 import { named } from "./client";
 
-/** Name of the GPU that the browser would use; empty if the browser does not tell. */
+/** Name of the GPU that the browser would use; empty if the browser hides it. */
 export async function findAdapter(): Promise<string> {
   const { gpu } = navigator;
   if (!gpu) throw named("NoWebGPU", "this browser has no WebGPU");
@@ -14,12 +14,12 @@ export async function findAdapter(): Promise<string> {
   return tidy(words);
 }
 
-/** Capitalises words: browsers report lower case. */
+/** Capitalises words, because browsers report GPU names in lower case. */
 function tidy(words: string): string {
   return words.replace(/\b[a-z]/g, (letter) => letter.toUpperCase());
 }
 
-/** The missing piece of WebGPU that an error names; undefined for other errors. */
+/** Why WebGPU is missing, according to an error's name; undefined for other errors. */
 export function lackOf(error: unknown): Lack | undefined {
   const name = error instanceof Error ? error.name : "";
   return name === "NoWebGPU" || name === "NoAdapter" || name === "NoDevice" ? name : undefined;

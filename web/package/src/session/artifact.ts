@@ -1,4 +1,4 @@
-/** The module's two builds: for WebGPU, and for WebGL2, which is downloaded only when needed. */
+/** The two builds of the wasm module: one for WebGPU, and one for WebGL2, which is downloaded only when needed. */
 
 import { fetchPart } from "./parts";
 
@@ -12,7 +12,7 @@ export interface Artifact {
   openWorker(): Worker;
 }
 
-/** Downloads and compiles a module; streams it if the server sends the MIME type of wasm. */
+/** Downloads and compiles a module; compiles during the download if the server sends the MIME type of wasm. */
 export async function compile(url: string): Promise<WebAssembly.Module> {
   return fetchPart(url, async (response) => {
     if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {

@@ -1,4 +1,4 @@
-/** Runs a bind: a coarse pass first, so that the model can be dragged soon, then one with the given options. */
+/** Runs a bind: first a coarse pass, so that the model can soon be dragged, then a pass with the given options. */
 
 import type {
   BindEvent,
@@ -14,7 +14,7 @@ import { createEta } from "../eta";
 import { type Client, named } from "./client";
 import type { BoundArrays } from "./messages";
 
-/** Grid of the coarse pass. */
+/** Number of cells along the cage's longest side in the coarse pass. */
 const COARSE = 32;
 
 /** Errors after which the bind is repeated on the CPU. */

@@ -4,7 +4,8 @@ import type { Job } from "../contract";
 import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
 
 /**
- * Time for a cancelled job to stop, ms, before its worker is terminated: on the CPU it receives no message until it is done.
+ * Time after which the worker of a cancelled job is terminated if the job has not stopped, ms. A job on the CPU blocks
+ * its worker, which then cannot receive the cancellation.
  */
 const PATIENCE = 400;
 
@@ -42,8 +43,8 @@ export function unloaded(reason: string): Error {
 const closing = () => named("Cancelled", "the page is closing");
 
 /**
- * Starts a worker with the compiled module. A worker that stopped or does not react to a cancel is replaced when the next job
- * needs it.
+ * Starts a worker with the compiled module. A worker that failed or does not react to a cancellation is replaced when a
+ * job needs one.
  */
 export function createClient(module: WebAssembly.Module, open: () => Worker): Client {
   const waiting = new Map<number, Waiting>();
@@ -58,7 +59,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       event.preventDefault();
       // Ignore errors of a worker that was replaced.
       if (started !== worker) return;
-      // Only errors of a running script have a message.
+      // Only errors of a running script have a message. Other errors mean that the script could not be loaded.
       const isRunning = "message" in event;
       lose(isRunning ? named("Worker", event.message || "the worker stopped") : unloaded("its worker"));
     });
@@ -79,7 +80,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     }
     waiting.delete(message.id);
     if (message.kind === "failed" && message.name === "RuntimeError") {
-      // A trap leaves the instance unusable.
+      // After a trap, the worker's wasm instance is unusable.
       const error = named(
         "Worker",
         `the computation broke off (${message.message}): it may need too much memory`,
@@ -100,7 +101,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     for (const job of lost) job.failed(error);
   }
 
-  /** Terminates a worker that does not react to a cancel, and sends the other jobs to a new one. */
+  /** Terminates a worker that does not react to the cancellation of a job, and sends its other jobs to a new worker. */
   function replace(id: number): void {
     worker?.terminate();
     worker = undefined;

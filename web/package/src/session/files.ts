@@ -1,23 +1,23 @@
-/** Reads dropped files: finds the model among them, and its siblings. */
+/** Reads dropped files: finds the model among them, and its siblings, the files that it may refer to. */
 
 import type { NamedFile } from "../contract";
 import { NAMING_ENDINGS } from "../contract/generated";
 import { extension, isModel } from "../names";
 import { named } from "./client";
 
-/** Size limit, bytes. Opening a file takes several times its size in memory. */
+/** Maximum size of a file, bytes. Opening a file takes several times its size in memory. */
 const LARGEST = 1 << 30;
 
 export interface Bytes {
   readonly name: string;
   readonly bytes: Uint8Array;
-  /** The other files, by name and by path relative to the model's folder. */
+  /** The siblings, by name and by path relative to the model's folder. */
   readonly siblings: ReadonlyMap<string, Uint8Array>;
   /** The compressed original, if `bytes` were decompressed. */
   readonly packed?: Uint8Array;
 }
 
-/** Finds a sibling by the path that the model refers to. */
+/** Returns a function that finds a sibling by the path in the model's file, or else by the file name in that path. */
 export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8Array | undefined {
   return (path) => {
     const plain = path.replace(/^(\.\/)+/, "");
@@ -41,7 +41,7 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   return { name: main.name, bytes, siblings };
 }
 
-/** The error for a file above the size limit; undefined if all are below it. */
+/** The error for the first file above the size limit; undefined if there is none. */
 export function tooLarge(files: readonly NamedFile[]): Error | undefined {
   const large = files.find(({ file }) => file.size > LARGEST);
   const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);

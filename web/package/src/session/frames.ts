@@ -1,4 +1,4 @@
-/** Draws on demand: any number of requests between two frames lead to one frame. */
+/** Draws frames on demand. All requests between two animation frames are answered by one drawing. */
 
 /** Pause before the next attempt if the GPU is busy, ms. */
 const BUSY_PAUSE = 12;
@@ -9,8 +9,9 @@ const QUIET = 250;
 export interface Frames {
   ask(): void;
   /**
-   * Starts drawing. `draw` takes whether to draw at full resolution, and returns whether it did, or undefined if the GPU is
-   * busy. `calm` says whether there is time for an unrequested frame at full resolution.
+   * Starts drawing. The argument of `draw` says whether to draw at full resolution. It returns whether it did, or
+   * undefined if the GPU is busy and nothing was drawn. `calm` says whether there is time to draw a frame again at full
+   * resolution.
    */
   start(draw: (sharp: boolean) => boolean | undefined, calm: () => boolean): void;
   listen(listener: (ms: number) => void): () => void;
@@ -29,7 +30,7 @@ export function createFrames(): Frames {
     if (stopped) return;
     clearTimeout(quiet);
     if (!asked) requestAnimationFrame(frame);
-    // A normal request takes precedence over sharpening, which follows later.
+    // A requested frame takes precedence over drawing the last one again at full resolution.
     asked = asked === "soon" ? asked : how;
   };
   const sharpen = () => {
@@ -45,7 +46,7 @@ export function createFrames(): Frames {
     try {
       isSharp = draw(how === "sharp");
     } catch (error) {
-      // The session reports lost devices; everything else goes to the page's error handler.
+      // The session reports a lost device. Other errors go to the page's error handler.
       if (!(error instanceof Error && error.name === "DeviceLost")) reportError(error);
       return;
     }

@@ -30,14 +30,16 @@ export interface Texture {
 
 /** A file that a worker has read successfully. */
 export interface ReadModel extends Bytes {
-  /** The chosen up axis, if it differs from the file's. */
+  /** The up axis that the user chose; undefined for the file's own. */
   readonly up: UpAxis | undefined;
   /** Textures of each model, by index; null for those that are missing or that this browser cannot decode. */
   readonly textures: readonly (readonly (Texture | null)[])[];
   /** The cage of a project. */
   readonly cage: CheckedCage | undefined;
   readonly notices: readonly string[];
-  /** Time that the worker took to read the file, ms. The page freezes for about as long when it reads the file again. */
+  /**
+   * Time that the worker took to read the file, ms. The page freezes for about as long when it reads the file again.
+   */
   readonly took: number;
   /** Number of vertices of all models. */
   readonly vertices: number;
@@ -61,7 +63,7 @@ export interface SampleArrays {
 /** Input, progress and output of each job. */
 export interface Jobs {
   bind: {
-    /** The last `extra` positions are not vertices of the model. */
+    /** The last `extra` positions are points of the model's rig, such as joints, instead of vertices. */
     input: { positions: Float32Array; extra: number; cage: CageArrays; options: BindOptions };
     step: Progress;
     output: BoundArrays;
@@ -82,7 +84,7 @@ export interface Jobs {
   reshape: {
     input: {
       files: readonly NamedFile[];
-      /** The origin of cage and pose. */
+      /** The origin to which the cage and the pose are relative. */
       origin: Float64Array;
       cage: CageArrays;
       posed: Float32Array;
@@ -133,13 +135,13 @@ export interface Jobs {
     step: never;
     output: CheckedCage;
   };
-  /** Carries poses of the cage `old` over to `cage`, the vertices of a new one. `poses` are concatenated. */
+  /** Converts poses of the cage `old` to poses of the cage with the vertices `cage`. `poses` are concatenated. */
   carry: {
     input: { model: Float32Array; cage: Float32Array; old: CageArrays; poses: Float32Array };
     step: never;
     output: Float32Array;
   };
-  /** Prepares pulling; replaces the previous pull. */
+  /** Prepares pulls of a model, and discards what was prepared before. */
   pullOpen: {
     input: { positions: Float32Array; triangles: Uint32Array; cage: CageArrays };
     step: never;

@@ -1,4 +1,4 @@
-/** Opens WebGPU, or else WebGL2. */
+/** Chooses between WebGPU and WebGL2, and loads the build of the module for it. */
 
 import type { Lack } from "../contract";
 import { findAdapter, hasWebGl2, lackOf } from "./adapter";
@@ -24,8 +24,8 @@ export interface OpenedOn {
 }
 
 /**
- * Starts with WebGPU, or else with WebGL2 and the processor. Throws an error named NoWebGPU, NoAdapter or NoDevice if both are
- * missing.
+ * Calls `start` with WebGPU, or if that is missing, with WebGL2 and the processor. Throws an error named NoWebGPU,
+ * NoAdapter or NoDevice if both are missing.
  */
 export async function openOn<T>(canvases: Canvases, start: (opened: OpenedOn) => Promise<T>): Promise<T> {
   try {

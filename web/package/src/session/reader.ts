@@ -1,4 +1,4 @@
-/** Opening a file, on the page's side: a worker reads it first, and the page only if that succeeded. */
+/** The page's part of opening a file. A worker reads the file first; the page reads it only if the worker succeeded. */
 
 import type { Job, Reading } from "../contract";
 import type { Loaded } from "../pkg/cagework";
@@ -19,15 +19,15 @@ type RunApart = <K extends "read" | "readCage" | "check" | "repair">(
 /** Runs one job at a time, each in a new worker that is closed afterwards. */
 export type Apart = RunApart & {
   /**
-   * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for many small
-   * files.
+   * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for
+   * many small files.
    */
   share(): () => void;
 };
 
 /**
- * Runs jobs on untrusted files in workers of their own: a crash or its memory ends with the worker. A new job cancels the
- * previous one.
+ * Runs jobs on untrusted files in workers of their own, so that a crash affects only that worker, and closing the
+ * worker frees its memory. A new job cancels the previous one.
  */
 export function createApart(open: () => Client): Apart {
   let isShared = false;
@@ -76,19 +76,22 @@ export function createApart(open: () => Client): Apart {
   return Object.assign(apart, { share });
 }
 
-/** Longest time without a pause on the main thread, ms. */
+/** Longest time for which reading blocks the main thread without a pause, ms. */
 const HELD = 30;
 
+/** Time of the last pause, ms. */
 let paused = 0;
 
-/** Lets pending events and frames run, unless that happened recently. */
+/** Lets pending events and frames run, unless the last pause was less than `HELD` ms ago. */
 async function pause(): Promise<void> {
   if (performance.now() - paused < HELD) return;
   await new Promise((resolve) => setTimeout(resolve));
   paused = performance.now();
 }
 
-/** Reads, on this thread, a file that a worker has already read. Returns its model, then the other models of a project. */
+/**
+ * Reads on this thread a file that a worker has already read. Returns its model, then the other models of a project.
+ */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.packed) loaded.setPacked(read.packed);

@@ -1,4 +1,4 @@
-/** Opening a file, in the worker: a file that crashes or hangs the reader does so here, not on the page. */
+/** The worker's part of opening a file. If a file crashes the reader or never ends, the page is not affected. */
 
 import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
 import type { Loaded, Polygons } from "../pkg/cagework";
@@ -47,7 +47,7 @@ export async function readModel(
   };
 }
 
-/** The further models of a project. */
+/** Takes all models after the first out of an opened project. */
 export function furtherOf(loaded: Loaded): Loaded[] {
   const next = loaded.takeNext();
   return next ? [next, ...furtherOf(loaded)] : [];
@@ -77,7 +77,9 @@ export async function readCage(
   return checked(pkg, loaded.asCage(), model, smooth);
 }
 
-/** A cage as arrays with the result of its check. `smooth` is the number of subdivision steps. */
+/**
+ * Copies a cage to arrays and checks it. `smooth`: number of subdivision steps if the cage has no controls of its own.
+ */
 export function checked(pkg: Package, cage: Polygons, model: Float32Array, smooth = 0): CheckedCage {
   const arrays = polygons(cage);
   const controls = arrays.controls ?? { smooth, inner: 0, elements: [], radius: null };
@@ -96,7 +98,7 @@ export function check(
   return { problems, vertices, edges, faces, points, outside };
 }
 
-/** Copies a mesh to arrays and frees its wasm memory. */
+/** Copies a polygon mesh to arrays and frees its wasm memory. */
 export function polygons(mesh: Polygons): CageArrays {
   const { positions, corners, controls } = mesh;
   mesh.free();

@@ -1,11 +1,11 @@
-/** The worker: runs long jobs in sequence. */
+/** Code of the worker, which runs long jobs in sequence. */
 
 import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
 import { check, checked, read, readCage, readModel } from "./reading";
 
-/** Shortest time between two progress messages, ms: more are never drawn. */
+/** Shortest time between two progress messages of a stage, ms. The page draws about as often. */
 const STEP_PAUSE = 33;
 
 type Send = (message: FromWorker, transfer?: Transferable[]) => void;
@@ -15,7 +15,7 @@ const cancelled = new Set<number>();
 let ready: Promise<unknown> = Promise.resolve();
 let queue: Promise<unknown> = Promise.resolve();
 
-/** Answers the page's messages with one build of the module. */
+/** Starts to run the jobs that the page sends, with one build of the wasm module. */
 export function serve(pkg: Package): void {
   const work = createWork(pkg);
   addEventListener("message", ({ data }: MessageEvent<ToWorker>) => {
@@ -50,7 +50,7 @@ async function answer(work: Work, id: number, job: JobKind, input: unknown): Pro
   }
 }
 
-/** Sends progress at intervals. Returns false once the job is cancelled. */
+/** Returns a function that sends progress messages at intervals. It returns false once the job is cancelled. */
 function steps(id: number): (step: Step) => boolean {
   let last = Number.NEGATIVE_INFINITY;
   let stage: string | undefined;

@@ -1,9 +1,9 @@
-/** Decodes textures with the browser, which supports more formats than we would want to bundle. */
+/** Decodes textures with the browser, so that the module contains no image decoders. */
 
 import type { Loaded } from "../pkg/cagework";
 import type { Texture } from "./messages";
 
-/** Decodes all textures of a file and counts failures. Calls `tell` with the fraction done. */
+/** Decodes all textures of a model and counts those that fail. Calls `tell` with the fraction done. */
 export async function decodeTextures(
   loaded: Loaded,
   tell: (share: number) => void,

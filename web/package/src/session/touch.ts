@@ -1,4 +1,4 @@
-/** Touch input: one finger acts as the pointer, two move and zoom the view. */
+/** Touch input: one finger acts as the pointer, two fingers move and zoom the view. */
 
 import type { Engine } from "../contract";
 
@@ -8,17 +8,19 @@ interface Spot {
 }
 
 export interface Touch {
-  /** Each returns true if the touch is part of a two-finger gesture and is not a pointer event. */
+  /** `down`, `move` and `up` return true if the touch is part of a two-finger gesture: the caller then ignores it. */
   down(id: number, at: Spot): boolean;
   move(id: number, at: Spot): boolean;
   up(id: number): boolean;
-  /** Forgets all fingers. */
+  /** Treats all fingers as lifted. */
   clear(): void;
 }
 
 export function createTouch(options: { engine: () => Engine; interrupt: () => void }): Touch {
   const fingers = new Map<number, Spot>();
-  /** Set by the second finger until all are lifted, so that the remaining finger does not grab a handle. */
+  /**
+   * True from the second finger's touch until all fingers are lifted, so that the last finger does not drag anything.
+   */
   let navigating = false;
 
   return {
@@ -55,7 +57,10 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
   };
 }
 
-/** Change between two positions of two fingers: translation of their midpoint, and zoom factor. */
+/**
+ * Change between two positions of two fingers: translation of their midpoint, its new position, and zoom factor.
+ * Undefined with fewer fingers.
+ */
 export function pinch(
   before: readonly Spot[],
   after: readonly Spot[],
