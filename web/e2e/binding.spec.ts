@@ -4,11 +4,11 @@ import { BIND_DEFAULTS } from "../src/defaults";
 import { bound, expect, open, shoot, test } from "./support";
 import { longestTask } from "./tasks";
 
-/** Upper limit of a main-thread task during a bind, ms of processor time. */
+/** Upper limit for the longest task of the main thread during a bind, ms of processor time. */
 const LONGEST_TASK = 50;
 
 test("a bind at g = 64 blocks no frame", async ({ browser, page }) => {
-  // Frames and the bind share one software GPU: a small picture leaves time for both.
+  // Drawing and the bind share one software GPU: in a small window, drawing takes little of its time.
   await page.setViewportSize({ width: 420, height: 420 });
   await open(page);
   let frames = 0;
@@ -47,7 +47,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
     const rows = page.getByRole("table", { name: "Binds of this cage" }).locator("tbody tr");
     await expect(rows.getByRole("rowheader")).toHaveText([/Classic, Jacobi/, /Embedded, multigrid/]);
     const errors = (await rows.locator("td:last-child").allTextContents()).map(Number);
-    // The classic method moves each vertex to the centre of its cell.
+    // The classic method gives each vertex the coordinates of the centre of its cell.
     expect(errors[0], `rest errors ${errors}`).toBeGreaterThan(100 * (errors[1] ?? 1));
     await expect(page.locator(".curves li")).toHaveText(["Jacobi", "multigrid"]);
     await expect(page.locator(".plot polyline")).toHaveCount(2);
@@ -94,7 +94,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
           () => "done",
           (error: Error) => error.name,
         );
-        // The worker accepts another bind, and the previous weights stay in use.
+        // After the cancellation, the worker accepts another bind. The engine keeps weights throughout.
         const report = await session.bind({ ...options, grid: 16, tau: 1e-5 }, () => undefined).done;
         return { name, steps, grid: report.grid, backend: report.backend, bound: session.engine.bound };
       }, backend);

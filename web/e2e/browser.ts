@@ -11,8 +11,8 @@ const QUIET = [
 ];
 
 /**
- * Software rendering: Mesa draws the page and WebGL, at a quarter of the processor time that SwiftShader takes for WebGL. Chromium
- * offers WebGPU without a graphics card only through SwiftShader.
+ * Software rendering: Mesa draws the page and WebGL, in a quarter of the processor time that SwiftShader takes for
+ * WebGL. WebGPU runs on SwiftShader, the only adapter that Chromium offers without a graphics card.
  */
 const SOFTWARE = ["--use-angle=gl-egl", "--ignore-gpu-blocklist"];
 
@@ -24,5 +24,5 @@ const launch = (args: readonly string[]) => ({
 /** Chromium with WebGPU. */
 export const WITH_WEBGPU = launch(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
 
-/** Chromium with WebGL2 only. The processor composes the page, which the canvas of WebGPU does not support. */
+/** Chromium with WebGL2. The processor composes the page: this mode does not support WebGPU canvases. */
 export const WITH_WEBGL = launch(["--disable-gpu-compositing"]);

@@ -1,4 +1,4 @@
-/** Smooth cages and interior controls, for a worm in a large box. */
+/** Smooth cages and interior controls, tested with a worm in a large box. */
 
 import type { Page } from "@playwright/test";
 import type { CageControls } from "../src/contract";
@@ -19,7 +19,7 @@ import {
   test,
 } from "./support";
 
-/** A box around the worm, centred at (0.15, 1, 0); its smooth surface encloses the worm too. */
+/** A box centred at (0.15, 1, 0), as OBJ. The smooth surface of the box encloses the worm too. */
 function cage(): Uint8Array {
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) =>
     [k & 1, (k >> 1) & 1, k >> 2].map((bit) => 6 * bit - 3),
@@ -38,7 +38,7 @@ async function boundTo(page: Page, smooth: number, inner: number): Promise<void>
   await bound(page);
 }
 
-/** Clicks a point given in object space. */
+/** Clicks where the point `place`, in object space, appears. */
 async function click(page: Page, place: [number, number, number]): Promise<void> {
   const box = await page.locator("canvas").first().boundingBox();
   const [x = 0, y = 0] = await page.evaluate(
@@ -74,7 +74,7 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await page.getByRole("switch", { name: /Smooth its surface/ }).click();
     await boundTo(page, 2, 0);
     const smooth = await modelPositions(page);
-    // A corner of the box has a smaller weight in the B-spline.
+    // The B-spline surface gives the moved corner smaller weights, so that the model moves less.
     expect(largestMove(plain, smooth)).toBeGreaterThan(0.01);
     await shoot(page, "controls-smooth");
     await page.keyboard.press("Control+z");
@@ -92,7 +92,7 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await boundTo(page, 0, 4);
     expect((await controls(page))?.elements).toEqual([{ point: 0 }, { line: [1, 2, 3] }]);
     const inside = (await cagePositions(page)).slice(3 * 8);
-    // Midway through the worm along the view ray: less than half its radius from its axis.
+    // A new control is midway through the worm along the view ray, which is less than half a radius from the axis.
     const wanted = [0.3, 0.9, 1.3, 1.7].flatMap(axis);
     expect(largestMove(wanted, inside)).toBeLessThan(0.2);
     await shoot(page, "controls-inside");
@@ -102,14 +102,14 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     const before = await modelPositions(page);
     const { x, y } = await handle(page, 11);
-    // The whole bone is selected: select its end only.
+    // The pull would move the whole bone, which is selected. Select only its last vertex.
     await page.mouse.click(x, y);
     await pull(page, { x, y }, 60, 0);
     await rested(page);
     const after = await modelPositions(page);
     const reached = largestMove(await cagePositions(page), await restPositions(page));
     expect(reached).toBeGreaterThan(0.2);
-    // Points at the control follow it completely, the surface of the worm partly.
+    // The tube's surface is 0.4 from the bone, so that it moves by less than the control.
     expect(largestMove(before, after)).toBeGreaterThan(0.2 * reached);
     await shoot(page, "controls-posed");
   });

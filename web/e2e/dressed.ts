@@ -6,9 +6,9 @@ import { validationErrors } from "./models";
 import { bound, type Dropped, drop, expect, largestMove, modelPositions } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
-/** Rounding of rigid models, relative to their size. */
+/** Tolerance for distances within a rigid model, relative to the model's size. */
 export const RIGID = 1e-5;
-/** Rounding of exported positions. */
+/** Tolerance for exported positions, object units. */
 export const SAME = 1e-5;
 export const BUCKLE = 0.2;
 
@@ -19,7 +19,7 @@ export const row = (page: Page, name: string) => page.getByRole("listitem", { na
 export const press = (page: Page, name: string) => page.getByRole("button", { name, exact: true }).click();
 export const undo = (page: Page) => page.keyboard.press("Control+z");
 
-/** Drops the three models, waits until they are bound and opens the list. */
+/** Drops body, shirt and buckle, waits until they are bound and opens the list of models. */
 export async function dressed(page: Page): Promise<readonly Dropped[]> {
   const files = await wardrobe();
   await drop(page, files);
@@ -30,7 +30,7 @@ export async function dressed(page: Page): Promise<readonly Dropped[]> {
   return files;
 }
 
-/** Bends the whole cage, so that no model stays or keeps its shape by itself. */
+/** Bends the cage so that every model changes shape and place, unless an option prevents that. */
 export async function bend(page: Page): Promise<void> {
   await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
@@ -43,7 +43,7 @@ export async function bend(page: Page): Promise<void> {
   });
 }
 
-/** Splits the positions of all models. */
+/** Splits the concatenated positions of all models by model. */
 export function apart(all: readonly number[]) {
   const [shirt, buckle] = [3 * SIZES.body, 3 * (SIZES.body + SIZES.shirt)];
   return { body: all.slice(0, shirt), shirt: all.slice(shirt, buckle), buckle: all.slice(buckle) };
@@ -63,7 +63,7 @@ export async function downloads(page: Page, kind: string, n: number): Promise<Dr
   );
 }
 
-/** Exports each model, and checks that the files match the screen. */
+/** Exports each model to a GLB of its own, and checks that the files are valid and equal what is drawn. */
 export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" | "buckle", number[]>> {
   const drawn = apart(await modelPositions(page));
   const files = await downloads(page, "glb", 3);
@@ -83,7 +83,10 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
   return found;
 }
 
-/** Shares of the skin and of the trousers that are within a distance of their rest positions. The GPU rounds, an export does not. */
+/**
+ * The fractions of the body's upper half (skin) and of its lower half (trousers) whose vertices are within a distance
+ * of rest, per coordinate. Positions read from the GPU need a larger tolerance than exported ones.
+ */
 export function still(
   points: readonly number[],
   rest: readonly number[],
@@ -97,7 +100,7 @@ export function still(
   return [share(kept.slice(0, half)), share(kept.slice(half))];
 }
 
-/** A point of the window where the brush touches the model, away from handles; paints nothing. */
+/** A point of the window at which the brush hits model `id`, away from handles. The trial strokes are reverted. */
 export async function paintable(page: Page, id: number): Promise<{ x: number; y: number }> {
   const look = (id: number) => {
     const engine = globalThis.cagework?.engine;
@@ -109,7 +112,7 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
     } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
     for (let y = 0.1 * height; y < height; y += 6) {
       for (let x = 0.3 * width; x < 0.7 * width; x += 6) {
-        // The brush must also hit the model 14 pixels further.
+        // A stroke from here may go 14 pixels right and down: that point must hit the model as well.
         const isOn = [0, 14].every((d) => engine?.paint(x + d, y + d, 0.005, 255));
         if (!isOn) continue;
         engine?.revert();
@@ -121,7 +124,7 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
   };
   let found = { x: 0, y: 0 };
   await expect(async () => {
-    // The GPU may be busy with the previous stroke.
+    // Painting fails while the GPU is busy with the previous stroke.
     found = await page.evaluate(look, id);
   }).toPass();
   return found;

@@ -1,4 +1,4 @@
-/** Files that are dropped on the page. */
+/** Files dropped on the page. */
 
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -43,13 +43,13 @@ test("good files get a cage and can be dragged, bad files leave the model open a
   }
 
   await test.step("a dropped folder is opened with the files in it", async () => {
-    // A drop from the disk: a DataTransfer made by a script cannot hold folders.
+    // A real drop, simulated by the browser: a DataTransfer made by a script cannot hold folders.
     const folder = mkdtempSync(join(tmpdir(), "cagework-"));
     const model = join(folder, "garden");
     mkdirSync(join(model, "parts"), { recursive: true });
     const files = await gltfFiles();
     const document = JSON.parse(Buffer.from(files[0]?.bytes ?? []).toString());
-    // The texture and the buffer are in a subfolder; other files are next to it.
+    // The texture and the buffer are in a subfolder. The folder also has a text file and a hidden file.
     for (const part of [...document.buffers, ...document.images]) part.uri = `parts/${part.uri}`;
     writeFileSync(join(model, "garden.gltf"), JSON.stringify(document));
     for (const { name, bytes } of files.slice(1)) writeFileSync(join(model, "parts", name), bytes);
@@ -139,7 +139,8 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   const choice = page.getByRole("group", { name: "Up axis" });
   await choice.getByRole("radio", { name: "Z" }).click();
-  // A turn by -90 degrees about x. A saved pose has 16 bits for the largest displacement.
+  // The model turns by -90 degrees about x. Saved poses have 16 bits per coordinate, relative to the largest
+  // displacement.
   const TOLERANCE = 1e-3;
   const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
   const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);
@@ -153,7 +154,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
   expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
   await shoot(page, "turned");
-  // An added model is turned as well, even if it does not follow the bent cage.
+  // An added model is turned as well, also if it is set to stay as it is while the cage bends.
   const chooser = page.waitForEvent("filechooser");
   await page.getByRole("button", { name: "Add to this cage" }).click();
   const beam = { name: "beam.obj", mimeType: "text/plain", buffer: Buffer.from(box([0.1, 0.2, 0.6])) };

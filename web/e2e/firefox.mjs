@@ -1,4 +1,5 @@
-// Tests the page in Debian's Firefox, by WebDriver BiDi: opens, drags, undoes and exports with WebGL2 and with WebGPU.
+// Tests the page in Debian's Firefox by WebDriver BiDi: it opens, drags, undoes and exports with WebGL2 and with
+// WebGPU.
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
@@ -11,7 +12,7 @@ import { launch } from "puppeteer-core";
 
 const PORT = Number(process.env.E2E_PORT ?? 4180);
 const ADDRESS = `http://127.0.0.1:${PORT}/`;
-/** Timeout, ms: a software GPU on two cores is slow. */
+/** Timeout of each wait, ms: rendering on two processor cores is slow. */
 const PATIENCE = 120_000;
 
 /** Waits until `condition` is true in the page. */
@@ -57,7 +58,7 @@ async function visit(name, display, preferences) {
     });
     console.log(`${name}: ${adapter}${lack ? ` (${lack})` : ""}`);
 
-    // A handle that a click selects.
+    // The place of a cage vertex that a click selects.
     const place = await page.evaluate(() => {
       const { engine } = globalThis.cagework;
       const canvas = document.querySelector("canvas");
@@ -78,7 +79,7 @@ async function visit(name, display, preferences) {
     await page.mouse.move(place.x + 15, place.y + 10, { steps: 3 });
     await page.mouse.move(place.x + 30, place.y + 20, { steps: 3 });
     await page.mouse.up();
-    // A worker computes the pose asynchronously.
+    // The drag ends asynchronously, because a worker computes the pose: wait until it can be undone.
     const isMoved = () => /Undo: /.test(document.querySelector('#bar [data-tip^="Undo"]')?.dataset.tip ?? "");
     await page.waitForFunction(isMoved, { timeout: PATIENCE });
     assert.notDeepEqual(await heights(page), before, "a drag moves the cage");
@@ -128,7 +129,7 @@ try {
   ]);
   const lack = await visit("Firefox, WebGL2", screen.display, { "dom.webgpu.enabled": false });
   assert.equal(lack, "NoWebGPU", "without WebGPU the page says so");
-  // By default Firefox blocks software adapters.
+  // WebGPU on a software adapter, which Firefox blocks by default.
   const allowed = {
     "dom.webgpu.enabled": true,
     "dom.webgpu.workers.enabled": true,

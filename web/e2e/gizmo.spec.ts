@@ -8,6 +8,7 @@ import { bound, cagePositions, drawn, drop, expect, handle, open, reachable, sho
 /** Tolerance for equal coordinates: rounding of `f32` in a model two units long. */
 const ALIKE = 1e-4;
 
+/** A place at which the pointer hits a handle of the gizmo, in window pixels. */
 interface Grip {
   readonly x: number;
   readonly y: number;
@@ -15,7 +16,7 @@ interface Grip {
   readonly away: readonly [number, number];
 }
 
-/** A point of the window that belongs to a handle of the gizmo. */
+/** Finds a place at which the pointer hits the handle `wanted` of the gizmo. */
 async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
   const found = await page.evaluate((wanted) => {
     const engine = globalThis.cagework?.engine;
@@ -24,7 +25,7 @@ async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
     if (!engine || !canvas || !center) return null;
     const { left, top } = canvas.getBoundingClientRect();
     const [cx = 0, cy = 0] = engine.project(center[0] ?? 0, center[1] ?? 0, center[2] ?? 0);
-    // A circle of 98 pixels encloses the whole gizmo, including the screen-space ring.
+    // The gizmo, including its outermost ring, is within 98 pixels of its centre.
     for (const radius of [60, 70, 80, 50, 40, 30, 20, 92, 98]) {
       for (let k = 0; k < 120; k++) {
         const away = [Math.cos((k * Math.PI) / 60), Math.sin((k * Math.PI) / 60)] as const;
@@ -53,13 +54,13 @@ async function pull(page: Page, wanted: GizmoHandle, by: (grip: Grip) => readonl
   return { before, after: await cagePositions(page) };
 }
 
-/** Displacements along one axis. */
+/** Displacement of each cage vertex along one axis. */
 function along(axis: number, { before, after }: { before: number[]; after: number[] }): number[] {
   return after.map((value, k) => value - (before[k] ?? 0)).filter((_, k) => k % 3 === axis);
 }
 
 const largest = (list: readonly number[]) => list.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-/** Drags away from the centre, and around it, pixels. */
+/** Drags by 36 pixels: away from the centre of the gizmo, and at right angles to that. */
 const outwards = ({ away: [x, y] }: Grip) => [36 * x, 36 * y] as const;
 const across = ({ away: [x, y] }: Grip) => [-36 * y, 36 * x] as const;
 
@@ -74,7 +75,7 @@ function middle(list: readonly number[]): number[] {
 test("arrows, rings and boxes move along their own axis only", async ({ page }) => {
   await page.setViewportSize({ width: 820, height: 520 });
   await open(page);
-  // A small model, because the test draws many frames.
+  // A small model keeps the test short: it draws many frames.
   await drop(page, [
     { name: "cube.obj", bytes: box(0.5) },
     { name: "cube-cage.obj", bytes: box(1) },
@@ -132,7 +133,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.keyboard.press("5");
     const turned = await pull(page, "all", across);
     expect(largest(turned.after.map((value, k) => value - (turned.before[k] ?? 0)))).toBeGreaterThan(0.05);
-    // Without perspective, a rotation around the view direction keeps distances on the screen.
+    // In a parallel projection, a rotation about the view direction preserves distances on the screen.
     const [center] = await seen(middle(turned.before));
     const [from, to] = [await seen(turned.before), await seen(turned.after)];
     const reach = (p: number[]) =>
@@ -171,12 +172,12 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.getByRole("checkbox", { name: "Mean value" }).check({ force: true });
     await expect(page.locator(".compare-labels")).toBeVisible();
     await page.keyboard.press("n");
-    // At rest both reproduce the model; antialiasing makes a few pixels differ.
+    // At rest, both kinds of coordinates reproduce the model. Antialiasing differs in a few pixels.
     const alike = await difference(page);
     await page.evaluate(() => {
       const session = globalThis.cagework;
       const positions = session?.engine.restPositions();
-      // One corner far out. (Both coordinates reproduce affine maps of the whole cage exactly.)
+      // Only the last corner moves. (Both kinds of coordinates reproduce affine maps of the whole cage exactly.)
       session?.engine.setCagePositions(
         positions?.map((value, k) => (k >= 21 ? 3 * value : value)) ?? new Float32Array(),
       );
@@ -188,7 +189,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   });
 });
 
-/** Number of pixels that differ between the two halves, and of foreground pixels in each. */
+/** Counts the pixels that differ between the left and right views, and the foreground pixels of each. */
 async function difference(page: Page): Promise<{ different: number; left: number; right: number }> {
   const veil = (visibility: string) =>
     page.evaluate((visibility) => {
@@ -212,7 +213,7 @@ async function difference(page: Page): Promise<{ different: number; left: number
       Math.max(...[0, 1, 2].map((c) => Math.abs((data[4 * a + c] ?? 0) - (data[4 * b + c] ?? 0))));
     const counts = { different: 0, left: 0, right: 0 };
     for (let y = 0; y < height; y++) {
-      // The leftmost pixel of each row is background, a vertical gradient.
+      // The background is a vertical gradient: the first pixel of each row has its colour.
       const edge = y * width;
       for (let x = 0; x < half; x++) {
         const [a, b] = [edge + x, edge + x + shift];

@@ -1,5 +1,7 @@
-/** Files that ask for endless work or memory, made by crates/cagework-cli/tests/hostile.rs, which reads all of them; here is one
- * for each way in which the page can fail. The processor time and memory of each are written to target/hostile-page.md. */
+/**
+ * Files that demand endless work or memory. crates/cagework-cli/tests/hostile.rs makes and reads all of them; this test
+ * drops one for each way in which the page can fail, and writes processor time and memory to target/hostile-page.md.
+ */
 
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -10,33 +12,35 @@ import { bound, drop, expect, open, test } from "./support";
 const TARGET = join(import.meta.dirname, "../../target");
 const FOLDER = join(TARGET, "tmp/hostile");
 
-/** Files to drop, each with what it asks for. */
+/** Files to drop together: a model, then its material and texture. A comment says what each demands. */
 const DROPS: readonly (readonly string[])[] = [
-  // A stack as deep as its JSON.
+  // Recursion: nested arrays, 100,000 deep.
   ["deep.gltf"],
-  // Memory, refused before it is allocated.
+  // 1000 morph targets of a large accessor, refused before memory is allocated.
   ["morph_zero.glb"],
-  // Nodes that contain each other.
+  // Two nodes that are each other's child.
   ["cycle.glb"],
-  // Many objects.
+  // 100,000 materials.
   ["materials.glb"],
-  // Long texts: most memory.
+  // 3,000,000 numbers in a line, and a number of 10,000,000 digits: the most memory of all files.
   ["numbers.obj"],
   ["token.obj"],
-  // A picture that takes minutes without a graphics card.
+  // 40,000 instances of a mesh: minutes per frame without a graphics card.
   ["instances.glb"],
-  // A cage around triangles that all intersect, and around none.
+  // A cage around 2000 triangles that intersect each other, and around a vertex at 1e30.
   ["all_meet.obj"],
   ["far.obj"],
-  // A texture whose file is small, but which decodes to 67 million pixels.
+  // A texture in a small file that has 67 million pixels.
   ["texture_large.obj", "large.mtl", "large.png"],
 ];
 
-/** Upper limit per file, seconds of processor time, which grows little under load. On an idle machine none takes 10 s. */
+/**
+ * Upper limit per file, seconds of processor time, which depends little on load. No file takes 10 s on an idle machine.
+ */
 const LONGEST_S = 30;
 const MOST_BYTES = 1e9;
 
-/** Reads a file in /proc of each process; empty if the process has ended. */
+/** Contents of a file in the /proc folder of each process; empty for processes that have ended. */
 const statusOf = (processes: readonly number[], file: "stat" | "status"): string[] =>
   processes.map((id) => {
     try {
@@ -46,20 +50,20 @@ const statusOf = (processes: readonly number[], file: "stat" | "status"): string
     }
   });
 
-/** The memory of the largest process, bytes. */
+/** Resident memory of the largest of the processes, bytes. */
 const largestOf = (processes: readonly number[]): number =>
   Math.max(
     ...statusOf(processes, "status").map((text) => 1024 * Number(/VmRSS:\s+(\d+)/.exec(text)?.[1] ?? 0)),
   );
 
-/** Processor time so far, seconds: user and system time of Linux in hundredths. */
+/** User and system time of the processes since their start, seconds. Linux counts in hundredths. */
 const processorTimeOf = (processes: readonly number[]): number =>
   statusOf(processes, "stat").reduce((sum, text) => {
     const [user = 0, system = 0] = text.replace(/.*\) /, "").split(" ").slice(11, 13).map(Number);
     return sum + (user + system) / 100;
   }, 0);
 
-/** Waits until the dropped file is bound or refused; returns the message, or "bound". */
+/** Waits until the dropped model is bound or refused; returns the error message, or "bound". */
 async function outcome(page: Page, name: string): Promise<string> {
   const said = await page.waitForFunction((name) => {
     const alert = document.querySelector("#toasts [role=alert]")?.textContent?.trim();

@@ -1,4 +1,4 @@
-/** The work that the page saves in the browser. */
+/** Work that the page has saved in the browser's database. */
 
 import type { Page } from "@playwright/test";
 
@@ -23,7 +23,7 @@ export const savedSince = (page: Page, moment: number, name = ""): Promise<boole
     { moment, name },
   );
 
-/** Truncates the saved files, as a disk failure would. */
+/** Truncates all saved files, as a disk failure would. */
 export const cutKept = (page: Page): Promise<void> =>
   page.evaluate(
     () =>

@@ -1,4 +1,4 @@
-/** Opening a large model never blocks the page. */
+/** Opening a large model never blocks the page for long. */
 
 import type { Page } from "@playwright/test";
 import { torus } from "./models";
@@ -6,8 +6,8 @@ import { bound, carry, expect, letGo, open, test } from "./support";
 import { longestTask } from "./tasks";
 
 /**
- * Vertices, and the upper limit of a main-thread task, ms of processor time: three times the promised limit, for slow machines.
- * Reading, caging or binding on the main thread would take seconds.
+ * Number of vertices, and the upper limit for a task of the main thread, ms of processor time: three times the page's
+ * aim, for slow machines. Reading, caging or binding on the main thread would take seconds.
  */
 const LIMITS = [
   [30_000, 150],
@@ -34,7 +34,7 @@ const watch = (page: Page): Promise<void> =>
     };
   });
 
-// A small picture, since the processor computes each pixel.
+// A small window: each pixel is computed by the processor.
 test.use({ viewport: { width: 420, height: 420 } });
 
 for (const [vertices, most] of LIMITS) {
@@ -43,10 +43,11 @@ for (const [vertices, most] of LIMITS) {
     page,
   }) => {
     await open(page);
-    // Transferring the file to the browser is not part of the measurement.
+    // The file is sent to the browser before the measurement.
     const files = await carry(page, [{ name: "torus.glb", bytes: await torus(vertices) }]);
     await watch(page);
-    // The limit applies to processor time. The wall-clock times of the Long Tasks API grow under load and are only reported.
+    // The limit is on processor time. The Long Tasks API reports wall-clock time, which grows under load: it is only
+    // recorded.
     const longest = await longestTask(browser, page, async () => {
       await letGo(page, files);
       await expect(page).toHaveTitle(/torus/, { timeout: 120_000 });

@@ -33,7 +33,7 @@ function png(): Uint8Array {
   return new Uint8Array(Buffer.concat(parts));
 }
 
-/** A bent tube along y, radius 0.4, 2 high, with texture coordinates. */
+/** A bent tube along y, 2 high, of radius up to 0.4, with texture coordinates. */
 function tube(rings = 40, around = 32): { positions: Float32Array; uvs: Float32Array; indices: Uint32Array } {
   const positions: number[] = [];
   const uvs: number[] = [];
@@ -78,12 +78,12 @@ function document(): { document: Document; node: Node } {
   return { document, node };
 }
 
-/** A textured GLB. */
+/** The textured tube as GLB. */
 export async function glb(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document().document);
 }
 
-/** The same model as .gltf with .bin and texture. */
+/** The textured tube as .gltf, with files for its buffer and texture. */
 export async function gltfFiles(): Promise<{ name: string; bytes: Uint8Array }[]> {
   const { json, resources } = await new NodeIO().writeJSON(document().document, { basename: "worm" });
   const files = Object.entries(resources).map(([name, bytes]) => ({ name, bytes }));
@@ -139,7 +139,7 @@ export async function meshoptGlb(): Promise<Uint8Array> {
   return io.writeBinary(made);
 }
 
-/** A tetrahedron as OBJ; `open` omits a face. */
+/** A tetrahedron as OBJ. If `open`, it lacks a face. */
 export function obj(scale: number, open = false): Uint8Array {
   const corners = [
     [1, 1, 1],
@@ -152,13 +152,13 @@ export function obj(scale: number, open = false): Uint8Array {
   return new TextEncoder().encode([...lines, ...faces, ""].join("\n"));
 }
 
-/** Corners, and faces of corner indices from 0. */
+/** Vertex positions, and faces as vertex indices from 0. */
 export interface Mesh {
   readonly positions: readonly (readonly number[])[];
   readonly faces: readonly (readonly number[])[];
 }
 
-/** A box around the origin, given half its sides: six quads, counter-clockwise from outside. */
+/** A box around the origin, given half its side lengths. Its six quads are counter-clockwise seen from outside. */
 export function boxFaces(half: number | readonly [number, number, number]): Mesh {
   const sides = typeof half === "number" ? [half, half, half] : half;
   const signs = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 1, k & 2, k & 4].map((bit) => (bit ? 1 : -1)));
@@ -189,7 +189,7 @@ export function box(half: number | readonly [number, number, number]): Uint8Arra
   return objOf(boxFaces(half));
 }
 
-/** Errors that the Khronos validator finds. */
+/** Errors that the Khronos glTF validator finds in a GLB. */
 export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
   const report = await validator.validateBytes(new Uint8Array(bytes));
   const ERROR = 0;
@@ -198,7 +198,10 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
     .map(({ code, pointer, message }) => `${code} at ${pointer}: ${message}`);
 }
 
-/** A body and a hat on a skeleton of two joints, with two morph targets of default weights 0 and 1, and a clip that animates all. */
+/**
+ * A body and a hat skinned to two joints, and a rigid buckle. The body has two morph targets of default weights 0 and
+ * 1. A clip animates both joints and the morph targets.
+ */
 export async function dancer(): Promise<Uint8Array> {
   const document = new Document();
   const buffer = document.createBuffer();
@@ -218,7 +221,10 @@ export async function dancer(): Promise<Uint8Array> {
   const SIDES = 16;
   const RINGS = 13;
 
-  /** A closed tube. Each key maps the relative height, 0 to 1, to a radial displacement. */
+  /**
+   * A closed, skinned tube. Each of `keys` is a morph target: radial displacement as a function of relative height, 0
+   * to 1.
+   */
   const tube = (
     name: string,
     [from, to]: [number, number],
@@ -295,14 +301,14 @@ export async function dancer(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document);
 }
 
-/** Positions of the mesh `name` in a file. */
+/** Positions of the first primitive of the mesh `name` in a GLB. */
 export async function positionsOf(bytes: Uint8Array, name: string): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const mesh = root.listMeshes().find((mesh) => mesh.getName() === name);
   return [...(mesh?.listPrimitives()[0]?.getAttribute("POSITION")?.getArray() ?? [])];
 }
 
-/** Vertices of the first mesh of a file at a keyframe of its animation of morph targets. */
+/** Vertices of the first primitive of a GLB at a keyframe of its morph target animation. */
 export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const [primitive] = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());

@@ -12,13 +12,13 @@ const DIST = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 
 interface Site {
   readonly address: string;
-  /** Replaces the build by another one, in which all hashed files have other names. */
+  /** Replaces the files by a new build in which all hashed files have other names. */
   deploy(): void;
   /** Stops the server. */
   stop(): Promise<void>;
 }
 
-/** Each test has a server and a copy of the page of its own. */
+/** Each test has its own server and its own copy of the page. */
 const test = base.extend<{ site: Site }>({
   serviceWorker: true,
   // biome-ignore lint/correctness/noEmptyPattern: Playwright reads the names of fixtures from the pattern.
@@ -54,7 +54,7 @@ const test = base.extend<{ site: Site }>({
   },
 });
 
-/** Waits until all files of the page are kept in the browser. */
+/** Waits until the service worker has stored all files of the page. */
 const kept = (page: Page) => page.waitForFunction(() => navigator.serviceWorker.controller !== null);
 
 test("after the first visit everything works without a network", async ({ page, site }) => {
@@ -97,7 +97,7 @@ test("an open tab keeps its version and offers the new one", async ({ page, cont
   });
   await test.step("they are deleted after it is closed", async () => {
     expect(await other.evaluate(() => caches.keys())).toHaveLength(2);
-    // A navigation deletes builds without a tab. The closed tab may still hold its lock for a moment.
+    // Each navigation deletes builds that no tab uses. The closed tab may hold its lock a moment longer.
     const builds = async () => {
       await other.reload();
       return other.evaluate(() => caches.keys());

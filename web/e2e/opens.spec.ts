@@ -1,4 +1,4 @@
-/** The first visit: a sample that can be dragged at once. */
+/** The first visit: the page opens with a sample that can be dragged at once. */
 
 import { box } from "./models";
 import { followsAHandle } from "./stories";
@@ -24,7 +24,7 @@ test("opens below any path with a bound sample, draws nothing when idle, and sha
       const stop = globalThis.cagework?.onFrame(() => {
         frames += 1;
       });
-      // One second of the browser's frames.
+      // Wait for 60 frames of the browser, about a second.
       for (let k = 0; k < 60; k++) await new Promise(requestAnimationFrame);
       stop?.();
       return frames;
@@ -61,7 +61,7 @@ test("opens below any path with a bound sample, draws nothing when idle, and sha
       expect(text).toMatch(new RegExp(`^${name} v\\d.*: .*(MIT|Apache)`, "m"));
     expect(text).toContain("Permission is hereby granted");
     expect(text).toContain("Apache License");
-    // Build tools are not part of the page.
+    // The list contains no build tools, whose code is not part of the page.
     expect(text).not.toMatch(/^(vite|syn|wasm-bindgen-cli-support) v/m);
     const library = await page.request.get("./rust-standard-library.html");
     expect(library.ok()).toBe(true);

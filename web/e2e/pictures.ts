@@ -1,4 +1,4 @@
-/** Makes the pictures of samples in the page, and those of docs/, for `cargo xtask pictures`. */
+/** Makes the pictures of the samples and of docs/ for `cargo xtask pictures`. */
 
 import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -8,7 +8,7 @@ import { bound, drawn, grip, open } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
 
-/** Side length, pixels: sharp on high-density screens. */
+/** Side length, pixels: enough for high-density screens. */
 const SIDE = 216;
 
 test("pictures of the samples", async ({ page }) => {
@@ -39,7 +39,7 @@ test("pictures of the samples", async ({ page }) => {
 
 const DOCUMENTS = join(import.meta.dirname, "../../docs/pictures");
 
-/** Stops of the tour that the documents show: number from 1, and options. */
+/** Pictures taken at stops of the tour: file name, number of the stop from 1, and the option to choose there. */
 const FIGURES: readonly { readonly name: string; readonly stop: number; readonly choose?: string }[] = [
   { name: "cage", stop: 1 },
   { name: "weights", stop: 2 },
@@ -50,7 +50,7 @@ const FIGURES: readonly { readonly name: string; readonly stop: number; readonly
   { name: "enough-smoothing", stop: 5, choose: "1e-5" },
 ];
 
-/** The picture of the README: a knee is dragged, the other leg stays. */
+/** Takes the README's picture: a knee is dragged, and the other leg does not move. */
 async function liftsAKnee(page: Page): Promise<void> {
   await page.getByRole("button", { name: /Legs close together/ }).click();
   await expect(page).toHaveTitle(/Legs/);
@@ -65,7 +65,7 @@ async function liftsAKnee(page: Page): Promise<void> {
   await page.mouse.move(knee.x, knee.y);
   await page.mouse.down();
   await page.mouse.move(knee.x - 70, knee.y - 110, { steps: 20 });
-  // The worker computes the pose.
+  // A worker computes the pose of the pull.
   await page.waitForTimeout(2000);
   await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70 });
   await page.mouse.up();
@@ -81,7 +81,7 @@ async function visit(page: Page, stop: number, choice?: string): Promise<void> {
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
   if (choice) await card.getByRole("radio", { name: choice, exact: true }).check({ force: true });
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
-  // The slice is computed with a delay.
+  // A slice is computed after a delay, which its busy mark shows.
   await expect(page.locator("[data-busy]")).toHaveCount(0);
 }
 
@@ -106,7 +106,7 @@ test("pictures of the documents", async ({ page }) => {
     });
     writeFileSync(join(DOCUMENTS, `${name}.webp`), Uint8Array.from(data));
   }
-  // The split view exists only in the page, below its tools.
+  // The split view is drawn only in the page, with tools above it, which are hidden for the picture.
   await visit(page, 9);
   await page.evaluate(() => {
     for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;

@@ -1,10 +1,10 @@
-/** Accessibility, and resources that are lost or reused. */
+/** Layout and accessibility, a lost GPU device, and memory that is used again. */
 
 import type { Locator, Page } from "@playwright/test";
 import { complaintsOfAxe, survives } from "./stories";
 import { cagePositions, calm, dropBox, expect, open, shoot, test } from "./support";
 
-/** Whether an element shows all of its text. */
+/** Whether the text of an element fits into it. */
 const isWhole = (of: Locator) => of.evaluate((element) => element.scrollWidth <= element.clientWidth);
 
 const boxOf = async (of: Locator) => (await of.boundingBox()) ?? { x: 0, y: 0, width: 0, height: 0 };
@@ -14,7 +14,9 @@ type Box = Awaited<ReturnType<typeof boxOf>>;
 const overlap = (a: Box, b: Box) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
-/** Names, messages, tips and tools fit in windows of several sizes; toolbars are one tab stop. */
+/**
+ * Checks that names, messages, tips and tools fit into windows of several sizes, and that a toolbar is one tab stop.
+ */
 async function fits(page: Page): Promise<void> {
   await page.setViewportSize({ width: 1440, height: 900 });
   await dropBox(page, "a-model-whose-file-name-is-much-longer-than-the-bar-has-room-for-it");
@@ -94,6 +96,6 @@ test("a lost device is recovered, axe finds no fault in any step, and models lea
     }
     return sizes;
   });
-  // Wasm memory never shrinks, but must stop growing once the largest model has been open twice.
+  // Wasm memory never shrinks. Once the largest model has been open twice, it must not grow any more.
   expect(bytes.at(-1)).toBe(bytes[3]);
 });

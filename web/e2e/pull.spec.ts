@@ -1,4 +1,4 @@
-/** Pulling points of the model. */
+/** Pulling and pinning points of the model. */
 
 import {
   cagePositions,

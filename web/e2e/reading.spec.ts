@@ -1,14 +1,14 @@
-/** Files are read in their own worker: a worker that traps or hangs leaves the open model usable. */
+/** A worker reads each file. If the worker traps or hangs, the open model can still be edited. */
 
 import type { Page } from "@playwright/test";
 import { complaintsOfAxe } from "./stories";
 import { cagePositions, drag, drop, dropBox, expect, open, shoot, spoilReading, test } from "./support";
 
-/** Their sizes make the worker trap or hang. */
+/** Files whose sizes `spoilReading` recognises: the first makes the worker trap, the second makes it hang. */
 const hostile = { name: "hostile.glb", bytes: new Uint8Array(100) };
 const endless = { name: "endless.glb", bytes: new Uint8Array(101) };
 
-/** The open model has not changed and can be dragged. */
+/** Checks that the cage is unchanged and can be dragged. */
 async function isAlive(page: Page, before: number[]): Promise<void> {
   expect(await cagePositions(page)).toEqual(before);
   await drag(page, 30, 20);

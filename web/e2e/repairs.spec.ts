@@ -1,4 +1,4 @@
-/** The repair buttons of the Cage step, each with a cage that has the fault. */
+/** The repair buttons of the Cage step, each tested with a cage that has the fault. */
 
 import type { Page } from "@playwright/test";
 import { box, boxFaces, type Mesh, objOf } from "./models";
@@ -7,15 +7,15 @@ import { bound, drop, expect, open, test } from "./support";
 interface Fault {
   readonly name: string;
   readonly cage: Mesh;
-  /** Half the sides of the model, a box. */
+  /** Half the side lengths of the model, a box. */
   readonly model?: readonly [number, number, number] | number;
   readonly says: RegExp;
   readonly button: RegExp;
-  /** Whether the faulty cage cannot be bound. */
+  /** Whether the fault prevents a bind. */
   readonly broken?: boolean;
-  /** Whether the cage is valid but the model cannot be bound to it. */
+  /** Whether the bind fails although the cage itself is valid. */
   readonly refused?: boolean;
-  /** Vertices of the repaired cage, if known. */
+  /** Number of vertices of the repaired cage, if known. */
   readonly vertices?: number;
 }
 
@@ -86,7 +86,7 @@ test("every fault has a button that repairs it", async ({ page }) => {
   for (const fault of FAULTS) {
     await test.step(fault.name, async () => {
       await show(page, fault);
-      // The page binds usable cages and moves to the next step.
+      // The page binds a usable cage by itself, and then goes to the next step: return to the Cage step.
       if (fault.refused) await expect(page.getByText(/none of the model's/i).first()).toBeVisible();
       else if (!fault.broken) await bound(page);
       await page.getByRole("button", { name: "Cage", exact: false }).first().click();
@@ -112,7 +112,7 @@ test("every fault has a button that repairs it", async ({ page }) => {
     await bound(page);
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const card = panel.locator(".problem-card").filter({ hasText: /thinner than a cell/ });
-    // 2 long and 2/128 thick: one cell at a grid of 128. (Powers of two are exact in files and f32.)
+    // The part is 2 long and 2/128 thick, one cell at a grid of 128. (Powers of two are exact in OBJ files and f32.)
     await card.getByRole("button", { name: /Bind with 128 cells/ }).click();
     await expect(card.getByText("Fine enough")).toBeVisible();
     await bound(page);

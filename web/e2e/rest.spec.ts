@@ -1,4 +1,4 @@
-/** Editing the cage at rest: a box around a cube whose corners stick out when a cage vertex moves inwards. */
+/** Reshaping the rest cage: a box around a cube, whose corners are outside if a cage vertex moves inwards. */
 
 import type { Page } from "@playwright/test";
 import { box } from "./models";
@@ -21,7 +21,7 @@ import {
 const restPositions = (page: Page): Promise<number[]> =>
   page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
 
-/** Clicks the middle of a reachable edge or face, and returns its corners. */
+/** Clicks the middle of an edge (`size` 2) or quad (4) that is visible; returns the indices of its corners. */
 async function choose(page: Page, size: 2 | 4): Promise<number[]> {
   const { x, y, corners } = await spot(page, size);
   await page.mouse.click(x, y);
@@ -30,7 +30,7 @@ async function choose(page: Page, size: 2 | 4): Promise<number[]> {
   return corners;
 }
 
-/** Waits until the cage has `count` vertices, and returns them at rest. */
+/** Waits until the cage has `count` vertices; returns the rest positions. */
 async function settled(page: Page, count: number): Promise<number[]> {
   await expect.poll(async () => (await restPositions(page)).length / 3).toBe(count);
   return restPositions(page);
@@ -62,7 +62,8 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
     await expect(badge).toHaveText(/Encloses the model/);
     await page.keyboard.press("g");
     await page.keyboard.press("x");
-    // Half of the distance to the centre: the model's corner is a tenth inside the cage's.
+    // Half the distance from the cage's corner to the centre. The model's corner is a tenth of the way in, so that it
+    // is outside.
     await page.keyboard.type(String(-0.5 * (corner[0] ?? 0)));
     await expect(badge).toHaveText(/outside/);
     await shoot(page, "rest-outside");
@@ -112,7 +113,7 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
     const face = await choose(page, 4);
     await page.keyboard.press("Shift+E");
     const extruded = await settled(page, 12);
-    // Four new corners, all at the same distance from the old ones.
+    // Four new corners, each at the same distance from the old corner nearest to it.
     const ways = [0, 1, 2, 3].map((k) => {
       const made = extruded.slice(24 + 3 * k, 27 + 3 * k);
       const from = face.map((i) => rest.slice(3 * i, 3 * i + 3));
@@ -140,7 +141,7 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
   });
 
   await test.step("an impossible edit shows an alert until it is closed", async () => {
-    // The preceding undo replaced the cage, which starts a bind.
+    // The preceding undo has started a bind, which must not close the alert.
     await page.keyboard.press("Shift+S");
     const alert = page.locator("#toasts [role=alert]");
     await expect(alert).toContainText(/select an edge/i);
@@ -193,7 +194,8 @@ test("an edited cage is bound completely, on the chosen back end", async ({ page
     const before = await restPositions(page);
     await move(0.01);
     await page.keyboard.press("Enter");
-    // Cancelled after the bind of the previous edit would have begun: that edit must still be bound.
+    // Escape comes after the pause that follows an edit: the bind of the previous edit is delayed, but must still
+    // happen.
     await move(0.3);
     const since = await page.evaluate(() => performance.now());
     await page.waitForFunction((since) => performance.now() > since + 200, since);

@@ -1,4 +1,4 @@
-/** Rigged models are posed, play their clips and are exported with both. */
+/** Rigged models are posed, play their clips, and are exported with pose and clips. */
 
 import type { Page } from "@playwright/test";
 import { dancer, positionsOf, shownAt, validationErrors } from "./models";
@@ -22,7 +22,7 @@ import {
 
 const TIMES = [0, 0.6, 1.3];
 
-/** Vertices of the first clip at the given times, seconds. */
+/** Vertex positions while the first clip is at each of the given times, seconds. */
 async function played(page: Page, at: readonly number[] = TIMES): Promise<number[][]> {
   return page.evaluate(async (times) => {
     const session = globalThis.cagework;
@@ -50,7 +50,7 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
   await expect(page).toHaveTitle(/Legs close together/);
   await bound(page);
   const rest = await played(page);
-  // Chosen clips play by themselves unless the user prefers reduced motion, as all other tests do.
+  // Clips start by themselves unless the user prefers reduced motion, which is set for all other tests.
   await page.emulateMedia({ reducedMotion: "no-preference" });
 
   await test.step("a chosen clip plays, and pauses at the time of the slider", async () => {

@@ -28,7 +28,7 @@ test("a damaged link and a project with impossible settings open with defaults a
   const before = await cagePositions(page);
   await drag(page, 30, 20);
   expect(await cagePositions(page)).not.toEqual(before);
-  // Once accepted, these settings made every bind and estimate fail until a reload.
+  // Settings out of range. Without the checks, every bind and memory estimate would fail until a reload.
   const settings = {
     bind: { grid: 64.5, tau: 0, memory_limit: 1e18 },
     cage: { vertices: 9e9 },
@@ -37,7 +37,7 @@ test("a damaged link and a project with impossible settings open with defaults a
   };
   const project = await page.evaluate((settings) => {
     const engine = globalThis.cagework?.engine;
-    // At rest the document has no pose of its own in the file.
+    // A pose at rest is not written, so that the pose in the settings is the only one.
     engine?.setCagePositions(engine.restPositions());
     return Array.from(engine?.writeProject(settings) ?? []);
   }, JSON.stringify(settings));
@@ -53,7 +53,7 @@ test("a damaged link and a project with impossible settings open with defaults a
   await drag(page, 30, 20);
 });
 
-/** Waits until the restarted page reports the crash and has `model` open in its pose; shows the report. */
+/** Checks that the page has restarted, reports the crash of `model` with this trace, and has restored the pose. */
 async function restarted(page: Page, model: RegExp, posed: number[], trace: string): Promise<void> {
   const alert = page.locator("#toasts [role=alert]");
   await expect(alert).toContainText("Cagework stopped and was restarted", { timeout: 60_000 });
@@ -67,7 +67,7 @@ async function restarted(page: Page, model: RegExp, posed: number[], trace: stri
   await page.keyboard.press("Escape");
 }
 
-/** Drags a handle and waits until the browser has saved the pose; returns it. */
+/** Drags a handle, waits until the browser has saved the pose, and returns that. */
 async function savedPose(page: Page, name: string): Promise<number[]> {
   const before = await page.evaluate(() => Date.now());
   await drag(page, 50, 30);
@@ -82,7 +82,7 @@ test("a panic after several models restarts the page with the saved work", async
   const posed = await savedPose(page, "model3");
   await crash(page, "panic");
   await restarted(page, /model3/, posed, "panicked at");
-  // Console messages and page state arrive separately.
+  // Console messages can arrive after changes of the page.
   await expect.poll(() => complaints.join(), "the console has the panic").toMatch(/panicked at/);
   await dropBox(page, "good");
   await drag(page, 20, 10);

@@ -1,10 +1,10 @@
-// Serves dist/, or another folder, at the root and below a path, without special headers.
+// Serves a folder (dist/ by default) at the root and below the path BELOW, without special headers.
 
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
 
-// Different ports allow tests of two copies of the repository at once. With 0 the system chooses one.
+// The port is an option, so that tests of two working copies can run at once. With 0 the system chooses a free port.
 const PORT = Number(process.env.E2E_PORT ?? 4179);
 const FOLDER = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 const BELOW = "/~student/some%20where/cagework";

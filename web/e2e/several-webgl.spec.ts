@@ -1,4 +1,4 @@
-/** Several models without WebGPU: the processor computes rigid and fixed parts. */
+/** Several models without WebGPU: the processor deforms models with rigid and fixed parts. */
 
 import { WITH_WEBGL } from "./browser";
 import { apart, BUCKLE, bend, dressed, exportsEach, paintable, press, RIGID, row, still } from "./dressed";

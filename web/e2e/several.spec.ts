@@ -1,4 +1,6 @@
-/** Several models in one cage: dropped together, following it in different ways, exported separately. */
+/**
+ * Several models in one cage. They are dropped together, have different options, and are exported to separate files.
+ */
 
 import type { Page } from "@playwright/test";
 import {
@@ -38,7 +40,7 @@ import {
 } from "./support";
 import { distances, pointsOf, SIZES } from "./wardrobe";
 
-/** Clicks with the brush. Returns the largest distance of a painted vertex of model 0 from there, pixels. */
+/** Clicks at `at` with the brush. Returns the largest distance from there to a painted vertex of model 0, pixels. */
 async function dabbed(page: Page, at: { x: number; y: number }, positions: number[]): Promise<number> {
   await page.mouse.click(at.x, at.y);
   return page.evaluate(
@@ -78,7 +80,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
 
   await test.step("a model is hidden", async () => {
     const picture = () => drawing(page);
-    // Handles are highlighted when the pointer is near.
+    // Both pictures are taken with the pointer here, because handles near the pointer are highlighted.
     await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
     const before = await picture();
     await press(page, "Hide shirt.glb");
@@ -133,7 +135,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBe(before);
     await page.keyboard.press("Control+y");
     await page.getByRole("radio", { name: "Follow again" }).check({ force: true });
-    // Painted vertices have returned to their rest positions, so that others are under the pointer.
+    // Painted vertices have returned to their rest positions, so that the brush must be aimed again.
     await pull(page, await paintable(page, 0), 2, 6);
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBeLessThan(painted);
     await undo(page);

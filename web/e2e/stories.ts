@@ -1,4 +1,4 @@
-/** Checks that run with WebGPU and with WebGL. */
+/** Checks shared by the tests with WebGPU and with WebGL. */
 
 import AxeBuilder from "@axe-core/playwright";
 import type { Page } from "@playwright/test";
@@ -23,13 +23,13 @@ import {
   shoot,
 } from "./support";
 
-/** Accessibility faults that axe finds. */
+/** Accessibility faults that axe finds in the page, each with its elements. */
 export async function complaintsOfAxe(page: Page): Promise<string[]> {
   const { violations } = await new AxeBuilder({ page }).analyze();
   return violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
 }
 
-/** Drags a handle, and checks cage, model and pixels, then undo and redo. */
+/** Drags a handle and checks that cage, model and pixels change; then checks undo and redo. */
 export async function followsAHandle(page: Page, picture: string): Promise<void> {
   const before = { cage: await cagePositions(page), model: await modelPositions(page) };
   const pixels = await drawing(page);
@@ -38,7 +38,7 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   const after = { cage: await cagePositions(page), model: await modelPositions(page) };
   const moved = largestMove(before.cage, after.cage);
   expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
-  // Weights are at most 1: no vertex moves farther than the handle.
+  // Weights are at most 1: no vertex of the model moves farther than the dragged cage vertex.
   const follows = largestMove(before.model, after.model);
   expect(follows).toBeGreaterThan(0.02 * moved);
   expect(follows).toBeLessThanOrEqual(1.001 * moved);
@@ -52,7 +52,7 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
 }
 
-/** Pulls a point of the model, then undoes that. */
+/** Pulls a point of the model, checks that it is below the pointer, and undoes the pull. */
 export async function pullsTheModel(page: Page): Promise<void> {
   const before = await cagePositions(page);
   const at = await grip(page, [0.35, 0.45]);
@@ -64,7 +64,7 @@ export async function pullsTheModel(page: Page): Promise<void> {
   expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
 }
 
-/** Checks the heat map of a vertex, the slice through the grid and the coordinates side by side. */
+/** Checks the heat map of a vertex's weights, the slice through the grid, and the side-by-side comparison. */
 export async function showsColours(page: Page, picture: string): Promise<void> {
   const pixels = () => drawing(page);
   const vertex = await reachable(page);
@@ -91,7 +91,7 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   await shoot(page, `${picture}-compare`);
 }
 
-/** Shows the three coordinates side by side: equal at rest, different in a pose. */
+/** Shows the three kinds of coordinates side by side; checks that they agree at rest and differ in a pose. */
 async function comparesAll(page: Page): Promise<void> {
   await dropsAWorm(page, "compared");
   const choices = page.getByRole("group", { name: "Coordinates side by side" });
@@ -135,20 +135,20 @@ async function comparesAll(page: Page): Promise<void> {
   for (const gap of await apart()) expect(gap, "posed").toBeGreaterThan(1e-3 * size);
 }
 
-/** `name`: not that of the open model, since the title shows when the model is open. */
+/** Drops a model named `name`, which must differ from the open model's: the title tells when it has been opened. */
 async function dropsAWorm(page: Page, name: string): Promise<void> {
   await drop(page, [{ name: `${name}.glb`, bytes: await glb() }]);
   await expect(page).toHaveTitle(new RegExp(name));
   await bound(page);
 }
 
-/** Drops a model and poses it. */
+/** Drops a model and drags a handle by (dx, dy) pixels. */
 export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]): Promise<void> {
   await dropsAWorm(page, "worm");
   await drag(page, dx, dy);
 }
 
-/** Exports a posed model, and opens the file. */
+/** Exports a posed model, opens the file, and checks that it shows the pose. */
 export async function exportsWhatIsShown(page: Page, picture: string): Promise<void> {
   await posesAWorm(page, [60, 10]);
   const posed = await modelPositions(page);
@@ -161,14 +161,14 @@ export async function exportsWhatIsShown(page: Page, picture: string): Promise<v
   expect(largestMove(posed, again)).toBeLessThan(1e-4);
 }
 
-/** Exports a picture, which is not empty. */
+/** Exports a picture, and checks that it is a PNG and not empty. */
 export async function exportsAPicture(page: Page): Promise<void> {
   const picture = await download(page, "picture");
   expect(Buffer.from(picture.bytes.slice(1, 4)).toString()).toBe("PNG");
   expect(picture.bytes.length).toBeGreaterThan(20_000);
 }
 
-/** Checks that model and pose survive a lost GPU and can be dragged. */
+/** Checks that model and pose are restored after `lose` has made the page lose the GPU, and that a drag still works. */
 export async function survives(page: Page, lose: () => Promise<unknown>): Promise<void> {
   await drag(page, 40, 40);
   const before = await modelPositions(page);

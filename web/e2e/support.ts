@@ -1,4 +1,4 @@
-/** Helpers of all tests: opening the page, querying its engine, dropping files. */
+/** Helpers of the page tests: opening the page, querying its engine, dropping files. */
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -8,19 +8,19 @@ import { box } from "./models";
 
 declare global {
   var cagework: Session | undefined;
-  /** Resolves when the GPU is lost. */
+  /** Set by tests that lose the GPU: a promise that resolves when the page is notified of the loss. */
   var wasLost: Promise<unknown> | undefined;
 }
 
-/** Folder of screenshots, for inspection with SHARP=1. */
+/** Folder of the screenshots that `SHARP=1` saves for inspection. */
 export const SCREENS = join(import.meta.dirname, "../../target/screens");
 
-/** A rare performance warning of the software GL driver. */
+/** A rare performance warning of the software GL driver, which is ignored. */
 const OF_THE_DRIVER = /GL Driver Message .*queueSerial/;
 
-/** Tests fail if the console has errors or warnings at their end. */
+/** The test function. A test fails if the page has logged errors or warnings, or if a request has failed. */
 export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }>({
-  /** Whether the page may register its service worker, which would answer in place of routes. */
+  /** Whether the page may register its service worker. It would answer requests that tests want to intercept. */
   serviceWorker: [false, { option: true }],
   context: async ({ context, serviceWorker }, use) => {
     if (!serviceWorker) {
@@ -40,7 +40,7 @@ export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }
         if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`);
       });
       await use(complaints);
-      // Routed requests may still be in progress, unless the test has closed the page.
+      // Wait for intercepted requests in progress, unless the test has closed the page.
       if (!page.isClosed()) await page.unrouteAll({ behavior: "wait" });
       expect(complaints, "the console is clean").toEqual([]);
     },
@@ -66,7 +66,7 @@ export async function bound(page: Page): Promise<void> {
   });
 }
 
-/** The position of a cage vertex in the window. */
+/** Position of a cage vertex in window pixels. */
 export async function handle(page: Page, vertex: number): Promise<{ x: number; y: number }> {
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
@@ -78,8 +78,10 @@ export async function handle(page: Page, vertex: number): Promise<{ x: number; y
   return { x: box.x + x, y: box.y + y };
 }
 
-/** A cage vertex that a click selects, and that is inside the cage's bounding box by at least the share `within` of its extents;
- * -1 if there is none. */
+/**
+ * Index of a cage vertex that a click selects, -1 if there is none. It is inside the cage's bounding box by at least
+ * the fraction `within` of its extents.
+ */
 export async function reachable(page: Page, within = 0): Promise<number> {
   return page.evaluate((within) => {
     const engine = globalThis.cagework?.engine;
@@ -106,7 +108,7 @@ export async function reachable(page: Page, within = 0): Promise<number> {
   }, within);
 }
 
-/** The centre in the window of an edge (2 corners) or face (more) that a click selects. */
+/** Centre, in window pixels, of an edge (`corners` 2) or face (more) that a click selects, and the corners' indices. */
 export async function spot(
   page: Page,
   corners: number,
@@ -142,7 +144,7 @@ export async function spot(
   return found;
 }
 
-/** Drags one cage vertex (with Alt) by pixels; returns its index. */
+/** Drags a cage vertex by (dx, dy) pixels, with Alt; returns the vertex's index. */
 export async function drag(page: Page, dx: number, dy: number): Promise<number> {
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
@@ -157,7 +159,7 @@ export async function drag(page: Page, dx: number, dy: number): Promise<number> 
 }
 
 /**
- * Finds the point of the model, away from all handles, that is nearest to a given position in the view. `share`: that
+ * Finds the point of the model that is nearest to a position in the view and away from all handles. `share`: the
  * position, as fractions of the view's width and height.
  */
 export async function grip(
@@ -188,7 +190,7 @@ export async function grip(
   return found;
 }
 
-/** The position of a point of the model in the window. */
+/** Where a point of the model appears, window pixels. */
 export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: number; y: number }> {
   return page.evaluate((point) => {
     const engine = globalThis.cagework?.engine;
@@ -199,7 +201,7 @@ export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: num
   }, point);
 }
 
-/** Drags by pixels, in steps. */
+/** Drags with the mouse by (dx, dy) pixels in several moves. */
 export async function pull(
   page: Page,
   from: { x: number; y: number },
@@ -212,7 +214,7 @@ export async function pull(
   await page.mouse.up();
 }
 
-/** Waits until a pull has ended and can be undone. */
+/** Waits until the last undo step is a pull. */
 export async function rested(page: Page): Promise<void> {
   await expect(page.getByRole("button", { name: /^Undo/ })).toHaveAttribute("data-tip", /Pull/);
 }
@@ -226,7 +228,7 @@ export function modelPositions(page: Page): Promise<number[]> {
   return page.evaluate(async () => Array.from((await globalThis.cagework?.readPositions()) ?? []));
 }
 
-/** Largest distance between two lists of points. */
+/** Largest distance between points of the same index in two lists of coordinates. */
 export function largestMove(a: readonly number[], b: readonly number[]): number {
   let largest = 0;
   for (let k = 0; k + 2 < a.length; k += 3) {
@@ -241,7 +243,7 @@ export interface Dropped {
   readonly bytes: Uint8Array;
 }
 
-/** A DataTransfer that holds files. */
+/** A DataTransfer, in the page, that holds the files. */
 export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHandle<DataTransfer>> {
   const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
   return page.evaluateHandle((packed) => {
@@ -254,19 +256,19 @@ export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHa
   }, packed);
 }
 
-/** Drops a DataTransfer on the window. */
+/** Drops a DataTransfer on the view. */
 export async function letGo(page: Page, data: JSHandle<DataTransfer>): Promise<void> {
   for (const type of ["dragenter", "dragover", "drop"]) {
     await page.locator("#stage").dispatchEvent(type, { dataTransfer: data });
   }
 }
 
-/** Drops files on the window. */
+/** Drops files on the view. */
 export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
   await letGo(page, await carry(page, files));
 }
 
-/** Drops a box with a box as its cage, and waits until they are bound. */
+/** Drops a box in a larger box named as its cage, and waits until they are bound. */
 export async function dropBox(page: Page, name: string): Promise<void> {
   await drop(page, [
     { name: `${name}.obj`, bytes: box(0.5) },
@@ -291,13 +293,15 @@ export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(isSharp);
 }
 
-/** Screenshot of the canvas without the elements above it: toasts disappear, and the rendering of shadows varies. */
+/**
+ * Screenshot of the canvas alone. The elements above it are hidden: toasts disappear by themselves, and shadows vary.
+ */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
   const { x, y, width, height } = box;
-  // The Content-Security-Policy forbids style elements, and `visibility: hidden` would remove the focus.
+  // A constructed style sheet, which the Content-Security-Policy allows. `visibility: hidden` would remove the focus.
   const sheet = await page.evaluateHandle(() => {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(
@@ -313,7 +317,7 @@ export async function drawing(page: Page): Promise<Buffer> {
   return picture;
 }
 
-/** Waits until all finite animations have ended. */
+/** Waits until no animation is running, except endless ones. */
 export async function calm(page: Page): Promise<void> {
   await page.waitForFunction(() =>
     document.getAnimations().every(({ playState, effect }) => {
@@ -328,17 +332,17 @@ const isSharp = () => {
   return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
 };
 
-/** How long a screenshot waits for full resolution, ms. The canvas stays coarse during computations. */
+/** Timeout of a screenshot's wait for full resolution, ms. The canvas stays at low resolution during computations. */
 const SHARPENED = 2000;
 
-/** With SHARP=1, saves a screenshot. */
+/** Saves a screenshot if the environment variable `SHARP` is set. */
 export async function shoot(page: Page, name: string): Promise<void> {
   if (!process.env.SHARP) return;
   await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }
 
-/** Clicks a button of the export step and returns the file. */
+/** Clicks the export button of the given kind; returns the downloaded file. */
 export async function download(page: Page, kind: string): Promise<Dropped> {
   await page.getByRole("button", { name: "Export", exact: false }).first().click();
   const [file] = await Promise.all([
@@ -357,7 +361,7 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
     ([how, bytes]) => {
       setTimeout(() => {
         const engine = globalThis.cagework?.engine;
-        // A box with more faces than an index can count, and an array larger than the memory.
+        // A box with more faces than an index can count panics; an array larger than the wasm memory traps.
         if (how === "panic") globalThis.cagework?.boxCage(3000);
         else engine?.setCagePositions(new Float32Array(bytes / 4));
       });
@@ -367,7 +371,8 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
 }
 
 /**
- * Makes workers trap or hang when they read a file of the given size, bytes; or any file. Call it before the page loads.
+ * Makes workers trap when they read a file of `trap` bytes, and hang when they read a file of `hang` bytes, or any
+ * file. Must be called before the page loads.
  */
 export async function spoilReading(
   page: Page,

@@ -1,4 +1,4 @@
-/** Durations of tasks of the main thread. */
+/** Measures tasks of the page's main thread. */
 
 import type { Browser, Page } from "@playwright/test";
 
@@ -7,12 +7,12 @@ interface TraceEvent {
   readonly name: string;
   readonly pid: number;
   readonly tid: number;
-  /** Processor time, microseconds: unlike wall-clock time, it does not grow under load. */
+  /** Processor time, microseconds. Unlike wall-clock time, it does not grow with the machine's load. */
   readonly tdur?: number;
   readonly args?: { readonly name?: string };
 }
 
-/** Runs `work` and returns the longest task of the main thread during it, milliseconds of processor time. */
+/** Runs `work` and returns the duration of the main thread's longest task, milliseconds of processor time. */
 export async function longestTask(browser: Browser, page: Page, work: () => Promise<void>): Promise<number> {
   await browser.startTracing(page, { categories: ["toplevel", "__metadata"] });
   await work();

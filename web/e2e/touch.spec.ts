@@ -30,7 +30,7 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
     }));
   const send = (type: "touchStart" | "touchMove" | "touchEnd", share?: number) =>
     cdp.send("Input.dispatchTouchEvent", { type, touchPoints: share === undefined ? [] : at(share) });
-  // Without waiting: delays between the events could make the touch a long press.
+  // All events are sent at once: delays between them could make the touch a long press.
   await Promise.all([
     send("touchStart", 0),
     ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share)),
@@ -46,7 +46,7 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     const width = await page.evaluate(() => document.documentElement.scrollWidth);
     expect(width).toBeLessThanOrEqual(390);
     await page.touchscreen.tap(200, 200);
-    // The status covers the model: it becomes transparent, but stays available to screen readers.
+    // The status line would cover the model: it becomes transparent, but screen readers still read it.
     await expect(page.locator("#status span")).toHaveText(/selected|Ready/);
     await expect(page.locator("#status span")).toHaveCSS("opacity", "0");
     await shoot(page, "phone-read");
@@ -88,9 +88,9 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     expect((await drawing(page)).equals(before)).toBe(true);
   });
   const rest = await cagePositions(page);
-  // Without perspective, all points move by the same distance.
+  // In a parallel projection, panning moves all points by the same distance.
   await page.getByRole("button", { name: "Parallel projection" }).tap();
-  /** Two vertices of the cage, far apart in the picture. */
+  /** Window positions of two cage vertices that are far apart in the picture. */
   const seen = async () => [await handle(page, 0), await handle(page, 40)] as const;
   const apart = (p: { x: number; y: number }, q: { x: number; y: number }) =>
     Math.hypot(p.x - q.x, p.y - q.y);
@@ -148,7 +148,7 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.01);
     await touch("touchStart", [
       [x + 30, y + 30],
-      // On the background of the view.
+      // The second finger is on the background.
       [90, 170],
     ]);
     await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
@@ -169,7 +169,7 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     await page.keyboard.press("Alt+a");
     const at = await grip(page, [0.4, 0.3]);
     await fingers(cdp, [[at.x, at.y]], [[at.x + 25, at.y - 25]]);
-    // The previous undo step is also a pull, so that its name does not show the end of this one.
+    // Wait for the point itself: the undo label would not change, since the previous step is also a pull.
     await expect
       .poll(async () => apart(await placeOf(page, at.point), { x: at.x + 25, y: at.y - 25 }))
       .toBeLessThan(4);

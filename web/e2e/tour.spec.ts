@@ -21,7 +21,7 @@ test.use({ hasTouch: true });
 
 const card = (page: Page) => page.getByRole("region", { name: "Tour" });
 
-/** Waits until the stop is ready. */
+/** Waits until the tour shows the stop `stop` and its computations have ended. */
 async function arrived(page: Page, stop: number): Promise<void> {
   await expect(card(page)).toContainText(`${stop} of 10`);
   await expect(card(page)).toHaveAttribute("aria-busy", "false", { timeout: 60_000 });
@@ -32,19 +32,19 @@ async function next(page: Page, stop: number): Promise<void> {
   await arrived(page, stop);
 }
 
-/** The first groups of all matches in the card, as numbers. */
+/** All matches of a pattern in the tour's card: the first group of each, as a number. */
 async function numbers(page: Page, what: RegExp): Promise<number[]> {
   const text = (await card(page).textContent()) ?? "";
   return [...text.matchAll(what)].map((found) => Number(found[1]));
 }
 
-/** Chooses an option of the card and waits for the result. */
+/** Chooses an option of the tour's card and waits for its result. */
 async function choose(page: Page, name: string, stop: number): Promise<void> {
   await card(page).getByRole("radio", { name, exact: true }).check({ force: true });
   await arrived(page, stop);
 }
 
-/** Weights of a cage vertex: displacements of the model when this vertex moves by 1 along x. */
+/** Weights of a cage vertex at all model vertices: their displacements in x when the cage vertex moves by 1 along x. */
 async function weightsOf(page: Page, vertex: number): Promise<number[]> {
   const rest = await cagePositions(page);
   const set = (at: number[]) =>
@@ -56,13 +56,16 @@ async function weightsOf(page: Page, vertex: number): Promise<number[]> {
   return after.filter((_, k) => k % 3 === 0).map((x, v) => x - (before[3 * v] ?? 0));
 }
 
-/** Number of distinct positions of model vertices. */
+/** Number of distinct positions of model vertices, rounded to 1e-4. */
 async function spots(page: Page): Promise<number> {
   const at = (await modelPositions(page)).map((x) => x.toFixed(4));
   return new Set(at.flatMap((x, k) => (k % 3 === 0 ? [`${x} ${at[k + 1]} ${at[k + 2]}`] : []))).size;
 }
 
-/** The 99.9th percentile over all edges of the increase of the dihedral angle from rest, radians. */
+/**
+ * The 99.9th percentile, over all edges, of the angle between the adjacent normals in the pose minus that at rest,
+ * radians.
+ */
 async function sharpestFold(page: Page): Promise<number> {
   return page.evaluate(async () => {
     const session = globalThis.cagework;
@@ -127,7 +130,7 @@ test("the claims of each stop hold", async ({ page }) => {
     expect(Math.min(...weights)).toBeGreaterThan(-1e-6);
     expect(Math.max(...weights)).toBeCloseTo(legend?.largest?.value ?? 0, 3);
     expect(Math.max(...weights)).toBeLessThan(1);
-    // Weights in one hind leg of a vertex at the other.
+    // Weights of a vertex at one hind leg, on the other hind leg.
     const leg = await weightsOf(page, 48);
     const other = leg.filter((_, v) => {
       const [x = 0, y = 0, z = 0] = rest.slice(3 * v, 3 * v + 3);
@@ -210,7 +213,7 @@ test("the claims of each stop hold", async ({ page }) => {
       const sheared: number[] = [];
       for (const kind of ["harmonic", "mean_value", "green"] as const) {
         const at = await session.readPositions(kind);
-        // The upper jaw.
+        // Coordinates of the vertices of the upper jaw.
         const jaw = Array.from(rest.keys()).filter(
           (k) => k % 3 === 0 && (rest[k] ?? 0) > 0.3 && (rest[k + 1] ?? 0) > 0.12,
         );
@@ -219,7 +222,7 @@ test("the claims of each stop hold", async ({ page }) => {
             ...jaw.map((k) => Math.hypot(...[0, 1, 2].map((c) => (at[k + c] ?? 0) - (rest[k + c] ?? 0)))),
           ),
         );
-        // The ratio of the largest to the smallest stretch of a triangle's sides, 99th percentile.
+        // 99th percentile, over all triangles, of the ratio of the largest to the smallest stretch of the sides.
         const shears: number[] = [];
         for (let t = 0; t < triangles.length; t += 3) {
           const [a, b, c] = triangles.slice(t, t + 3);

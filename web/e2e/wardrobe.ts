@@ -1,17 +1,17 @@
-/** A body, a shirt and a buckle, made by formula: three files for one cage. */
+/** Three models for one cage: a body, a shirt and a buckle, made by formula. */
 
 import { Document, type Material, type Node, NodeIO } from "@gltf-transform/core";
 import type { Dropped } from "./support";
 
-/** Vertices of each file, in the order of its primitives. */
+/** Number of vertices of each model, summed over its primitives. */
 export const SIZES = { body: 2 * 13 * 24, shirt: 15 * 24, buckle: 8 } as const;
 
 const AROUND = 24;
-/** Radius of the body, which is 2 high and closed at both ends; its lower half has another material. */
+/** Largest radius of the body, which is 2 high and closed at both ends. Its lower half has another material. */
 const RADIUS = 0.35;
 const radiusAt = (y: number) => RADIUS * Math.sqrt(Math.max(0, Math.sin((Math.PI * y) / 2)));
 
-/** A surface of rings between two heights. */
+/** A surface of revolution about y, made of `rings` circles between the heights `from` and `to`. */
 function sleeve(from: number, to: number, rings: number, radius: (y: number) => number) {
   const positions: number[] = [];
   const indices: number[] = [];
@@ -84,7 +84,7 @@ function body(): Promise<Dropped> {
   return all.file("body.glb");
 }
 
-/** A sleeve around the upper body, on a skeleton of two joints with a clip. */
+/** A sleeve around the upper body, skinned to two joints that a clip animates. */
 function shirt(): Promise<Dropped> {
   const all = new Builder();
   const { document } = all;
@@ -152,7 +152,7 @@ function buckle(): Promise<Dropped> {
 
 export const wardrobe = (): Promise<Dropped[]> => Promise.all([body(), shirt(), buckle()]);
 
-/** Positions of all vertices of a file's meshes, in the order of its primitives. */
+/** Positions of all vertices of a GLB: its meshes in order, and their primitives in order. */
 export async function pointsOf({ bytes }: Pick<Dropped, "bytes">): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const primitives = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());

@@ -1,4 +1,4 @@
-/** A browser without WebGPU: drawn with WebGL2, computed on the processor. */
+/** A browser without WebGPU: the page draws with WebGL2, and the processor computes. */
 
 import type { Page } from "@playwright/test";
 import { WITH_WEBGL } from "./browser";
@@ -15,7 +15,10 @@ import { bound, calm, expect, grip, open, shoot, test } from "./support";
 
 test.use({ launchOptions: WITH_WEBGL });
 
-/** Removes WebGPU: Chromium warns in the console, which must stay empty, if the page requests an adapter. */
+/**
+ * Removes `navigator.gpu`. If the page requested an adapter, Chromium would warn in the console, and warnings fail the
+ * test.
+ */
 async function withoutWebGpu(page: Page): Promise<void> {
   await page.addInitScript(() => {
     Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
@@ -117,7 +120,7 @@ test("without WebGPU the page exports, plays, and recovers from a lost context",
     await bound(page);
   });
   await test.step("a lost context comes back with model and pose", async () => {
-    // Through the context of the canvas, as the browser does.
+    // Loses the context of the page's own canvas, as a browser would.
     await survives(page, () =>
       page.evaluate(() => {
         const context = document.querySelector("canvas")?.getContext("webgl2");

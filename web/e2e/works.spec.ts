@@ -1,18 +1,18 @@
-/** Work that the browser saves: one entry per model, open in one tab at a time. */
+/** Saved work: the browser stores one entry per model, and only one tab has an entry open. */
 
 import type { Page } from "@playwright/test";
 import { cutKept, savedSince } from "./kept";
 import { complaintsOfAxe } from "./stories";
 import { bound, cagePositions, calm, drag, dropBox, expect, largestMove, open, shoot, test } from "./support";
 
-/** Drops a box in a cage and waits until the browser has saved it. */
+/** Drops a box with a cage and waits until the browser has saved the work. */
 async function work(page: Page, name: string): Promise<void> {
   const before = await page.evaluate(() => Date.now());
   await dropBox(page, name);
   await expect.poll(() => savedSince(page, before, name), { timeout: 60_000 }).toBe(true);
 }
 
-/** Leaves the page for another document of the same origin, which has the same storage. */
+/** Goes to another document of the same origin, which has the same storage. */
 async function leave(page: Page): Promise<void> {
   await page.route("**/favicon.ico", (route) => route.fulfill({ body: "" }));
   await page.goto("./licences.txt");
@@ -20,7 +20,7 @@ async function leave(page: Page): Promise<void> {
 
 const listOf = (page: Page) => page.getByRole("dialog", { name: "Kept in this browser" });
 
-/** Opens the list from the step Model. */
+/** Opens the list of saved work from the Model step. */
 async function showList(page: Page): Promise<void> {
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   await page.getByRole("button", { name: /^Kept in this browser/ }).click();
@@ -91,7 +91,7 @@ test("changed work is saved before another model opens, listed, restored, delete
     await show("clamp");
     expect(await savedSince(page, 0)).toBe(false);
     await drag(page, 50, 30);
-    // Within the delay of the autosave.
+    // Open the rat before the delay of the autosave has passed.
     await show("rat");
     await showList(page);
     await expect(items).toHaveText([/^Clamp/]);
@@ -107,7 +107,7 @@ test("changed work is saved before another model opens, listed, restored, delete
     await work(page, "workB");
     const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
     await expect(kept).toBeVisible();
-    // The message about the clamp may still be there.
+    // The same message about the clamp may still be visible: use the button next to this one.
     await kept.locator("..").getByRole("button", { name: "Bring it back" }).click();
     await expect(page).toHaveTitle(/workA/);
     await bound(page);
@@ -136,7 +136,7 @@ test("changed work is saved before another model opens, listed, restored, delete
   await test.step("damaged work is deleted and reported", async () => {
     await leave(page);
     await cutKept(page);
-    // The message disappears after a while, which a slow bind can outlast.
+    // Look for the message while the page opens: it disappears after a while, which a slow bind can outlast.
     await Promise.all([
       open(page),
       expect(page.locator("#toasts")).toContainText(

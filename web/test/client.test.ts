@@ -11,7 +11,7 @@ afterEach(() => {
 
 const MODULE = {} as WebAssembly.Module;
 
-/** Workers that answer when the test tells them to. */
+/** A client whose workers are simulated: they record jobs and answer when the test calls `answer`, `stop` or `miss`. */
 function workers() {
   const all: { target: EventTarget; jobs: number[]; isOver: boolean }[] = [];
   const client = createClient(MODULE, () => {
@@ -31,7 +31,7 @@ function workers() {
     all[of]?.target.dispatchEvent(new MessageEvent("message", { data }));
   const stop = (of: number) =>
     all[of]?.target.dispatchEvent(Object.assign(new Event("error"), { message: "out of memory" }));
-  /** As browsers report a script that cannot be loaded. */
+  /** The error event of a worker whose script cannot be loaded: it has no message. */
   const miss = (of: number) => all[of]?.target.dispatchEvent(new Event("error"));
   const jobs = () => all.map((one) => one.jobs);
   const run = (id: string) => client.run("sample", { id });
@@ -40,7 +40,7 @@ function workers() {
 
 const said = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
 
-it("a job that ignores its cancel costs its worker, and other jobs are sent again", async () => {
+it("a job that ignores its cancellation loses its worker, and other jobs are sent to a new worker", async () => {
   const { all, answer, jobs, run } = workers();
   const [first, second] = [run("a"), run("b")];
   first.cancel();
@@ -75,7 +75,7 @@ it("a stopped worker is restarted by the next job", async () => {
   expect(await said(second.done)).toBe("Worker");
 });
 
-it("a worker whose script cannot be loaded is an error of its own", async () => {
+it("if the script of a worker cannot be loaded, its job fails with the error Unloaded", async () => {
   const { miss, run } = workers();
   const job = run("a");
   miss(0);

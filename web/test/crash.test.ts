@@ -53,7 +53,7 @@ it("the page restarts after a crash and knows its report", () => {
   expect(before?.report).toContain("unreachable");
 });
 
-it("a second crash before the first frame asks, so that restarts cannot loop", () => {
+it("a second crash before the first frame asks the user, so that restarts cannot loop", () => {
   const { begin, crash } = browser();
   begin();
   crash(trap);
@@ -73,7 +73,7 @@ it("a drawn frame resets the crash count", () => {
   expect(second.restart).toHaveBeenCalledOnce();
 });
 
-it("without storage the first crash asks", () => {
+it("without session storage, the first crash asks the user", () => {
   const { begin, crash } = browser();
   vi.stubGlobal("sessionStorage", undefined);
   const first = begin();

@@ -11,7 +11,7 @@ interface Json {
   extensionsRequired?: string[];
 }
 
-/** A meshopt .gltf: streams in worm.bin, and a fallback buffer for programs without the decoder. */
+/** A meshopt .gltf with two buffers: compressed data in worm.bin, and a fallback for programs without the decoder. */
 async function twoBuffers(change: (json: Json) => void) {
   const bytes = await meshoptGlb();
   const start = GLB_HEADER + CHUNK_HEADER;
@@ -27,13 +27,13 @@ async function twoBuffers(change: (json: Json) => void) {
 describe("meshopt files", () => {
   const cases: [string, (json: Json) => void][] = [
     ["marked as fallback", () => undefined],
-    // Fallback data, as in the extension's sample file.
+    // The extension is optional, as in its sample file: programs without it read the fallback buffer.
     ["that others read", (json) => delete json.extensionsRequired],
     ["without a mark", (json) => delete json.buffers[1]?.extensions],
-    // A fallback buffer without a file.
+    // The fallback buffer names a file that does not exist.
     ["in a file that is not there", (json) => Object.assign(json.buffers[1] ?? {}, { uri: "fallback.bin" })],
   ];
-  // A GLB allows one buffer: "GLB must have 0-1 buffers".
+  // The rewritten file is a GLB, which allows at most one buffer.
   it.each(cases)("open with a fallback buffer %s", async (_, change) => {
     const plain = await new NodeIO().readBinary(await twoBuffers(change));
     const [mesh] = plain.getRoot().listMeshes();

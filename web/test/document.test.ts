@@ -3,7 +3,7 @@ import { cageOf, createFake, MODEL, memberOf, modelOf, reportOf, settled } from 
 
 const [FIRST, SECOND] = [cageOf(8, 1), cageOf(12, 2)];
 
-it("a cage without a check is checked; undo of another cage shows the known check again", async () => {
+it("a cage without a check is checked; undoing a change of cage shows the stored check", async () => {
   const { asked, engine, show, store, teach } = createFake();
   const marked: unknown[] = [];
   teach({ showFaults: (vertices) => marked.push(vertices) });
@@ -22,14 +22,14 @@ it("a cage without a check is checked; undo of another cage shows the known chec
   expect(marked).toEqual([FIRST.check?.vertices, FIRST.check?.vertices]);
 });
 
-it("a check that came with a cage replaces a new one", async () => {
+it("a cage that comes with its check is not checked again", async () => {
   const { asked, showCage, store } = createFake();
   showCage(FIRST);
   await settled();
   expect([store.get().check, asked.length]).toEqual([FIRST.check, 0]);
 });
 
-it("another cage has no weights: report, comparison and slice end; cached weights bring a report", () => {
+it("a new cage has no weights: report, comparison and slice are reset; cached weights restore the report", () => {
   const { show, showCage, store, teach } = createFake();
   const report = reportOf();
   teach({ boundReport: () => report, cageState: () => undefined });
@@ -46,7 +46,7 @@ it("another cage has no weights: report, comparison and slice end; cached weight
   expect(store.get().report).toBe(report);
 });
 
-it("weights in progress for the previous cage are cancelled", async () => {
+it("a new cage cancels a bind in progress", async () => {
   const { ctx, showCage } = createFake();
   const bind = ctx.queue.add(
     "bind",
@@ -60,7 +60,7 @@ it("weights in progress for the previous cage are cancelled", async () => {
   expect(await bind).toBe(true);
 });
 
-it("a model that is open alone keeps the name that it is shown under; notices are kept once", () => {
+it("a single model keeps its displayed name; repeated notices are listed once", () => {
   const { showModel, store } = createFake();
   showModel({ ...MODEL, notices: ["a"] });
   store.set({ model: { ...MODEL, name: "Rat", notices: ["a", "b"] }, cageClip: "Walk" });

@@ -65,7 +65,7 @@ describe("dropped files", () => {
     expect(planDrop(["horse.cagework.glb"])).toMatchObject({ kind: "project", main: 0 });
   });
 
-  it("ask for the model if only companion files came", () => {
+  it("ask for the model if only companion files were dropped", () => {
     expect(planDrop(["scene.bin", "a.png"]).kind).toBe("textures");
   });
 

@@ -4,7 +4,7 @@ import { expect, it } from "vitest";
 
 const read = (name: string) => JSON.parse(readFileSync(join(import.meta.dirname, "../..", name), "utf8"));
 
-/** Whether a range such as "^18.0.0 || >=20.9" allows a version, [major, minor]. */
+/** Whether an npm version range such as "^18.0.0 || >=20.9" allows the version [major, minor]. */
 function allows(range: string, [major = 0, minor = 0]: readonly number[]): boolean {
   return range.split("||").some((part) => {
     const bounds = part.trim().split(/(?<=[\d*])\s+/);

@@ -24,7 +24,7 @@ describe("time left", () => {
     const eta = createEta(0);
     eta.update(0.1, 1000);
     const fast = eta.update(0.5, 1100) ?? Number.POSITIVE_INFINITY;
-    // At the first speed, 0.1 per second, it would be 5 s.
+    // At the first speed, 0.1 per second, the remaining half would take 5000 ms.
     expect(fast).toBeLessThan(1000);
   });
 

@@ -1,4 +1,7 @@
-/** A fake session without wasm, workers or GPU. Tests resolve its jobs; a cage is two arrays. */
+/**
+ * A fake session for tests of actions, without wasm, workers or GPU. Jobs end when the test resolves them, and a cage
+ * has only positions and corners.
+ */
 
 import { named } from "@cagework/core/session/client";
 import type { Context, Fix } from "../src/actions/context";
@@ -22,7 +25,7 @@ import { createStore, type Store } from "../src/signals";
 import { INITIAL } from "../src/state";
 import { type Explained, textOf } from "../src/strings";
 
-/** A requested job. */
+/** A job that the tested code has requested. The test resolves or rejects it. */
 export interface Asked {
   readonly kind: string;
   readonly input: unknown;
@@ -38,37 +41,37 @@ export interface Fake {
   readonly mirror: DocumentMirror;
   readonly asked: Asked[];
   readonly said: string[];
-  /** Buttons of the last message. */
+  /** Buttons of the last message in `said`. */
   offered: readonly { readonly label: string; run(): void }[];
   readonly problems: (Explained & { fix?: Fix["label"] })[];
-  /** Kinds of coordinates that the engine has computed. */
+  /** Coordinates, besides those of the bind, that count as computed; tests add to the list. */
   readonly others: string[];
-  /** Names of engine calls that the fake only records. */
+  /** Names of the engine functions called that have no implementation in the fake. */
   readonly calls: string[];
-  /** Commands that the engine was given. */
+  /** Commands passed to `engine.apply`, in order. */
   readonly commands: Command[];
-  /** Labels of steps. */
+  /** Labels of the undo steps, in order. */
   readonly did: string[];
-  /** Changes the document as the page sees it. */
+  /** Changes fields of the engine's view of the document, and notifies the page. */
   show(patch: Partial<View>): void;
-  /** Changes the models. */
+  /** Replaces the engine's description of its models. */
   showModel(model: ModelInfo): void;
-  /** Takes a cage that was checked. */
+  /** Replaces the cage. If it has a check, the page stores that too and requests none. */
   showCage(cage: CheckedCage): void;
-  /** Replaces a function of the engine. */
+  /** Replaces or adds functions of the engine. */
   teach(functions: Partial<Engine>): void;
 }
 
 const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
 
-/** A model of several. */
+/** One model of a document that may contain several. */
 export function memberOf(id: number, name: string, triangles = 12): MemberInfo {
   const options = { shown: true, rigid: [], stays: [] };
   const parts = ["material:Cloth", "node:Buckle"];
   return { id, name, format: "obj", vertices: 8, triangles, rigged: false, parts, options, painted: false };
 }
 
-/** The engine's description of these models. */
+/** The engine's description of a document with these models. */
 export function modelOf(members: readonly MemberInfo[]): ModelInfo {
   return { ...MODEL, name: members[0]?.name ?? "", members: [...members] };
 }
@@ -106,12 +109,12 @@ export function cageOf(n: number, height = 0): CheckedCage {
   return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check };
 }
 
-/** Controls of a plain cage. */
+/** Controls of a cage without smoothing and without interior controls. */
 export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
 export const OPENED: Opened = { model: MODEL, check: null, settings: null, notices: [] };
 
-/** The report of a bind with these options. */
+/** A report of a converged multigrid bind on a grid of 64; `patch` replaces fields. */
 export function reportOf(patch: Partial<BindReport> = {}): BindReport {
   const none = { mean: 0, max: 0 };
   return {
@@ -171,7 +174,7 @@ export function createFake(): Fake {
       entry = { kind, input, resolve: (output) => resolve(output as T), reject, cancelled: false };
       asked.push(entry);
     });
-    // Awaited by the caller.
+    // The caller handles the rejection. Without this handler, one before the caller awaits `done` would fail the test.
     done.catch(() => undefined);
     const cancel = () => {
       if (!entry || entry.cancelled) return;

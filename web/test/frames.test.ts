@@ -4,7 +4,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 /** Time between two frames, ms. */
 const FRAME = 16;
 
-/** Longer than the pause before a frame is sharpened, ms. */
+/** More than the delay after which an idle page draws a sharp frame, ms. */
 const LONG = 2000;
 
 beforeEach(() => {
@@ -17,7 +17,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** Frames of a simulated GPU, with a log of the draw calls. */
+/** A frame loop on a simulated GPU. `drawn`: for each draw call, whether it requests full resolution. */
 function slow(answer: (sharp: boolean) => boolean | undefined, calm = () => true) {
   const drawn: boolean[] = [];
   const frames = createFrames();

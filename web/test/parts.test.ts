@@ -9,7 +9,7 @@ afterEach(() => {
 const name = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
 const bytes = (response: Response) => response.arrayBuffer();
 
-it("parts that cannot be loaded are reported as such, other errors as they are", async () => {
+it("code that cannot be loaded fails with the error Unloaded; other errors keep their names", async () => {
   const answers: Record<string, () => Promise<unknown>> = {
     offline: () => Promise.reject(new TypeError("Failed to fetch")),
     missing: () => Promise.resolve(new Response("", { status: 404 })),
@@ -29,7 +29,7 @@ it("parts that cannot be loaded are reported as such, other errors as they are",
   );
 });
 
-it("says what to do, and offers to reload", async () => {
+it("the message says what to do and offers to reload", async () => {
   const error = await loadPart(Promise.reject(new TypeError())).catch((error: unknown) => error);
   expect(explain(error, "The tour could not start")).toEqual({
     title: "The tour could not start",

@@ -1,9 +1,9 @@
-/** Queue of jobs, and their cancellation. */
+/** The queue of jobs, and their cancellation. */
 
 import { describe, expect, it } from "vitest";
 import { createQueue, follow } from "../src/queue";
 
-/** A job that the test resolves or rejects. */
+/** A promise for a job's result, and `end`, which resolves it. */
 function held() {
   let end = () => {};
   const done = new Promise<void>((resolve) => {

@@ -7,7 +7,7 @@ import { T } from "../src/words";
 
 const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });
 
-/** A worker that the test answers for, with a log of its use. */
+/** Simulated workers: the test ends their jobs by `answer` or `fail`; `closed` counts calls of `close`. */
 function workers() {
   const opened: { closed: number; answer: (output: object) => void; fail: (error: Error) => void }[] = [];
   const open = (): Client => {
@@ -55,7 +55,7 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
   await expect(alone.done).rejects.toThrow("reading this file failed unexpectedly");
 });
 
-it("cancel and another file end the current read", async () => {
+it("a cancellation or another file ends the current read", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   const first = apart("read", { files: [file("a.obj")], up: undefined });

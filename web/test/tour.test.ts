@@ -6,7 +6,7 @@ import { createGuide } from "../src/tour/guide";
 import { isOf, STOPS } from "../src/tour/stops";
 import { cageOf, createFake, MODEL, reportOf } from "./fake";
 
-/** A page with the unmodified rat, and a tour whose binds end at once. */
+/** A page with the rat sample in its own cage, and a tour whose binds finish at once. */
 function page() {
   const fake = createFake();
   const { store } = fake;
@@ -86,7 +86,7 @@ it("links count stops from 1; invalid numbers mean the first one", () => {
   ]);
 });
 
-it("reports match their bind although Rust's tau has fewer digits", () => {
+it("a report matches the options of its bind although Rust rounds tau to f32", () => {
   const report = reportOf({ grid: 32, tau: Math.fround(1e-3) });
   expect(isOf(report, { grid: 32, tau: 1e-3 })).toBe(true);
   expect(isOf(report, { grid: 32, tau: 1e-4 })).toBe(false);

@@ -8,7 +8,7 @@ describe("the pseudo-locale", () => {
     const { text } = pseudo({ text: "Choose a model" });
     expect(text).toBe("Çĥööšéçĥ á ɱöðéļɱö");
   });
-  it("keeps what is put into a sentence", () => {
+  it("leaves inserted values unchanged", () => {
     const { list, none } = pseudo({
       list: (names: string[], n: number) => `${names.join(" and ")}: ${n} files`,
       none: (name: string) => (name ? `With ${name}` : "Nothing"),
@@ -17,7 +17,7 @@ describe("the pseudo-locale", () => {
     expect(none("rat")).toMatch(/ rat$/);
     expect(none("")).not.toContain("undefined");
   });
-  it("has no plain letter in its sentences", () => {
+  it("leaves no plain letter in a sentence", () => {
     const plain = (value: unknown): unknown[] => {
       if (typeof value === "string") return /[a-z]/i.test(value.replaceAll("Cagework", "")) ? [value] : [];
       return typeof value === "object" && value !== null ? Object.values(value).flatMap(plain) : [];
@@ -40,7 +40,7 @@ describe("another language", () => {
 describe("the status line of a gesture", () => {
   const say = (kind: "grab" | "rotate" | "scale", amounts: number[], axis: number | null, plane = false) =>
     sayGesture({ kind, amounts, axis, plane });
-  it("gives amounts with at most three decimals, and the restriction", () => {
+  it("gives amounts with at most three decimals, and the constraint", () => {
     expect(say("grab", [0.30001, -0.4, -0.0001], null)).toBe("Move (0.3, -0.4, 0)");
     expect(say("grab", [0.25], 0)).toBe("Move 0.25 along X");
     expect(say("grab", [0, 1, 2], 0, true)).toBe("Move (0, 1, 2) in YZ");

@@ -16,7 +16,7 @@ const DAY = 86_400_000;
 const entry = (id: string, when: number): Entry => ({ id, name: `${id}.obj`, when, size: 100 });
 const work = (id: string, where: Work["where"] = "nowhere"): Work => ({ ...entry(id, 0), where });
 
-/** A GLB that consists of its header: magic, version 2, length. */
+/** The 12-byte header of a GLB (magic, version 2, file length), padded with zeros to `length` bytes. */
 function glb(length: number): Uint8Array {
   const bytes = new Uint8Array(length);
   const view = new DataView(bytes.buffer);
@@ -54,7 +54,7 @@ describe("entries", () => {
       false,
       false,
     ]);
-    // A view into a larger buffer.
+    // A Uint8Array that starts in the middle of a larger buffer.
     const larger = new Uint8Array(60);
     larger.set(glb(40), 8);
     expect(isWhole(larger.subarray(8, 48))).toBe(true);

@@ -11,7 +11,7 @@ function page() {
   const bind = createBind(fake.ctx);
   fake.showModel(MODEL);
   fake.showCage(cageOf(8));
-  /** Ends a bind. */
+  /** Ends the requested job number `at` with this report; the engine then has weights. */
   const finish = (at: number, report: BindReport) => {
     fake.show({ bound: true });
     fake.asked[at]?.resolve(report);
@@ -52,7 +52,7 @@ it("a second bind cancels the first silently; the latest report of each solver i
   ]);
 });
 
-it("a cancelled bind leaves the previous one, and the settings just chosen are marked as not applied", async () => {
+it("a cancelled bind keeps the previous bind active and marks the chosen settings as not applied", async () => {
   const { bind, finish, store, said, problems } = page();
   const first = bind.start();
   await settled();

@@ -23,7 +23,7 @@ function page() {
   return { ...fake, cage, grids, carried, height, offers: () => fake.offered };
 }
 
-it("a generated cage replaces the previous one as a step; the first cage adds none", async () => {
+it("a generated cage replaces the previous cage as one undo step; the first cage adds no step", async () => {
   const { cage, asked, store, did, height } = page();
   const [first, second] = [cageOf(8, 1), cageOf(12, 2)];
   for (const made of [first, second]) {
@@ -38,7 +38,7 @@ it("a generated cage replaces the previous one as a step; the first cage adds no
   expect(asked.length, "a worker has checked each already").toBe(2);
 });
 
-it("poses wait for the previous cage: offers to carry them over, and to go back", async () => {
+it("poses of the previous cage do not fit a new cage: the page offers to carry them over", async () => {
   const { cage, asked, said, show, showCage, carried, teach, offers } = page();
   showCage(cageOf(8, 1));
   show({ poses: [{ name: "a", fits: true }], shares: [0.5] });
@@ -52,7 +52,7 @@ it("poses wait for the previous cage: offers to carry them over, and to go back"
   expect(carried).toMatchObject([{ poses: Float32Array.of(7), shares: [0.5] }]);
 });
 
-it("a control that is added takes poses along; smoothing needs not", () => {
+it("adding a control carries the poses over; smoothing does not need to", () => {
   const { cage, engine, commands, carried, showCage, teach } = page();
   showCage(cageOf(4));
   expect(cage.setSmooth(2)).toBe(true);
@@ -64,7 +64,7 @@ it("a control that is added takes poses along; smoothing needs not", () => {
   expect(carried.map(({ cage: { positions } }) => positions.length)).toEqual([12]);
 });
 
-it("of two requested cages only the later is used", async () => {
+it("of two requested cages only the second is used", async () => {
   const { cage, asked, problems, height, store } = page();
   const both = [cage.make(), cage.make()];
   await settled();
@@ -73,7 +73,7 @@ it("of two requested cages only the later is used", async () => {
   expect([height(), problems.length, store.get().cageProgress]).toEqual([5, 0, null]);
 });
 
-it("settings that the cage does not have make it the next action, until it is made", async () => {
+it("after a change of the cage settings, the next action is to make the cage", async () => {
   const { cage, asked, store, ctx } = page();
   const app = { ctx, store, cage, run: () => undefined, go: () => undefined } as unknown as App;
   store.set({ step: "cage" });
@@ -101,7 +101,7 @@ it("settings that the cage does not have make it the next action, until it is ma
   expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", true]);
   store.set({ cageSource: "hull" });
   expect(labels()).toEqual(["Make this cage", "Bind the model"]);
-  // The options of automatic cages do not matter to a hull.
+  // A cage from the convex hull does not use the options of automatic cages.
   await make(24);
   change({ vertices: 100 });
   expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", false]);
@@ -136,7 +136,7 @@ it("a box is checked; results of an older check are dropped", async () => {
   expect(store.get().check).toBe(check);
 });
 
-it("tells when a cage has more vertices than wanted", async () => {
+it("reports a cage with more vertices than requested", async () => {
   const { cage, asked, said } = page();
   const made = cage.make();
   await settled();

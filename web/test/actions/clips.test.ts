@@ -43,7 +43,7 @@ function page() {
     model: { ...MODEL, rigged: true, clips: [{ name: "Walk", seconds: 2 }], targets },
   });
   const clips = createClips(fake.ctx, () => undefined);
-  /** Runs the next frame at this time, ms. */
+  /** Runs the next requested animation frame with the timestamp `now`, ms. */
   const frame = (now: number) => frames.shift()?.(now);
   return { ...fake, clips, shown, frame, starts: () => starts, end: () => fake.teach({ showsClip: false }) };
 }
@@ -127,14 +127,14 @@ it("rigid parts are limited to those of the open model", () => {
   expect(rigOf(store.get()).rigid).toEqual(["sword"]);
 });
 
-it("changing the joint option shows the cage's pose again", async () => {
+it("changing the joint option ends the clip", async () => {
   const { clips, store } = page();
   await clips.choose(0);
   clips.rig({ joints: "stay" });
   expect([store.get().clip.clip, store.get().rigOptions.joints]).toEqual([null, "stay"]);
 });
 
-it("the cage bends the moving model once its lattice is ready, which is requested once", async () => {
+it("with the option `dynamic`, a clip starts once the lattice is ready; the lattice is requested once", async () => {
   const { clips, asked, starts, teach, said } = page();
   clips.rig({ dynamic: true });
   teach({ hasLattice: false });

@@ -1,4 +1,4 @@
-/** Smooth cages and controls inside: commands, and bones that clicks draw. */
+/** Smooth cages and interior controls: their commands, and drawing bones by clicks. */
 
 import { expect, test } from "vitest";
 import { createBind } from "../../src/actions/bind";

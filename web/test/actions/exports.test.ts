@@ -3,7 +3,7 @@ import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
 import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
-/** Names of downloads. */
+/** File names of downloads since the start of the test. */
 let downloads: string[] = [];
 let copied: string[] = [];
 
@@ -55,7 +55,7 @@ it("files are named after the model and their size is shown", async () => {
   expect(said.at(-2)).toContain("(3 byte)");
 });
 
-it("several models are exported to one file each, or one alone", async () => {
+it("each of several models is exported to its own file; one of them can be exported alone", async () => {
   const { exports, teach, said, store } = page();
   const members = [memberOf(4, "body.vrm"), memberOf(5, "a/shirt.glb"), memberOf(7, "shirt.glb")];
   store.set({ model: modelOf(members) });
@@ -122,7 +122,7 @@ it("a project contains the page's settings", async () => {
   expect(project.fileName()).toBe("cube.cagework.glb");
 });
 
-it("links are for samples in their own cage; otherwise suggests a project", async () => {
+it("links work for samples in their own cage; otherwise the page suggests saving a project", async () => {
   const { exports, store, said } = page();
   await exports.share();
   expect([copied, said[0]]).toEqual([

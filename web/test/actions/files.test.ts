@@ -124,7 +124,7 @@ it("a file that freezes the page for seconds needs confirmation", async () => {
   expect([store.get().busy, store.get().goOn, problems, asked.length]).toEqual([null, null, [], 1]);
 });
 
-it("loads a cage next to the model; reports an empty file and an empty drop", async () => {
+it("a cage file dropped with a model is loaded; an empty file and a drop without models are reported", async () => {
   const { files, asked, steps, problems } = page();
   const opened = files.openFiles([file("cube.obj"), file("cube-cage.obj")]);
   await settled();

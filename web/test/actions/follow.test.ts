@@ -11,7 +11,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A page that counts checks and binds. */
+/** A page that counts cage checks (`looks`) and binds. */
 function page() {
   const fake = createFake();
   const count = { looks: 0, binds: 0 };
@@ -48,7 +48,7 @@ it("a changed cage is checked at once and bound after a pause, once", () => {
   expect(count.binds).toBe(1);
 });
 
-it("waits during a gesture, and does not repeat a bind", () => {
+it("does not bind during a gesture, and does not repeat a bind that covers the cage", () => {
   const { count, state, change } = page();
   state.isActive = true;
   change();

@@ -35,7 +35,7 @@ function page() {
   fake.showModel(modelOf([body]));
   fake.showCage(cageOf(8));
   fake.show({ bound: true });
-  /** Completes the last read and add. */
+  /** Resolves the pending read. If all files are read, also resolves the add job, which adds models of these names. */
   const read = async (...names: string[]) => {
     fake.asked.at(-1)?.resolve({ took: 0 });
     await settled();
@@ -49,7 +49,7 @@ function page() {
   return { ...fake, models, steps, read, names, offer: () => fake.offered[0] };
 }
 
-/** The names that a request gives its step, for one model and two. */
+/** The undo labels that an add job would use for one model and for two models. */
 const labels = (input: unknown) => [1, 2].map((input as { label: (n: number) => string }).label);
 
 it("an added model joins the cage as one step, with its notices", async () => {
@@ -83,7 +83,7 @@ it("adding several models reads each; unreadable ones are named and skipped", as
   ]);
 });
 
-it("cancelling the read adds nothing; neither does running out of memory", async () => {
+it("cancelling the read adds no model; neither does an engine that refuses them", async () => {
   const { models, asked, store, names, problems } = page();
   const cancelled = models.add([file("shirt.glb"), file("hat.glb")]);
   await settled();
@@ -114,7 +114,7 @@ it("a model outside the cage is reported once, with the offer of a new cage", as
   expect(steps).toEqual(["settle", "cage body-cage.obj", "cage around all"]);
 });
 
-it("adds no project or unknown file, and nothing to an empty page", async () => {
+it("adds neither projects nor unknown files; on an empty page the models are opened instead", async () => {
   const { models, store, problems, steps, names } = page();
   expect(await models.add([file("notes.txt")])).toBe(false);
   expect(await models.add([file("work.cagework.glb")])).toBe(false);

@@ -3,7 +3,7 @@ import { createEdit } from "../../src/actions/edit";
 import { createPainting } from "../../src/actions/painting";
 import { createFake, memberOf, modelOf } from "../fake";
 
-/** Two models of eight vertices. In the view, the first model has ten pixels per vertex; below y = 100 is background. */
+/** Two models of eight vertices. The first has 10 pixels in x for each vertex; pixels with y < 100 are background. */
 function page() {
   const fake = createFake();
   let amounts = new Uint8Array();

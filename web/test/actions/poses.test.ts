@@ -13,7 +13,7 @@ afterEach(() => {
 
 const POINT = [9, 9, 9];
 
-/** A page with a cage of two vertices, posed at height 1, and a saved pose. */
+/** A page with one saved pose and a cage of two vertices, both of them moved to (1, 1, 1). */
 function page() {
   const fake = createFake();
   const poses = createPoses(fake.ctx, createEdit(fake.ctx));
@@ -82,7 +82,7 @@ it("one drag of a blend slider is one undo step", () => {
   expect(did).toEqual(["Move", "Blend poses"]);
 });
 
-it("playing ends where it began; another pose ends it", () => {
+it("playing poses restores the pose before it; applying a pose ends it", () => {
   const { poses, engine, store } = page();
   poses.togglePlay();
   expect(store.get().playing).toBe(true);
@@ -91,7 +91,7 @@ it("playing ends where it began; another pose ends it", () => {
   expect([store.get().playing, engine.cagePositions()[0]]).toEqual([false, 1]);
 });
 
-it("saving while poses are played saves the moment that is shown", () => {
+it("saving while poses are playing saves the pose on screen", () => {
   const { poses, engine, commands, store } = page();
   poses.togglePlay();
   engine.setCagePositions(new Float32Array(6).fill(9));

@@ -3,7 +3,7 @@ import { createEdit } from "../../src/actions/edit";
 import { createPulling } from "../../src/actions/pull";
 import { cageOf, createFake, settled } from "../fake";
 
-/** Animation frames, run by the test. */
+/** Callbacks of requested animation frames; the test calls them. */
 let frames: (() => void)[] = [];
 beforeEach(() => {
   frames = [];
@@ -15,7 +15,7 @@ afterEach(() => {
 
 const POINT = { triangle: 0, bary: [1, 0, 0] as [number, number, number] };
 
-/** A page ready to pull, whose model is only at pointer position (10, 10). */
+/** A page ready to pull. The model is hit only by pointers with x = 10. */
 function page() {
   const fake = createFake();
   const shown: unknown[][] = [];
@@ -85,7 +85,7 @@ it("a grab includes all pins except the grabbed one", async () => {
   pull.begin(10, 10);
   expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { grabs: 1, seeds: Uint32Array.of(3) } });
   pull.end(false);
-  // From another view, the pin is not under the pointer.
+  // After a change of view, the pin is no longer under the pointer, so that the pull starts a second grab.
   teach({ project: () => Float32Array.of(90, 90, 1) });
   pull.begin(10, 10);
   expect(asked.at(-1)).toMatchObject({ input: { grabs: 1, seeds: Uint32Array.of(3, 3) } });
@@ -95,7 +95,7 @@ it("a grab includes all pins except the grabbed one", async () => {
   expect([store.get().pins, did]).toEqual([[], ["Pin", "Remove pins"]]);
 });
 
-it("changing the reach grabs again from the same pose", async () => {
+it("changing the reach during a pull sends a new grab", async () => {
   const { pull, answer, took, asked } = page();
   pull.begin(10, 10);
   await answer(took);

@@ -4,7 +4,9 @@ import type { NamedFile } from "../../src/contract";
 import type { Entry } from "../../src/works/entry";
 import { cageOf, createFake, MODEL } from "../fake";
 
-/** Simulated browser storage. */
+/**
+ * Simulated browser storage: saved work by identifier. `held`: identifiers locked by a tab; `own`: the one of this tab.
+ */
 const kept = new Map<string, { entry: Entry; file: Uint8Array | undefined }>();
 const disk: { error: Error | undefined } = { error: undefined };
 let held: string[] = [];
@@ -64,7 +66,7 @@ const entryOf = (id: string, when = Date.now()): Entry => ({ id, name: `${id}.ob
 const keep = (id: string, when?: number) =>
   kept.set(id, { entry: entryOf(id, when), file: Uint8Array.of(1) });
 
-it("work is saved after a pause, and not during an operation", async () => {
+it("work is saved after a pause without changes, but not during a gesture", async () => {
   const { works, store } = page();
   store.set({ gesture: "Move" });
   works.touch();
