@@ -1,4 +1,4 @@
-//! Whole binds by the published and the embedded method, on one thread and on all threads.
+//! Times of whole binds by the published and the embedded method, on one thread and on all threads.
 #![allow(missing_docs, reason = "criterion's macros make public functions without documentation")]
 
 use std::hint::black_box;
@@ -17,7 +17,7 @@ fn bind(criterion: &mut Criterion) {
                 b.iter(|| black_box(input.bind(Method::Embedded, Solver::Multigrid, grid, threads)));
             });
         }
-        // A bind takes seconds, so only the grid that the ratios refer to is measured.
+        // A bind by the published method takes seconds, so that only the grid of the ratios is measured.
         group.bench_function(BenchmarkId::new(format!("classic Jacobi, {name}"), 64), |b| {
             b.iter(|| black_box(input.bind(Method::Classic, Solver::Jacobi, 64, threads)));
         });

@@ -1,5 +1,5 @@
-//! Generates cages of 24, 80 and 200 vertices for the samples and for the models on the command line, checks and binds them, and prints
-//! a Markdown table. Exits with an error if a cage is invalid or too inaccurate.
+//! Generates cages of 24, 80 and 200 vertices for the samples and for the models on the command line, checks and binds
+//! them, and prints a Markdown table. Exits with an error if a cage is invalid or its rest error too large.
 //!
 //! `cargo bench -p cagework-benches --bench cages -- horse.glb cow.obj`
 
@@ -12,7 +12,7 @@ use cagework_core::mesh::TriMesh;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 
-/// Target numbers of vertices; 80 is the default.
+/// Target numbers of cage vertices; 80 is the default of the options.
 const TARGETS: [u32; 3] = [24, 80, 200];
 
 /// Cells along the longest side of the cage.

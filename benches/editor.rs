@@ -1,4 +1,5 @@
-//! Operations of the editor on a model of 30,000 vertices: commands, undo, redo and the view of panels. Aim: below 1 ms each.
+//! Times of the editor's operations on a model of 30,000 vertices: commands, undo, redo and the view that panels show.
+//! The aim is below 1 ms each.
 
 use std::time::Instant;
 
@@ -14,7 +15,7 @@ const RUNS: usize = 201;
 /// Vertices of the model.
 const VERTICES: usize = 30_000;
 
-/// Copies of the test animal side by side, cut off at [`VERTICES`].
+/// Copies of the test animal side by side, truncated to [`VERTICES`] vertices.
 fn model() -> Model {
     let animal = creature();
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());

@@ -1,8 +1,8 @@
-//! Times a frame: the cage is posed, the mesh and its normals are deformed, and the picture is drawn. The environment variable
-//! `CAGEWORK_ADAPTER` selects the GPU.
+//! Times a frame: the cage is posed, the mesh and its normals are deformed, and the picture is drawn. The environment
+//! variable `CAGEWORK_ADAPTER` selects the GPU.
 //!
-//! `pull` is the solver's time per frame on the processor; `deform` ends when positions and normals are computed, `frame` when
-//! the picture has been read back.
+//! In the output, `pull` is the time per frame of the pull solver on the processor. `deform` ends when positions and
+//! normals are computed, `frame` when the picture has been read back.
 
 use std::slice;
 use std::time::Instant;
@@ -49,7 +49,7 @@ fn posed(cage: &Cage, frame: usize) -> Vec<Vec3> {
     cage.positions().iter().map(turn).collect()
 }
 
-/// Median and minimum, milliseconds.
+/// Describes times by their median and minimum, milliseconds.
 fn summary(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     format!("median {:.2} ms, fastest {:.2} ms", times[times.len() / 2], times[0])
@@ -84,8 +84,8 @@ fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindO
     println!("  a frame: {}", summary(frame.collect()));
 }
 
-/// Times the processor's part of a clip's frame: uploading joint matrices and morph weights for a mesh of [`VERTICES`] vertices with
-/// 60 joints and 8 morph targets, and computing the humanoid's joint matrices.
+/// Times the processor's part of a clip's frame: uploading joint matrices and morph weights of a mesh of [`VERTICES`]
+/// vertices with 60 joints and 8 morph targets, and computing the joint matrices of the humanoid sample.
 fn play(session: &mut Session) {
     const N: usize = VERTICES;
     let joints = (0..N as u32).flat_map(|v| (0..4).map(move |k| ((v + 15 * k) % 60, 0.25)));

@@ -1,4 +1,4 @@
-//! Input of the benches, and the stages of a bind one by one.
+//! Input of the benches, and the single stages of a bind.
 //!
 //! Mesh and cage are the animal of `cagework_tests::creature`, or the files in the environment variables
 //! `CAGEWORK_BENCH_MESH` and `CAGEWORK_BENCH_CAGE` (OBJ, glTF, GLB).
@@ -21,7 +21,7 @@ use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};
 use glam::Vec3;
 
-/// Grids of whole binds.
+/// Grids at which whole binds are timed.
 pub const GRIDS: [u32; 3] = [32, 64, 128];
 
 /// A mesh in a cage.
@@ -67,7 +67,7 @@ impl Input {
         bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
     }
 
-    /// The levels of the embedded method.
+    /// The grid levels of the embedded method.
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
@@ -75,7 +75,7 @@ impl Input {
         Hierarchy::new(&embedding.boundaries((&self.cage).into()), self.cage.n_vertices())
     }
 
-    /// Stencils of all vertices.
+    /// Sampling stencils of all points on the finest level.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
         let overlaps = Overlaps::default();
@@ -95,7 +95,7 @@ pub fn read(path: &str) -> Model {
     Model::read(path, &bytes, &mut |_| None).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Solves a batch of columns.
+/// Solves for one batch of columns.
 pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
     let rule = BindOptions::default().stop_rule().of_batch(hierarchy.n_batches());
     let report = workspace.solve(hierarchy, batch, rule, &mut |_, _| true);
@@ -109,7 +109,8 @@ pub fn solve_all(workspace: &mut Workspace, hierarchy: &Hierarchy) {
     }
 }
 
-/// Solves each batch in its own workspace, so that a sweep over all columns reads every field from memory, not from the cache.
+/// Solves each batch in its own workspace, so that a sweep over all columns reads every field from memory, not from the
+/// cache.
 #[must_use]
 pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
     (0..hierarchy.n_batches())
@@ -121,7 +122,7 @@ pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
         .collect()
 }
 
-/// Minimum time of several calls, milliseconds. Robust against other load on the machine.
+/// Minimum time of several calls, milliseconds. The minimum is robust against other load on the machine.
 pub fn fastest_ms(times: usize, mut call: impl FnMut()) -> f64 {
     let measured = (0..times.max(1)).map(|_| {
         let begin = Instant::now();

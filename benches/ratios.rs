@@ -1,18 +1,18 @@
-//! Ratios of times measured in the same run: the cost of a solve in sweeps, the cost of a finer grid, and the speed-up of the
-//! embedded method over the published one.
+//! Ratios of times measured in the same run: the cost of a solve in sweeps, the cost of a finer grid, and the speed-up
+//! of the embedded method over the published one.
 
 use cagework_benches::{GRIDS, Input, fastest_ms, resident_workspaces, solve_batch};
 use cagework_core::options::{Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::solve::multigrid::Workspace;
 
-/// Number of repetitions.
+/// Number of repetitions; the fastest time counts.
 const TIMES: usize = 60;
 
 /// Number of repetitions of binds that take seconds.
 const TIMES_SLOW: usize = 3;
 
-/// Sum over all batches of the minimum time of each batch, ms. Batches are interleaved, so that each finds the caches
+/// Sum over all batches of the minimum time of each batch, ms. Batches take turns, so that each batch finds the caches
 /// as the previous batch left them.
 fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut fastest = vec![f64::INFINITY; n_batches];

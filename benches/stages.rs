@@ -1,4 +1,4 @@
-//! Stages of an embedded bind on one thread: voxelize, sweep, V-cycle, solve, sample.
+//! Times of the stages of an embedded bind on one thread: voxelize, sweep, V-cycle, solve, sample.
 #![allow(missing_docs, reason = "criterion's macros make public functions without documentation")]
 
 use std::hint::black_box;

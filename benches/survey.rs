@@ -1,5 +1,5 @@
-//! Generates cages of four sizes for models defined by formulas, and measures their quality for other triangulations and for bending.
-//! Prints a Markdown table with a row per cage and a summary per size.
+//! Generates cages of four sizes for models defined by formulas, and measures their quality under other triangulations
+//! and under bending. Prints a Markdown table with a row per cage and a summary per size.
 //!
 //! The columns `crossings` (pairs of intersecting triangles), `open` (edges that do not belong to two triangles) and
 //! `outside` (model vertices) give the worst of four triangulations: diagonals from the first vertex, from the second,
@@ -50,7 +50,8 @@ impl Patches {
         self
     }
 
-    /// A tube along a curve from parameter 0 to 1 to (point, radius).
+    /// Adds a tube. `curve` maps the parameter, 0 to 1, to the tube's centre and radius; `along` is the number of
+    /// segments.
     fn tube(self, along: u32, curve: impl Fn(f32) -> (Vec3, f32)) -> Self {
         self.patch([along, 12], |u, v| {
             let way = (curve(u + 1e-3).0 - curve(u - 1e-3).0).normalize();
@@ -60,7 +61,7 @@ impl Patches {
         })
     }
 
-    /// A capsule between two points.
+    /// Adds a capsule between two points.
     fn limb(self, from: impl Into<Vec3>, to: impl Into<Vec3>, radius: f32) -> Self {
         let (from, to) = (from.into(), to.into());
         let way = (to - from).normalize_or(Vec3::Z);
@@ -88,7 +89,7 @@ impl Patches {
         self.limb(at, at, radius)
     }
 
-    /// A surface of revolution about z. `outline`: (radius, height).
+    /// Adds a surface of revolution about z. `outline`: points (radius, height).
     fn revolved(self, outline: [[f32; 2]; 5]) -> Self {
         let outline = outline.map(|[r, z]| vec3(r, r, z));
         self.patch([40, 32], |u, v| {
@@ -97,7 +98,7 @@ impl Patches {
         })
     }
 
-    /// A block of 2 x 2 x 0.6 with a round hole, without its side faces.
+    /// Adds a block of 2 x 2 x 0.6 with a round hole through it. Its four outer side faces are missing.
     fn holed(self, x: f32, y: f32) -> Self {
         self.patch([3, 32], |u, v| {
             let round = on_circle(TAU * v);
@@ -125,12 +126,12 @@ fn figure() -> Patches {
     halves.limb([0.0, 0.0, 1.0], [0.0, 0.0, 1.45], 0.2).limb([0.0, 0.0, 1.75], [0.0, 0.0, 1.8], 0.14)
 }
 
-/// Adds `n` parts, each a function of its index.
+/// Joins `n` parts. `add` adds the part of a given index.
 fn each(n: u32, add: impl Fn(Patches, f32) -> Patches) -> Patches {
     (0..n).fold(Patches::default(), |parts, k| add(parts, k as f32))
 }
 
-/// Adds `n` parts, each a function of random numbers.
+/// Joins `n` parts that `add` makes from random numbers.
 fn random(n: u32, add: impl Fn(Patches, &mut Random) -> Patches) -> Patches {
     let mut random = Random::new(38);
     (0..n).fold(Patches::default(), |parts, _| add(parts, &mut random))
@@ -214,10 +215,10 @@ fn models() -> Vec<(&'static str, Patches)> {
     models
 }
 
-/// Summarises a column over all cages of a size.
+/// Function that summarises a column of the table over all cages of a size.
 type Total = fn(&[f64]) -> f64;
 
-/// Measured quantities.
+/// Measured quantities: the columns of the table.
 const COLUMNS: [(&str, Total); 12] = [
     ("vertices", |of| of.iter().sum()),
     ("quads / faces", |of| of.iter().sum::<f64>() / of.len() as f64),
@@ -233,7 +234,7 @@ const COLUMNS: [(&str, Total); 12] = [
     ("ms", largest),
 ];
 
-/// Number of positive values.
+/// Number of positive values in a column.
 fn count(of: &[f64]) -> f64 {
     of.iter().filter(|&&x| x > 0.0).count() as f64
 }
@@ -319,7 +320,8 @@ fn row(model: &TriMesh, target: u32) -> [f64; COLUMNS.len()] {
     ]
 }
 
-/// Angles between normals across edges and diagonals, degrees; across edges the largest one of all triangulations of both faces.
+/// Angles in degrees between the normals of adjacent triangles: across each diagonal of a face, and across each edge,
+/// where the largest angle of all triangulations of both faces counts.
 fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     let normal = |[a, b, c]: [u32; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.positions[v as usize].as_dvec3());

@@ -11,7 +11,7 @@ use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
 use cagework_tests::random::Random;
 use glam::{Mat3, Vec3};
 
-/// A sample's vertices and cage, and the field of a pose of the cage.
+/// A sample's vertices, its cage, and the field of the pose that `posed` gives the cage.
 fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec3>, Cage, Field) {
     let sample = samples::build(id).unwrap();
     let cage = Cage::new(&sample.cage).unwrap();
@@ -51,7 +51,7 @@ fn affine_map_of_the_cage_is_reproduced_inside() {
     let affine = |p: Vec3| matrix * p + Vec3::new(0.1, -0.2, 0.3);
     let (positions, cage, field) =
         field_of("rat", |sample| sample.cage.positions.iter().map(|&p| affine(p)).collect());
-    // At this distance all corners of a vertex's lattice cell are inside the cage.
+    // At this distance from the cage, all corners of a vertex's lattice cell are inside.
     let deep = deep_vertices(&positions, &cage, &field, 3.0_f32.sqrt());
     assert!(deep.len() > 50, "{}", deep.len());
     let mut bent = positions.clone();
@@ -68,7 +68,7 @@ fn field_decays_continuously_to_zero_at_the_edge_of_the_lattice() {
     let up = Vec3::new(0.0, 0.5, 0.0);
     let (_, cage, field) = field_of("rat", |sample| sample.cage.positions.iter().map(|&p| p + up).collect());
     let centre = cage.bounds().center();
-    // A translated cage has a constant displacement, which decays outside of it.
+    // A translated cage displaces all points inside by the same vector, which decays outside.
     let edge = field.lattice.origin.x + (field.lattice.dims.x - 1) as f32 * field.lattice.cell;
     let far = Vec3::new(edge, centre.y, centre.z);
     let mut along: Vec<Vec3> =
@@ -165,7 +165,7 @@ fn mapped_points_are_mapped_back() {
         let back = inverse.find(field.map(p));
         assert!(back.is_some_and(|back| back.distance(p) <= 1e-5 * cage.diagonal()), "{p} {back:?}");
     }
-    // Far outside, nothing moves.
+    // Far from the cage, the field moves no point.
     let far = Vec3::splat(100.0);
     assert_eq!((field.map(far), inverse.find(far), field.gradient(far)), (far, Some(far), Mat3::IDENTITY));
 }

@@ -30,7 +30,7 @@ fn context(options: &ContextOptions) -> GpuContext {
     }
 }
 
-/// Every third vertex of the animal, for speed, and its cage.
+/// Every third vertex of the animal, to save time, and its cage.
 fn input() -> (Vec<Vec3>, Cage) {
     (creature().positions.into_iter().step_by(3).collect(), cage(&creature_cage()))
 }
@@ -104,8 +104,8 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
-/// Held and rigid parts, set before or after the weights or copied to another device, move the mesh as in an export,
-/// with compute kernels and on devices that only draw.
+/// Parts that stay or are rigid move as in an export, on devices that compute and on devices that only draw. They may
+/// be set before or after the weights, or copied to another device.
 #[test]
 fn parts_are_restored_as_in_an_export() {
     let (rest, cage) = input();
@@ -139,7 +139,8 @@ fn parts_are_restored_as_in_an_export() {
     }
 }
 
-/// The columns of Green weights are the cage's vertices and triangles. The controls of triangles are computed from the pose.
+/// Green weights have a column for each vertex and each triangle of the cage. The controls of triangles are computed
+/// from the pose.
 #[test]
 fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let (positions, _) = input();
@@ -161,7 +162,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     }
 }
 
-/// Tests a device as in a browser without WebGPU: the processor binds and deforms, and a lost device is recovered.
+/// As in a browser without WebGPU, the processor binds and deforms, and a lost device is recovered.
 #[test]
 fn session_that_only_draws_equals_the_cpu() {
     let only = ContextOptions { draws_only: true, ..ContextOptions::default() };

@@ -120,7 +120,8 @@ fn gpu(method: Method, solver: Solver) -> BackEnd {
     BackEnd { bind, options: BindOptions { method, solver, ..BindOptions::default() } }
 }
 
-// Other combinations (classic Jacobi on the GPU, most solvers on all threads) are compared with one of these in `agreement`.
+// Other combinations (classic Jacobi on the GPU, most solvers on all threads) are compared with one of these in
+// `agreement`.
 solver_suite!(embedded_multigrid_gpu, embedded, gpu(Method::Embedded, Solver::Multigrid));
 solver_suite!(embedded_jacobi_gpu, embedded, gpu(Method::Embedded, Solver::Jacobi));
 solver_suite!(classic_multigrid_gpu, every, gpu(Method::Classic, Solver::Multigrid));
@@ -160,7 +161,7 @@ mod error_bounds {
     }
 }
 
-/// Multigrid only: termination at the precision of f32.
+/// Properties of multigrid only.
 mod multigrid {
     use super::*;
 

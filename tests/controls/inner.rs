@@ -11,7 +11,7 @@ use pollster::block_on;
 
 use crate::support::{bound, samples, scattered};
 
-/// Weights of one control. `[n_points]`
+/// Weights of one control at all points. `[n_points]`
 fn column(binding: &Binding, control: usize) -> Vec<f64> {
     binding.weights.column(control as u32).map(f64::from).collect()
 }
@@ -21,13 +21,13 @@ fn points_at(positions: &[Vec3], radius: f32) -> InnerControls {
     InnerControls { positions: positions.to_vec(), elements, radius: Some(radius) }
 }
 
-/// A ball of radius 1/4 in a sphere of radius 1.
+/// A ball of radius 1/4 in the centre of a sphere of radius 1.
 fn ball_in_sphere() -> ControlSet {
     ControlSet::new(&cage(&icosphere(3)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap()
 }
 
-/// Between concentric spheres of radius R = 1/4 and 1, the harmonic function that is 1 on the inner sphere and 0 on the outer one
-/// is (1/r - 1) / (1/R - 1) = (1/r - 1) / 3.
+/// Between concentric spheres of radius R = 1/4 and 1, the harmonic function that is 1 on the inner sphere and 0 on the
+/// outer one is (1/r - 1) / (1/R - 1) = (1/r - 1) / 3.
 #[test]
 fn weight_of_a_ball_in_a_sphere_matches_the_formula() {
     let set = ball_in_sphere();
@@ -47,9 +47,9 @@ fn weight_of_a_ball_in_a_sphere_matches_the_formula() {
     }
 }
 
-/// Next to the ball the formula holds in each direction, not only on average. Linear interpolation in a cell of width h has an error of
-/// at most `h^2 / 8` times the sum of the second derivatives, here `(2 + 1 + 1) / (3 r^3)`. Four steps of subdivision make the cage
-/// round enough.
+/// Next to the ball the formula holds in each direction, not only on average. Linear interpolation in a cell of width h
+/// has an error of at most `h^2 / 8` times the sum of the second derivatives, here `(2 + 1 + 1) / (3 r^3)`. The cage is
+/// an icosphere of four subdivisions, which is round enough.
 #[test]
 fn weights_next_to_a_ball_match_the_formula_in_every_direction() {
     let set = ControlSet::new(&cage(&icosphere(4)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap();
@@ -67,8 +67,8 @@ fn weights_next_to_a_ball_match_the_formula_in_every_direction() {
     }
 }
 
-/// A straight bone in a limb is bent at its middle joint. The points around it rotate by the same rotation in each direction of the
-/// bend, without twist about the bone, and are not torn apart at the joint.
+/// A straight bone in a limb is bent at its middle joint. In each direction of the bend, the points around the bone
+/// rotate with its moved half, without twist about the bone, and are not torn apart at the joint.
 #[test]
 fn bent_bone_rotates_the_points_around_it_without_twist() {
     let joints = [-0.6_f32, 0.0, 0.6].map(|z| Vec3::new(0.0, 0.0, z));
@@ -92,7 +92,7 @@ fn bent_bone_rotates_the_points_around_it_without_twist() {
             *controls.last_mut().unwrap() = turn * joints[2];
             let posed = deform_bound(&binding.weights, &binding.frames, &controls);
             for (v, p) in points.iter().enumerate().filter(|(_, p)| (0.18..0.32).contains(&p.z)) {
-                // Compare the offsets to the opposite point across the bone, and to a point further along the bone.
+                // Compare with the opposite point across the bone, and with a point further along the bone.
                 for other in [v - v % 8 + (v + 4) % 8, v + 80] {
                     let [rest, posed] = [points[other] - *p, posed[other] - posed[v]];
                     let off = (turn * rest).angle_between(posed).to_degrees();
@@ -109,7 +109,7 @@ fn bent_bone_rotates_the_points_around_it_without_twist() {
     }
 }
 
-/// A sheet between two boxes: points on one side have no weight of cage vertices on the other.
+/// A sheet separates two halves of a box: points in one half have no weight of the cage vertices of the other half.
 #[test]
 fn sheet_across_a_box_separates_its_halves() {
     let corners = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]];
@@ -137,7 +137,7 @@ fn sheet_across_a_box_separates_its_halves() {
     assert!(binding.outside.is_empty());
 }
 
-/// The weight at a point around a tube is linear in its projection onto the line.
+/// Around a straight bone, the weights at a point are linear in the projection of the point onto the bone's axis.
 #[test]
 fn weights_are_linear_along_a_tube() {
     let (a, b, radius) = (Vec3::new(-0.6, 0.1, 0.0), Vec3::new(0.5, -0.2, 0.1), 0.1);
@@ -150,7 +150,8 @@ fn weights_are_linear_along_a_tube() {
     let way = (b - a).normalize();
     let side = way.any_orthonormal_vector();
     let shares: Vec<f32> = (1..20).map(|k| k as f32 / 20.0).collect();
-    // The points are inside the tube, then just outside its surface, each with the largest allowed error.
+    // Distances of the points from the axis, inside and just outside the bone's surface, each with the largest allowed
+    // error.
     for (distance, most) in [(0.5 * radius, 1e-4), (1.06 * radius, 0.02)] {
         let around = |s: f32| {
             (0..6).map(move |k| a.lerp(b, s) + Quat::from_axis_angle(way, k as f32) * (distance * side))
@@ -262,7 +263,9 @@ fn points_inside_a_ball_follow_it() {
     }
 }
 
-/// Weights are identical for any number of threads, within 1e-4 on the GPU, and within a cell for the classic method.
+/// Weights on one thread and on all threads are identical; GPU weights differ by less than 1e-4, and classic weights by
+/// less than
+/// 0.01 on average.
 #[test]
 fn back_ends_and_methods_agree_on_inner_controls() {
     let set = all_kinds();
@@ -297,8 +300,9 @@ fn back_ends_and_methods_agree_on_inner_controls() {
     assert!(apart < 1e-4, "{apart}");
 }
 
-/// 64 balls that are smaller than the cells of coarse levels. V-cycles alone converge slowly or diverge here, so the solver switches
-/// to conjugate gradients, on the processor even for a GPU. Expected values: conjugate gradients without a preconditioner.
+/// 64 balls that are smaller than the cells of coarse levels. V-cycles alone converge slowly or diverge here, so the
+/// solver switches to conjugate gradients, on the processor even for a GPU. Expected values: conjugate gradients
+/// without a preconditioner.
 #[test]
 fn many_small_balls_do_not_stall_the_solve() {
     let places = [-0.787_f32, -0.254, 0.280, 0.813];
@@ -330,8 +334,9 @@ fn many_small_balls_do_not_stall_the_solve() {
     }
 }
 
-/// Largest jump of a weight on lines near some corners: the change between points 1/250 of a cell apart, minus the larger one of the
-/// changes before and after it. The lines pass the corners at a distance of 0.1 to 1.5 cells.
+/// Largest jump of a weight on lines near some corners: the change between points 1/250 of a cell apart, minus the
+/// larger one of the changes in the previous and in the next step. The lines pass the corners at a distance of 0.1 to
+/// 1.5 cells.
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;
     let mut random = Random::new(81);
@@ -358,8 +363,8 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     largest
 }
 
-/// At the tip of a spike and at the corners of a sheet, where re-entrant edges end, jumps are at most 8e-3 and decrease under
-/// refinement. Rays that pass just beyond the end of an edge must be split there too.
+/// At the tip of a spike and at the corners of a sheet, where re-entrant edges end, jumps are at most 8e-3 and decrease
+/// under refinement. Rays that pass just beyond the end of an edge must be split there too.
 #[test]
 fn weights_do_not_jump_where_re_entrant_edges_end() {
     let tip = Vec3::new(0.05, 0.03, -0.3);

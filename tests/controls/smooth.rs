@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::support::{bound, samples, scattered};
 
-/// One step of Catmull-Clark subdivision of a value per vertex, with a neighbour search that is independent of the core's. Returns
-/// the new values (vertices, edges sorted by their ends, faces) and the new quads.
+/// One step of Catmull-Clark subdivision of values at vertices; the search for neighbours is independent of the core's.
+/// Returns the new values (of vertices, of edges sorted by their ends, of faces) and the new quads.
 fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
@@ -52,7 +52,7 @@ fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     (new, quads)
 }
 
-/// A mesh subdivided `steps` times, and the row of each new vertex: its weights of the original vertices.
+/// A mesh subdivided `steps` times, and for each new vertex a row: its weights of the original vertices.
 fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) {
     let n = mesh.positions.len();
     let mut faces = Vec::new();
@@ -72,7 +72,7 @@ fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) 
     (PolygonMesh { positions: rows.iter().map(place).collect(), faces }, rows)
 }
 
-/// Rounding of f32 weights between two binds with different batches of columns.
+/// Tolerance for f32 weights of two binds with different batches of columns: rounding.
 const ROUND_OFF: f64 = 1e-5;
 
 /// Boundary values on bent quads miss the rest position by up to 2 % of the bend. Restoring rows distributes this error
@@ -100,7 +100,7 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
         for v in 0..points.len() {
             let mut expected = vec![0.0; cage.n_vertices()];
             let (columns, weights) = by_route.weights.row(v);
-            // The remaining columns are offsets.
+            // The remaining columns of the row are offsets.
             for (&k, &w) in columns.iter().zip(weights).filter(|(k, _)| (**k as usize) < rows.len()) {
                 for (sum, share) in expected.iter_mut().zip(&rows[k as usize]) {
                     *sum += f64::from(w) * share;
@@ -152,7 +152,8 @@ fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
     }
 }
 
-/// Vertices just outside the smooth surface follow a rigid motion fully; those further away follow it partially and are excluded.
+/// Vertices just outside the smooth surface follow a rigid motion fully; those further away follow it partially and are
+/// excluded.
 #[test]
 fn smooth_cage_keeps_the_rest_pose_and_rigid_motions() {
     let cage = cage(&l_shape());

@@ -7,7 +7,7 @@ use cagework_core::solve::rows::LANES;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, bind};
 use glam::Vec3;
 
-/// Binds points on the processor, at tau = 1e-7 and otherwise default options, then `edit`ed.
+/// Binds points on the processor with tau = 1e-7 and otherwise default options, changed by `edit`.
 pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut BindOptions)) -> Binding {
     let mut options = BindOptions { tau: 1e-7, ..BindOptions::default() };
     edit(&mut options);

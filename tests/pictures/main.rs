@@ -205,18 +205,18 @@ fn orthographic_from_above() {
     assert_picture(&mut session, "orthographic-top");
 }
 
-/// Some canvas formats are not sRGB; colours must be the same in them.
+/// Canvas formats that are not sRGB show the same colours.
 #[test]
 fn formats_without_srgb_look_the_same() {
     let mut session = creature();
-    // Draw only opaque elements, because such formats blend sRGB values.
+    // Blended elements would differ, because such formats blend sRGB values: draw opaque elements only.
     let bare = SceneOptions { floor: false, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.set_scene(bare);
     let expected = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
     let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);
     let n = expected.len();
     let sum: f64 = expected.iter().zip(&actual).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
-    // With such formats, multisampling averages sRGB values, so edges are slightly darker.
+    // Edges are slightly darker, because multisampling in such formats averages sRGB values.
     assert!(sum / (n as f64) < 1.0, "{}", sum / n as f64);
 }
 

@@ -13,7 +13,8 @@ use cagework_tests::creature;
 use glam::{Quat, Vec2, Vec3};
 use pollster::block_on;
 
-/// A device that computes, and one that only draws as in browsers without WebGPU. Pictures must be the same on both.
+/// Options of a device that computes, and of one that only draws, as in browsers without WebGPU. Pictures must be equal
+/// on both.
 pub(crate) fn everywhere() -> [ContextOptions; 2] {
     [false, true].map(|draws_only| ContextOptions { draws_only, ..ContextOptions::default() })
 }
@@ -26,7 +27,7 @@ pub(crate) fn empty(options: &ContextOptions) -> Session {
     }
 }
 
-/// Rotates the animal so that y is up.
+/// Undoes the rotation of the animal, and makes y its up axis.
 fn upright(p: Vec3) -> Vec3 {
     let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.2, -0.35, 0.5).inverse();
     let p = turn * p;
@@ -134,7 +135,7 @@ fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
             let (u, v) = (step as f32 / AROUND as f32, ring as f32 / RINGS as f32);
             let (polar, around) = (PI * v, TAU * u);
             let out = Vec3::new(polar.sin() * around.sin(), polar.cos(), polar.sin() * around.cos());
-            // At the seam the position is shared, and the texture coordinates are not.
+            // At the seam two corners share a position but not their texture coordinates.
             if step < AROUND {
                 model.positions.push(center + out);
             }

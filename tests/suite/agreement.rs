@@ -5,7 +5,7 @@ use cagework_tests::{Random, assert_close, dense, points};
 
 use super::{BackEnd, WEIGHT_TOLERANCE};
 
-/// Both back ends solve the same equations, to an error far below the discretisation error.
+/// The weights of two solvers of the same equations differ by less than the solvers' error bound.
 pub(crate) fn solvers_agree(a: &BackEnd, b: &BackEnd) {
     let turn = Random::new(20).rotation();
     for mesh in [c_shape(), moved(&triangulated(&c_shape()), |p| turn * p)] {

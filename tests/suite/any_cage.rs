@@ -1,5 +1,5 @@
-//! Difficult cages: thresholds, parts that share faces or overlap, re-entrant edges, bent quads, and faces that the grid cannot
-//! resolve. Figures at g = 64 are in `docs/notes/any-cage.md`.
+//! Difficult cages: thresholds, parts that share faces or overlap, re-entrant edges, bent quads, and faces that the
+//! grid cannot resolve. Figures at g = 64 are in `docs/notes/any-cage.md`.
 
 use cagework_core::{Cage, PolygonMesh, Weights};
 use cagework_tests::cages::{cage, cuboid, icosphere, l_shape, moved, sphere, together};
@@ -19,9 +19,9 @@ fn twisted(points: &[Vec3], size: f32) -> Vec<Vec3> {
     points.iter().map(|&p| Quat::from_rotation_y(0.5 * p.y / size) * p).collect()
 }
 
-/// Dropped weights are redistributed: no weight becomes negative or changes by more than 5 times the threshold, and a smooth pose
-/// changes by at most 1e-3 of the diagonal. (Dropping without redistribution changes weights by 0.5 on an icosphere of 642
-/// vertices.)
+/// Dropped weights are redistributed: no weight becomes negative or changes by more than 5 times the threshold, and a
+/// smooth pose changes by at most 1e-3 of the diagonal. (Dropping without redistribution changes weights by 0.5 on an
+/// icosphere of 642 vertices.)
 pub(crate) fn sparsify_changes_weights_and_poses_little(back_end: &BackEnd) {
     let mut n_dropped = 0;
     for cage in principles::cages().into_iter().chain([2, 3].map(|times| cage(&icosphere(times)))) {
@@ -78,8 +78,9 @@ pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
     }
 }
 
-/// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956). Each step jumps to a random point of the
-/// largest sphere inside one of the boxes. Near the boundary of the union a walk ends with the trilinear coordinates in its box.
+/// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956). Each step jumps to a
+/// random point of the largest sphere inside one of the boxes. Near the boundary of the union a walk ends with the
+/// trilinear coordinates in its box.
 fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &mut Random) -> [f64; 16] {
     let mut sums = [0.0; 16];
     for _ in 0..n_walks {
@@ -119,7 +120,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         let both = cage(&together(&body, &arm));
         let points: Vec<Vec3> = [
             [3.0, 2.0, 2.0],
-            // These points are next to inner walls, which sampling rays may hit.
+            // These points are next to walls inside the union, which sampling rays may hit.
             [3.999, 1.9, 1.9],
             [4.001, 2.0, 1.8],
             [2.001, 2.0, 2.1],
@@ -159,7 +160,8 @@ fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// Largest change of a weight between points 1/250 of a cell apart, on lines that pass re-entrant edges within 1.5 cells.
+/// Largest change of a weight between points 1/250 of a cell apart, on lines that pass re-entrant edges within 1.5
+/// cells but not within 0.1 cells.
 fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     let cell = cage.bounds().extent().max_element() / grid as f32;
     let edges = re_entrant_edges(cage, 0.1 * cell);
@@ -190,8 +192,8 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     largest
 }
 
-/// Next to re-entrant edges weights change by at most 4e-3 per 1/250 of a cell, and less on a finer grid: rays that hit an edge and
-/// rays that just miss it give the same values.
+/// Next to re-entrant edges weights change by at most 4e-3 per 1/250 of a cell, and less on a finer grid: rays that hit
+/// an edge and rays that just miss it give the same values.
 pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     let turn = Random::new(76).rotation();
     let rotated = moved(&l_shape(), |p| turn * p);
@@ -203,8 +205,8 @@ pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     }
 }
 
-/// Lifting a corner of the unit cube changes weights continuously, starting from planar faces. (Splitting bent faces into two
-/// triangles makes weights jump by 0.237 at the lift where the split first occurs.)
+/// Lifting a corner of the unit cube changes weights continuously, starting from planar faces. (Splitting bent faces
+/// into two triangles makes weights jump by 0.237 at the lift where the split first occurs.)
 pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd) {
     let flat = cuboid(Vec3::ZERO, Vec3::ONE);
     let points = points::inside(&cage(&flat), 300, 77);
@@ -218,7 +220,7 @@ pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd
     for lifts in lifts.windows(2) {
         let after = bind(lifts[1]);
         let change = largest_change(&before, &after);
-        // The constant 1e-5 allows for rounding and the solver's error.
+        // The summand 1e-5 allows for rounding and for the solver's error.
         let allowed = 20.0 * (lifts[1] - lifts[0]) + 1e-5;
         assert!(change <= allowed, "from {} to {}: a weight changes by {change}", lifts[0], lifts[1]);
         before = after;

@@ -47,7 +47,7 @@ pub(crate) fn tetrahedron_is_barycentric_within_a_cell(back_end: &BackEnd) {
     let points = points::inside(&cage, 300, 1);
     let expected: Vec<f32> = points.iter().flat_map(|&p| barycentric(p)).collect();
     let binding = back_end.bind_with(&points, &cage, |o| o.grid = 32);
-    // A coordinate decreases from 1 at its corner to 0 on the opposite face.
+    // Slope of a coordinate, which decreases from 1 at its corner to 0 on the opposite face.
     let steepest = (0..4)
         .map(|k| {
             let [a, b, c] = [1, 2, 3].map(|j| CORNERS[(k + j) % 4]);

@@ -1,4 +1,4 @@
-//! Properties of solvers, each a function of a back end.
+//! Properties that every solver has, each a function of a back end.
 
 pub(crate) mod agreement;
 pub(crate) mod any_cage;
@@ -25,15 +25,15 @@ pub(crate) type Bind = fn(&[Vec3], &Cage, &BindOptions, &dyn Progress) -> Result
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BackEnd {
     pub(crate) bind: Bind,
-    /// Method, solver and threads; properties set the other options.
+    /// Method, solver and threads. The properties choose the other options.
     pub(crate) options: BindOptions,
 }
 
-/// Grid of properties that hold at any resolution.
+/// Grid size for properties that hold at any resolution.
 pub(crate) const GRID: u32 = 16;
 
-/// Threshold for delta at which the remaining error is below [`WEIGHT_TOLERANCE`]. At g = 16 a Jacobi sweep multiplies the error by
-/// cos(pi / 16) = 0.98, so the error is about 50 deltas.
+/// Threshold for delta at which the remaining error is below [`WEIGHT_TOLERANCE`]. At g = 16 a Jacobi sweep multiplies
+/// the error by cos(pi / 16) = 0.98, so the error is about 50 deltas.
 pub(crate) const TAU: f32 = 1e-7;
 
 /// Largest error of weights solved to [`TAU`], including rounding.
@@ -67,7 +67,7 @@ impl BackEnd {
         self.bind_with(points, cage, |_| ())
     }
 
-    /// Whether the method interpolates weights and reproduces linear functions.
+    /// Whether the method is the embedded one, which interpolates weights and reproduces linear functions.
     pub(crate) fn is_embedded(&self) -> bool {
         self.options.method == Method::Embedded
     }

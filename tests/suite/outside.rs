@@ -73,8 +73,10 @@ pub(crate) fn vertices_near_the_cage_follow_affine_maps_and_far_ones_stay(back_e
     }
 }
 
-/// A round bar that protrudes from an octagonal prism by up to 1.2 % of its diagonal, twisted by one radian per unit. The twist shears
-/// the surface at radius r = 1/2 by 1/2, so it stretches edges by at most the larger singular value of that shear, 1.28.
+/// A round bar that protrudes from an octagonal prism by up to 1.2 % of its diagonal is twisted by one radian per unit.
+/// The twist shears the surface at radius r = 1/2 by 1/2, so that it stretches edges by at most the larger singular
+/// value of that shear,
+/// 1.28.
 pub(crate) fn protruding_model_deforms_smoothly(back_end: &BackEnd) {
     let ring = |n: u16, r: f32, z: f32| {
         (0..n).map(move |k| {
@@ -107,7 +109,8 @@ pub(crate) fn protruding_model_deforms_smoothly(back_end: &BackEnd) {
     }
 }
 
-/// With a cage around one end of a bar, vertices beyond 15 % of the cage's diagonal are bit-identical after deformation.
+/// With a cage around one end of a bar, vertices beyond 15 % of the cage's diagonal are bit-identical after
+/// deformation.
 pub(crate) fn partial_cage_leaves_the_rest_of_the_model(back_end: &BackEnd) {
     let cage = cage(&cuboid(Vec3::new(0.0, -0.3, -0.3), Vec3::new(1.0, 0.3, 0.3)));
     let bar: Vec<Vec3> = (0..100u8).map(|k| Vec3::new(f32::from(k) / 50.0 - 1.0, 0.1, 0.05)).collect();
@@ -121,7 +124,7 @@ pub(crate) fn partial_cage_leaves_the_rest_of_the_model(back_end: &BackEnd) {
     if !back_end.is_embedded() {
         return;
     }
-    // The transition is continuous.
+    // The displacement is continuous along the bar.
     let steps = moved.windows(2).map(|w| w[0].distance(w[1]));
     assert!(steps.fold(0.0, f32::max) < 0.03, "the pose stretches steps of 0.02 to 0.0233 inside the cage");
 }
@@ -131,7 +134,7 @@ pub(crate) fn refusal_names_count_and_first_vertex(back_end: &BackEnd) {
     let mut vertices = points::inside(&cage, 20, 42);
     vertices[11] = Vec3::new(-9.0, 0.0, 0.0);
     vertices[5] = Vec3::new(0.0, 9.0, 0.0);
-    // Duplicate positions outside count once.
+    // Vertices outside with equal positions count once.
     let error = back_end.try_bind(&vertices, &cage, |o| o.outside = OutsidePolicy::Refuse).unwrap_err();
     assert_eq!(error, BindError::Outside { count: 2, first: 5 });
     let message = error.to_string();

@@ -1,4 +1,5 @@
-//! Defining properties of harmonic coordinates (Joshi et al. 2007): non-negative, partition of unity, linear precision, locality.
+//! Defining properties of harmonic coordinates (Joshi et al. 2007): non-negative, partition of unity, linear precision,
+//! locality.
 
 use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::{
@@ -87,7 +88,7 @@ pub(crate) fn affine_motion_is_followed(back_end: &BackEnd) {
     let matrix = Mat3::from_cols_array(&[1.5, 0.3, -0.2, 0.4, -0.7, 0.1, 0.0, 0.6, 2.0]);
     let to = |p: &Vec3| matrix * *p + Vec3::new(3.0, -2.0, 1.0);
     let [posed, expected] = [cage.positions(), &points].map(|p| p.iter().map(to).collect::<Vec<_>>());
-    // The map stretches distances at most threefold.
+    // The map stretches no distance by more than a factor of three.
     assert_combined(&binding.weights, &posed, &expected, 3.0 * REST_TOLERANCE * f64::from(cage.diagonal()));
 }
 

@@ -47,14 +47,15 @@ pub(crate) fn break_cancels_in_every_stage(back_end: &BackEnd) {
         let options = cagework_core::BindOptions { grid: 24, ..back_end.options };
         let result = (back_end.bind)(&points, &cage, &options, &watch);
         assert!(matches!(result, Err(BindError::Cancelled(_))), "{stage:?}");
-        // No events follow the break, except from threads that were already reporting.
+        // After the break, only threads that were already reporting may report.
         let calls = after.into_inner().unwrap();
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         assert!(calls <= threads.max(1), "{calls} reports after the break in {stage:?}");
     }
 }
 
-/// Locating all points in the grid, between voxelizing and solving, can take minutes for faces with hundreds of corners.
+/// Locating all points in the grid, between voxelizing and solving, can take minutes for faces with hundreds of
+/// corners.
 pub(crate) fn cancellation_is_polled_while_points_are_located(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 2000, 52);

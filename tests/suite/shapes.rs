@@ -113,7 +113,7 @@ pub(crate) fn quads_that_are_not_planar_reproduce_points(back_end: &BackEnd) {
     assert!(binding.report.weights.min >= -1e-6);
 }
 
-/// Few or no cell centres are inside such parts, as in the leg of a horse on a coarse grid.
+/// Thin parts, such as the leg of a horse on a coarse grid, contain few or no cell centres.
 pub(crate) fn parts_thinner_than_a_cell_get_weights(back_end: &BackEnd) {
     let leg = moved(&blocks(&[[0, 0, 0], [0, 0, 1]]), |p| p * Vec3::new(0.02, 0.02, 1.0));
     let with_body = together(&cuboid(Vec3::new(1.0, 0.0, 0.0), Vec3::new(2.0, 1.0, 2.0)), &leg);

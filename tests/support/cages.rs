@@ -39,7 +39,7 @@ pub fn octahedron() -> PolygonMesh {
     let positions = Vec3::AXES.iter().flat_map(|&a| [a, -a]).collect();
     let faces = (0..8u32).map(|octant| {
         let [x, y, z] = [octant & 1, 2 + (octant >> 1 & 1), 4 + (octant >> 2 & 1)];
-        // Each reflected axis reverses the orientation.
+        // An odd number of reflected axes reverses the orientation.
         if octant.count_ones().is_multiple_of(2) { vec![x, y, z] } else { vec![x, z, y] }
     });
     PolygonMesh { positions, faces: faces.collect() }
@@ -56,7 +56,7 @@ pub fn icosahedron() -> PolygonMesh {
         Vec3::from(at)
     };
     let positions: Vec<Vec3> = (0..12).map(corner).collect();
-    // Neighbouring corners are 2 apart.
+    // Adjacent corners are at a distance of 2.
     let is_near = |a: usize, b: usize| (positions[a].distance(positions[b]) - 2.0).abs() < 1e-3;
     let mut faces = Vec::new();
     for (a, b, c) in (0..12).flat_map(|a| (a..12).flat_map(move |b| (b..12).map(move |c| (a, b, c)))) {
@@ -133,7 +133,8 @@ pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let mut mesh = PolygonMesh::default();
     for cube in &filled {
         for axis in 0..3 {
-            // (u, v, axis) is right-handed, so counter-clockwise in u and v faces in the positive direction of the axis.
+            // (u, v, axis) is right-handed, so counter-clockwise in u and v faces in the positive direction of the
+            // axis.
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             for up in [false, true] {
                 let mut beside = *cube;

@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 
 use crate::cages::{blocks, moved};
 
-/// Rotation of animal and cage, so that no face is aligned with the grid.
+/// Rotation of the animal and of its cage, so that no face is aligned with the grid.
 fn turn() -> Quat {
     Quat::from_euler(glam::EulerRot::XYZ, 0.2, -0.35, 0.5)
 }
@@ -24,7 +24,7 @@ const PARTS: [(Vec3, Vec3, f32); 8] = [
     (Vec3::new(4.5, 2.5, 2.6), Vec3::new(4.5, 2.5, 0.5), 0.35),
 ];
 
-/// Rings of a capsule, and vertices per ring.
+/// Number of rings of a capsule, and of vertices per ring.
 const RINGS: u32 = 42;
 const AROUND: u32 = 44;
 
@@ -41,7 +41,8 @@ pub fn creature() -> TriMesh {
     mesh
 }
 
-/// The cage: a body of 5 x 3 x 2 blocks, four legs of two blocks, tail, neck and head; 112 vertices, all faces are quads.
+/// The animal's cage: a body of 5 x 3 x 2 blocks, four legs of two blocks, tail, neck and head; 112 vertices, all faces
+/// are quads.
 #[must_use]
 pub fn creature_cage() -> PolygonMesh {
     let body = (0..30).map(|k| [k % 5, k / 5 % 3, 2 + k / 15]);

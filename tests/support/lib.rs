@@ -1,4 +1,5 @@
-//! Helpers of tests and benches: seeded random numbers, cages with known coordinates, points inside them, comparison.
+//! Helpers of tests and benches: cages with known coordinates, points inside them, seeded random numbers, comparison of
+//! lists.
 //!
 //! All inputs are generated, so that no test depends on a file outside the repository.
 

@@ -1,4 +1,4 @@
-//! Points inside cages.
+//! Random points inside cages.
 
 use cagework_core::Cage;
 use cagework_core::geometry::winding_number;

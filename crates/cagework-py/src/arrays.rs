@@ -20,7 +20,7 @@ pub(crate) enum Points<'py> {
 }
 
 impl Points<'_> {
-    /// The points, relative to the origin that was subtracted when they were read. `[n]`
+    /// The points `[n]`, relative to the origin that was subtracted when they were read.
     pub(crate) fn as_slice(&self) -> &[Vec3] {
         match self {
             Self::Borrowed(array) => {
@@ -31,7 +31,7 @@ impl Points<'_> {
     }
 }
 
-/// Converts a value to a C-contiguous array. Arrays that are one already are returned unchanged.
+/// Converts a value to a C-contiguous array. A C-contiguous array is returned unchanged.
 fn c_contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let none = value.py().None();
     Ok(value.py().import("numpy")?.call_method1("require", (value, none, "CA"))?.cast_into()?)
@@ -219,7 +219,8 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
         .map_err(|e| error::array(format!("weights: {e}")))
 }
 
-/// Adds `outside`, `frames` and `offsets` to a report, and returns the weights of the controls: the offset columns are split off.
+/// Adds `outside`, `frames` and `offsets` to a report. Splits the offset columns off the weights, and returns those of
+/// the controls.
 ///
 /// # Errors
 /// Never in practice.
@@ -240,7 +241,7 @@ pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -
     Ok(weights.columns(0..n_controls))
 }
 
-/// Inverse of [`split_offsets`]: appends the offset columns in a report to the weights of the controls.
+/// Inverse of [`split_offsets`]: appends the offset columns in a report to the weights of the controls, `own`.
 ///
 /// # Errors
 /// `ArrayError`; `KeyError` if the report is not one of `bind`.

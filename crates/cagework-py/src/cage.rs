@@ -22,23 +22,23 @@ use crate::{arrays, error, files, work};
 /// Cage(vertices, faces, smooth=0)
 ///
 /// vertices: [n_cage, 3] float32 or float64, object units; faces: integers of shape [n, 3] or [n, 4], or a list of
-/// arrays of any lengths, counter-clockwise seen from outside (an inside-out mesh is flipped, with a notice); smooth: 0 to 3 steps of
-/// Catmull-Clark subdivision of the surface. Positions are stored as float32 relative to an origin near the cage, which is zero
-/// unless the cage is far away.
+/// arrays of any lengths, counter-clockwise seen from outside (an inside-out mesh is flipped, with a notice); smooth: 0
+/// to 3 steps of Catmull-Clark subdivision of the surface. Positions are stored as float32 relative to an origin near
+/// the cage, which is zero unless the cage is far away.
 ///
 /// Raises CageError, which names the invalid face, edge or vertex, and ArrayError.
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Cage {
     set: ControlSet,
-    /// Subtracted from all positions.
+    /// Subtracted from all stored positions, object units.
     origin: DVec3,
-    /// `[n_cage, 3]`, not writeable.
+    /// Rest positions `[n_cage, 3]`; read-only.
     vertices: Py<PyArray2<f64>>,
     report: Option<CageReport>,
 }
 
 impl Cage {
-    /// Builds a cage from a mesh with positions relative to an origin.
+    /// Builds a cage from a mesh and the origin to which its positions are relative.
     fn of(
         py: Python<'_>,
         (mesh, origin): (&PolygonMesh, DVec3),
@@ -52,12 +52,12 @@ impl Cage {
         Ok(Self { set, origin, vertices: vertices.unbind(), report })
     }
 
-    /// Origin of the positions: zero unless the cage is far away.
+    /// Origin to which the positions are relative: zero unless the cage is far away.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Controls to bind to.
+    /// The controls that points are bound to.
     pub(crate) fn controls(&self) -> Controls<'_> {
         Controls::from(&self.set)
     }
@@ -67,7 +67,7 @@ impl Cage {
     }
 }
 
-/// Converts the steps of subdivision. Takes a float, so that any number gets the core's error message.
+/// Converts the number of subdivision steps. It is a float so that any number gets the error message of the core.
 fn steps(smooth: f64) -> PyResult<u32> {
     SMOOTH.check(smooth).map_err(error::option)?;
     Ok(smooth as u32)
@@ -89,8 +89,8 @@ impl Cage {
         Self::of(py, (&PolygonMesh { positions, faces: arrays::faces(faces)? }, origin), smooth, None)
     }
 
-    /// Reads a cage from a file in any format of docs/formats.md. Vertices of an STL or a glTF are merged if their positions are
-    /// equal.
+    /// Reads a cage from a file in any format of docs/formats.md. Vertices of an STL or a glTF are merged if their
+    /// positions are equal.
     ///
     /// Raises OSError, ModelError if the file cannot be read as a model, CageError if it is not a valid cage.
     #[staticmethod]
@@ -102,7 +102,8 @@ impl Cage {
         Self::of(py, (&model.cage_mesh(), model.origin()), smooth, None)
     }
 
-    /// Writes the cage as an OBJ file: at rest, or with the posed vertices [n_cage, 3], float32 or float64, object units.
+    /// Writes the cage as an OBJ file: at rest, or with the posed vertices [n_cage, 3], float32 or float64, object
+    /// units.
     ///
     /// Raises OSError, ArrayError.
     #[pyo3(signature = (path, vertices = None))]
@@ -164,7 +165,7 @@ impl Cage {
         format!("Cage({} vertices, {} faces)", cage.n_vertices(), cage.faces().len())
     }
 
-    /// Arguments for pickle.
+    /// Arguments that pickle passes to the constructor.
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         (self.vertices(py), self.faces(py)?, self.smooth()).into_pyobject(py)
     }
@@ -172,12 +173,13 @@ impl Cage {
 
 /// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, **options) -> Cage
 ///
-/// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap itself.
+/// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap
+/// itself.
 ///
-/// Options, as for `cagework cage`: target=80 (maximum number of vertices, 8 to 400), detail=0.028 (fraction of the longest side),
-/// quads=True, shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of
-/// the diagonal), voxels=0 (along the longest side; 0: derived from target), smooth=0 (steps of subdivision; the smooth surface
-/// encloses the model).
+/// Options, as for `cagework cage`: target=80 (maximum number of vertices, 8 to 400), detail=0.028 (fraction of the
+/// longest side), quads=True, shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False,
+/// clearance=0.0 (fraction of the diagonal), voxels=0 (along the longest side; 0: derived from target), smooth=0 (steps
+/// of subdivision; the smooth surface encloses the model).
 ///
 /// Raises CageError if no cage can be generated, OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
@@ -200,12 +202,12 @@ pub(crate) fn generate_cage(
 
 /// Lists the faults of a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
 ///
-/// cage: a Cage, or an object with vertices and faces such as trimesh.Trimesh, which need not be closed; points: [n, 3] that
-/// should be inside; grid: cells along the longest side, to find parts thinner than a cell; smooth: steps of subdivision,
-/// by default those of the Cage.
+/// cage: a Cage, or an object with vertices and faces such as trimesh.Trimesh, which need not be closed; points: [n, 3]
+/// that should be inside; grid: cells along the longest side, to find parts thinner than a cell; smooth: steps of
+/// subdivision, by default those of the Cage.
 ///
-/// Each problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
-/// fixes. A cage without errors can be bound.
+/// Each problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points),
+/// message and fixes. A cage without errors can be bound.
 ///
 /// Raises ArrayError, OptionError.
 #[pyfunction]

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use pyo3::PyErr;
 
-/// Imports an exception class, and defines a function that creates it from an error.
+/// Imports exception classes, and defines for each a function that creates the exception from an error.
 macro_rules! exceptions {
     ($($(#[$about:meta])* $name:ident: $class:ident,)+) => {
         mod classes {

@@ -56,7 +56,7 @@ impl Field {
         Ok(Self { weights, field, cage: cage.clone().unbind() })
     }
 
-    /// The field of another pose of the same cage. Nothing is bound again.
+    /// The field of another pose of the same cage. Does not bind again.
     ///
     /// Raises ArrayError.
     fn pose(&self, py: Python<'_>, posed: &Bound<'_, PyAny>) -> PyResult<Self> {
@@ -75,8 +75,8 @@ impl Field {
         self.each(py, points, |p| self.field.map(p))
     }
 
-    /// The points that `map` moves to the given ones: [n, 3] -> [n, 3], object units. NaN where there is none, for example
-    /// where the deformation folds.
+    /// The points that `map` moves to the given ones: [n, 3] -> [n, 3], object units. NaN where there is none, for
+    /// example where the deformation folds.
     ///
     /// Raises ArrayError.
     fn inverse<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -84,7 +84,8 @@ impl Field {
         self.each(py, points, |p| inverse.find(p).unwrap_or(Vec3::NAN))
     }
 
-    /// Deformation gradients at points: [n, 3] -> [n, 3, 3] float32. F[k] @ d is where a small vector d at point k goes.
+    /// Deformation gradients at points: [n, 3] -> [n, 3, 3] float32. F[k] @ d is where a small vector d at point k
+    /// goes.
     ///
     /// Raises ArrayError.
     fn gradient<'py>(
@@ -109,7 +110,7 @@ impl Field {
 }
 
 impl Field {
-    /// Applies a map to points, `[n, 3]`.
+    /// Maps each of the points, `[n, 3]`.
     fn each<'py>(
         &self,
         py: Python<'py>,

@@ -59,7 +59,7 @@ impl Source {
 /// Reads a file that a model refers to. `None` if it does not exist.
 fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    // Canonical paths, so that a symbolic link cannot lead out of the folder either.
+    // Canonical paths also detect symbolic links that lead out of the folder.
     let (folder, path) = (folder.canonicalize().ok()?, folder.join(name).canonicalize().ok()?);
     if !path.starts_with(folder) {
         return Some(Err("leads out of the model's folder".into()));
@@ -67,7 +67,7 @@ fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     Some(std::fs::read(path).map_err(|e| format!("cannot be read ({e})")))
 }
 
-/// The exception for this kind of error, such as `FileNotFoundError`, with the file's name.
+/// The Python exception for an I/O error, such as `FileNotFoundError`; its message contains the file's name.
 fn named(path: &Path, error: &io::Error) -> PyErr {
     io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
 }
@@ -82,14 +82,14 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 
 /// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
-/// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such as
-/// the pose of a cage.
+/// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such
+/// as the pose of a cage.
 ///
-/// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as in the file. They
-/// are float32, or float64 if float32 would lose digits, as for map coordinates.
+/// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as
+/// in the file. They are float32, or float64 if float32 would lose digits, as for map coordinates.
 ///
-/// states: append the vertices in each morph target; clip: with states, also append the vertices in the frames of this clip. A cage
-/// around all of them is generate_cage(*read_model(model, states=True)).
+/// states: append the vertices in each morph target; clip: with states, also append the vertices in the frames of this
+/// clip. A cage around all of them is generate_cage(*read_model(model, states=True)).
 ///
 /// Raises OSError, ModelError.
 #[pyfunction]

@@ -1,8 +1,8 @@
 //! The native module of the Python package `cagework`. Its Python code is in `python/cagework`.
 //!
-//! Wraps core, cage, pose and io. Arrays are exchanged with NumPy without copies where possible, weights as scipy.sparse matrices.
-//! Long work releases the interpreter lock and can be cancelled by Ctrl-C (`work.rs`). Doc comments of functions are shown by
-//! Python's `help`.
+//! Wraps core, cage, pose and io. Arrays are exchanged with NumPy without copies where possible; weights are
+//! scipy.sparse matrices. Long work releases the interpreter lock, and Ctrl-C cancels it (`work.rs`). Python's `help`
+//! shows the doc comments of functions and classes.
 
 mod arrays;
 mod bind;

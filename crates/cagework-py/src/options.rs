@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::error;
 
-/// Options from keyword arguments. Missing arguments and `None` have their default.
+/// Options from keyword arguments. Missing arguments and `None` mean the default.
 ///
 /// # Errors
 /// `TypeError` for an unknown name, `OptionError` for a value of the wrong type. Ranges are checked by the core.
@@ -28,7 +28,7 @@ pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
         };
         if !value.is_none() {
             *option = json(&name, &value)?;
-            // Checked one by one, so that the error names the option.
+            // Convert after each option, so that the error names the option at fault.
             serde_json::from_value::<T>(all.clone()).map_err(|e| wrong(&name, e))?;
         }
     }
@@ -49,7 +49,7 @@ fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     })
 }
 
-/// Inverse of [`dictionary`].
+/// Converts a dictionary to a struct; the inverse of [`dictionary`].
 ///
 /// # Errors
 /// `ArrayError` if the value does not have the expected structure.

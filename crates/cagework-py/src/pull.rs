@@ -14,17 +14,19 @@ use crate::bind::bind_options;
 use crate::cage::Cage;
 use crate::{arrays, error, work};
 
-/// Frames of a drag; the default of `cagework pull`.
+/// Number of frames of the simulated drag, as in `cagework pull`.
 const FRAMES: u32 = 30;
 
 /// Solves for the pose of the cage that moves vertices of the model to targets with little bending:
-/// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5, **options)
+/// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5,
+/// **options)
 /// -> [n_cage, 3] float64, object units
 ///
-/// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their targets;
-/// pins: [l] vertices that stay; report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by default the cage at
-/// rest; reach: how far along the surface the model follows, as a fraction of its size; None for automatic, math.inf for the whole model;
-/// relax: 0 keeps the details of the initial pose, 1 restores the rest shape; options: of the bind of the solver's samples.
+/// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
+/// targets; pins: [l] vertices that stay; report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by
+/// default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size; None for
+/// automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the rest shape;
+/// options: of the bind of the solver's samples.
 ///
 /// Raises PullError, BindError, OptionError, ArrayError. Ctrl-C cancels the bind.
 #[pyfunction]
@@ -45,7 +47,7 @@ pub(crate) fn pull<'py>(
     relax: f64,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    // Samples lie next to the model, and may be outside the cage where it is close to the model.
+    // The solver's samples are next to the model. Where the cage is close to the model, samples may be outside of it.
     let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
     let (controls, origin) = (cage.get().controls(), cage.get().origin());
     let positions = arrays::points("vertices", vertices, None, origin)?.as_slice().to_vec();

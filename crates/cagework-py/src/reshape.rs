@@ -16,13 +16,14 @@ use crate::{arrays, error, work};
 /// Deforms a model with its rig: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
 ///
-/// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object units;
-/// options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and textures; other formats
-/// are kept. The bytes are identical to those that `cagework bind` and `cagework deform` write.
+/// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object
+/// units; options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and
+/// textures; other formats are kept. The bytes are identical to those that `cagework bind` and `cagework deform` write.
 ///
-/// joints: "follow" moves them with the cage, "stay" leaves them, "turn" also rotates them; keep_travel: do not scale the travel
-/// distance of clips; rigid: names of parts (materials, nodes, joints, groups) whose connected pieces keep their shape; mask: dict from
-/// the name of a part to how much of it stays in place, 0 to 1; static: write the mesh only, without its rig.
+/// joints: "follow" moves them with the cage, "stay" leaves them, "turn" also rotates them; keep_travel: do not scale
+/// the travel distance of clips; rigid: names of parts (materials, nodes, joints, groups) whose connected pieces keep
+/// their shape; mask: dict from the name of a part to how much of it stays in place, 0 to 1; static: write the mesh
+/// only, without its rig.
 ///
 /// Raises OSError, ModelError, BindError, OptionError, ArrayError. Ctrl-C cancels.
 #[pyfunction]
@@ -60,7 +61,7 @@ pub(crate) fn reshape<'py>(
         let keeps_rig = model.is_rigged() && !r#static;
         let extra = if keeps_rig { model.extra_points().map_err(error::model)? } else { Vec::new() };
         let points = [model.positions.as_slice(), &extra].concat();
-        // Includes the memory for writing, so that exceeding the limit is an error before the bind.
+        // `held` includes the memory for writing, so that a model above the limit fails before the bind.
         let held = model.bytes() + model.bytes_to_write(model.format());
         let options = BindOptions { held, extra_points: extra.len(), ..options };
         let bound = bind(&points, controls, &options, progress).map_err(error::bind)?;

@@ -13,8 +13,8 @@ use pyo3::{PyResult, Python};
 /// Time between two checks for Ctrl-C.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Runs `work` in another thread and releases the interpreter lock. This thread polls for signals, which Python delivers
-/// to its main thread only, and cancels the work through its progress.
+/// Runs `work` in another thread and releases the interpreter lock. The calling thread polls for signals, which Python
+/// delivers to its main thread only. If a signal handler raises, the work's progress tells it to stop.
 ///
 /// # Errors
 /// The exception of a signal handler, usually `KeyboardInterrupt`.
@@ -28,7 +28,8 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
         thread::scope(|scope| {
             let (working, ended) = channel::<()>();
             let worker = scope.spawn(|| {
-                // Dropping this value tells the other thread that the work has ended or panicked.
+                // Dropping this value closes the channel, which tells the calling thread that the work has ended or
+                // panicked.
                 let _working = working;
                 work(&progress)
             });

@@ -60,7 +60,7 @@ def rigged_glb(radius=0.3):
     weights[:, 1] = np.clip(positions[:, 2] + 0.5, 0, 1)
     weights[:, 0] = 1 - weights[:, 1]
     bind = np.stack([np.eye(4, dtype="<f4")] * 2)
-    bind[1, 3, 2] = -0.5  # Inverse of the second joint, column-major.
+    bind[1, 3, 2] = -0.5  # The inverse bind matrix of the second joint, column-major.
     half = np.sqrt(0.5)
     arrays = {
         "positions": (positions, "VEC3"),

@@ -38,7 +38,7 @@ def test_rows_sum_to_one_and_reproduce_the_rest_pose(model, cage, bound):
 
 
 def test_affine_map_of_the_cage_is_applied_to_the_model(model, cage, bound):
-    # Follows from the sum of 1 and the reproduced positions.
+    # Holds because rows sum to 1 and reproduce the rest positions.
     turn = np.array([[0.5, -1.0, 0.2], [0.9, 0.4, 0.0], [0.0, 0.3, 1.5]])
     moved = bound[0] @ (cage.vertices @ turn.T + [3.0, -2.0, 1.0])
     np.testing.assert_allclose(moved, model.vertices @ turn.T + [3.0, -2.0, 1.0], atol=10 * TOLERANCE)
@@ -50,14 +50,15 @@ def test_deform_is_the_matrix_product_except_for_points_far_outside(cage, bound)
     np.testing.assert_allclose(cw.deform(weights, posed), weights @ posed, atol=TOLERANCE)
 
     cube = cw.Cage(*box())
-    # At distances of 0.1 and 1 from a cube with the diagonal 3.46: within 5 % of it, and beyond 15 %.
+    # Inside a cube with the diagonal 3.46, and at distances of 0.1 and 1 from it: within 5 % of the diagonal, and
+    # beyond 15 %.
     weights, report = cw.bind(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.1], [0.0, 0.0, 2.0]]), cube, grid=8)
     assert report["outside_vertices"] == 2 and report["staying_vertices"] == 1
     assert report["outside"]["vertex"].tolist() == [1, 2] and report["outside"]["share"].tolist() == [1, 0]
     moved = cube.vertices + [5.0, 0.0, 0.0]
     expected = [[5.0, 0.0, 0.0], [5.0, 0.0, 1.1], [0.0, 0.0, 2.0]]
     np.testing.assert_allclose(cw.deform(weights, moved, report), expected, atol=TOLERANCE)
-    # Rows of points outside are not restored; their offsets contain the difference.
+    # The rows of points outside do not reproduce them; their offsets contain the difference.
     np.testing.assert_allclose(weights @ moved, expected * np.array([[1], [1], [0]]), atol=10 * TOLERANCE)
 
 

@@ -46,7 +46,7 @@ def client():
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """Small rigged models of different widths."""
+    """Paths of small rigged models of different widths."""
     folder = tmp_path_factory.mktemp("models")
     for k in range(N_FILES):
         (folder / f"model-{k:03}.glb").write_bytes(rigged_glb(0.2 + 0.1 * k / N_FILES))
@@ -74,7 +74,7 @@ def test_files_are_processed_once_each_although_workers_are_killed(client, files
     for file in [files[0], files[20], files[199]]:
         assert (out / file.name).read_bytes() == cw.reshape(file, cage, posed, grid=8)
 
-    # The second call processes only changed inputs and missing outputs.
+    # The second call processes only the input that has changed and the output that is missing.
     os.utime(files[7])
     (out / files[8].name).unlink()
     again = reshape_files(files, out, cage, posed, **options)

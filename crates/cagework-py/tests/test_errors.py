@@ -76,7 +76,7 @@ def test_stubs_match_the_module():
     (cage,) = (node for node in body if isinstance(node, ast.ClassDef) and node.name == "Cage")
     stubbed = {node.name for node in cage.body} - {"__new__"}
     assert stubbed == {name for name in vars(cw.Cage) if not name.startswith("_")}
-    # Unknown options are a TypeError, so calls with every option in the stubs show that all exist.
+    # Unknown options are a TypeError, so calls with every option in the stubs show that all of them exist.
     defaults = {"BindOptions": lambda **o: cw.bind(POINT, CUBE, **o), "CageOptions": lambda **o: cw.generate_cage(*box_triangles(), **o)}
     for node in body:
         if isinstance(node, ast.ClassDef) and node.name in defaults:

@@ -9,7 +9,7 @@ from support import bent, command, rigged_glb
 
 @pytest.fixture(scope="module")
 def rigged(tmp_path_factory):
-    """A folder with a rigged model, its cage and a pose, and the cage."""
+    """A folder with a rigged model, its cage and a pose of the cage as files, and the cage as an object."""
     folder = tmp_path_factory.mktemp("rigged")
     (folder / "model.glb").write_bytes(rigged_glb())
     cage = cw.generate_cage(*cw.read_model(folder / "model.glb"), target=40, clearance=0.05)

@@ -10,7 +10,7 @@ import cagework as cw
 import numpy as np
 from support import box
 
-# A bind with 193 batches of columns. Cancellation is polled between batches.
+# A bind of 193 batches of columns, between which cancellation is polled.
 SCRIPT = """
 import sys
 sys.path.insert(0, {tests!r})
@@ -27,7 +27,8 @@ except KeyboardInterrupt:
     print("interrupted")
 print(cw.bind(points, cage, grid=8)[0].shape)
 """
-# Longest time from Ctrl-C to the end of the process, seconds. A batch takes 0.1 s and the whole bind 90 s on an idle machine.
+# Longest time from Ctrl-C to the end of the process, seconds. A batch takes 0.1 s and the whole bind 90 s on an idle
+# machine.
 TIMEOUT = 20.0
 
 
@@ -59,5 +60,5 @@ def test_another_thread_runs_while_a_bind_does():
     ended.set()
     counting.join()
     during = [began, *(t for t in ticks if began < t < began + took), began + took]
-    # If bind kept the interpreter lock, the largest gap would be the whole bind.
+    # If the bind did not release the interpreter lock, the thread would not count during the whole bind.
     assert max(np.diff(during)) < took / 2 and len(during) > 10

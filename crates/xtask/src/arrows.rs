@@ -1,7 +1,5 @@
-//! Checks the dependencies of crates (`cargo tree`) against the arrows of ARCHITECTURE.md, and their modules for
-//! circles.
-//!
-//! Every crate needs a rule here.
+//! Checks the dependencies of crates (`cargo tree`) against the arrows of ARCHITECTURE.md, and that modules do not use
+//! each other in circles. Every crate of the workspace must have a rule in [`RULES`].
 
 mod modules;
 
@@ -12,7 +10,7 @@ use crate::command::output;
 /// Allowed and forbidden dependencies of one of our crates, direct or indirect.
 struct Rule {
     name: &'static str,
-    /// Our crates that it may depend on.
+    /// Crates of this workspace that it may depend on.
     may_use: &'static [&'static str],
     /// Third-party crates that it must not depend on.
     must_not_use: &'static [&'static str],
@@ -43,7 +41,7 @@ const RULES: &[Rule] = &[
     Rule {
         name: "cagework-editor",
         may_use: &["cagework-core", "cagework-io", "cagework-pose"],
-        // As cagework-io.
+        // For the same reason as in cagework-io, wasm-bindgen is allowed.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
@@ -100,7 +98,7 @@ pub(crate) fn check() -> Result<(), String> {
         return Err(format!("crate {stranger} has no rule in crates/xtask/src/arrows.rs: give it one"));
     }
     for rule in RULES {
-        // Not `--target all`, which follows combinations of targets and features that no build has.
+        // `--target all` would follow combinations of targets and features that no build has.
         let mut used = tree(&["--package", rule.name, "--all-features"])?;
         used.extend(tree(&["--package", rule.name, "--all-features", "--target", "wasm32-unknown-unknown"])?);
         for name in used.iter().filter(|name| **name != rule.name) {

@@ -11,7 +11,7 @@ pub(crate) fn root() -> PathBuf {
 /// Runs a program in the root and shows its command line and output.
 ///
 /// # Errors
-/// When it cannot be started or fails.
+/// When the program cannot be started or fails.
 pub(crate) fn run(program: &str, args: &[&str], envs: &[(&str, &str)]) -> Result<(), String> {
     let shown = show(program, args);
     eprintln!("\n$ {shown}");
@@ -24,10 +24,10 @@ pub(crate) fn run(program: &str, args: &[&str], envs: &[(&str, &str)]) -> Result
     if status.success() { Ok(()) } else { Err(format!("`{shown}` failed ({status})")) }
 }
 
-/// Runs a program in the root and returns what it printed.
+/// Runs a program in the root and returns its stdout.
 ///
 /// # Errors
-/// When it cannot be started or fails.
+/// When the program cannot be started or fails.
 pub(crate) fn output(program: &str, args: &[&str]) -> Result<String, String> {
     let output = Command::new(program)
         .args(args)

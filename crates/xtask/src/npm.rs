@@ -1,4 +1,4 @@
-//! Programs of npm: installed from the lock file, run from node_modules.
+//! Installs programs of npm from the lock file, and runs them from node_modules.
 
 use crate::command::{root, run};
 
@@ -23,7 +23,7 @@ pub(crate) fn install() -> Result<(), String> {
 /// Runs an installed program.
 ///
 /// # Errors
-/// When it fails.
+/// When the program fails.
 pub(crate) fn exec(args: &[&str]) -> Result<(), String> {
     run("npx", &[&["--no-install"], args].concat(), &[])
 }

@@ -1,4 +1,4 @@
-//! The npm package: packed, installed into a blank project, tested there in Node and in a browser.
+//! The npm package: packs it, installs it into a blank project, and tests it there in Node and in a browser.
 
 use std::path::Path;
 
@@ -10,9 +10,9 @@ use crate::npm::{self, exec};
 use crate::wasm::{self, target_folder};
 
 const PACKAGE: &str = "web/package";
-/// Licences of everything compiled into the package; ignored by git.
+/// Folder for the licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
-/// Folders with the tests and pages of the blank project.
+/// Folders whose tests and pages are copied into the blank project.
 const COPIED: [&str; 2] = ["web/package/examples", "web/package/test"];
 
 /// Tests the package. Needs the wasm of a page build, and the command built by `cargo test` for comparisons.
@@ -30,7 +30,7 @@ pub(crate) fn test() -> Result<(), String> {
         let as_users = ["--module", module, "--moduleResolution", resolution];
         exec(&[&["tsc"], &strict[..], &as_users, &[&format!("{project}/consumer.ts")]].concat())?;
     }
-    // Build the pages like a user's bundler.
+    // Build the test pages as a user's bundler would.
     let vite = ["vite", "build", "--config", "web/package/test/vite.config.ts", "--logLevel", "error"];
     run("npx", &[&["--no-install"], &vite[..]].concat(), &envs)?;
     let playwright = ["playwright", "test", "--config", "web/package/playwright.config.ts"];

@@ -1,4 +1,4 @@
-//! The Python package: its wheel, built, installed into a blank environment and tested there.
+//! The Python package: builds its wheel, installs it into a blank environment, and tests it there.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use crate::licences;
 use crate::wasm::target_folder;
 
 const PACKAGE: &str = "crates/cagework-py";
-/// Licences of everything compiled into the wheel; ignored by git.
+/// Folder for the licences of everything compiled into the wheel; ignored by git.
 const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
 /// Arguments of Python that install packages. `--no-compile`: compiling all of SciPy would double the time of the
 /// installation, and Python compiles each module when it is first imported.
@@ -45,7 +45,7 @@ fn environment() -> Result<String, String> {
     Ok(python)
 }
 
-/// Builds the wheel; returns its folder, which contains nothing else.
+/// Builds the wheel into an emptied folder; returns the folder.
 fn build(python: &str, args: &[&str]) -> Result<String, String> {
     let wheels = target_folder()?.join("wheels");
     let notices = root().join(NOTICES);

@@ -1,25 +1,26 @@
-//! The page: built into `dist/`, served, tested in a browser.
+//! The page: builds it into `dist/`, serves it, and tests it in a browser.
 
 use crate::command::{root, run};
 use crate::licences;
 use crate::npm::{self, exec};
 use crate::wasm;
 
-/// Limit on the wasm file that visitors download, gzip-compressed bytes: 2 % above its size. (PLY and STL took 60 kB, several
-/// models and the npm package 40, OFF, colours in GLBs and models far from the origin 55, commands and undo 57.)
+/// Limit on the wasm file that visitors download, gzip-compressed bytes: 2 % above its size. (PLY and STL took 60 kB,
+/// several models and the npm package 40, OFF, colours in GLBs and models far from the origin 55, commands and undo
+/// 57.)
 const MAX_WASM_BYTES: usize = 1_262_000;
-/// Limit on the wasm file for browsers without WebGPU, gzip-compressed bytes: it contains a translator of shaders.
+/// The same limit for browsers without WebGPU. Their wasm file also contains a translator of shaders.
 const MAX_WEBGL_BYTES: usize = 1_908_000;
-/// Limit on the script that visitors download, gzip-compressed bytes.
+/// Limit on the script of the page, gzip-compressed bytes.
 const MAX_SCRIPT_BYTES: usize = 95_000;
 
-/// Minimum number of `f32x4.add` in a wasm file: 596 if the core's loops are vectorised, otherwise 261 (in libraries and
-/// hand-written code).
+/// Minimum number of `f32x4.add` in a wasm file: 596 if the core's loops are vectorised, otherwise 261 (in libraries
+/// and hand-written code).
 const MIN_VECTOR_ADDS: usize = 450;
 /// The instruction `f32x4.add`.
 const VECTOR_ADD: [u8; 3] = [0xfd, 0xe4, 0x01];
 
-/// Folder of the built page.
+/// Folder of the built page, in the repository's root.
 const FOLDER: &str = "dist";
 
 /// Builds the page into `dist/`: files that work under any path of any web server.
@@ -48,7 +49,7 @@ pub(crate) fn start(args: &[&str]) -> Result<(), String> {
 /// Tests TypeScript modules without a browser.
 ///
 /// # Errors
-/// When one fails.
+/// When a test fails.
 pub(crate) fn test_scripts() -> Result<(), String> {
     npm::install()?;
     exec(&["vitest", "run", "--root", "web"])
@@ -57,7 +58,7 @@ pub(crate) fn test_scripts() -> Result<(), String> {
 /// Builds the page and tests it in a browser; `args` are passed to Playwright.
 ///
 /// # Errors
-/// When one fails.
+/// When a test fails.
 pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
     build()?;
     test_built_page(args)
@@ -79,7 +80,7 @@ pub(crate) fn test_firefox() -> Result<(), String> {
     run("node", &["web/e2e/firefox.mjs"], &[])
 }
 
-/// Renders the page's pictures of the samples, `web/public/samples`.
+/// Makes the pictures of the samples (`web/public/samples`) and of the documents (`docs/pictures`) in the page.
 ///
 /// # Errors
 /// When a step fails.
@@ -89,10 +90,10 @@ pub(crate) fn pictures() -> Result<(), String> {
     run("npx", &playwright, &[("PICTURES", "1")])
 }
 
-/// Checks TypeScript types, which the build ignores.
+/// Checks the types of the TypeScript sources, which the build does not check.
 ///
 /// # Errors
-/// When one is wrong.
+/// When a type is wrong.
 pub(crate) fn check_types() -> Result<(), String> {
     wasm::ensure()?;
     exec(&["tsc", "--project", "web"])

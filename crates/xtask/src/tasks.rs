@@ -1,4 +1,4 @@
-//! The tasks. Each installs what it needs.
+//! The tasks of the repository. Each task installs what it needs.
 
 use std::process::Command;
 
@@ -19,8 +19,8 @@ pub(crate) fn build() -> Result<(), String> {
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
-/// Packages of all test builds, the same everywhere so that builds share features and artifacts. Benches have no tests but
-/// need criterion, which takes half a minute to build; xtask has other features.
+/// Packages of all test builds. The list is always the same, so that builds share features and artifacts. Benches have
+/// no tests but need criterion, which takes half a minute to build; xtask has other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
 /// Runs all tests.
@@ -29,7 +29,7 @@ pub(crate) fn test() -> Result<(), String> {
     run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
     let rust = [&["test", "--locked"], &TESTED[..]].concat();
     run("cargo", &[&rust[..], &["--no-run"]].concat(), &[])?;
-    // Most Rust tests leave one of two cores idle.
+    // Two tasks at once, because most Rust tests leave one of two cores idle.
     beside("test-beside", || {
         run("cargo", &rust, &[])?;
         // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
@@ -48,9 +48,9 @@ pub(crate) fn test_beside() -> Result<(), String> {
     site::build()
 }
 
-/// Reads damaged files with all readers. Built as tests, with overflow checks and debug assertions.
+/// Runs every reader of files on damaged files. The readers are built with overflow checks and debug assertions.
 pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
-    // With the features of `cargo test`.
+    // Built with the features of `cargo test`, so that no dependency is built again.
     run(
         "cargo",
         &[&["test", "--quiet", "--locked"], &TESTED[..], &["--test", "fuzz", "--"], args].concat(),
@@ -58,7 +58,7 @@ pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
     )
 }
 
-/// Checks format, lints, documentation, packaging and types.
+/// Checks formatting, lints, documentation, packaging and types.
 pub(crate) fn check() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
@@ -81,7 +81,8 @@ fn check_rust() -> Result<(), String> {
     prose::check()?;
     deny::check()?;
     one_version()?;
-    // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a release.
+    // Fails if a package lacks metadata or files. Building the packages is left to `cargo publish --dry-run` before a
+    // release.
     let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
     for name in ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-gpu"] {
         package.extend(["-p", name]);
@@ -106,7 +107,7 @@ fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
-    // With the features of `cargo test`; `cargo run` would build dependencies again for this package.
+    // Built with the features of `cargo test`. `cargo run` would build dependencies again for this package alone.
     run(
         "cargo",
         &[&["build", "--quiet", "--locked"], &TESTED[..], &["--example", "export_samples"]].concat(),

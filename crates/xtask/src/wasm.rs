@@ -10,9 +10,9 @@ use crate::command::{output, root, run};
 /// Cargo profile of the wasm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Profile {
-    /// Quick to build.
+    /// Quick to build; used for development.
     Dev,
-    /// Small and fast.
+    /// Small and fast; used for the page and the npm package.
     Web,
 }
 
@@ -27,16 +27,16 @@ impl Profile {
 
 /// One of the two builds of `cagework-web`, for browsers with and without WebGPU.
 struct Artifact {
-    /// Arguments of Cargo that select features.
+    /// Arguments of Cargo that select the features.
     features: &'static [&'static str],
-    /// Folder of the JavaScript package, ignored by git.
+    /// Folder of the generated JavaScript package; ignored by git.
     package: &'static str,
-    /// Name of its files.
+    /// Name of the generated files, without extension.
     name: &'static str,
 }
 
-/// Browsers without WebGPU download only the first. Cargo keeps the artifact of the last build, which should be the one
-/// that developers build most often.
+/// Both builds, in build order. Cargo keeps the artifact of the last one only, so that the build of browsers with
+/// WebGPU, which developers use most, comes last.
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],
@@ -50,7 +50,7 @@ const ARTIFACTS: [Artifact; 2] = [
 /// otherwise all loops of the kernels stay scalar at any optimization level, and a bind takes 1.6 times as long.
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
-/// Sources of the packages.
+/// Files and folders that the packages are built from.
 const SOURCES: [&str; 10] = [
     "crates/cagework-core",
     "crates/cagework-cage",
@@ -64,11 +64,11 @@ const SOURCES: [&str; 10] = [
     "Cargo.lock",
 ];
 
-/// File in each package that names its profile.
+/// File in each package that contains the name of its profile.
 const PROFILE: &str = "profile.txt";
 
-/// Builds the release packages, unless they are newer than all sources. Cargo keeps the artifact of the last build only, so
-/// building both again would link both again, which takes five minutes on two cores.
+/// Builds the release packages, unless both are newer than all sources. Cargo keeps only the artifact of the last
+/// build: building both packages again would link both again, which takes five minutes on two cores.
 ///
 /// # Errors
 /// When a step fails.
@@ -95,7 +95,8 @@ fn newest(path: &Path) -> Option<SystemTime> {
     entries.flatten().filter_map(|entry| newest(&entry.path())).max()
 }
 
-/// Builds `crates/cagework-web` for the browser, once for each of its artifacts, and makes JavaScript packages of them.
+/// Builds `crates/cagework-web` for the browser, once for each of [`ARTIFACTS`], and generates their JavaScript
+/// packages.
 ///
 /// # Errors
 /// When a step fails.
@@ -112,7 +113,7 @@ pub(crate) fn build(profile: Profile) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes the JavaScript package.
+/// Generates the JavaScript package of an artifact from its wasm.
 fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), String> {
     let fault = |what: &str| {
         let what = what.to_owned();

@@ -4,8 +4,8 @@
     from cagework.distributed import reshape_files
     done = reshape_files(files, "out", cage, posed, client=Client("scheduler:8786"))
 
-Inputs and outputs are on a file system that all workers share. Outputs are written atomically. Outputs newer than their inputs
-are kept, so the same call after a crash processes only the remaining files. Tasks of a worker that dies are given to another one.
+Inputs and outputs are on a file system that all workers share. Outputs are written atomically. An output newer than its input is
+kept, so that the same call after a crash processes only the remaining files. Dask gives the tasks of a dead worker to another one.
 """
 
 import os

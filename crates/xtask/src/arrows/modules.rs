@@ -1,8 +1,9 @@
-//! Import circles: modules of a crate or of one folder that use each other.
+//! Finds modules of a crate, or of one folder, that use each other in a circle.
 //!
-//! Sources are read as tokens, so that paths inside macros count and words in comments do not. An edge is a path through
-//! `crate`, `super` or `self` that ends in another module; a name of the crate's root counts as the module that it is
-//! re-exported from. What only tests compile (`#[cfg(test)]`) does not count.
+//! Sources are read as tokens: paths inside macros count, words in comments do not. A module has an edge to each module
+//! that it names in a path through `crate`, `super` or `self`. If the path names an item that the crate's root
+//! re-exports, the edge goes to the module that defines the item. Code that only tests compile (`#[cfg(test)]`) is
+//! ignored.
 
 mod read;
 #[cfg(test)]
@@ -14,10 +15,10 @@ use std::path::{Path, PathBuf};
 use crate::command::root;
 use read::{Crate, ROOT};
 
-/// Uses of a module by another one, `(from, to)`, and the first line of each (`file:line`).
+/// Edges `(from, to)`: module `from` uses module `to`. The value is the first line that does so (`file:line`).
 type Edges = BTreeMap<(String, String), String>;
 
-/// Checks every crate, the tests and the benches.
+/// Checks all crates, and the packages of tests and benches.
 ///
 /// # Errors
 /// Shows one circle of the first crate that has any.
@@ -35,8 +36,8 @@ pub(super) fn check() -> Result<(), String> {
     Ok(())
 }
 
-/// Root files of all crates, and whether their test code counts. It does not for `lib.rs` and `main.rs` of `crates/*/src`;
-/// it does for every target of the packages of tests and benches.
+/// Root files of all crates, and whether their code for tests counts: not in `lib.rs` and `main.rs` of `crates/*/src`,
+/// but in every target of the packages of tests and benches.
 fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     let mut roots = Vec::new();
     for folder in files_in(&root().join("crates"))? {
@@ -74,7 +75,7 @@ fn edges(source: &Crate) -> Edges {
     edges
 }
 
-/// Edges between the children of each module, by their full paths.
+/// For each module, the edges between its child modules, named by their full paths.
 fn edges_of_folders(source: &Crate) -> impl Iterator<Item = Edges> {
     source.modules.iter().map(|folder| {
         let mut edges = Edges::new();

@@ -1,4 +1,4 @@
-//! A crate's modules and the paths in them, from its source files.
+//! Reads the source files of a crate: its modules, and the paths that they mention.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 use crate::command::root;
 
-/// Name that stands for the crate's root among its modules.
+/// Name of the crate's root in the list of modules.
 pub(super) const ROOT: &str = "crate";
 
 /// A path that a module mentions.
@@ -29,7 +29,7 @@ pub(super) struct Crate {
     pub(super) modules: BTreeSet<Vec<String>>,
     /// Names that the root imports, with their paths.
     imported: BTreeMap<String, Vec<String>>,
-    /// Every path that may be an edge.
+    /// Every path that may lead to another module.
     pub(super) paths: Vec<Mention>,
 }
 
@@ -38,12 +38,12 @@ struct Place<'a> {
     file: &'a Path,
     /// Module path from the crate's root.
     module: Vec<String>,
-    /// Folder of the files of this module's children.
+    /// Folder that contains the files of the module's children.
     children: PathBuf,
 }
 
 impl Crate {
-    /// Reads a root file and all files that its modules are in.
+    /// Reads the crate's root file and the files of all its modules.
     ///
     /// # Errors
     /// Names a file that is missing or not Rust.
@@ -116,7 +116,7 @@ impl Crate {
                 }
                 _ => {}
             }
-            // `read_module` has read the braces of an inline module.
+            // An inline module takes three tokens: `mod`, its name, and the braces, which `read_module` has read.
             at += if is_inline_module(rest) { 3 } else { 1 };
         }
         Ok(())
@@ -141,8 +141,8 @@ impl Crate {
         }
     }
 
-    /// Records an import of the root, whose names modules reach through `crate::`. A private import is also a use.
-    /// Returns its number of tokens.
+    /// Records the names that the root imports, which modules reach through `crate::`. A private import also counts as
+    /// a use by the root. Returns the number of tokens of the import.
     fn read_root_import(&mut self, tokens: &[TokenTree], before: Option<&TokenTree>, place: &Place) -> usize {
         let (paths, length) = paths(tokens);
         // `pub use` and `pub(crate) use`.
@@ -170,7 +170,7 @@ impl Crate {
             "crate" => &[],
             "self" => &place.module,
             "super" => &place.module[..place.module.len().saturating_sub(ups)],
-            // In the root, modules need no prefix; which names are modules is known when all of it has been read.
+            // Paths in the root need no prefix. Which names are modules is known once the whole root has been read.
             _ if place.module.is_empty() && self.is_at_root(first) => &[],
             _ => return,
         };
@@ -181,7 +181,7 @@ impl Crate {
     }
 }
 
-/// A path as it is written.
+/// A path as the source writes it.
 struct Found {
     segments: Vec<String>,
     /// Name under which it is imported.
@@ -189,7 +189,7 @@ struct Found {
     line: usize,
 }
 
-/// Paths that begin at the first token (several if they have braces), and their number of tokens.
+/// Reads the paths that begin at the first token (several if there are braces). Also returns their number of tokens.
 fn paths(tokens: &[TokenTree]) -> (Vec<Found>, usize) {
     let mut found = Vec::new();
     let length = add_paths(tokens, &[], &mut found);
@@ -264,7 +264,7 @@ fn is_for_tests(tokens: &[TokenTree]) -> bool {
         if p.as_char() == '#' && g.stream().to_string().replace(' ', "") == "cfg(test)")
 }
 
-/// Number of tokens of an item, up to its semicolon or braces.
+/// Number of tokens of an item, up to and including its semicolon or braces.
 fn item_length(tokens: &[TokenTree]) -> usize {
     let is_end = |token: &TokenTree| match token {
         TokenTree::Punct(p) => p.as_char() == ';',
