@@ -1,6 +1,7 @@
 /** A browser without WebGPU: the page draws with WebGL2, and the processor computes. */
 
 import type { Page } from "@playwright/test";
+import { PSEUDO } from "../src/words/pseudo";
 import { WITH_WEBGL } from "./browser";
 import {
   complaintsOfAxe,
@@ -148,4 +149,7 @@ test("without WebGPU and WebGL2 the page explains what to do", async ({ page }) 
   await expect(page.getByText(/Firefox/).first()).toBeVisible();
   await shoot(page, "no-webgl2");
   expect(await complaintsOfAxe(page)).toEqual([]);
+  // The built page has the other languages. words.spec.ts checks their texts.
+  await page.goto("./?lang=pseudo");
+  await expect(page.getByRole("heading", { name: PSEUDO.words.without.needs })).toBeVisible();
 });

@@ -24,11 +24,13 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
   }, [stage, editingRest, painting]);
   return (
     <>
-      {cage && <Mode app={app} />}
-      {cage && editingRest && <Encloses app={app} />}
+      <div class="top-line">
+        {cage && <Mode app={app} />}
+        {cage && editingRest && <Encloses app={app} />}
+        <Looks app={app} />
+      </div>
       <Placing app={app} />
       {cage && <Tools app={app} />}
-      <Looks app={app} />
       <LegendOfColours app={app} />
       {isComparison(scene.compare) && (
         <div class="compare-labels" aria-hidden="true">

@@ -1,0 +1,393 @@
+/** The page around a fake session: shows each panel, step, dialog and message with made-up contents, for words.spec.ts. */
+
+import { sayGesture } from "../../src/actions/edit";
+import { createApp } from "../../src/app";
+import type {
+  BindOptions,
+  BindReport,
+  CageState,
+  Check,
+  InnerElement,
+  Mend,
+  ModelInfo,
+  Session,
+} from "../../src/contract";
+import type { AppState } from "../../src/state";
+import { INITIAL, STEPS } from "../../src/state";
+import { STOPS, solvers, stopsOf } from "../../src/tour/stops";
+import { askAfterCrash, showReport } from "../../src/ui/crashed";
+import { createLost } from "../../src/ui/lost";
+import { mount, mountUnsupported } from "../../src/ui/page";
+import { createToasts } from "../../src/ui/toasts";
+import { createStage } from "../../src/ui/viewport";
+import { chooseLanguage, T } from "../../src/words";
+import { createFake, MODEL, memberOf, reportOf } from "../../test/fake";
+import { inspect } from "./inspect";
+
+declare global {
+  /** Shows everything, and returns the faults of its texts. */
+  var visitAll: (() => Promise<string[]>) | undefined;
+}
+
+type Patch = Partial<AppState>;
+
+// Names without letters, which no language changes.
+const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
+const ONE = {
+  ...memberOf(0, "01", 1234),
+  rigged: true,
+  painted: true,
+  parts: ["material:1", "node:2", "joint:3", "group:4"],
+};
+const RIG: ModelInfo = {
+  ...MODEL,
+  name: "01",
+  vertices: 12_345,
+  triangles: 23_456,
+  materials: 2,
+  textures: 3,
+  joints: 4,
+  clips: [{ name: "1", seconds: 2 }],
+  targets: [{ name: "1", default: 0.5 }],
+  props: ["1"],
+  rigged: true,
+  bounds: BOUNDS,
+  members: [ONE],
+};
+const SEVERAL: ModelInfo = {
+  ...RIG,
+  members: [
+    { ...ONE, options: { shown: false, rigid: ["material:1"], stays: ["node:2"] } },
+    { ...memberOf(1, "02"), parts: [], options: { shown: true, rigid: ["all"], stays: [] } },
+    { ...memberOf(2, "03"), parts: [], options: { shown: true, rigid: [], stays: ["all"] } },
+    { ...memberOf(3, "04"), parts: [], options: { shown: true, rigid: ["1", "2"], stays: ["3", "4"] } },
+  ],
+};
+const CAGE: CageState = {
+  usable: true,
+  controls: { smooth: 0, inner: 0, elements: [], radius: null },
+  radius: 0.1,
+  info: { vertices: 80, edges: 200, faces: 122, quads: 80, triangles: 122, bounds: BOUNDS, notices: [] },
+};
+const INSIDE: readonly InnerElement[] = [{ point: 0 }, { line: [1, 2] }, { face: [3, 4, 5] }, { point: 6 }];
+const CONTROLLED: CageState = {
+  ...CAGE,
+  controls: { smooth: 2, inner: 7, elements: [...INSIDE], radius: null },
+};
+const NONE = {
+  vertices: new Uint32Array(),
+  edges: new Uint32Array(),
+  faces: new Uint32Array(),
+  points: new Float32Array(),
+  outside: new Uint32Array(),
+};
+const GOOD: Check = { problems: [], ...NONE };
+const checkOf = (mends: readonly (Mend | null)[], severity: "error" | "note", count: number): Check => ({
+  problems: mends.map((fix, k) => ({ code: "model_outside", severity, message: `${k}.`, count, fix })),
+  ...NONE,
+});
+const REPAIRS = ["weld", "drop_degenerate", "mirror", "fill_holes", "flip", "grow"] as const;
+const MENDS: readonly Mend[] = [
+  ...REPAIRS.map((repair) => ({ kind: "repair", repair }) as const),
+  { kind: "grid", cells: 32 },
+  { kind: "grid", cells: 128 },
+  { kind: "regenerate" },
+];
+const reportBy = (way: Partial<BindOptions>): BindReport =>
+  reportOf({
+    ...way,
+    delta_history: [0.1, 0.01, 0.001],
+    timings_ms: { voxelize: 12, solve: 1234, sample: 0.5, total: 98_765 },
+    memory_bytes: { estimated: 12_345_678, peak: 1_234_567_890 },
+    inner_controls: 3,
+    smooth: 2,
+    outside_vertices: 2,
+  });
+const REPORT = reportBy({});
+const EARLIER = [...solvers(32), { solver: "cg", preconditioner: "v_cycle" } as const].map(reportBy);
+const BOUND: Patch = { model: RIG, cage: CAGE, check: GOOD, bound: true, report: REPORT, steps: 1 };
+const RUN = { ...INITIAL.bindOptions, solver: "cg" } as const;
+const selected = (count: number, last: number | null): AppState["selected"] => ({
+  count,
+  last,
+  center: count > 0 ? [1, 2, 3] : null,
+});
+const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
+  values.map((value) => ({ ...also, [key]: value }) as Patch);
+
+/** States of each step, upon `BOUND`. */
+const states = (): Record<AppState["step"], readonly Patch[]> => ({
+  model: [
+    { model: null, cage: null, bound: false },
+    { works: [work("here"), work("nowhere")], lack: "NoWebGPU" },
+    { model: SEVERAL, sample: "rat", undoLabel: T.did.grab, redoLabel: T.did.pull },
+    ...of("painting", [
+      { id: 0, radius: 0.1, erase: false },
+      { id: 0, radius: 0.1, erase: true },
+    ]),
+    ...of("busy", [T.opening.fileOf("01", 0, 2)], {
+      busyStep: T.opening.freezes(1_234_567, 12_345),
+      goOn: () => {},
+      cancelBusy: () => {},
+    }),
+    ...of(
+      "hovering",
+      (["page", "cage", "list"] as const).map((to) => ({ files: 2, to })),
+    ),
+    { hovering: { files: 1, to: "page" }, model: null },
+  ],
+  cage: [
+    ...of("cageSource", ["auto", "hull", "box", "file"]),
+    { cage: null, check: null, bound: false },
+    { check: null, cageProgress: 0.5 },
+    { check: checkOf(MENDS, "error", 2), cage: { ...CAGE, usable: false }, bound: false },
+    { check: checkOf(MENDS, "error", 1), cage: { ...CAGE, usable: false }, bound: false },
+    { check: checkOf([null], "note", 1) },
+    { cage: { ...CAGE, info: { ...CAGE.info, vertices: 30 } } },
+    { cage: CONTROLLED, selected: selected(1, 81) },
+    ...of("placing", ["point", "line", "face"], { cage: CONTROLLED }),
+    ...of("element", ["vertex", "edge", "face"], { editingRest: true, selected: selected(2, 1) }),
+    { editingRest: true, strays: 3 },
+    { editingRest: true, check: null },
+    { editingRest: true, scene: { ...INITIAL.scene, cage: false } },
+    { model: { ...RIG, notices: ["1."] }, cageClip: "1" },
+  ],
+  bind: [
+    { bound: false, report: null },
+    { earlier: EARLIER, appliedOptions: { ...INITIAL.bindOptions, grid: 32 } },
+    { bindOptions: { ...INITIAL.bindOptions, method: "classic", solver: "jacobi", backend: "gpu" } },
+    { bindOptions: { ...INITIAL.bindOptions, method: "classic" } },
+    { bindOptions: { ...INITIAL.bindOptions, solver: "jacobi" } },
+    { bindOptions: RUN, lack: "NoAdapter" },
+    { bindOptions: { ...RUN, preconditioner: "v_cycle" } },
+    { report: { ...REPORT, converged: false } },
+    { report: { ...REPORT, at_round_off: true, outside_vertices: 0, backend: "gpu" } },
+    { report: { ...REPORT, rest_error: { ...REPORT.rest_error, max_rel: 1 } } },
+    ...(["simplify", "voxelize", "solve", "sample"] as const).map((stage, k): Patch => {
+      const curve = REPORT.delta_history.map((delta, i) => [i + 1, delta] as const);
+      const run = { options: RUN, revision: 0, fraction: 0.5, iteration: 3, delta: 0.1, curve };
+      return {
+        bindRun: {
+          ...run,
+          pass: k % 2 === 0 ? "coarse" : "fine",
+          stage,
+          etaMs: [null, 900, 90_000][k] ?? null,
+        },
+      };
+    }),
+  ],
+  pose: [
+    {},
+    { bound: false, report: null },
+    { selected: selected(1, 1), pins: [{ triangle: 0, bary: [1, 0, 0] }], pullWhole: true },
+    { selected: selected(1, 81), cage: CONTROLLED },
+    {
+      selected: selected(3, 1),
+      symmetry: true,
+      proportionalOn: true,
+      scene: { ...INITIAL.scene, pull: false },
+    },
+    { selected: selected(1, 1), editingRest: true, scene: { ...INITIAL.scene, gizmo: "move", pull: false } },
+    { scene: { ...INITIAL.scene, cage: false } },
+    { scene: { ...INITIAL.scene, cage: false, pull: false } },
+    { scene: { ...INITIAL.scene, pull: false } },
+    { scene: { ...INITIAL.scene, original: true } },
+    { boxArmed: true, ortho: true },
+    { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
+    {
+      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3 })),
+      shares: [0.5, 1, 0],
+      playing: true,
+      playingPose: null,
+      posed: true,
+    },
+    {
+      clip: { ...INITIAL.clip, clip: 0, playing: true },
+      rigOptions: { ...INITIAL.rigOptions, rigid: ["1"] },
+    },
+    { clip: { ...INITIAL.clip, clip: 0 }, rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
+    { rigOptions: { ...INITIAL.rigOptions, joints: "turn" } },
+    { rigOptions: { ...INITIAL.rigOptions, joints: "stay" } },
+    ...(["material", "clay", "weight", "error"] as const).map(
+      (colour): Patch => ({
+        scene: { ...INITIAL.scene, colour },
+        seeOpen: true,
+        selected: selected(1, 1),
+        legend: {
+          low: 1e-7,
+          high: 0.5,
+          logarithmic: true,
+          map: "error",
+          largest: { value: 0.5, vertex: 1234 },
+        },
+      }),
+    ),
+    ...(["kinds", "value"] as const).flatMap((slice) =>
+      [null, 1].map(
+        (last): Patch => ({
+          scene: { ...INITIAL.scene, slice, colour: "weight" },
+          seeOpen: true,
+          selected: selected(last === null ? 0 : 1, last),
+          legend: {
+            low: 0,
+            high: 1,
+            logarithmic: false,
+            map: slice === "kinds" ? "kinds" : "viridis",
+            largest: null,
+          },
+        }),
+      ),
+    ),
+    { scene: { ...INITIAL.scene, compare: ["harmonic", "mean_value", "green"] }, cage: CONTROLLED },
+  ],
+  export: [
+    { model: null, cage: null, bound: false },
+    { bound: false, report: null },
+    { cage: CONTROLLED },
+    { model: SEVERAL, poses: [{ name: "01", fits: true }] },
+    { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
+  ],
+});
+
+const work = (where: "here" | "elsewhere" | "nowhere") => ({
+  id: where,
+  name: `01-${where.length}`,
+  when: Date.now() - 90_000_000,
+  size: 1234,
+  where,
+  stopped: true as const,
+});
+/** Dialogs of the page, upon `BOUND`. */
+const DIALOGS: readonly Patch[] = [
+  { sheetOpen: true },
+  { waysOpen: true, lack: "NoDevice" },
+  { worksOpen: true, works: [work("here"), work("elsewhere"), work("nowhere")] },
+  { worksOpen: true },
+];
+
+const CRASH = { during: "…", report: "…" };
+
+async function start(): Promise<void> {
+  await chooseLanguage();
+  const byId = (id: string) => document.getElementById(id) ?? document.body;
+  const stage = createStage(byId("stage"));
+  const fake = createFake();
+  fake.teach({ unmatched: () => new Uint32Array(3), legend: () => legend ?? undefined });
+  let legend: AppState["legend"] = null;
+  const { store } = fake;
+  const { Toasts, tell, offer } = createToasts();
+  const { session } = fake.ctx;
+  const viewport = () => stage.viewport.getBoundingClientRect();
+  const app = createApp({ store, session, tell, viewport });
+  let lose = (_: string) => {};
+  const lost = createLost(stage.freshCanvas, () => {});
+  let isBroken = false;
+  lost.watch({
+    onLost: (listener: typeof lose) => {
+      lose = listener;
+    },
+    recover: () => (isBroken ? Promise.reject(new Error("1")) : new Promise(() => {})),
+  } as unknown as Session);
+  mount({ app, Toasts, Lost: lost.Lost, byId });
+  // With weights, no state starts a bind.
+  fake.show({ bound: true });
+  const show = (patch: Patch) => {
+    legend = patch.legend ?? null;
+    const samples = Object.keys(T.samples);
+    store.set({ ...INITIAL, ...BOUND, adapter: "1", samples, ...patch, legend });
+  };
+
+  globalThis.visitAll = async () => {
+    const faults = new Set<string>();
+    const seen = new Set<string>();
+    const look = async (where: string) => {
+      // Components are rendered in microtasks, and effects run in a task.
+      for (const _ of [1, 2]) await new Promise((done) => setTimeout(done));
+      for (const fault of inspect(seen)) faults.add(`${where}: ${fault}`);
+    };
+    const all = states();
+    for (const step of STEPS)
+      for (const [k, patch] of all[step].entries()) {
+        show({ step, ...patch });
+        await look(`${step} ${k}`);
+      }
+    for (const [k, patch] of DIALOGS.entries()) {
+      show(patch);
+      await look(`dialog ${k}`);
+    }
+    show({});
+
+    for (const title of Object.values(T.failed)) {
+      const fixes = Object.keys(T.fixes) as (keyof typeof T.fixes)[];
+      const fix = fixes[seen.size % fixes.length] ?? "file";
+      tell.problem(
+        { title: typeof title === "string" ? title : title("1"), message: T.somethingWrong },
+        app.ctx.fixFor(fix),
+      );
+      await look("problem");
+      tell.clear();
+    }
+    for (const [text, label] of [
+      [T.did.forgotten, ""],
+      [T.works.restored("01", "1"), T.works.show],
+      [T.works.left("01"), T.works.back],
+      [T.exports.noLinkChanged, T.exports.saveProject],
+      [T.models.together(3), T.models.showList],
+      [T.models.outside, T.models.makeAround],
+    ] as const) {
+      if (label) tell.say(text, { label, run: () => {} });
+      else tell.say(text);
+      await look("message");
+    }
+    offer(T.offline.ready, { label: T.offline.reload, run: () => {} });
+    await look("offer");
+
+    await Promise.race([app.tour.start(0), new Promise((done) => setTimeout(done, 50))]);
+    while (!app.tour.loaded()) await new Promise((done) => setTimeout(done));
+    for (const [stop, name] of STOPS.entries()) {
+      const { binds, step } = stopsOf(true)[name];
+      for (const reports of [[], binds.map(reportBy)]) {
+        show({ step, tour: { stop, reports, doing: reports.length > 0 ? null : [2, 3] } });
+        await look(`stop ${name}`);
+      }
+    }
+    show({});
+
+    // Other sentences appear as messages, whose lines are as long as those of any panel.
+    for (const text of sentencesOf(T).filter((text) => !isSeen(seen, text))) {
+      tell.say(text);
+      await look("message");
+    }
+
+    lose("1");
+    await look("a lost device");
+    isBroken = true;
+    lose("1");
+    await look("a device lost again");
+    document.querySelector<HTMLElement>(".lost .primary")?.click();
+    await look("a device that stays lost");
+
+    showReport(CRASH);
+    await look("a report");
+    document.querySelector<HTMLElement>("dialog[open] .icon-button")?.click();
+    askAfterCrash(CRASH, () => {});
+    await look("a second crash");
+    mountUnsupported("NoWebGPU");
+    await look("no WebGL2");
+    return [...faults];
+  };
+}
+
+const isSeen = (seen: ReadonlySet<string>, text: string) => {
+  const own = text.trim();
+  for (const one of seen) if (one.includes(own)) return true;
+  return false;
+};
+
+/** All sentences of a catalogue without values. */
+const sentencesOf = (words: unknown): string[] => {
+  if (typeof words === "string") return words === "" ? [] : [words];
+  return typeof words === "object" && words !== null ? Object.values(words).flatMap(sentencesOf) : [];
+};
+
+void start();

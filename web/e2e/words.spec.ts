@@ -1,0 +1,57 @@
+/** Every panel in the pseudo-locale: all text comes from the catalogue, and none is cut off. */
+
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { build, type Rolldown } from "vite";
+import { expect, test } from "./support";
+
+const WEB = join(import.meta.dirname, "..");
+
+/** Builds the page with gallery.ts in place of main.ts; returns its files by name. */
+async function gallery(): Promise<Map<string, string | Uint8Array>> {
+  const built = (await build({
+    configFile: false,
+    root: WEB,
+    base: "./",
+    logLevel: "error",
+    resolve: { alias: { "@cagework/core": join(WEB, "package/src") } },
+    plugins: [
+      {
+        name: "gallery",
+        transformIndexHtml: {
+          order: "pre",
+          handler: (html) => html.replace("./src/main.ts", "./e2e/gallery/gallery.ts"),
+        },
+      },
+    ],
+    build: { write: false, minify: false, target: "es2023", modulePreload: { polyfill: false } },
+  })) as Rolldown.RolldownOutput;
+  return new Map(
+    built.output.map((file) => [file.fileName, file.type === "chunk" ? file.code : file.source]),
+  );
+}
+
+let built: ReturnType<typeof gallery> | undefined;
+
+for (const [name, device] of [
+  ["desktop computer", { viewport: { width: 1440, height: 900 } }],
+  ["phone", { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true }],
+] as const) {
+  test.describe(name, () => {
+    test.use(device);
+    test(`on a ${name} all text is in the catalogue and fits`, async ({ page }) => {
+      built ??= gallery();
+      const files = await built;
+      await page.route("**/gallery/**", async (route) => {
+        const path = new URL(route.request().url()).pathname.replace(/.*\/gallery\//, "") || "index.html";
+        const types = { html: "text/html", js: "text/javascript", css: "text/css" };
+        const contentType = types[path.split(".").at(-1) as keyof typeof types] ?? "image/webp";
+        const body = files.get(path) ?? (await readFile(join(WEB, "public", path)));
+        await route.fulfill({ contentType, body: typeof body === "string" ? body : Buffer.from(body) });
+      });
+      await page.goto("./gallery/?lang=pseudo");
+      await page.waitForFunction(() => globalThis.visitAll);
+      expect(await page.evaluate(() => globalThis.visitAll?.())).toEqual([]);
+    });
+  });
+}
