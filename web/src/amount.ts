@@ -1,6 +1,9 @@
-/** Numbers typed during a gesture. */
+/** The amount that is typed during a gesture, such as "-0.5". */
 
-/** The text after a key press: digits append, one point is allowed, minus toggles the sign, Backspace deletes. */
+/**
+ * The typed text after a key press: digits append, one decimal point is allowed, minus toggles the sign, Backspace
+ * deletes. Undefined for other keys.
+ */
 export function nextAmount(typed: string, key: string): string | undefined {
   if (/^\d$/.test(key)) return typed + key;
   if (key === "." || key === ",") return typed.includes(".") ? typed : `${typed}.`;

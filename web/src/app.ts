@@ -49,16 +49,16 @@ export interface App {
   readonly exports: Exports;
   readonly tour: TourActions;
   readonly mac: boolean;
-  /** Runs the command of a shortcut. */
+  /** Runs a command of the shortcut table. */
   run(command: Command): void;
   go(step: StepName): void;
-  /** Opens the browser's file dialog. */
+  /** Opens the browser's file dialog, and opens the chosen model. */
   chooseModel(): void;
   chooseFolder(): void;
-  /** Chooses models to add to the cage. */
+  /** Opens the file dialog, and adds the chosen models to the cage. */
   chooseMore(): void;
   chooseCage(): void;
-  /** Chooses an OBJ file of inner controls. */
+  /** Opens the file dialog, and reads inner controls from the chosen OBJ file. */
   chooseControls(): void;
   /** Opens the first sample. The open work stays saved in the browser. */
   startFresh(): void;
@@ -139,7 +139,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   };
   const reload = async () => {
     await works.flush();
-    // Remove a link from the address once the work is saved: after reloading, the page would open the link instead of
+    // Once the work is saved, remove a share link from the address. The reloaded page would open the link instead of
     // the work.
     if (store.get().savedAt !== null) history.replaceState(null, "", location.pathname + location.search);
     location.reload();

@@ -6,7 +6,7 @@ import type { AppState } from "./state";
 import { forgetCrash, keepCrash, lastCrash } from "./store";
 import { T } from "./words";
 
-/** A crash, stored for the page after the restart. */
+/** What is known about a crash. It is stored, so that the restarted page can show it. */
 export interface Crash {
   /** Sentence that says what was open or in progress. */
   readonly during: string;
@@ -20,15 +20,15 @@ export function isFatal(error: unknown): boolean {
 }
 
 export interface Crashes {
-  /** The crash before this page's start, if any. */
+  /** The crash that made the page restart; undefined after a normal start. */
   readonly before: Crash | undefined;
-  /** Called when a model is bound and drawn: the next crash then counts as a first one. */
+  /** Call this when a model is bound and drawn. The next crash then counts as a first crash. */
   settled(): void;
 }
 
 /**
- * Listens for crashes. The first one calls `restart`. One more before a model is bound and drawn calls `ask`: the work that is
- * reopened may be the cause, and the page would restart forever.
+ * Listens for crashes. Calls `restart` after a first crash. Calls `ask` after another crash before a model is bound and
+ * drawn: the work that the page reopens may be the cause, and the page would restart forever.
  */
 export function watchCrashes(store: Store, restart: () => void, ask: (crash: Crash) => void): Crashes {
   const before = lastCrash();

@@ -1,4 +1,4 @@
-/** Defaults and ranges of options, generated from Rust, which documents the reasons. */
+/** Defaults and ranges of options. They are generated from Rust's definitions, which document them. */
 
 import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generated";
 
@@ -15,5 +15,5 @@ export {
   SLIDERS,
 } from "@cagework/core/contract/generated";
 
-/** The published method. */
+/** Options of the published method (Joshi et al. 2007). */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };

@@ -30,7 +30,7 @@ export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
 
-/** The settings that determine the cage which `make` of actions/cage.ts returns, as a text to compare. */
+/** The settings that determine which cage `make` of actions/cage.ts makes, as a text that can be compared. */
 export function cageKey({ cageSource, cageOptions, cageClip, boxDivisions }: CageSettings): string {
   if (cageSource === "auto") return JSON.stringify([cageOptions, cageClip]);
   return cageSource === "box" ? `box ${boxDivisions}` : cageSource;
@@ -38,7 +38,7 @@ export function cageKey({ cageSource, cageOptions, cageClip, boxDivisions }: Cag
 
 type CageSettings = Pick<AppState, "cageSource" | "cageOptions" | "cageClip" | "boxDivisions">;
 
-/** Whether the settings of the Cage panel are not those of the cage. */
+/** Whether the settings of the Cage panel differ from those with which the current cage was made. */
 export function hasUnmadeCage(state: AppState): boolean {
   return state.cage !== null && state.cageMade !== cageKey(state);
 }
@@ -46,7 +46,10 @@ export function hasUnmadeCage(state: AppState): boolean {
 /** Fraction of the requested vertices below which the panel explains why a generated cage has so few. */
 const FEW = 0.9;
 
-/** Whether a generated cage has far fewer vertices than requested, because it follows the shape as closely as requested. */
+/**
+ * Whether a generated cage has far fewer vertices than the maximum, because fewer already follow the shape closely
+ * enough.
+ */
 export function isCageSparse(state: AppState): boolean {
   const { cage, cageOptions, cageSource, sampleCage } = state;
   const isGenerated = cage !== null && cageSource === "auto" && !sampleCage && !hasUnmadeCage(state);
@@ -58,14 +61,14 @@ export function fittingPoses(state: AppState): readonly PoseView[] {
   return state.poses.filter((pose) => pose.fits);
 }
 
-/** The element that clicks select: vertices in pull mode, except while reshaping. */
+/** Kind of element that clicks select. In pull mode these are vertices, unless the cage is being reshaped. */
 export function elementInUse({ element, scene, editingRest }: AppState): CageElement {
   return scene.pull && !editingRest ? "vertex" : element;
 }
 
 /**
- * Options of automatic binds and saved projects: those of the last bind, if there is one. Later choices are not applied
- * yet.
+ * Options of automatic binds and saved projects: those of the last bind, or without one, the chosen options. Options
+ * that were chosen after a bind take effect when the user binds again.
  */
 export function optionsInUse({ appliedOptions, bindOptions }: AppState): BindOptions {
   return appliedOptions ?? bindOptions;

@@ -1,4 +1,4 @@
-/** Mirrors the document: updates the state keys that Rust determines. */
+/** Mirrors the document: updates the keys of the state whose values Rust determines. */
 
 import { attempt, type Context } from "./actions/context";
 import type { Check, View } from "./contract";
@@ -22,7 +22,7 @@ export interface DocumentMirror {
 export function followDocument(ctx: Context): DocumentMirror {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Checks by the keys of mesh and cage. */
+  /** Finished checks, by the `keyOf` of models and cage. */
   const checks = new Map<string, Check>();
   let shown: View | undefined;
   let checking: Promise<unknown> = Promise.resolve();
@@ -39,7 +39,7 @@ export function followDocument(ctx: Context): DocumentMirror {
   const startCheck = () =>
     attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) => {
-        // Wait first: an opened cage may come with its check, which cancels this one.
+        // Wait for the current task to end: an opened cage may come with its check, and taking that cancels this job.
         await new Promise((resolve) => setTimeout(resolve));
         if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
       }),
@@ -48,7 +48,7 @@ export function followDocument(ctx: Context): DocumentMirror {
   const modelPatch = (): Partial<AppState> => {
     const { model, cageClip } = store.get();
     const info = engine().modelInfo();
-    // A single model may be named after its sample or file. Keep that name.
+    // The name of a single model may be that of its sample or file. Keep it.
     const isAlone = info.members.length === 1 && model?.members.length === 1;
     const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
     return {
@@ -61,7 +61,7 @@ export function followDocument(ctx: Context): DocumentMirror {
     };
   };
 
-  /** State for another cage, or for the same cage around other models. */
+  /** Values of state keys for another cage, or for the same cage around other models. */
   const cagePatch = (view: View): Partial<AppState> => ({
     cage: engine().cageState() ?? null,
     check: checks.get(keyOf(view)) ?? null,
@@ -78,7 +78,7 @@ export function followDocument(ctx: Context): DocumentMirror {
       const before = shown;
       const old = store.get();
       const isOther = keyOf(view) !== keyOf(before);
-      // Weights in progress are for the previous models or cage.
+      // A bind in progress is for the previous models or cage.
       if (isOther) ctx.queue.cancel("bind");
       shown = view;
       const isNewlyBound = view.bound && (isOther || !before?.bound);
@@ -90,7 +90,7 @@ export function followDocument(ctx: Context): DocumentMirror {
         poses: unchanged(old.poses, view.poses),
         shares: unchanged(old.shares, view.shares),
         pins: unchanged(old.pins, view.pins),
-        // Edges and faces are selected for reshaping only.
+        // Edges and faces can be selected only while the cage is reshaped.
         ...(old.editingRest && !view.editingRest ? { element: "vertex" } : {}),
         selected: unchanged(old.selected, view.selected),
         undoLabel: undo,
@@ -112,7 +112,7 @@ export function followDocument(ctx: Context): DocumentMirror {
 
 const keyOf = (view: View | undefined) => `${view?.mesh ?? 0} ${view?.cage ?? 0}`;
 
-/** Returns the old value if the new one is equal, so that its panels are not rendered again. */
+/** Returns the old value if the new one is equal, so that panels that show it are not rendered again. */
 function unchanged<T>(old: T, value: T): T {
   return JSON.stringify(old) === JSON.stringify(value) ? old : value;
 }

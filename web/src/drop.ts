@@ -11,11 +11,11 @@ export interface DropPlan {
   kind: DropKind;
   /** Index of the file to open. */
   main?: number;
-  /** Further models for the same cage, in the order given. */
+  /** Indices of further models for the same cage, in the order given. */
   more?: readonly number[];
-  /** The file to use as the cage. */
+  /** Index of the file to use as the cage. */
   second?: number;
-  /** Says what will happen. */
+  /** Says what opening the files will do, or why they cannot be opened. */
   sentence: string;
 }
 
@@ -24,7 +24,7 @@ const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
 const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;
 const PROJECT_NAME = /\.cagework\.glb$/i;
 
-/** Plans how to open these files. Next to another model, a file named "...cage..." is the cage. */
+/** Plans how to open these files. If there are several models, one whose name contains the word "cage" is the cage. */
 export function planDrop(names: readonly string[]): DropPlan {
   if (names.length === 0) return { kind: "nothing", sentence: T.opening.dropped };
   const project = names.findIndex((name) => PROJECT_NAME.test(name));
@@ -63,7 +63,7 @@ export function planDrop(names: readonly string[]): DropPlan {
   };
 }
 
-/** Of a model in several formats, as in many downloads, keeps the one with most information. */
+/** If files differ only in their extension, as in many downloads, keeps the format that stores most information. */
 function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]): T[] {
   const path = (name: string) => name.slice(0, name.length - extension(name).length);
   const isBest = ({ name }: T) =>
@@ -71,7 +71,9 @@ function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]
   return models.filter(isBest);
 }
 
-/** Announces the effect of a drop while files hover. Browsers then reveal only the number of files. */
+/**
+ * Says what dropping files will do while they are dragged. Until they are dropped, browsers reveal only their number.
+ */
 export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
   if (files > 1) {
     return T.opening.together;

@@ -2,7 +2,7 @@
 
 import { MODEL_ENDINGS } from "./defaults";
 
-/** The language, as set by words/index.ts. */
+/** Language tag of the page, which words/index.ts sets. */
 export let LOCALE = "en";
 
 const formats = () => ({
@@ -43,7 +43,7 @@ export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${format.plural.select(value) === "one" ? one : many}`;
 }
 
-/** ".glb, .obj, and .stl": the extensions of model files. */
+/** Lists the extensions of model files: ".glb, .obj, and .stl". */
 export function endings(type: "conjunction" | "disjunction"): string {
   return new Intl.ListFormat(LOCALE, { type }).format(MODEL_ENDINGS.map((ending) => `.${ending}`));
 }
@@ -53,7 +53,7 @@ export function list(names: readonly string[]): string {
   return format.list.format(names);
 }
 
-/** Bytes with one to three digits before the point: 1536 -> "1.5 kB". */
+/** Formats a number of bytes with one to three digits before the point: 1536 -> "1.5 kB". */
 export function bytes(value: number): string {
   const units = ["byte", "kilobyte", "megabyte", "gigabyte", "terabyte"] as const;
   const power = Math.min(units.length - 1, Math.max(0, Math.floor(Math.log10(Math.max(1, value)) / 3)));
@@ -61,7 +61,7 @@ export function bytes(value: number): string {
   return inUnit(scaled, units[power] ?? "byte", power === 0 || scaled >= 100 ? 0 : 1);
 }
 
-/** Milliseconds as a duration: 45 -> "45 ms", 1234 -> "1.2 sec", 90000 -> "1 min 30 sec". */
+/** Formats milliseconds as a duration: 45 -> "45 ms", 1234 -> "1.2 sec", 90000 -> "1 min 30 sec". */
 export function duration(ms: number): string {
   if (ms < 999.5) return inUnit(ms, "millisecond", ms < 1 ? 2 : 0);
   if (ms < 59_950) return inUnit(ms / 1000, "second", 1);
@@ -69,7 +69,9 @@ export function duration(ms: number): string {
   return `${inUnit(Math.floor(seconds / 60), "minute")} ${inUnit(seconds % 60, "second")}`;
 }
 
-/** Three significant digits, with an exponent for small and large numbers: 0.000123 -> "1.23e-4". */
+/**
+ * Formats a number with three significant digits, and with an exponent if it is small or large: 0.000123 -> "1.23e-4".
+ */
 export function scientific(value: number): string {
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -78,23 +80,23 @@ export function scientific(value: number): string {
   return `${format.digits.format(Number(mantissa))}e${Number(exponent)}`;
 }
 
-/** At most three decimals: -0.00012 -> "0". */
+/** Formats a number with at most three decimals: -0.00012 -> "0". */
 export function decimals(value: number): string {
   return format.decimals.format(value);
 }
 
-/** A fraction as percent, clamped to 0 and 100. */
+/** Formats a fraction as percent, clamped to 0 and 100. */
 export function percent(share: number, maximumFractionDigits = 0): string {
   const clamped = Math.min(1, Math.max(0, share));
   return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
 }
 
-/** Characters that fit into a number field of the panel. */
+/** Number of characters that fit into a number field of the panel. */
 const FIELD = 9;
 
 /**
- * A coordinate for a number field: up to five significant digits, no trailing zeros, no minus zero. Values that are rounding noise
- * of an object of the given size are zero.
+ * Formats a coordinate for a number field: up to five significant digits, no trailing zeros, no minus zero. Values
+ * below the rounding errors of an object of the given size become zero.
  */
 export function coordinate(value: number, size = 0): string {
   if (Math.abs(value) <= 1e-6 * size) return "0";

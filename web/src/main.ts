@@ -28,7 +28,7 @@ function byId(id: string): HTMLElement {
   return element;
 }
 
-/** Reloads without the link, which may have caused the crash. */
+/** Reloads the page without the share link in its address, which may have caused the crash. */
 function restart(): void {
   window.history.replaceState(null, "", location.pathname + location.search);
   location.reload();

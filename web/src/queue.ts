@@ -1,4 +1,4 @@
-/** Queue of asynchronous jobs: those of one kind run in sequence. */
+/** Queue of asynchronous jobs. Jobs of the same kind run in sequence, jobs of different kinds in parallel. */
 
 import type { Job } from "./contract";
 
@@ -14,8 +14,9 @@ export interface Queue {
 }
 
 interface Line {
-  /** Controllers of unfinished work. */
+  /** Controllers that abort unfinished work. */
   readonly stops: Set<AbortController>;
+  /** The work added last. */
   last: Promise<unknown>;
 }
 
@@ -46,13 +47,13 @@ export function createQueue(): Queue {
   return queue;
 }
 
-/** Calls `stop` when the signal aborts, or at once if it has. */
+/** Calls `stop` when the signal aborts, or at once if it has already aborted. */
 export function onAbort(signal: AbortSignal, stop: () => void): void {
   if (signal.aborted) stop();
   else signal.addEventListener("abort", stop, { once: true });
 }
 
-/** The job's result. The signal cancels the job. */
+/** Awaits the job's result. Cancels the job if the signal aborts. */
 export function follow<T>(signal: AbortSignal, job: Job<T>): Promise<T> {
   onAbort(signal, job.cancel);
   return job.done;

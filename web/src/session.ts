@@ -14,14 +14,14 @@ import { once, prepareSample } from "./session/opening";
 import { T } from "./words";
 
 declare global {
-  /** For the browser's console, and for tests. */
+  /** The open session, for the browser's console and for tests. */
   var cagework: Session | undefined;
 }
 
 /** Time after which drawing starts even if no model has been opened, ms. */
 const LONGEST_EMPTY = 3000;
 
-/** Fields of a sample file, which has no companion files and no notices. */
+/** Fields of `ReadModel` with the same values for all samples, which have no companion files and no notices. */
 const OWN = {
   siblings: new Map(),
   up: undefined,
@@ -65,7 +65,9 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
   });
   // If preparing the pipelines fails, the first frame tries again and reports the error.
   engine.warm().catch(() => undefined);
-  /** Starts drawing, with the first model: on a slow GPU, an empty frame would delay it. */
+  /**
+   * Starts drawing once the first model is open. On a slow GPU, drawing an empty frame before would delay the model.
+   */
   const begin = once(() =>
     frames.start(
       (sharp) => engine.drawFrame(sharp),
@@ -73,7 +75,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     ),
   );
   setTimeout(begin, LONGEST_EMPTY);
-  /** Selects the CPU backend where the GPU cannot compute: without WebGPU, and for conjugate gradients. */
+  /** Selects the CPU backend if the GPU cannot compute: without WebGPU, and for conjugate gradients. */
   const possible = (options: BindOptions): BindOptions =>
     lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
   /** The canvas in use. WebGL2 reports a lost context only by an event of the canvas. */
@@ -106,7 +108,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     puller ??= openApart();
     return puller;
   };
-  /** Discards the job's result if model or cage have changed since the job started. */
+  /** Rejects the job with "Cancelled" if models or cage have changed when it is done. */
   const ofNow = <T>(job: Job<T>): Job<T> => {
     const { revision } = engine;
     return chain(job, (result) => {
@@ -156,7 +158,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
           for (const [k, read] of reads.entries()) {
             if (isGivenUp) throw named("Cancelled", "cancelled");
             hear?.(k);
-            // Of a project, only the models are added, not the cage.
+            // If the file is a project, add its models and ignore its cage.
             all.push(...(await load(pkg, read as ReadModel)));
           }
         } catch (error) {

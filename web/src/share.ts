@@ -4,14 +4,14 @@ import type { CageControls, CameraView, SceneOptions } from "./contract";
 import { PageError } from "./strings";
 import { T } from "./words";
 
-/** What a link contains in addition to the pose. */
+/** Camera, selected vertices and scene options of a link. */
 export interface Seen {
   readonly camera: CameraView;
   readonly selected: readonly number[];
   readonly scene: Partial<SceneOptions>;
 }
 
-/** Smoothing and controls inside, with their rest positions. */
+/** Smoothing of the cage and controls inside it, with their rest positions. */
 export interface SharedControls {
   readonly controls: CageControls;
   /** `[n_inner, 3]` */
@@ -33,7 +33,7 @@ export interface Shared {
 /** Maximum length of a fragment that is decoded, characters. A pose of 400 cage vertices takes about 3 kB. */
 const LONGEST = 16_384;
 
-/** The fragment of a link, including the #. */
+/** Encodes the fragment of a link, including the #. */
 export async function encodeShare(shared: Shared): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
   if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
@@ -44,7 +44,7 @@ export async function encodeShare(shared: Shared): Promise<string> {
   return `#${fields}`;
 }
 
-/** Decodes a fragment. Undefined if it is not a share link; throws if it is damaged. */
+/** Decodes the fragment of an address. Returns undefined if it is no share link; throws if the link is damaged. */
 export async function decodeShare(fragment: string): Promise<Shared | undefined> {
   const fields = new URLSearchParams(fragment.slice(1));
   const sample = fields.get("sample");
@@ -100,7 +100,7 @@ function unpack(data: Uint8Array): Promise<Uint8Array> {
   return through(data, new DecompressionStream("deflate-raw"));
 }
 
-/** URL-safe Base64 without padding. */
+/** Encodes bytes as URL-safe Base64 without padding. */
 export function toBase64Url(data: Uint8Array): string {
   let binary = "";
   for (const byte of data) binary += String.fromCharCode(byte);

@@ -4,7 +4,7 @@ import { batch, signal } from "@preact/signals";
 import type { AppState } from "./state";
 
 export interface Store {
-  /** The current state. Panels and effects that read a key are updated when it changes. */
+  /** The current state. Panels and effects that read a key are updated when the key's value changes. */
   get(): AppState;
   /** Changes several keys in one batch. */
   set(patch: Partial<AppState>): void;

@@ -16,7 +16,7 @@ import type { Stage } from "./ui/viewport";
 import { T } from "./words";
 import { hasEntries } from "./works/database";
 
-/** Limit of the device pixel ratio: higher ratios are hardly visible and cost four times the pixels. */
+/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a hardly visible difference. */
 const MOST_SHARP = 2;
 
 export interface Start {
@@ -51,7 +51,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
   effect(() => {
     const { model, cage, steps, appliedOptions, symmetry } = store.get();
     const { bound, undoLabel, sampleCage, tour } = store.get();
-    // An unmodified sample is not worth saving.
+    // Do not save a sample that was not modified.
     const isUntouched = sampleCage && undoLabel === null;
     const isWork = bound && !isUntouched && tour === null;
     // Reading these keys subscribes to their changes: all of them are part of the work.
@@ -65,7 +65,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
     if (!store.get().bound) return;
     crashes.settled();
     stop();
-    // Idle callbacks are missing in Safari.
+    // Safari has no requestIdleCallback.
     const whenIdle = globalThis.requestIdleCallback ?? setTimeout;
     whenIdle(() => void offline.register());
   });
@@ -77,7 +77,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
   });
 }
 
-/** Whether this visit opens the first sample: no link, and no kept work. */
+/** Whether this visit opens the first sample, because the address has no link and no work is saved in the browser. */
 export async function isFresh(): Promise<boolean> {
   return location.hash.length <= 1 && !(await hasEntries());
 }
@@ -89,7 +89,7 @@ async function open(app: App, crash: Crash | undefined): Promise<void> {
   if (stop !== undefined) await app.tour.start(stop);
   else if (!link.opened) await openFirst(app);
   else void app.works.refresh();
-  // Last, because opening clears messages.
+  // Show messages last, because opening a model clears them.
   sayDamage(app, link.damage);
   if (crash) {
     const report = { label: T.crash.showReport, run: () => showReport(crash) };
@@ -97,7 +97,7 @@ async function open(app: App, crash: Crash | undefined): Promise<void> {
   }
 }
 
-/** Opens this tab's last work or the only work there is; otherwise a sample, and the list of kept work. */
+/** Opens the work that `toOpen` chooses. Otherwise opens a sample and, if several works are saved, shows their list. */
 async function openFirst(app: App): Promise<void> {
   if (await app.works.restore()) return;
   const { works, samples } = app.store.get();
@@ -108,10 +108,11 @@ async function openFirst(app: App): Promise<void> {
 
 interface Link {
   readonly opened: boolean;
+  /** Error if the link is damaged. */
   readonly damage?: unknown;
 }
 
-/** Opens a share link. Returns whether a model is open now, and the damage of the link. */
+/** Opens the sample, pose and view of the share link in the address, if it contains one. */
 async function openShared(app: App): Promise<Link> {
   let opened = false;
   try {

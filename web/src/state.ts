@@ -98,7 +98,9 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   element: CageElement;
   symmetry: boolean;
   unmatched: number;
-  /** Radius as a share of the cage's diagonal; kept while `proportionalOn` is false. */
+  /**
+   * Radius of proportional editing, as a fraction of the cage's diagonal. Remembered while `proportionalOn` is false.
+   */
   proportional: number;
   proportionalOn: boolean;
   /** Whether clicks and taps add to the selection. */
@@ -118,7 +120,7 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Whether pulls move the whole model. */
   pullWhole: boolean;
   playing: boolean;
-  /** The brush that paints which vertices of a model stay; null unless painting. */
+  /** The brush that paints which vertices of a model stay in place; null while nothing is painted. */
   painting: Painting | null;
   /** The clip shown in place of the cage's pose. */
   clip: ClipState;
@@ -133,16 +135,16 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   theme: Theme;
   /** Time of the last save in this browser, ms since 1970; null before the first. */
   savedAt: number | null;
-  /** Work kept in this browser, newest first. */
+  /** Work saved in this browser, newest first. */
   works: readonly Work[];
-  /** Whether the list of kept work is shown. */
+  /** Whether the list of saved work is shown. */
   worksOpen: boolean;
-  /** State of the tour; null outside it. */
+  /** State of the tour; null while it is not running. */
   tour: TourState | null;
   sheetOpen: boolean;
   /** Whether the instructions for enabling WebGPU are shown. */
   waysOpen: boolean;
-  /** Files dragged over the window; null without any. */
+  /** Files that are dragged over the window; null if none are. */
   hovering: { readonly files: number; readonly to: DropPlace } | null;
 }
 
@@ -245,18 +247,22 @@ export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeo
 
 export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
 
-/** The model's keys for another model. Backend and memory limit depend on the computer and stay. */
+/**
+ * Values of the `MODEL_STATE` keys when another model is opened. Backend and memory limit stay: they suit the computer.
+ */
 export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): ModelState {
   return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };
 }
 
 /** State of the tour. */
 export interface TourState {
-  /** Number of the stop, from 0. */
+  /** Index of the stop, from 0. */
   readonly stop: number;
   /** Reports of this stop's binds, in order. */
   readonly reports: readonly BindReport[];
-  /** The bind in progress and the number of binds; null when all are done. */
+  /**
+   * Number of the bind in progress, from 1 (0 while the sample is opened), and of all binds; null when all are done.
+   */
   readonly doing: readonly [bind: number, all: number] | null;
 }
 

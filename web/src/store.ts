@@ -18,7 +18,7 @@ export function keepCrash(crash: Crash): boolean {
   }
 }
 
-/** The crash stored by the previous page in this tab. */
+/** The crash that this tab stored before it restarted the page. */
 export function lastCrash(): Crash | undefined {
   try {
     const { during, report } = JSON.parse(sessionStorage.getItem(CRASH) ?? "{}");
@@ -48,7 +48,7 @@ export function saveTheme(theme: Theme): void {
   writeItem(THEME, theme);
 }
 
-/** Whether a notice has been closed. */
+/** Whether the user has closed a notice. */
 export function hasSeen(notice: string): boolean {
   return readItem(SEEN + notice) !== null;
 }

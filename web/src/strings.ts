@@ -3,7 +3,7 @@
 import type { ErrorName } from "./contract";
 import { T } from "./words";
 
-/** A sentence in the page's language, or in English. */
+/** A sentence: a string in the page's language, or an object with an English text from Rust. */
 export type Message = string | { readonly english: string };
 
 export const textOf = (message: Message) => (typeof message === "string" ? message : message.english);
@@ -32,7 +32,7 @@ export interface Explained {
   /** Headline: what failed. */
   title: string;
   message: Message;
-  /** A remedy that the page offers. */
+  /** The remedy that the message offers as a button. */
   fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
 

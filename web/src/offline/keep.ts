@@ -1,18 +1,19 @@
-/** Keeps the page's files in the browser by the service worker in worker.js, and offers new versions of the page. */
+/** Registers the service worker of worker.js, which stores the page's files in the browser, and offers new versions. */
 
 export interface Offline {
-  /** Registers the service worker, which then downloads all files of the page: call it when nothing else is urgent. */
+  /** Registers the service worker, which then downloads all files of the page. Call it when nothing else is urgent. */
   register(): Promise<void>;
 }
 
 /**
- * `offer` is called when another version of the page is ready, at most once. Its argument makes the browser use that version
- * from the next load on. Without service workers (over plain http, in some private windows) nothing is kept.
+ * Calls `offer` at most once, when another version of the page is ready. The argument of `offer` is a function that
+ * makes the browser use that version from the next load on. Without service workers (over plain http, in some private
+ * windows), the page is not stored.
  */
 export function keepOffline(offer: (adopt: () => Promise<void>) => void): Offline {
   const { serviceWorker, locks } = navigator;
   if (!serviceWorker || !locks || import.meta.env.DEV) return { register: async () => undefined };
-  // As long as a tab holds this lock, the service worker keeps the files of its build.
+  // While a tab holds this lock, the service worker keeps the files of the build that the tab has loaded.
   const held = locks.request(import.meta.url, { mode: "shared" }, () => new Promise(() => undefined));
   held.catch(() => undefined);
   let isOffered = false;
@@ -22,29 +23,29 @@ export function keepOffline(offer: (adopt: () => Promise<void>) => void): Offlin
   };
   return {
     async register() {
-      // Fails where storage is forbidden.
+      // Registration fails if the browser forbids storage.
       const registration = await serviceWorker.register("./sw.js").catch(() => undefined);
       if (!registration) return;
       if (registration.waiting) offerOnce(registration);
       registration.addEventListener("updatefound", () => {
         const { installing } = registration;
         installing?.addEventListener("statechange", () => {
-          // Without an active worker this is the first version.
+          // If no worker is active, this is the first version that is stored, so there is nothing to offer.
           if (registration.waiting && registration.active) offerOnce(registration);
         });
       });
       document.addEventListener("visibilitychange", () => {
-        // Fails offline.
+        // The update fails without a connection.
         if (document.visibilityState === "visible") registration.update().catch(() => undefined);
       });
       await serviceWorker.ready;
-      // The server may have got another version since this page was loaded.
+      // If the server was updated after this page was loaded, the worker has stored the newer version.
       if (!(await caches.match(import.meta.url, { ignoreVary: true }))) offerOnce(registration);
     },
   };
 }
 
-/** Activates the waiting version. Other tabs keep the files of theirs. */
+/** Activates the service worker of the new version. Tabs with the previous version still get their files. */
 async function adopt({ waiting }: ServiceWorkerRegistration): Promise<void> {
   if (!waiting) return;
   const isOver = new Promise<void>((done) => {

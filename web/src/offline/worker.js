@@ -1,6 +1,7 @@
 /**
- * The service worker. It keeps all files of one build in the browser and answers from them, so that the page works offline and
- * an open tab never mixes two builds. `BUILD` is defined by web/vite.config.ts.
+ * The service worker. It stores all files of one build in the browser and answers requests with them, so that the page
+ * works offline and an open tab never mixes files of two builds. web/vite.config.ts defines `BUILD`, the list of the
+ * files.
  */
 
 const SCOPE = registration.scope;
@@ -9,7 +10,7 @@ const SCOPE = registration.scope;
  */
 const PREFIX = `cagework ${SCOPE} `;
 const CACHE = PREFIX + BUILD.id;
-/** The key of index.html, whose own name some servers redirect. */
+/** Key under which index.html is stored. It is the folder's address, because some servers redirect index.html to it. */
 const PAGE = new URL("./", SCOPE).href;
 
 addEventListener("install", (event) => event.waitUntil(install()));
@@ -22,10 +23,10 @@ addEventListener("fetch", (event) => {
   event.respondWith(answer(request));
 });
 
-/** Downloads the files of the build. Fails if the server now has another build. */
+/** Downloads and stores the files of the build. Fails if the server now has another build. */
 async function install() {
   const cache = await caches.open(CACHE);
-  // Names of hashed files never change their content, so the browser's HTTP cache may answer.
+  // The names of these files contain a hash of their content, so files from the browser's HTTP cache are right.
   await cache.addAll(BUILD.hashed);
   await cache.addAll(BUILD.named.map((name) => new Request(name, { cache: "no-cache" })));
   const page = await fetch(PAGE, { cache: "no-cache" });
@@ -34,7 +35,7 @@ async function install() {
   await cache.put(PAGE, page);
 }
 
-/** Deletes builds that no tab uses: each tab holds a lock with the address of its main script. */
+/** Deletes the files of builds that no tab uses. Each tab holds a lock named by the address of its main script. */
 async function clean() {
   const { held } = await navigator.locks.query();
   const used = new Set(held.map(({ name }) => name));
@@ -45,7 +46,7 @@ async function clean() {
   }
 }
 
-/** Answers from this build, from an older one that a tab still uses, or from the server. */
+/** Answers a request with a file of this build, of an older build that a tab still uses, or from the server. */
 async function answer(request) {
   const address = new URL(request.url);
   address.search = "";

@@ -1,4 +1,4 @@
-/** Startup: the first sample is built in advance. */
+/** Helpers for startup. */
 
 import type { Client } from "@cagework/core/session/client";
 
@@ -12,12 +12,13 @@ export function once(work: () => void): () => void {
 }
 
 /**
- * Returns a function that builds samples. For a first visit, the first sample is built while the GPU is being opened.
+ * Returns a function that builds samples. If `fresh` resolves with true, the first sample is built at once, while the
+ * GPU is being opened.
  */
 export function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
   const build = (id: string) => client.run("sample", { id }).done;
   let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
-  // The error is reported when the sample is opened.
+  // If this fails, the error is reported when the sample is opened.
   early.catch(() => undefined);
   return async (id: string) => {
     // The caller takes over the arrays, so the next call builds the sample again.

@@ -1,4 +1,4 @@
-/** Kept work in IndexedDB. Entries and project files are in separate stores, so that listing entries reads no file. */
+/** Work saved in IndexedDB. Entries and project files are in separate stores, so that listing entries reads no file. */
 
 import { type Entry, isEntry, isWhole } from "./entry";
 
@@ -43,7 +43,7 @@ async function run<T>(
   }
 }
 
-/** Whether any work is kept. False if the browser forbids storage. */
+/** Whether any work is saved. False if the browser forbids storage. */
 export async function hasEntries(): Promise<boolean> {
   return (await run("readonly", (entries) => entries.count()).catch(() => 0)) > 0;
 }
@@ -62,13 +62,13 @@ export async function readEntries(): Promise<{ entries: Entry[]; damaged: number
   return { entries: values.filter(isGood), damaged: damaged.length };
 }
 
-/** The project file of an entry; undefined if it is incomplete. */
+/** The project file of an entry; undefined if it is missing or incomplete. */
 export async function readFile(id: string): Promise<Uint8Array | undefined> {
   const file: unknown = await run("readonly", (_, files) => files.get(id));
   return isWhole(file) ? file : undefined;
 }
 
-/** Writes an entry, replacing one with the same id. Without `file`, the stored file is kept. */
+/** Writes an entry and its project file, replacing those with the same id. Without `file`, leaves the stored file. */
 export async function writeEntry(entry: Entry, file?: Uint8Array): Promise<void> {
   await run("readwrite", (entries, files) => {
     if (file) files.put(file, entry.id);

@@ -1,4 +1,4 @@
-/** Entries of kept work: what is stored next to each project file. */
+/** Entries of the list of saved work: what is stored with each project file. */
 
 import { LOCALE } from "../format";
 import { T } from "../words";
@@ -21,7 +21,7 @@ export interface Work extends Entry {
 }
 
 const DAY_MS = 86_400_000;
-/** Days from the last change until work is deleted. */
+/** Number of days after the last save for which work is kept. */
 export const KEPT_DAYS = 30;
 
 /** Magic number and position of the length field in a GLB header (glTF 2.0, section 4.4.1). */
@@ -57,8 +57,9 @@ export function newestFirst<T extends Entry>(entries: readonly T[]): T[] {
 }
 
 /**
- * Chooses the work to open at startup: the one that this tab had open before a reload, even if the old page still holds its
- * lock, or else the only work that no other tab has open. Returns undefined if the page has crashed twice with that work.
+ * Chooses the work to open at startup: the work that this tab had open before a reload, even if the old page still
+ * holds its lock, or else the only work that no other tab has open. Returns undefined if there is no such work, or if
+ * the page has crashed twice with it.
  */
 export function toOpen(works: readonly Work[], own: string | null): Work | undefined {
   const free = works.filter(({ where }) => where !== "elsewhere");
@@ -66,7 +67,7 @@ export function toOpen(works: readonly Work[], own: string | null): Work | undef
   return chosen?.stopped ? undefined : chosen;
 }
 
-/** The elapsed time in words. */
+/** Says how long ago a time was: 300000 -> "5 minutes ago". */
 export function ago(ms: number): string {
   const minutes = Math.round(ms / 60_000);
   if (minutes < 1) return T.works.moment;

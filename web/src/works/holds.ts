@@ -1,8 +1,11 @@
-/** Web Locks that say which tab has which work open. The browser releases the lock when a tab closes or crashes. */
+/**
+ * Web Locks for saved work, so that one tab at a time has it open. The browser releases a lock when its tab closes or
+ * crashes.
+ */
 
 const PREFIX = "cagework.work.";
 const OWN = "cagework.work";
-/** Time to wait for a lock, ms: the page before a reload may still hold it. */
+/** Time to wait for a lock, ms. After a reload, the previous page may still hold it. */
 const PATIENCE_MS = 1000;
 
 /** Locks work for this tab until the returned function is called; undefined if another tab holds the lock. */
@@ -30,7 +33,7 @@ export function rememberOwn(id: string | null): void {
     if (id === null) sessionStorage.removeItem(OWN);
     else sessionStorage.setItem(OWN, id);
   } catch {
-    // Storage is forbidden, so no work is kept either.
+    // Storage is forbidden, so no work is saved either.
   }
 }
 
