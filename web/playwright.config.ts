@@ -1,17 +1,17 @@
 import { defineConfig } from "@playwright/test";
 import { WITH_WEBGPU } from "./e2e/browser";
 
-/** Where e2e/server.mjs serves the built page. */
+/** Address at which e2e/server.mjs serves the built page. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
 
 export default defineConfig({
   testDir: "e2e",
   outputDir: "../target/e2e",
-  // Tests wait for timers and single threads: three of them keep two cores busy.
+  // Tests often wait for timers or a single thread: three tests in parallel keep two cores busy.
   workers: 3,
   fullyParallel: true,
   forbidOnly: true,
-  // A machine under load takes several times as long as an idle one.
+  // On a busy machine, tests take several times as long as on an idle one.
   timeout: 180_000,
   retries: 0,
   expect: { timeout: 20_000 },
@@ -21,11 +21,11 @@ export default defineConfig({
     : [{ name: "page", testMatch: "*.spec.ts" }],
   use: {
     baseURL: BASE,
-    // Few pixels, since the processor computes each. SHARP=1 makes sharp pictures for inspection.
+    // Draw few pixels, because the processor computes them. SHARP=1 makes sharp pictures for inspection.
     viewport: { width: 1024, height: 640 },
     deviceScaleFactor: process.env.SHARP || process.env.PICTURES ? 1 : 0.5,
     acceptDownloads: true,
-    // Each frame of a transition draws the whole page.
+    // Avoid transitions, each frame of which draws the whole page.
     contextOptions: { reducedMotion: "reduce" },
     launchOptions: WITH_WEBGPU,
   },

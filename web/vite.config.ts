@@ -25,12 +25,12 @@ const licencesOfWorkers = (): Plugin => ({
   },
 });
 
-/** gltf-transform and draco3dgltf import modules of Node, which they use only there. */
+/** Warning of imports of Node's modules in gltf-transform and draco3dgltf, which use them only in Node. */
 const FOR_NODE = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
 
 const PUBLIC = join(import.meta.dirname, "public");
 
-/** Writes the service worker, preceded by the list of all files of this build. */
+/** Writes the service worker, preceded by the names of all files of this build. */
 const writeServiceWorker: Plugin = {
   name: "service-worker",
   generateBundle: {
@@ -55,7 +55,7 @@ const writeServiceWorker: Plugin = {
   },
 };
 
-/** URLs are relative, so the built page works under any path of any server. */
+/** Configuration of the page's build. URLs are relative, so the page works under any path of any server. */
 export default defineConfig({
   root: import.meta.dirname,
   // The page imports its own npm package from the sources.

@@ -1,6 +1,6 @@
 import { defineConfig } from "vitest/config";
 
-/** Tests of TypeScript that need no browser. The others are in e2e/. */
+/** Runs the TypeScript tests that need no browser. Those that need one are in e2e/. */
 export default defineConfig({
   root: import.meta.dirname,
   resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },

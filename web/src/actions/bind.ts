@@ -12,14 +12,14 @@ import { attempt, type Context } from "./context";
 
 export interface BindActions {
   /**
-   * Binds. Resolves with true if there are weights. `unasked`: the page started the bind, so errors on screen are not
-   * removed.
+   * Binds the model to the cage. Resolves with true if there are weights then. `unasked`: the page started the bind,
+   * not the user, so error messages stay on screen.
    */
   start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
   /** Changes options and binds. */
   again(patch: Partial<BindOptions>): Promise<boolean>;
   cancel(): void;
-  /** Whether the current cage is bound, has cached weights or is being bound. */
+  /** Whether the model is bound to the current cage, is being bound to it, or has cached weights for it. */
   covers(): boolean;
   setOptions(patch: Partial<BindOptions>): void;
   /** Computes coordinates of these kinds for comparison, once for each cage. Resolves with false on failure. */
@@ -42,7 +42,7 @@ export function createBind(ctx: Context): BindActions {
   };
   effect(estimate);
 
-  /** Report of the latest coarse pass. Later binds are not compared with it. */
+  /** Report of the latest coarse pass, which is excluded from the reports that later binds are compared with. */
   let coarse: BindReport | undefined;
   const adopted = (report: BindReport, pass: BindRun["pass"]) => {
     const { report: last, earlier } = store.get();
@@ -51,7 +51,7 @@ export function createBind(ctx: Context): BindActions {
     store.set({ report, earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER) });
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
-    // Apply colours that were chosen before there were weights.
+    // Colours of weights or errors may have been chosen before there were weights.
     const { engine } = ctx.session();
     engine.setScene(drawn(store.get()));
     store.set({ legend: engine.legend() ?? null });
@@ -111,7 +111,7 @@ export function createBind(ctx: Context): BindActions {
       const ok = await attempt(ctx, T.failed.bind, () =>
         ctx.queue.replace("bind", (signal) => bind(revision, signal, options)),
       );
-      // A bind of another cage may have been queued since.
+      // Meanwhile, a bind of another cage may have been queued. It has another revision.
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;
     },
@@ -174,7 +174,7 @@ export function sameWay(a: BindReport, b: BindReport): boolean {
   );
 }
 
-/** Maximum number of points of a curve. Above it, every second point is dropped; the plot is only 300 pixels wide. */
+/** Maximum number of points of a curve. A longer curve loses every second point; the plot is only 328 pixels wide. */
 const LONGEST = 600;
 
 /** Appends a point to a curve, unless its delta is not positive or its iteration equals that of the last point. */

@@ -1,4 +1,4 @@
-/** Makes cages: generated, a box, or from a file. Repairs them. */
+/** Makes cages (generated, as a box, or from a file) and repairs them. */
 
 import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
 import { cageKey } from "../derived";
@@ -12,7 +12,7 @@ import type { Edit } from "./edit";
 import { carriableOf, type PoseActions } from "./poses";
 
 export interface CageActions {
-  /** Subdivides the cage 0 to 3 times for a smooth surface. False if that fails. */
+  /** Sets how often the cage is subdivided for a smooth surface, 0 to 3 times. Returns false if that fails. */
   setSmooth(steps: number): boolean;
   /**
    * Changes smoothing or inner controls of the cage as one undo step, and carries poses over. Shows an error and
@@ -20,8 +20,8 @@ export interface CageActions {
    */
   change(label: string, change: Command | (() => void), failed?: string): boolean;
   /**
-   * Makes a cage with the settings of the Cage panel. Resolves with false on failure. `unasked`: started by the page,
-   * so errors on screen stay.
+   * Makes a cage with the settings of the Cage panel. Resolves with false on failure. `unasked`: the page started this,
+   * not the user, so error messages stay on screen.
    */
   make(unasked?: boolean): Promise<boolean>;
   cancel(): void;
@@ -63,7 +63,7 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
     const isFirst = !before && ctx.store.get().undoLabel === null;
     ctx.session().takeCage(cage, isFirst ? undefined : label);
     if (cage.check) know(cage.check);
-    // A first or loaded cage may reach beyond the view.
+    // A first cage or one from a file may not fit into the view.
     if (!before || label === T.did.loadCage) engine().frameAll();
     if (!before || !(posed || saved.length > 0)) return;
     const back = { label: T.pose.backToCage, run: () => void engine().undo() };

@@ -1,4 +1,4 @@
-/** Plays the clips of a rigged model, as in an exported file. */
+/** Plays the clips of a rigged model, deformed as in an exported file. */
 
 import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
@@ -9,7 +9,7 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface ClipActions {
-  /** Shows a clip by index, and plays it unless reduced motion is preferred; null for the rest pose. */
+  /** Shows the clip with this index, and plays it unless the user prefers reduced motion; null shows the rest pose. */
   choose(clip: number | null): Promise<void>;
   toggle(): Promise<void>;
   /** Seeks to a time in seconds and pauses. */
@@ -23,7 +23,7 @@ export interface ClipActions {
   stop(): void;
 }
 
-/** Computes the lattice for deforming a moving model by the cage, if the options need it and it is missing. */
+/** Computes the lattice by which the cage deforms a moving model, if the options need one and the engine has none. */
 export async function loadLattice(ctx: Context): Promise<void> {
   const { engine } = ctx.session();
   if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
@@ -57,7 +57,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
       set({ clip: null, seconds: 0, targets: [] });
   };
 
-  // Undo steps, gestures and blends pose the cage, which ends a paused clip.
+  // Undo steps, gestures and blends pose the cage, which ends the clip in the engine: reset the state.
   effect(() => {
     store.get().steps;
     store.get().gesture;

@@ -1,4 +1,4 @@
-/** What every action needs: the session, the state and messages. */
+/** What every action needs (session, state, queue, messages), and functions that run actions and show their errors. */
 
 import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
@@ -17,7 +17,7 @@ export interface Tell {
   say(text: Message, ...fixes: Fix[]): void;
   /** Shows an error that stays until it is closed or fixed. */
   problem(explained: Explained, fix?: Fix): void;
-  /** Removes all errors, because a new attempt begins. */
+  /** Removes all error messages. Called when the user starts something new. */
   clear(): void;
 }
 
@@ -47,7 +47,7 @@ export async function attempt(
   }
 }
 
-/** Ask before blocking the page for longer than this, ms. */
+/** Time for which opening a file may block the page without asking the user first, ms. */
 const LONG_MS = 4000;
 
 /**
@@ -83,7 +83,9 @@ export async function waitFor<T extends object>(
   }
 }
 
-/** Shows an error, unless it is a cancellation. `file`: whether the fix "choose another file" opens or adds one. */
+/**
+ * Shows an error, unless it is a cancellation. `file`: whether the fix "file" offers to open or to add another file.
+ */
 export function report(ctx: Context, title: string, error: unknown, file: "file" | "add" = "file"): void {
   if (isCancelled(error)) return;
   if (isFatal(error)) {

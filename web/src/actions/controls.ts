@@ -11,7 +11,10 @@ import type { Edit } from "./edit";
 export type Place = readonly [x: number, y: number, z: number];
 
 export interface ControlActions {
-  /** Adds a point, a bone through several points, or a sheet between them. False if it does not fit. */
+  /**
+   * Adds a point, a bone through several points, or a sheet between them. Returns false if it does not fit into the
+   * cage.
+   */
   add(kind: InnerKind, places: readonly Place[]): boolean;
   /** Adds a sheet around a point that faces the camera and is as large as fits. */
   addSheet(center: Place): boolean;
@@ -22,11 +25,11 @@ export interface ControlActions {
   /** Removes the selected inner controls. */
   remove(): boolean;
   clear(): boolean;
-  /** Chooses the kind of control that clicks add, and shows the rest cage. Null ends adding. */
+  /** Chooses the kind of control that clicks add, and shows the cage at rest. Null ends adding. */
   arm(kind: InnerKind | null): void;
   /** Handles a click while a kind is chosen. */
   place(x: number, y: number): void;
-  /** Shows where a click would add a control. */
+  /** Marks the point that a click at this position would add. */
   hover(x: number, y: number): void;
   /** Adds the bone that is being drawn, and ends adding. */
   finish(): void;
@@ -45,8 +48,9 @@ export function createControls(
 ): ControlActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Points of the bone that is being drawn, and the position of the last click. */
+  /** Points of the bone that is being drawn. */
   let places: Place[] = [];
+  /** Position of the last click, CSS pixels. */
   let last: { readonly x: number; readonly y: number } | undefined;
 
   const middle = (x: number, y: number): Place => {

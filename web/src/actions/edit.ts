@@ -1,4 +1,6 @@
-/** Moves and reshapes the cage. Gestures change it live and become one undo step when they end. */
+/**
+ * Moves vertices of the cage and reshapes it. A gesture changes the cage live and becomes one undo step when it ends.
+ */
 
 import { nextAmount } from "../amount";
 import type { Command, Gesture, GestureView, GizmoHandle, RestEdit } from "../contract";
@@ -12,7 +14,7 @@ export interface Edit {
   beginGizmo(handle: GizmoHandle, x: number, y: number): boolean;
   drag(x: number, y: number): void;
   constrain(axis: 0 | 1 | 2, plane: boolean): void;
-  /** Handles a key typed as part of an amount. False if it is not part of one. */
+  /** Handles a key as part of the gesture's amount, such as "-0.5". Returns false for other keys. */
   type(key: string): boolean;
   end(keep: boolean): void;
   active(): boolean;
@@ -34,17 +36,18 @@ export interface Edit {
   setEditingRest(on: boolean): void;
 }
 
+/** Arrow keys that are pressed at shorter intervals than this become one undo step, ms. */
 const NUDGE_PAUSE_MS = 600;
 
 export function createEdit(ctx: Context): Edit {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Name of the gesture in progress, for its undo step. */
+  /** Name of the gesture in progress, which the label of its undo step contains. */
   let verb: string | undefined;
   let typed = "";
   let nudging: ReturnType<typeof setTimeout> | undefined;
 
-  /** Adds an undo step with the changes of the gesture. */
+  /** Adds an undo step with the changes of a finished gesture. */
   const keep = (label: string) => {
     if (!store.get().editingRest) {
       engine().commit(label);

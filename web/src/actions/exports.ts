@@ -18,13 +18,13 @@ export interface Exports {
   save(kind: ExportKind): Promise<void>;
   /** Copies a link to the open work, or offers to save a project if a link cannot contain it. */
   share(): Promise<void>;
-  /** Sets the picture's pixels per pixel of the view, and whether it shows only the model. */
+  /** Sets the pixels of a picture per CSS pixel of the view, and whether the picture shows only the model. */
   pictureOf(scale: number, alone: boolean): void;
   /** Sets the format of exported shapes. */
   shapeIn(format: ShapeFormatName): void;
 }
 
-/** Pause between downloads, ms: browsers drop simultaneous ones. */
+/** Pause between two downloads, ms. Browsers drop downloads that start at the same time. */
 const BETWEEN_MS = 250;
 
 /** Largest side of a picture, pixels. */
@@ -55,7 +55,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   const suffix = (kind: Exclude<ExportKind, "project">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
-  /** Saves one file per chosen model. */
+  /** Downloads one file for each model to export. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
     if (kind === "glb") await loadLattice(ctx);
     const { members } = model;
@@ -68,7 +68,7 @@ export function createExports(ctx: Context, project: Project): Exports {
       // A single model may be shown under the name of its sample or project.
       const source = members.length === 1 ? model.name : name;
       const full = `${stem(source)}${suffix(kind)}`;
-      // A VRM keeps its extension.
+      // A VRM is a GLB with its own extension.
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
       const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
       const blob = new Blob([new Uint8Array(own[kind](id))]);
@@ -145,7 +145,7 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   picture: ".png",
 };
 
-/** A file name that is not in `taken`, because models from different folders may have the same name. */
+/** Appends a number to a file name that is in `taken`: models from different folders may have the same name. */
 function other(name: string, taken: readonly string[]): string {
   const again = (n: number) => name.replace(/(?=\.\w+$)/, `-${n}`);
   let n = 2;
@@ -164,7 +164,7 @@ function download(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** Files of a file input, with names and paths. */
+/** Converts the files of a file input to files with names and paths. */
 export function named(files: Iterable<File>): NamedFile[] {
   return Array.from(files, (file) => ({ name: file.name, path: file.webkitRelativePath || file.name, file }));
 }

@@ -39,11 +39,11 @@ export interface FileNeeds {
   readonly works: Pick<WorkActions, "flush" | "leave">;
   /** Ends playback and operations in progress before something else is opened. */
   settle(): void;
-  /** Called before a sample, or a file (null), is opened. */
+  /** Called before a sample is opened, or before a file is opened (null). */
   overtaken(sample: string | null): void;
 }
 
-/** Further models, and options, that are opened together with a model. */
+/** What is opened together with a model: further models, a cage, and bind options. */
 interface Along {
   readonly others: readonly Named[];
   readonly cageFiles: readonly NamedFile[] | undefined;
@@ -55,7 +55,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   const { store } = ctx;
   const take = async (opened: Opened, sample: string | null, along: Partial<Along> = {}) => {
     const { others = [], cageFiles, signal, bind } = along;
-    // A cage or weights in progress are for the previous model.
+    // A cage generation or bind in progress is for the previous model.
     for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
     const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
     store.set({
@@ -93,7 +93,10 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     if (from.includes(store.get().step)) store.set({ step });
   };
 
-  /** Makes the cage and binds, unless the user has to act first. */
+  /**
+   * Makes the cage and binds, unless the user has to repair the cage first. Changes the step of the page unless the
+   * model is `familiar`, which samples and projects are.
+   */
   const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     if (cageFiles) {
       if (!(await needs.cage.load(cageFiles, true))) return;
@@ -119,7 +122,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       });
     });
 
-  /** Saves the open work, then opens something else. */
+  /** Saves the open work, then opens another model. */
   const replace = async (open: () => Promise<Opened>, sample: string | null, along: Partial<Along>) => {
     needs.settle();
     needs.overtaken(sample);
@@ -164,10 +167,10 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   };
 }
 
-/** Name shown for the model: a sample's label, or the name of a project's model. */
+/** Name shown for the model: a sample's label, the name of a project without its extension, or the name of the file. */
 function shownName(opened: Opened, sample: string | null): string {
   const { name } = opened.model;
   const own = T.samples[sample ?? ""]?.name;
-  // Several models keep their common name.
+  // The name of several models, such as "fox.glb and 2 more", is kept.
   return own ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
 }

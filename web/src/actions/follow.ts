@@ -10,7 +10,7 @@ import type { View } from "./view";
 
 /** Pause after the last change before binding, ms. */
 const PAUSE_MS = 150;
-/** Finest grid that is bound automatically. */
+/** Largest number of cells along the cage's longest side with which the page binds automatically. */
 const FINEST = 128;
 
 export interface Followers {
@@ -27,7 +27,7 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
     soon = setTimeout(() => {
       const { cage } = store.get();
       const options = optionsInUse(store.get());
-      // Try again later: a gesture that ends without a change does not start a bind.
+      // Wait for the end of a gesture in progress. If it changes nothing, its end does not start a bind.
       if (edit.active()) bindSoon(PAUSE_MS);
       else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
     }, pause);
@@ -45,7 +45,7 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
   });
   effect(() => {
     const { bound, bindRun, cage } = store.get();
-    // Wait for the last pass, because preparing pulls would slow it down.
+    // Wait for the last pass of the bind, which preparing pulls would slow down.
     if (cage && bound && bindRun === null) untracked(() => pull.prepare());
   });
   effect(() => {

@@ -1,4 +1,4 @@
-/** Adds and removes models in the cage, and selects which of their parts follow it. */
+/** Adds models to the cage, removes them, and selects which of their parts follow the cage. */
 
 import type { MemberInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
@@ -15,8 +15,8 @@ export interface Models {
   /** Adds models from files to the open cage. */
   add(files: readonly NamedFile[]): Promise<boolean>;
   /**
-   * Adds models that were read. `label` returns the name of the undo step for a number of models; without it, no step
-   * is added.
+   * Adds models that were read from files. `label` returns the name of the undo step for a number of models; without
+   * it, no step is added.
    */
   join(others: readonly Named[], signal: AbortSignal, label?: (models: number) => string): Promise<boolean>;
   /** Removes a model from the cage. */
@@ -42,7 +42,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
   const members = (): readonly MemberInfo[] => store.get().model?.members ?? [];
   const memberOf = (id: number) => members().find((member) => member.id === id);
 
-  /** Generates a cage if the model has none yet, because a cage in progress is for the previous models. */
+  /** Generates a cage if there is none yet, because a generation in progress is for the previous models. */
   const remakeCage = () => {
     if (!store.get().cage) void cage.regenerate();
   };

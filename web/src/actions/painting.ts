@@ -18,11 +18,14 @@ export interface PaintActions {
   /** Keeps the stroke as an undo step, or reverts it. */
   end(keep: boolean): void;
   active(): boolean;
-  /** Radius of the brush, CSS pixels: null where it would not paint, undefined while the GPU is busy. */
+  /**
+   * Radius of the brush at a position of the view, CSS pixels; null where it would not paint, undefined while the GPU
+   * is busy.
+   */
   radiusAt(x: number, y: number): number | null | undefined;
 }
 
-/** Largest distance between the dabs of a stroke, CSS pixels. */
+/** Largest distance between two points of a stroke at which the brush paints, CSS pixels. */
 const DAB_PX = 6;
 /** Initial radius of the brush, as a fraction of the model's size. */
 const RADIUS = 0.05;
@@ -37,7 +40,7 @@ export function createPainting(
 ): PaintActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  /** Radius with which painting starts next time. */
+  /** Radius of the brush when painting starts again, as a fraction of the model's size. */
   let radius = RADIUS;
   let stroke: { readonly x: number; readonly y: number } | undefined;
 
@@ -95,7 +98,7 @@ export function createPainting(
       const { painting } = store.get();
       const isOpen = stroke !== undefined && painting !== null;
       stroke = undefined;
-      // Something else may have been opened during the stroke.
+      // During the stroke, another model may have been opened, which ended painting.
       if (!isOpen) return;
       if (keepIt) engine().commit(painting.erase ? T.did.erase : T.did.paint);
       else engine().revert();

@@ -1,4 +1,4 @@
-/** Pins, which pulls keep in place, and the mark of the grabbed point. */
+/** Pins, the points of the model that pulls keep in place, and the mark of the grabbed point. */
 
 import type { SurfacePoint } from "../contract";
 import { T } from "../words";
@@ -6,7 +6,7 @@ import type { Context } from "./context";
 import type { Edit } from "./edit";
 
 export interface Pins {
-  /** Marks the point that is or would be grabbed, and its target. */
+  /** Marks the point that is grabbed, or would be by a press, and its target. Without arguments, removes the marks. */
   show(held?: SurfacePoint, target?: Float32Array): void;
   /** Position of a model point in the view, CSS pixels; undefined if its model was removed. */
   inView(point: SurfacePoint): { x: number; y: number } | undefined;

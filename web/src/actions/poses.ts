@@ -17,8 +17,8 @@ export interface PoseActions {
   /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */
   blend(index: number, share: number, done: boolean): void;
   /**
-   * Converts the poses of the previous cage to the current one: with a label as an undo step, otherwise as part of the
-   * last step.
+   * Converts the poses of the previous cage to poses of the current cage. With a label, this is an undo step of its
+   * own, otherwise a part of the last step.
    */
   carry(before: Carriable, label?: string): Promise<boolean>;
   reset(): void;
@@ -29,7 +29,7 @@ export interface PoseActions {
 /** A cage and its poses, stored before the cage is replaced. */
 export interface Carriable {
   readonly cage: CageArrays;
-  /** The pose, then each saved pose that fits. `[1 + n_poses, n_controls, 3]` */
+  /** The current pose, then each saved pose that fits this cage. `[1 + n_poses, n_controls, 3]` */
   readonly poses: Float32Array;
   readonly shares: readonly number[];
 }
@@ -65,7 +65,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
         const carried = await follow(signal, ctx.session().carryPoses(cage, poses));
         stop();
         if (label) edit.setEditingRest(false);
-        // A pose at rest stays at rest.
+        // A cage that was in its rest pose stays in its rest pose.
         if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
         const positions = triples(carried);
         engine().apply({ do: "carry_poses", from: n / 3, positions, shares: [...shares] }, label);
@@ -130,8 +130,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
 }
 
 /**
- * The default name of a new pose: "Pose" and one more than the number of poses, or the next number whose name is
- * unused.
+ * The default name of a new pose: "Pose" and a number, the first one above the number of poses whose name is not used.
  */
 export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));

@@ -42,13 +42,18 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
   };
 }
 
-/** Scene options in a link: not those that are the user's own, and not those that need a computation. */
+/**
+ * Scene options that a link contains: no preferences, such as the theme, and none that need a computation, such as
+ * slices.
+ */
 export function ofLink(scene: SceneOptions): Partial<SceneOptions> {
   const { model, cage, floor, base_wireframe, colour, weights_to_one, problems } = scene;
   return { model, cage, floor, base_wireframe, colour, weights_to_one, problems };
 }
 
-/** Whether a model has settings that a link cannot contain. */
+/**
+ * Whether a model has settings that a link cannot contain: it is painted or hidden, or parts do not follow the cage.
+ */
 function hasChoices({ painted, options: { shown, rigid, stays } }: MemberInfo): boolean {
   return painted || !shown || rigid.length + stays.length > 0;
 }

@@ -11,13 +11,13 @@ import { createPins } from "./pins";
 export interface Pulling {
   /** Prepares pulls of the bound model and cage. */
   prepare(): void;
-  /** Marks the point that would be grabbed at this position. Returns whether there is one. */
+  /** Marks the point of the model that a press at this position would grab. Returns whether there is one. */
   hover(x: number, y: number): boolean;
   /** Removes the mark of `hover`. */
   leave(): void;
   /** Grabs the model at a position of the view. False if the model is not there. */
   begin(x: number, y: number): boolean;
-  /** Grabs a vertex of the cage. */
+  /** Grabs a vertex of the cage. Returns false if pulls are not ready. */
   beginCage(vertex: number, x: number, y: number): boolean;
   drag(x: number, y: number): void;
   /** Releases the grab, or restores the previous pose. */
@@ -25,7 +25,7 @@ export interface Pulling {
   active(): boolean;
   /** Scales how far the drag reaches along the surface. */
   reach(factor: number): void;
-  /** Moves the last grabbed point, or the one in the middle of the view, by CSS pixels. */
+  /** Moves the point that was grabbed last, or the point in the middle of the view, by CSS pixels. */
   nudge(right: number, up: number): void;
   /** Adds or removes a pin at a position of the view. False if neither is possible. */
   pin(x: number, y: number): boolean;
@@ -33,32 +33,36 @@ export interface Pulling {
   whole(on: boolean): void;
 }
 
-/** Error of a grab, as a fraction of the model's size, above which its target is shown. */
+/** Distance of a grabbed point from its target above which the target is shown, as a fraction of the model's size. */
 const OFF = 0.01;
-/** Maximum number of frames solved after release. */
+/** Maximum number of frames that are solved after the pointer is released. */
 const SETTLING = 30;
 /** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
 const WIDEST = 1.2;
-/** Presses of arrow keys with shorter pauses than this are one pull, ms. */
+/** Arrow keys that are pressed at shorter intervals than this are one pull, ms. */
 const NUDGE_PAUSE_MS = 600;
 /** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
 const ON_CAGE = 0xffffffff;
 
 interface Drag {
+  /** Pose of the cage at the start of the drag. */
   readonly before: Float32Array;
   /** Engine revision that the grabbed points belong to. */
   readonly revision: number;
   readonly grabs: readonly (SurfacePoint | number)[];
-  /** Position of the pointer at the grab. */
+  /** Position of the pointer at the start of the drag, CSS pixels. */
   readonly from: { readonly x: number; readonly y: number };
-  /** Initial position of the first grab, and its target. */
+  /** Initial position of the first grabbed point. */
   place: Float32Array;
+  /** Target of the first grabbed point. */
   to: Float32Array;
-  /** Number of targets so far, to recognise answers for an older one. */
+  /** Number of targets so far, to recognise answers for an older target. */
   wanted: number;
   /** Reach of the pull as a fraction of the model's size; null until the solver has chosen it. */
   reach: number | null;
+  /** Whether the pointer was released. */
   letGo: boolean;
+  /** Movement of the pointer since the start of the drag, CSS pixels. */
   by: { right: number; up: number };
 }
 
@@ -77,7 +81,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     return bound && pullReady && !editingRest && !playing;
   };
 
-  /** Sends the grabs, and all pins that are not grabbed, to the worker. */
+  /** Sends the grabbed points, and all pins that are not grabbed, to the worker. */
   const grab = async (drag: Drag) => {
     const { pullWhole, symmetry } = store.get();
     const n = controlCount(store.get());
@@ -117,7 +121,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     drag.wanted += 1;
   };
 
-  /** Requests frames from the worker until the pull ends. Pauses while the pose has settled at the current target. */
+  /** Requests frames from the worker until the pull ends. Pauses after the pose has settled, until the target moves. */
   const run = async (drag: Drag) => {
     await grab(drag);
     let answered = -1;

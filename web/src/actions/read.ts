@@ -1,4 +1,4 @@
-/** Reads several models. Errors of one are reported, and the others are still read. */
+/** Reads several models. If one cannot be read, its error is shown and the others are still read. */
 
 import type { Job, NamedFile, ReadFile, Reading } from "../contract";
 import type { DropPlan } from "../drop";
@@ -15,7 +15,8 @@ export interface Named {
 }
 
 /**
- * The models of a drop, each followed by its possible companion files: all that are neither models nor `plan.second`.
+ * The models among dropped files, each followed by its possible companion files, which are all files that are neither
+ * models nor the cage (`plan.second`).
  */
 export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly NamedFile[])[] {
   const models = [plan.main, ...(plan.more ?? [])].flatMap((k) => files[k ?? -1] ?? []);
@@ -25,8 +26,8 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
 }
 
 /**
- * Reads models in sequence. If none can be read, their errors have been shown and the function throws a cancellation.
- * `another`: whether fixes offer to open or to add another file.
+ * Reads models in sequence. If none can be read, shows their errors and throws a cancellation. `another`: whether the
+ * fixes of errors offer to open or to add another file.
  */
 export async function readModels(
   ctx: Context,

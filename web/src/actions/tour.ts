@@ -6,9 +6,9 @@ import { loadTour, T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface TourActions {
-  /** Starts at a stop, counted from 0, by default where the tour was left. */
+  /** Starts the tour at a stop, counted from 0, by default where the user left it. */
   start(stop?: number): Promise<void>;
-  /** The downloaded tour; undefined before the first start. */
+  /** The downloaded code of the tour; undefined before the first start. */
   loaded(): Loaded | undefined;
   /** The guide of the tour in progress; undefined otherwise. */
   guide(): Guide | undefined;
@@ -29,7 +29,7 @@ export function createTour(ctx: Context, needs: GuideNeeds): TourActions {
   };
 }
 
-/** The stop in a link's fragment, counted from 0; undefined without one. */
+/** The stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
 export function stopOf(fragment: string): number | undefined {
   const said = new URLSearchParams(fragment.slice(1)).get("tour");
   return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);

@@ -38,17 +38,18 @@ export interface View {
   resized: () => void;
 }
 
-/** Pause before a moved slice is computed, ms: a slider sends many positions. */
+/** Pause after the last movement of a slice before it is computed, ms. A slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
 
 /**
- * Whether these are compared: at least two. Others are never shown alone, because gestures act on the harmonic shape.
+ * Whether these kinds are shown side by side, which takes at least two. Kinds other than harmonic are never shown
+ * alone, because gestures act on the shape by harmonic coordinates.
  */
 export function isComparison(kinds: readonly Coordinates[]): boolean {
   return kinds.length > 1;
 }
 
-/** Zoom at which the model fits into one of several views side by side. */
+/** Zoom relative to a single view at which the model fits into each of several views side by side. */
 const partZoom = (parts: number) => (parts > 2 ? 0.45 : parts > 1 ? 0.6 : 1);
 
 export function createView(
@@ -143,7 +144,7 @@ export function createView(
     },
     element(element) {
       store.set({ element });
-      // Choosing edges or faces outside reshaping ends pulling.
+      // Pull mode selects only vertices. Choosing edges or faces ends it, unless the cage is being reshaped.
       if (elementInUse(store.get()) !== element) scene({ pull: false });
     },
     pivot(pivot) {

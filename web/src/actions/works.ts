@@ -1,4 +1,4 @@
-/** Keeps work in the browser: one entry per work, open in at most one tab. */
+/** Saves work in the browser. Each work has one entry and is open in at most one tab. */
 
 import type { NamedFile } from "../contract";
 import { isFatal } from "../crash";
@@ -16,19 +16,20 @@ export interface WorkActions {
   flush(): Promise<void>;
   /** Releases the previous work after something else was opened, and offers to return to it. */
   leave(): void;
-  /** Reads the list of kept work into `AppState.works`. */
+  /** Reads the list of saved work into `AppState.works`. */
   refresh(): Promise<void>;
-  /** Opens kept work, as a copy if another tab has it open. */
+  /** Opens saved work, as a copy if another tab has it open. */
   open(work: Work): Promise<boolean>;
   remove(id: string): Promise<void>;
-  /** Opens the work that `toOpen` chooses. False without one, or if it cannot be opened. */
+  /** Opens the work that `toOpen` chooses. Resolves with false if it chooses none, or if the work cannot be opened. */
   restore(): Promise<boolean>;
   /** Excludes the work of this tab from automatic opening, because the page crashed with it. */
   distrust(): Promise<void>;
 }
 
+/** Pause after the last change before the work is saved, ms. */
 const PAUSE_MS = 1500;
-/** Larger projects are not saved automatically, bytes: each save would cause a noticeable pause. */
+/** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
 const LARGEST = 200 * 1024 ** 2;
 
 export interface WorkNeeds {
@@ -43,11 +44,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const { store } = ctx;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let saving: Promise<void> | undefined;
-  /** Whether saving the open work has failed, which was reported. */
+  /** Whether saving the open work has failed. The user has been told, and the work is not saved again. */
   let hasFailed = false;
   /** Whether the entry of the open work was deleted, and the work has not changed since. */
   let isUnwanted = false;
-  /** Entry of the open work. `release` lets other tabs open it. */
+  /** Entry of the open work. `release` gives up its lock, so that other tabs can open it. */
   let current: { readonly id: string; readonly name: string; readonly release: () => void } | undefined;
 
   const hasWork = () => store.get().cage?.usable === true && store.get().model !== null && !hasFailed;
@@ -59,7 +60,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     }
     hasFailed = true;
     const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
-    // Private windows refuse storage as well. Report it once.
+    // Other errors mean that the browser forbids storage, as in private windows.
     const text = isFull ? T.works.full(name) : T.works.forbidden;
     ctx.tell.say(text, ...(isFull ? [showList] : []));
   };
@@ -146,7 +147,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const open = async (work: Work, isFirst = false): Promise<boolean> => {
     const isCopy = work.where === "elsewhere" && !isFirst;
     const release = isCopy ? undefined : await hold(work.id);
-    // If the page crashes while opening it, the next start must know the work.
+    // Remember the work before opening it. If that crashes the page, the next start must know which work it was.
     if (isFirst) rememberOwn(release ? work.id : null);
     if (!isCopy && !release) {
       await refresh();

@@ -24,8 +24,9 @@ import type {
   UpAxis,
 } from "@cagework/core/contract";
 
+/** "The worker" is the one that all jobs share for which no other is named. It runs them in sequence. */
 export interface Session {
-  /** Synchronous part: state, picking, gestures, exports. Do not store other objects of the wasm module. */
+  /** The part of the session without workers: document, picking, gestures, exports. */
   readonly engine: Engine;
   /** Name of the GPU, as the report card shows it. */
   readonly adapter: string;
@@ -35,12 +36,12 @@ export interface Session {
   readonly samples: readonly string[];
 
   /**
-   * Reads one model with its companion files, or a project GLB, in its own worker. Files of a folder are found by `path`.
-   * Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If reading fails or crashes, the
-   * open model is not affected.
+   * Reads one model with its companion files, or a project GLB, in a worker of its own. Files of a folder are found by
+   * `path`. Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If reading fails or
+   * crashes, the open model is not affected.
    */
   readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
-  /** Opens what was read, including cage and poses of a project. Call it once per read. */
+  /** Opens a file that was read; of a project, also cage and poses. Call it once for each file. */
   open(read: ReadFile): Promise<Opened>;
   /** Until the returned function is called, one worker reads all files. It is replaced only after a failure. */
   shareReader(): () => void;
@@ -56,22 +57,25 @@ export interface Session {
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another up axis: rotates model, cage and poses. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
-  /** Checks the page's part of a project's settings: defaults (`bind` for a bind) replace bad values, and `notices` name them. */
+  /**
+   * Checks the page's part of a project's settings. Defaults replace bad values, which `notices` name. `bind`: defaults
+   * of bind options.
+   */
   readSettings(text: string, bind: BindOptions): Settings;
-  /** Reads a cage from a file like a model, and checks it. */
+  /** Reads a cage from a file, like a model, and checks it. */
   readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
-  /** A box around the model, its longest side cut into `divisions`. */
+  /** A box around the model, with faces of about equal size: `divisions` of them along its longest side. */
   boxCage(divisions: number): CageArrays;
   /** Generates a cage for the model, in the worker. `clip`: name of a clip whose frames it also encloses. */
   generateCage(options: CageOptions, onProgress: (fraction: number) => void, clip?: string): Job<CheckedCage>;
-  /** Checks the rest cage, in its own worker. */
+  /** Checks the cage at rest, in a worker of its own. */
   checkCage(): Job<Check>;
-  /** Repairs the rest cage, in the worker of `checkCage`. */
+  /** Repairs the cage at rest, in a worker of its own. Cancels `checkCage`. */
   repair(kind: Repair): Job<CheckedCage>;
-  /** The rest cage. */
+  /** The cage at rest. */
   cageArrays(): CageArrays;
   /**
-   * Converts poses of another cage of the model to the open cage, in the worker.
+   * Converts poses of `old`, another cage of the model, to poses of the open cage, in the worker.
    * `poses`: `[n_poses, n_old_controls, 3]`.
    */
   carryPoses(old: CageArrays, poses: Float32Array): Job<Float32Array>;
@@ -79,14 +83,14 @@ export interface Session {
   takeCage(cage: CheckedCage, label?: string): CageState;
 
   /**
-   * Binds in the worker: first on a coarse grid (g = 32) if the requested grid is finer, then on the requested grid. Each
-   * result is adopted as soon as it is ready; the pose stays. After `cancel()`, `done` rejects with name "Cancelled" and
-   * adopted results stay.
+   * Binds in the worker: first on a coarse grid (g = 32) if the requested grid is finer, then on the requested grid.
+   * Each result is adopted as soon as it is ready; the pose stays. After `cancel()`, `done` rejects with name
+   * "Cancelled" and adopted results stay.
    */
   bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;
   /**
-   * Bytes that a bind with these options needs. Throws the error that the bind would end with. Cheap enough to call on
-   * every change.
+   * Number of bytes that a bind with these options needs. Throws the error that the bind would end with. Fast enough to
+   * be called on every change.
    */
   estimateMemory(options: BindOptions): number;
   /**
@@ -102,18 +106,18 @@ export interface Session {
    */
   loadLattice(grid: number): Job<void>;
 
-  /** Prepares pulls of the open model, in their own worker. */
+  /** Prepares pulls of the open model, in a worker for pulls. */
   preparePull(): Job<null>;
-  /** Starts a pull with grabs and pins, in that worker. */
+  /** Starts a pull with grabbed and pinned points, in the worker for pulls. */
   pullGrab(grab: GrabInput): Job<Grabbed>;
-  /** Solves one frame of the pull. `to`: targets of the grabs, `[n_grabs, 3]`. */
+  /** Solves one frame of the pull, in the worker for pulls. `to`: targets of the grabbed points, `[n_grabs, 3]`. */
   pullFrame(to: Float32Array): Job<PullFrame>;
 
   /** Requests a frame; repeated calls are merged. Changes through `engine` request a frame themselves. */
   draw(): void;
   /**
-   * Called after each drawn frame with the milliseconds the main thread spent on it. Returns a function that removes
-   * the listener.
+   * Calls `listener` after each drawn frame with the milliseconds that the main thread spent on the frame. Returns a
+   * function that removes the listener.
    */
   onFrame(listener: (ms: number) => void): () => void;
   /** PNG of the scene, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
@@ -126,7 +130,7 @@ export interface Session {
    * removes the listener.
    */
   onLost(listener: (reason: string) => void): () => void;
-  /** Restores everything on a new device. `canvas` must be new: one with a lost context cannot be used again. */
+  /** Restores the view on a new device. `canvas` must be new, because one with a lost context cannot be used again. */
   recover(canvas: HTMLCanvasElement): Promise<void>;
   /** For tests: destroys the device, as a driver reset would. */
   loseDevice(): void;
@@ -137,7 +141,7 @@ export interface Session {
 
 /** A file that a worker has read successfully. */
 export interface ReadFile {
-  /** Approximate time for which opening it blocks the page, ms. */
+  /** Approximate time for which opening the file blocks the page, ms. */
   readonly took: number;
   readonly vertices: number;
 }
@@ -148,6 +152,6 @@ export interface Opened {
   readonly check: Check | null;
   /** Settings text of a project; null for other files. */
   readonly settings: string | null;
-  /** Sentences about what could not be restored. */
+  /** Sentences about parts of a project that could not be restored. */
   readonly notices: readonly string[];
 }

@@ -1,4 +1,4 @@
-/** Outline of the brush at the pointer, while painting. */
+/** Outline of the brush, shown at the pointer while painting. */
 
 import type { App } from "../app";
 
@@ -28,7 +28,7 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
   };
   const follow = (event: PointerEvent | WheelEvent) => {
     if (app.store.get().painting === null) return;
-    // A drag that started beside the model turns the view and does not paint.
+    // A drag that started beside the model turns the view instead of painting.
     if (event.buttons > 0 && !app.painting.active()) {
       hide();
       return;

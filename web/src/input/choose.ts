@@ -3,7 +3,7 @@
 import { named } from "../actions/exports";
 import type { NamedFile } from "../contract";
 
-/** Opens the file dialog for the given file types, or for a folder. */
+/** Opens the file dialog for the given file types, or for a folder. Calls `then` with the chosen files. */
 export function choose(accept: string, folder: boolean, then: (files: NamedFile[]) => void): void {
   const input = document.createElement("input");
   input.type = "file";

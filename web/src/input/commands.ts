@@ -6,8 +6,9 @@ import { controlCount, elementInUse } from "../derived";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 
-/** Movement of the selection by an arrow key, CSS pixels. `NUDGE_FAR` is the movement with Shift. */
+/** Movement of the selection by an arrow key, CSS pixels. */
 const NUDGE = 2;
+/** Movement of the selection by an arrow key with Shift, CSS pixels. */
 const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 

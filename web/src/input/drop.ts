@@ -4,7 +4,7 @@ import type { App } from "../app";
 import type { NamedFile } from "../contract";
 import type { DropPlace } from "../state";
 
-/** Limit of the files read from dropped folders, so that dropping a whole disk ends. */
+/** Maximum number of files that are read from dropped folders, in case a whole disk is dropped. */
 const MOST_FILES = 2000;
 
 export function attachDrop(panel: HTMLElement, app: App): void {
@@ -40,8 +40,8 @@ export function attachDrop(panel: HTMLElement, app: App): void {
 }
 
 /**
- * All files of a drop, including those in folders. Entries are taken before the first await, because the browser then clears
- * the list.
+ * Collects all dropped files, including those in folders. Takes the entries of the list before the first await, because
+ * the browser clears the list after the event.
  */
 async function collect(data: DataTransfer): Promise<NamedFile[]> {
   const entries = [...data.items]
@@ -64,7 +64,7 @@ async function walk(entry: FileSystemEntry, folder: string, into: NamedFile[]): 
   } else if (isFolder(entry)) {
     const reader = entry.createReader();
     for (;;) {
-      // readEntries returns batches; an empty one ends the list.
+      // readEntries returns the list in batches. An empty batch ends it.
       const portion = await new Promise<FileSystemEntry[]>((resolve, reject) =>
         reader.readEntries(resolve, reject),
       );

@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import { type Command, commandOf } from "./shortcuts";
 
-/** Elements that handle typed keys themselves. */
+/** Whether the element with the focus handles typed keys itself. */
 function isTyping(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target instanceof HTMLInputElement) return !["checkbox", "radio", "range"].includes(target.type);
@@ -12,7 +12,7 @@ function isTyping(target: EventTarget | null): boolean {
   );
 }
 
-/** Keys that controls use: arrows for sliders and radio buttons, Space and Enter for buttons. */
+/** Whether the control with the focus uses a key: arrows in sliders and radio buttons, Space and Enter on buttons. */
 function isControlKey(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest("dialog")) return true;
@@ -26,7 +26,7 @@ export interface KeyboardOptions {
   viewport: HTMLElement;
   app: App;
   run: (command: Command) => void;
-  /** Called when Space is pressed and released. */
+  /** Called with true when Space is pressed and with false when it is released. */
   original: (on: boolean) => void;
 }
 
@@ -54,7 +54,8 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     }
     const command = commandOf(event, { gesture, rest: editingRest, tour: tour !== null });
     if (!command) return;
-    // Tab switches the mode only if the view was focused by a click. With focus from the keyboard, Tab moves on as usual.
+    // Tab switches the mode only if the view got the focus by a click. If it got the focus by keyboard, Tab moves the
+    // focus.
     if (command === "restMode") {
       const clicked = document.activeElement === viewport && !viewport.matches(":focus-visible");
       if (!clicked || event.shiftKey) return;

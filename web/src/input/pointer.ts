@@ -5,10 +5,11 @@ import type { App } from "../app";
 import type { GizmoHandle, SelectMode } from "../contract";
 import type { Stage } from "../ui/viewport";
 
-/** Movement beyond this makes a press a drag instead of a click, pixels. */
+/** Movement of the pointer above which a press is a drag instead of a click, CSS pixels. */
 const SLOP = 4;
-/** A press of a finger of this length sets a pin, ms. */
+/** Time after which the press of a finger that does not move sets a pin, ms. */
 const LONG_PRESS_MS = 500;
+/** Distance from a handle of the cage or the gizmo within which a press grabs it, CSS pixels. */
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
 /** Logarithm of the zoom factor per wheel unit. A wheel notch is about 100 units, which enlarges the view by 16 %. */
@@ -77,7 +78,7 @@ export function attachPointer(stage: Stage, app: App): void {
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
       const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
       if (handle !== undefined && takeGizmo(handle, at)) return { kind: "gizmo" };
-      // On the model a finger pulls the model, unless a handle is directly under it.
+      // A finger on the model pulls the model, unless a handle is closer to it than MOUSE_RADIUS.
       const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
       if (vertices.length > 0) {
@@ -127,7 +128,7 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "handle":
         if (!drag.started && moved) {
-          // Stop the clip if the cage bends the moving model: only the rest shape can be posed.
+          // End a clip, because only the model at rest can be posed.
           app.clips.stop();
           if (!drag.was || drag.mode === "replace") {
             if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
@@ -135,7 +136,7 @@ export function attachPointer(stage: Stage, app: App): void {
           const [vertex = 0] = drag.vertices;
           const { scene, proportionalOn, symmetry } = store.get();
           const isOne = drag.vertices.length === 1 && engine().selection().length === 1;
-          // A single handle is pulled like a point of the model, unless Alt, proportional editing or mirroring is on.
+          // A single handle is pulled like a point of the model, except with Alt, proportional editing or mirroring.
           if (scene.pull && isOne && !drag.bare && !proportionalOn && !symmetry) {
             if (pull.beginCage(vertex, start.x, start.y)) {
               drag = { kind: "pull", started: true };
@@ -163,7 +164,7 @@ export function attachPointer(stage: Stage, app: App): void {
     }
   };
 
-  /** Handles a click on the background. */
+  /** Clears the selection after a click that hit nothing. */
   const selectNothing = () => {
     if (store.get().cage) engine().select(new Uint32Array(), "replace");
   };

@@ -2,14 +2,14 @@
 
 import { T } from "../words";
 
-/** Where a shortcut applies: everywhere, during a gesture (G, R or S), while the rest cage is edited, or on the tour. */
+/** When a shortcut applies: always, during a gesture (G, R or S), while the cage is reshaped, or during the tour. */
 export type Scope = "page" | "gesture" | "rest" | "tour";
 
 interface Entry {
   readonly keys: readonly string[];
   readonly group: Group;
   readonly scope?: Scope;
-  /** Keys shown on the sheet, where one row stands for several commands. */
+  /** Keys that the shortcut sheet shows, if one row of it stands for several commands. */
   readonly shown?: readonly string[];
 }
 
@@ -150,7 +150,7 @@ export function keyOf(event: KeyPress): string {
   return `${event.shiftKey && !sign ? "shift+" : ""}${mod ? "mod+" : ""}${event.altKey ? "alt+" : ""}${key}`;
 }
 
-/** The command of a key press. During a gesture, only its own commands and a few others apply. */
+/** The command of a key press. During a gesture, only commands with the scope "gesture" and a few others apply. */
 export function commandOf(
   event: KeyPress,
   scopes: Partial<Record<Exclude<Scope, "page">, boolean>>,
@@ -174,7 +174,7 @@ export function commandOf(
 const ARROWS = { arrowleft: "←", arrowright: "→", arrowup: "↑", arrowdown: "↓" };
 const MAC_KEYS = { mod: "⌘", shift: "⇧", alt: "⌥" };
 
-/** Key caps of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], or with Cmd on a Mac. */
+/** Labels of the keys of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], on a Mac ["⇧", "⌘", "Z"]. */
 export function caps(keys: string, mac: boolean): string[] {
   const names: Readonly<Record<string, string>> = { ...ARROWS, ...T.sheet.keys, ...(mac ? MAC_KEYS : {}) };
   return keys.split("+").map((part) => names[part] ?? part.toUpperCase());

@@ -1,4 +1,4 @@
-/** The tour's card, below the view: title, explanation, task and measurements of the current stop. */
+/** The card of the tour below the view: title, explanation, task and measurements of the current stop. */
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { copyLink } from "../actions/exports";

@@ -1,4 +1,4 @@
-/** Measurements of the tour's binds, and the one option that each stop lets the user change. */
+/** Figures of the tour's card: measurements of the stop's binds, and the option that the user can change. */
 
 import type { App } from "../app";
 import type { BindReport } from "../contract";
@@ -67,7 +67,7 @@ function Grid({ app }: Figure) {
   );
 }
 
-/** Mean rest errors, one row per bind. */
+/** Lists the mean rest errors of binds. */
 function RestErrors({
   reports,
   name,
@@ -171,7 +171,9 @@ function Times({ guide, reports }: Figure) {
   );
 }
 
-/** Table of the paper's mean rest errors. Each number is a button that shows its bind in the view. */
+/**
+ * Table of mean rest errors, like the paper's. Each number is a button that runs its bind again and shows the result.
+ */
 function Errors({ app, guide, reports }: Figure) {
   const { grid: gridNow, tau: tauNow } = app.store.get().bindOptions;
   return (
@@ -214,7 +216,7 @@ function Errors({ app, guide, reports }: Figure) {
   );
 }
 
-/** Subdivision steps and a bone inside, through the page's own actions. */
+/** Choice of subdivision steps, and a button that adds a bone inside the cage. */
 function Smooth({ app }: Figure) {
   const { cage } = app.store.get();
   if (!cage) return null;

@@ -1,4 +1,4 @@
-/** Runs the tour: ten stops, each of which sets up the page. Leaving the tour restores the previous work and settings. */
+/** Runs the tour. Each stop changes the state of the page. Leaving the tour restores the previous work and settings. */
 
 import type { BindActions } from "../actions/bind";
 import type { Context } from "../actions/context";
@@ -14,13 +14,13 @@ import { loadStop, saveStop } from "../store";
 import { isOf, STOPS, type Stop, type StopName, stopsOf } from "./stops";
 
 export interface Guide {
-  /** Starts at the given stop, or where the tour was left. */
+  /** Starts at the given stop, or at the stop where the user left the tour. */
   start(stop?: number): Promise<void>;
-  /** Goes to a stop. Beyond the last one the tour ends. */
+  /** Goes to a stop. After the last stop, ends the tour. */
   go(stop: number): Promise<void>;
-  /** Runs other binds, replacing the measurements of this stop. */
+  /** Runs other binds, whose measurements replace those of this stop. */
   measure(binds: readonly Partial<BindOptions>[]): Promise<void>;
-  /** Runs one more bind to show its result; the measurements of this stop stay. */
+  /** Runs one more bind to show its result, and adds its measurements to those of this stop. */
   show(way: Partial<BindOptions>): Promise<void>;
   /** Ends the tour and restores the previous work and settings. */
   end(): Promise<void>;
@@ -44,16 +44,16 @@ interface Before {
   readonly scene: AppState["scene"];
   readonly work: AppState["works"][number] | undefined;
   readonly sample: string | null;
-  /** The fragment of the link that opened the page. */
+  /** The fragment of the address at the start of the tour, which may be a share link. */
   readonly link: string;
 }
 
 export function createGuide(ctx: Context, { bind, edit, view, files, works }: GuideNeeds): Guide {
   const { store } = ctx;
   let before: Before | undefined;
-  /** Incremented at each stop. Async work with an older value is dropped. */
+  /** Incremented whenever other binds or another stop start. Asynchronous work with an older value is ignored. */
   let turn = 0;
-  /** The unmodified sample that is open. */
+  /** The sample that the tour has opened, or that was open and unmodified at its start. */
   let opened: string | undefined;
   /** The sample that the tour is opening. */
   let opening: string | null = null;
@@ -86,7 +86,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     return isOpen;
   };
 
-  /** Undoes what the user did at the previous stop. */
+  /** Undoes what the user did at the previous stop, and sets a pose of the sample; undefined for the rest pose. */
   const rest = (pose: number | undefined) => {
     const { engine } = ctx.session();
     engine.revert();
@@ -140,11 +140,11 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
     if (stop.pose === undefined) return;
-    // The posed cage reaches elsewhere: frame it, not the rest pose.
+    // Frame the cage in this pose; `frameAll` frames its rest pose.
     engine.selectAll();
     engine.frameSelection();
     if (stop.compare) {
-      // Zoom out, so that the leftmost view is not behind the tools.
+      // Zoom out, so that the toolbar does not cover the leftmost of the views.
       const { width, height } = ctx.viewport();
       engine.zoomAt(width / stop.compare.length / 2, height / 2, 0.8);
     }
@@ -220,7 +220,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       if (!before || (sample !== null && sample === opening)) return;
       turn += 1;
       ctx.queue.cancel("bind");
-      // The tour's steps are not work to keep.
+      // What the user did on the tour cannot be undone after it, and is not saved.
       ctx.session().engine.clearHistory();
       store.set({ tour: null });
       putBack(before);

@@ -1,4 +1,4 @@
-/** Entry point of the tour's chunk. */
+/** Entry point of the tour, which is downloaded when it is first started. */
 
 import type { FunctionComponent } from "preact";
 import type { Context } from "../actions/context";

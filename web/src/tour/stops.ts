@@ -1,4 +1,4 @@
-/** The stops of the tour: sample, binds and view of each. Their sentences are in words/en/tour.ts. */
+/** The stops of the tour: sample, binds and view of each stop. Their sentences are in words/en/tour.ts. */
 
 import type { BindOptions, BindReport, Coordinates, SceneOptions } from "../contract";
 import { PAPER_DEFAULTS } from "../defaults";
@@ -23,7 +23,7 @@ export interface Stop {
   /** Index of the sample's pose; the rest pose if undefined. */
   readonly pose?: number;
   readonly step: StepName;
-  /** Options of the stop's binds, run in this order. The weights of the last bind remain in use. */
+  /** Options of the stop's binds, in the order in which they run. The view shows the weights of the last bind. */
   readonly binds: readonly Partial<BindOptions>[];
   readonly scene?: Partial<SceneOptions>;
   /** Index of the cage vertex that is selected. */
@@ -34,8 +34,9 @@ export interface Stop {
   readonly turn?: readonly [x: number, y: number];
 }
 
-/** Grids and thresholds of the error table. All its binds together take about a second. */
+/** Grids of the error table. All binds of the table take about a second together. */
 export const GRIDS = [16, 32] as const;
+/** Thresholds of the error table. */
 export const TAUS = [1e-3, 1e-4, 1e-5] as const;
 
 const paper = (grid: number, tau: number): Partial<BindOptions> => {
@@ -50,7 +51,7 @@ export const solvers = (grid: number): Partial<BindOptions>[] =>
   (["jacobi", "cg", "multigrid"] as const).map((solver) => ({ ...paper(grid, 1e-5), solver }));
 export const ofPaper = (grid: number, tau: number) => [paper(grid, tau)];
 
-/** `gpu`: whether binds can run on the graphics card. */
+/** Returns all stops. `gpu`: whether binds can run on the graphics card. */
 export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
   const rat = { sample: "rat", turn: [90, 30] } as const;
   return {
@@ -102,17 +103,18 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
   };
 }
 
-/** Choices of subdivision steps, and the bone along the clamp's lower jaw, object units. */
+/** Numbers of subdivision steps that stop "smooth" offers. */
 export const STEPS = [0, 1, 2] as const;
+/** Ends of the bone along the clamp's lower jaw, object units. */
 export const BONE = [
   [-0.15, -0.3, 0],
   [0.85, -0.3, 0],
 ] as const;
 
-/** Bind options in which the binds of a stop differ. */
+/** Bind options in which binds of the same stop may differ. */
 const WAY = ["grid", "tau", "method", "solver", "backend"] as const;
 
-/** Whether a report belongs to a bind with these options. Numbers are compared as f32, because Rust's tau has 24 bits. */
+/** Whether a report belongs to a bind with these options. Numbers are compared as f32, the type of tau in Rust. */
 export function isOf(report: BindReport, way: Partial<Pick<BindOptions, (typeof WAY)[number]>>): boolean {
   const bits = (value: string | number) => (typeof value === "number" ? Math.fround(value) : value);
   return WAY.every((key) => way[key] === undefined || bits(way[key]) === bits(report[key]));

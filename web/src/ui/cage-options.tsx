@@ -8,13 +8,14 @@ import { T } from "../words";
 import { Segments, Slider, Toggle } from "./controls";
 
 /**
- * Lowest position of the voxel slider. It stands for 0, with which the number of vertices determines the resolution.
+ * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
+ * resolution.
  */
 const COARSEST = SLIDERS.voxels.min;
 /** Gaps narrower than this many voxels are closed. */
 const GAP_VOXELS = 3;
 
-/** The slider of closeness is logarithmic: 0 is the coarsest, 1 the finest. */
+/** The slider for closeness is logarithmic in `detail`: 0 is the coarsest detail, 1 the finest. */
 const { min: FINEST_DETAIL, max: COARSEST_DETAIL } = SLIDERS.detail;
 const FINER = COARSEST_DETAIL / FINEST_DETAIL;
 const detailOf = (closeness: number) => COARSEST_DETAIL * FINER ** -closeness;

@@ -73,7 +73,7 @@ export function CagePanel({ app }: { app: App }) {
   );
 }
 
-/** Why a cage has fewer vertices than requested, and the option that would change it. */
+/** Sentence that says why a cage has fewer vertices than requested, and which option would change that. */
 function sparse({ vertices, detail }: CageOptions): string {
   const share = percent(detail, 1);
   return detail > 1.01 * SLIDERS.detail.min ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
@@ -171,7 +171,7 @@ export function sayMend(fix: Mend, count: number): string {
 
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
   const { fix } = problem;
-  // A finer grid is offered only while the chosen one is coarser.
+  // If the fix is a finer grid, the problem is solved once such a grid is chosen.
   const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return (
     <div class={`problem-card ${problem.severity}`}>

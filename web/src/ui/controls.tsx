@@ -5,7 +5,7 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { type Message, textOf } from "../strings";
 import { Icon, type IconName } from "./icons";
 
-/** A message, marked if it is in another language than the page. */
+/** A message. English text in a page of another language is marked for screen readers. */
 export function Say({ text, kind }: { text: Message; kind?: string }) {
   return (
     <p class={kind} lang={typeof text === "string" ? undefined : "en"}>
@@ -99,7 +99,7 @@ interface SegmentsProps<T extends string> {
   hideLabel?: boolean;
 }
 
-/** A choice of one of a few: radio buttons drawn as segments. */
+/** A choice of one of a few values: radio buttons drawn as segments of a bar. */
 export function Segments<T extends string>({ label, choices, value, onChange, hideLabel }: SegmentsProps<T>) {
   const name = useUid();
   return (
@@ -161,7 +161,7 @@ interface SliderProps {
   onInput: (value: number) => void;
   /** Called on release, after the last `onInput`. */
   onCommit?: (value: number) => void;
-  /** Text of the value, for the eye and for screen readers. */
+  /** Formats the value for the display and for screen readers. */
   format?: (value: number) => string;
   name?: string;
 }
@@ -211,7 +211,7 @@ interface NumberInputProps {
   step?: string;
 }
 
-/** Number field. Calls `onCommit` on Enter or when the field loses focus, and only with a valid number. */
+/** Number field. Calls `onCommit` when the user presses Enter or leaves the field, if the number is valid. */
 export function NumberInput({ id, name, value, onCommit, min, max, step = "any" }: NumberInputProps) {
   const input = useRef<HTMLInputElement>(null);
   useLayoutEffect(() => {

@@ -6,7 +6,7 @@ import { T } from "../words";
 import { Button } from "./controls";
 import { Dialog } from "./dialog";
 
-/** Shows the text of the report for reading and copying. */
+/** Shows the text of a crash report, so that the user can read and copy it. */
 export function showReport(crash: Crash): void {
   const place = document.createElement("div");
   document.body.append(place);
@@ -24,7 +24,7 @@ export function showReport(crash: Crash): void {
   );
 }
 
-/** Asks after a second crash, before anything is opened. The dialog cannot be closed: the page behind it is not usable. */
+/** Asks what to do after a second crash. The dialog cannot be closed, because the page behind it is not usable. */
 export function askAfterCrash(crash: Crash, startFresh: () => void): void {
   const place = document.createElement("div");
   document.body.append(place);

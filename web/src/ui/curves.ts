@@ -7,8 +7,8 @@ import { type Curve, historyPoints, KINDS } from "./plot";
 import { solverName } from "./report";
 
 /**
- * During a bind, only its curve. Otherwise the curve of the last bind, then the latest curve of each other solver, up
- * to `KINDS.length` curves.
+ * During a bind, returns only its curve. Otherwise returns the curve of the last bind, then the latest curve of each
+ * other solver, up to `KINDS.length` curves in all.
  */
 export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];

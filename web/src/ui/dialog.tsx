@@ -8,7 +8,7 @@ import { IconButton, useUid } from "./controls";
 interface DialogProps {
   title: string;
   isOpen: boolean;
-  /** Called after closing. Without it the dialog cannot be closed. */
+  /** Called after the dialog was closed. Without this function, the dialog cannot be closed. */
   onClose?: () => void;
   kind?: string;
   onKeyDown?: (event: KeyboardEvent) => void;

@@ -23,7 +23,7 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["project", "save"],
 ];
 
-/** Why a file cannot be exported yet, or null. */
+/** Says why a file cannot be exported yet; null if it can. */
 function missing(kind: ExportKind, state: AppState): string | null {
   const { bindFirst, cageFirst, poseFirst, modelFirst } = T.exports;
   if (kind === "picture") return state.model ? null : modelFirst;
@@ -78,7 +78,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
   );
 }
 
-/** Chooses one model or all of them. */
+/** List to choose which model to export, or all of them. */
 function Which({ app }: { app: App }) {
   const { model, exportOnly } = app.store.get();
   const members = model?.members ?? [];

@@ -125,7 +125,7 @@ const ICONS = {
 
 export type IconName = keyof typeof ICONS;
 
-/** An icon, hidden from screen readers: the button around it has the name. */
+/** An icon. It is hidden from screen readers, which read the name of the button around it. */
 export function Icon({ name }: { name: IconName }) {
   return (
     <svg viewBox="0 0 24 24" class="icon" aria-hidden="true">

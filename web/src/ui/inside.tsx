@@ -90,7 +90,7 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
 }
 
 function Radius({ app, cage }: { app: App; cage: CageState }) {
-  /** Value while the slider is dragged. It is committed, and the model bound again, on release. */
+  /** Value while the slider is dragged. On release it becomes the radius, and the model is bound again. */
   const [held, setHeld] = useState<number | null>(null);
   const { min, max } = cage.info.bounds;
   const longest = Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);

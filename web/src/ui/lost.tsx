@@ -7,7 +7,7 @@ import { T } from "../words";
 import { Button, Say } from "./controls";
 import { Icon } from "./icons";
 
-/** After two losses within this time, ms, the page asks before it tries again: the device may be broken. */
+/** Interval between two losses below which the page asks before it recovers again, ms: the device may be broken. */
 const AGAIN_MS = 10_000;
 
 interface Loss {

@@ -11,7 +11,7 @@ import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
 import { useTouch } from "./touch";
 
-/** Placeholders until a sample's picture is loaded. */
+/** Icons that are shown until the picture of a sample is loaded. */
 const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp: "bind" };
 
 export function ModelPanel({ app }: { app: App }) {

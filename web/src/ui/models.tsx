@@ -44,7 +44,7 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
   );
 }
 
-/** Explains the icons: touch screens show no tool tips. */
+/** Explains the icons of the buttons. On touch screens, tool tips appear only on a long press. */
 function Signs() {
   return (
     <p class="hint signs">
@@ -86,7 +86,7 @@ function Row({ app, member }: { app: App; member: MemberInfo }) {
   );
 }
 
-/** Vertex count and options that differ from the default. */
+/** Says how many vertices a model has, and which of its options differ from the default. */
 function about({ vertices, options, painted }: MemberInfo): string {
   const { shown, rigid, stays } = options;
   const isWhole = rigid.includes(ALL) || stays.includes(ALL);
@@ -102,7 +102,7 @@ function about({ vertices, options, painted }: MemberInfo): string {
     .join(" · ");
 }
 
-/** Two toggle buttons that exclude each other: "keeps its shape" and "stays as it is". */
+/** Two toggle buttons for a part, of which at most one is pressed: "keeps its shape" and "stays as it is". */
 function Ways(props: { app: App; member: MemberInfo; part: string; label: string; disabled?: boolean }) {
   const { app, member, part, label, disabled } = props;
   return WAYS.map(([how, icon]) => (
@@ -119,7 +119,7 @@ function Ways(props: { app: App; member: MemberInfo; part: string; label: string
   ));
 }
 
-/** The member's parts by name, and the brush. */
+/** Lists the parts of a model, and offers to paint which vertices stay. */
 function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo; isAlone?: boolean }) {
   const { rigid, stays } = member.options;
   const isWhole = rigid.includes(ALL) || stays.includes(ALL);

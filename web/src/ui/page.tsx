@@ -52,7 +52,7 @@ export function mount({ app, Toasts, Lost, byId }: Parts): void {
   attachTips();
 }
 
-/** The tour's card, while the tour is running. */
+/** The card of the tour; nothing while the tour is not running. */
 function Tour({ app }: { app: App }) {
   const { tour } = app.store.get();
   const loaded = app.tour.loaded();

@@ -16,7 +16,7 @@ import { PosePanel } from "./pose";
 interface Action {
   label: string;
   icon?: IconName;
-  /** Without accent colour, for secondary actions such as Cancel. */
+  /** Whether the button has no accent colour, as for Cancel. */
   plain?: true;
   run: () => void;
 }
@@ -65,13 +65,13 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
 
 const cancel = (run: () => void): Action => ({ label: T.cancel, icon: "stop", plain: true, run });
 
-/** Makes the cage of the panel's settings. */
+/** The action that makes a cage with the settings of the panel, or opens a cage file. */
 function makeAction({ cageSource }: AppState, app: App): Action {
   if (cageSource === "file") return { label: T.cage.load, icon: "file", run: app.chooseCage };
   return { label: T.cage.make, run: () => void app.cage.make() };
 }
 
-/** What the cage still needs before it can be bound; undefined when it is ready. */
+/** The action that is needed before the model can be bound to the cage; undefined if none is. */
 function cageAction(state: AppState, app: App): Action | undefined {
   if (state.cageProgress !== null) return cancel(app.cage.cancel);
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
@@ -128,7 +128,7 @@ function Foot({ app }: { app: App }) {
   );
 }
 
-/** Heights at which the sheet snaps, as fractions of the window. */
+/** Heights to which the bottom sheet snaps, as fractions of the window. */
 const RESTS = [0.12, 0.42, 0.78] as const;
 
 function attachSheet(panel: HTMLElement, handle: HTMLElement): void {

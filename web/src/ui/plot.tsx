@@ -6,7 +6,7 @@ import { T } from "../words";
 export interface Curve {
   name: string;
   points: readonly (readonly [iteration: number, delta: number])[];
-  /** Class that sets the colour. */
+  /** Class that determines the colour. */
   kind: (typeof KINDS)[number];
 }
 
@@ -14,8 +14,8 @@ export interface Curve {
 export const KINDS = ["now", "before", "earlier"] as const;
 
 /**
- * If one curve has this many times the iterations of another, the horizontal axis is logarithmic. On a linear axis the short
- * curve would be a vertical line.
+ * If the longest curve has more than this many times the iterations of the shortest, the horizontal axis is
+ * logarithmic. On a linear axis the short curve would look like a vertical line.
  */
 const FAR_APART = 20;
 
@@ -37,7 +37,7 @@ export interface Scale {
   logarithmic: boolean;
 }
 
-/** Range of both axes: powers of ten that enclose all points and the threshold, and the last iteration. */
+/** Ranges of both axes: powers of ten that enclose all deltas and the threshold, and the last iteration. */
 export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   const deltas = curves
     .flatMap((curve) => curve.points.map(([, delta]) => delta))
@@ -55,12 +55,12 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   };
 }
 
-/** A point in the drawing. */
+/** A point of the drawing, in its units. */
 export type Place = readonly [x: number, y: number];
 
 /**
- * Start of the baseline of the threshold's label, below or above its line at height `at`: the first place that no curve crosses.
- * Curves fall from the left.
+ * Position of the label of the threshold, the left end of its baseline. Tries positions below and above the threshold's
+ * line, which is at height `at`, and returns the first that no curve crosses.
  */
 export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
   const right = WIDTH - RIGHT - 4 - width;
@@ -75,7 +75,7 @@ export function placeLabel(lines: readonly (readonly Place[])[], at: number, wid
   return places.find(isFree) ?? places[0] ?? { x: LEFT + 4, y: at - 4 };
 }
 
-/** Heights of a line at its corners between two places, and at these places. */
+/** Heights of a polyline between two horizontal positions: at its corners and at both positions. */
 function heightsBetween(line: readonly Place[], from: number, to: number): number[] {
   const heights = line.filter(([x]) => x >= from && x <= to).map(([, y]) => y);
   for (const at of [from, to]) {
@@ -168,7 +168,7 @@ function Label({
   );
 }
 
-/** Points of a report's history; consecutive entries are `interval` iterations apart. */
+/** Points of the curve of a report. Consecutive entries of `history` are `interval` iterations apart. */
 export function historyPoints(history: readonly number[], interval: number): Curve["points"] {
   return history
     .map((delta, index) => [(index + 1) * Math.max(1, interval), delta] as const)

@@ -6,10 +6,12 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import { Badge, Facts, Fold, Say } from "./controls";
 
-/** A largest rest error below this fraction of the cage's diagonal is invisible: a tenth of a pixel on a 4K screen. */
+/**
+ * Rest error that is invisible, as a fraction of the cage's diagonal: a tenth of a pixel on a screen 4,000 pixels wide.
+ */
 const INVISIBLE = 2.5e-5;
 
-/** The verdict as one sentence. */
+/** Says in one sentence whether the solver converged and how exactly the weights restore the model. */
 export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
   const { stopped, invisible, off } = T.report.verdicts;
   if (!report.converged) return stopped;
@@ -102,7 +104,7 @@ export function density(report: BindReport): number {
   return all === 0 ? 0 : report.weights.nonzeros / all;
 }
 
-/** Table of the binds of this cage. */
+/** Table that compares binds of the same cage. */
 export function CompareTable({ reports }: { reports: readonly BindReport[] }) {
   return (
     <table class="compare">

@@ -101,7 +101,7 @@ function Colours({ app }: { app: App }) {
   );
 }
 
-/** Chooses the coordinates to compare: none, any two, or all three. */
+/** Check boxes that choose which coordinates are shown side by side. */
 export function Comparison({ app }: { app: App }) {
   const { compare } = app.store.get().scene;
   const without = (kind: Coordinates) => compare.filter((other) => other !== kind);
@@ -116,7 +116,7 @@ export function Comparison({ app }: { app: App }) {
             <input
               type="checkbox"
               checked={compare.includes(kind)}
-              // Do not leave a single kind other than harmonic: the view would have nothing to pull.
+              // Do not allow a single kind other than harmonic, because gestures act on the harmonic shape.
               disabled={
                 compare.includes(kind) && String(without(kind)) !== "harmonic" && !isComparison(without(kind))
               }

@@ -71,7 +71,7 @@ function isPlain(cage: CageState | null): boolean {
   return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
 }
 
-/** Button that ends placing or painting, for touch screens without Enter and Escape. */
+/** Button that ends adding controls or painting, for touch screens, which have no Enter and Escape. */
 function Placing({ app }: { app: App }) {
   const { placing, painting } = app.store.get();
   const label = placing === "line" || painting ? T.view.done : T.view.cancel;
@@ -200,7 +200,7 @@ function BottomLine({ app }: { app: App }) {
         aria-live="polite"
         data-settled={underWay(state) === null ? "" : undefined}
       >
-        {/* Keyed by its text: each new status is a new element and restarts the fade-out. */}
+        {/* The text is the key, so that each new status is a new element, which restarts its fade-out. */}
         {text !== "" && <span key={text}>{text}</span>}
       </p>
       <p class="hint-line" hidden={isQuiet}>
@@ -210,7 +210,7 @@ function BottomLine({ app }: { app: App }) {
   );
 }
 
-/** Progress while a file is opened, with Cancel or, before a long freeze, "Open anyway". */
+/** Progress of opening a file, with a button to cancel. Before a long freeze, also asks whether to go on. */
 function Busy({ app }: { app: App }) {
   const { busy, busyStep, cancelBusy, goOn } = app.store.get();
   return (

@@ -4,7 +4,7 @@ import { cageBroken } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 
-/** The status line. Progress in percent is shown by the panel and the window title instead. */
+/** The status line. It contains no percentages, because the panel and the window's title show them. */
 export function statusOf(state: AppState): string {
   return underWay(state) ?? settled(state);
 }
@@ -34,7 +34,7 @@ function settled(state: AppState): string {
   return state.model ? T.status.notBound : "";
 }
 
-/** Hint next to the status. */
+/** The hint beside the status line. */
 export function hintOf(state: AppState, isTouch: boolean): string {
   const { cage, bound, bindRun, editingRest, clip, placing, painting, scene } = state;
   if (placing) return T.hints.placing;

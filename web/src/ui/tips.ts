@@ -1,8 +1,8 @@
-/** Tool tips of elements with `data-tip`: after hovering, on keyboard focus, and on a long press. */
+/** Tool tips of elements with `data-tip`. They appear on hovering, on keyboard focus, and on a long press. */
 
 /** Hover time before a tip appears, ms. */
 const REST_MS = 500;
-/** Time a tip stays after the finger is lifted, ms. */
+/** Time for which a tip stays after the finger is lifted, ms. */
 const READ_MS = 2500;
 /** Distance of a tip to its element and to the window's edge, CSS pixels. */
 const GAP = 6;
@@ -12,7 +12,7 @@ interface Size {
   readonly height: number;
 }
 
-/** Corner of a tip: below its element, or above where there is no room; beside an element of a column. */
+/** Upper left corner of a tip: below its element, or above if there is no room, or beside an element in a column. */
 export function placeTip(box: DOMRectReadOnly, tip: Size, isInColumn: boolean, window: Size) {
   const inside = (at: number, size: number, limit: number) => Math.min(Math.max(GAP, at), limit - size - GAP);
   if (isInColumn) {

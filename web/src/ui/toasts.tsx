@@ -1,6 +1,6 @@
 /**
- * Messages. Short ones disappear after a few seconds; problems stay until they are closed or fixed. Screen readers announce
- * both.
+ * Messages. Short ones disappear after a few seconds; problems stay until they are closed or fixed. Screen readers
+ * announce both.
  */
 
 import { signal } from "@preact/signals";
@@ -11,10 +11,11 @@ import { T } from "../words";
 import { Button, IconButton, Say } from "./controls";
 import { Icon } from "./icons";
 
-/** Time a message is shown, ms; longer if it has a button. */
+/** Time for which a message is shown, ms. */
 const SHOWN_MS = 5000;
+/** Time for which a message with a button is shown, ms. */
 const SHOWN_WITH_BUTTON_MS = 12_000;
-/** Limit of visible messages, so that they do not hide the model. */
+/** Maximum number of visible messages of a kind, so that they do not hide the model. */
 const MOST = 3;
 
 interface Toast {
@@ -22,7 +23,7 @@ interface Toast {
   readonly title?: string;
   readonly text: Message;
   readonly fixes: readonly Fix[];
-  /** Whether the message stays until it is closed. */
+  /** Whether the message stays until the user closes it. */
   readonly stays?: boolean;
 }
 
@@ -39,7 +40,7 @@ export function createToasts(): ToastParts {
   const said = signal<readonly Toast[]>([]);
   const problems = signal<readonly Toast[]>([]);
 
-  /** A repeated message replaces the earlier one. */
+  /** Adds a message. If the same message is already shown, replaces it. */
   const add = (list: typeof said, toast: Omit<Toast, "id">) => {
     const isSame = ({ title, text }: Toast) => title === toast.title && textOf(text) === textOf(toast.text);
     const others = list.value.filter((other) => !isSame(other));

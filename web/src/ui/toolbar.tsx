@@ -1,4 +1,6 @@
-/** Toolbars, after the toolbar pattern of WAI-ARIA: one tab stop; arrow keys, Home and End move the focus. */
+/**
+ * Toolbar, by the toolbar pattern of WAI-ARIA: it is one tab stop, and arrow keys, Home and End move the focus in it.
+ */
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
@@ -33,7 +35,7 @@ export function Toolbar({ label, kind, children }: ToolbarProps) {
   useLayoutEffect(() => {
     const { current } = element;
     if (!current) return;
-    // The style sheet makes it a row or a column.
+    // The style sheet determines whether the toolbar is a row or a column.
     const observer = new ResizeObserver(() => setColumn(current.clientHeight > current.clientWidth));
     observer.observe(current);
     return () => observer.disconnect();

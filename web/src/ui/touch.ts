@@ -1,6 +1,6 @@
 import { useLayoutEffect, useState } from "preact/hooks";
 
-/** Whether the main pointer is a finger. It can change while the page is open. */
+/** Whether the main pointer is a finger. Updates the component when this changes. */
 export function useTouch(): boolean {
   const [query] = useState(() => matchMedia("(pointer: coarse)"));
   const [isTouch, setTouch] = useState(query.matches);

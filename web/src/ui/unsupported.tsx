@@ -1,4 +1,4 @@
-/** Browsers without WebGPU: the reason, the steps that switch it on, and a notice that is shown once. */
+/** For browsers without WebGPU: the reason, the steps that switch it on, and a notice. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
@@ -12,7 +12,7 @@ import { Icon, Mark } from "./icons";
 export type Browser = "chrome" | "edge" | "firefox" | "safari" | "other";
 export type System = "windows" | "mac" | "linux" | "android" | "ios" | "other";
 
-/** Browser and system named by a user agent. Only used to choose which steps are shown first. */
+/** Browser and system that a user agent names. They determine only which steps are shown first. */
 export function recognise(agent: string): { browser: Browser; system: System } {
   const systems: [System, RegExp][] = [
     ["android", /android/i],
@@ -35,7 +35,7 @@ export function recognise(agent: string): { browser: Browser; system: System } {
 
 type Way = keyof typeof T.without.ways;
 
-/** The steps for a browser; undefined for an unknown one. */
+/** Key of the steps for a browser; undefined for an unknown browser. */
 function wayOf({ browser, system }: ReturnType<typeof recognise>): Way | undefined {
   if (browser === "other") return undefined;
   if (system === "linux" && browser === "chrome") return "chromeLinux";
@@ -58,7 +58,7 @@ function Steps({ way }: { way: Way }) {
   );
 }
 
-/** The steps for this browser, with those for others collapsed. */
+/** The steps for this browser, then those for other browsers, collapsed. */
 function Ways() {
   const mine = wayOf(recognise(navigator.userAgent));
   const all = Object.keys(T.without.ways) as Way[];
@@ -82,7 +82,7 @@ function Ways() {
   );
 }
 
-/** How to switch WebGPU on, for pages that draw with WebGL2. */
+/** Dialog that says how to switch WebGPU on. Offered while the page draws with WebGL2. */
 export function WaysDialog({ app }: { app: App }) {
   const { lack, waysOpen } = app.store.get();
   return (
@@ -103,7 +103,7 @@ export function WaysDialog({ app }: { app: App }) {
 
 const NOTICE = "without-webgpu";
 
-/** Notice about WebGL2. Not shown again after it was closed in this browser. */
+/** Notice that the page draws with WebGL2. Once it was closed, it is not shown again in this browser. */
 export function Notice({ app }: { app: App }) {
   const [isClosed, setClosed] = useState(() => hasSeen(NOTICE));
   const { lack } = app.store.get();
@@ -126,7 +126,7 @@ export function Notice({ app }: { app: App }) {
   );
 }
 
-/** Replaces the page if WebGL2 is missing too. */
+/** Shown instead of the page if WebGL2 is missing, too. */
 export function Unsupported({ lack }: { lack: Lack }) {
   return (
     <main class="unsupported">

@@ -6,13 +6,13 @@ export interface Stage {
   /** Receives pointer and keyboard events; contains the canvas. */
   readonly viewport: HTMLElement;
   readonly canvas: () => HTMLCanvasElement;
-  /** Replaces the canvas after its device was lost. */
+  /** Replaces the canvas by a new one, which is needed for another GPU device. */
   freshCanvas(): HTMLCanvasElement;
   /** Shows the rubber band of a box selection; null hides it. */
   band(box: { x: number; y: number; width: number; height: number } | null): void;
 }
 
-/** Creates the view. Called before the session opens, which needs the canvas. */
+/** Creates the view. Call this before opening the session, which needs the canvas. */
 export function createStage(element: HTMLElement): Stage {
   const make = () => {
     const made = document.createElement("canvas");

@@ -1,4 +1,4 @@
-/** List of the work kept in this browser. */
+/** List of the work saved in this browser. */
 
 import { useEffect, useState } from "preact/hooks";
 import type { App } from "../app";
@@ -20,7 +20,7 @@ export function WorksList({ app }: { app: App }) {
     if (!worksOpen) return;
     const refresh = () => void app.works.refresh();
     refresh();
-    // Another tab may have opened, closed or deleted some of it.
+    // While the window had no focus, another tab may have opened, closed or deleted work.
     window.addEventListener("focus", refresh);
     return () => window.removeEventListener("focus", refresh);
   }, [worksOpen]);
@@ -70,7 +70,7 @@ function Row({ work, open, remove }: { work: Work; open: () => void; remove: () 
   );
 }
 
-/** Deleting cannot be undone, so it takes two clicks. */
+/** Button that deletes work. It needs two clicks, because deleting cannot be undone. */
 function Delete({ name, remove }: { name: string; remove: () => void }) {
   const [isSure, setSure] = useState(false);
   const label = isSure ? T.works.reallyDelete : T.works.delete;

@@ -1,9 +1,9 @@
-/** The language of the page. To add one: a folder like en/, and a line in `LANGUAGES`. */
+/** The language of the page. To add a language, translate the folder en/ and add a line to `LANGUAGES`. */
 
 import { setLocale } from "../format";
 import { EN } from "./en";
 
-/** What each language defines. */
+/** The locale and sentences of a language. */
 export type Language = typeof EN;
 
 const LANGUAGES = new Map<string, () => Promise<Language>>([
@@ -22,7 +22,7 @@ export async function chooseLanguage(): Promise<void> {
   const asked = new URLSearchParams(location.search).get("lang") ?? "";
   const preferred = navigator.languages.map((tag) => tag.replace(/-.*/, ""));
   const name = [asked, ...preferred].find((name) => LANGUAGES.has(name));
-  // Offline, a language may not be there.
+  // Without a connection, a language that was never downloaded is missing: use English.
   language = (await LANGUAGES.get(name ?? "en")?.().catch(() => undefined)) ?? EN;
   T = language.words;
   setLocale(language.locale);

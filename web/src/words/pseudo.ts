@@ -1,4 +1,7 @@
-/** A language for tests, made from the English one: accented letters, 40 % longer. Text that stays plain is not in the catalogue. */
+/**
+ * A language for tests, made from the English sentences: letters are accented and words 40 % longer. Text that the page
+ * shows without accents does not come from words/.
+ */
 
 import type { Language } from ".";
 import { EN } from "./en";
@@ -19,7 +22,10 @@ function accent(text: string): string {
   });
 }
 
-/** Calls a sentence with a sign of the private use area for each string, and puts the strings in place afterwards. */
+/**
+ * Accents the result of a sentence function, but not the strings that it inserts. The function is called with a
+ * character of the private use area in place of each string; these characters are replaced afterwards.
+ */
 function accentResult(sentence: (...values: unknown[]) => unknown, values: unknown[]): unknown {
   const kept: string[] = [];
   const hide = (value: unknown): unknown => {
@@ -32,7 +38,7 @@ function accentResult(sentence: (...values: unknown[]) => unknown, values: unkno
   return accent(result).replace(/[\ue000-\uf8ff]/g, (sign) => kept[sign.charCodeAt(0) - 0xe000] ?? "");
 }
 
-/** The same catalogue with accented sentences. */
+/** Copies a catalogue of sentences, with accents. */
 export function pseudo<T>(words: T): T {
   const change = (value: unknown): unknown => {
     if (typeof value === "string") return accent(value);
@@ -45,7 +51,7 @@ export function pseudo<T>(words: T): T {
 }
 
 export const PSEUDO: Language = {
-  // Greek numbers, units and lists look unlike English ones.
+  // Greek, because its numbers, units and lists differ from English ones.
   locale: "el",
   words: pseudo(EN.words),
   tourWords: async () => pseudo(await EN.tourWords()),
