@@ -1,26 +1,26 @@
-//! Statistics of a document.
+//! Numbers of elements in a document: scenes, nodes, meshes and so on.
 
 /// Numbers of elements in a document. OBJ: `o` and `g` lines count as nodes, `usemtl` names as materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Scenes.
+    /// Number of scenes.
     pub scenes: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Meshes.
+    /// Number of meshes.
     pub meshes: usize,
-    /// Triangle primitives in use, once per node that shows their mesh.
+    /// Number of triangle primitives in use. A primitive counts once for each node that shows its mesh.
     pub primitives: usize,
-    /// Materials.
+    /// Number of materials.
     pub materials: usize,
-    /// Textures of a glTF; 0 for other formats.
+    /// Number of textures of a glTF; 0 for other formats.
     pub textures: usize,
-    /// Skins.
+    /// Number of skins.
     pub skins: usize,
-    /// Joints of all skins. Shared joints count once.
+    /// Number of joints of all skins. A joint of several skins counts once.
     pub joints: usize,
-    /// Animations.
+    /// Number of animations.
     pub animations: usize,
-    /// Morph targets of all meshes.
+    /// Number of morph targets of all meshes.
     pub morph_targets: usize,
 }

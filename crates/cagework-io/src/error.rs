@@ -22,22 +22,22 @@ pub enum WriteError {
         /// Vertex index.
         vertex: usize,
     },
-    /// GLB export of a model without triangles.
+    /// The model has no triangles, which a GLB export needs.
     #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
     NoFaces,
     /// The operation needs a rig, but the model is not a glTF.
     #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,
-    /// Clip index out of range.
+    /// No clip has this index.
     #[error("the model has no clip {0}: clips count from 0")]
     NoClip(usize),
     /// The export exceeds the GLB limit of 4 GiB.
     #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: export an OBJ instead")]
     TooLarge {
-        /// Size of the export.
+        /// Size that the export would have.
         bytes: u64,
     },
-    /// The original document cannot be patched.
+    /// The original document cannot be patched, for the reason given.
     #[error("the original document cannot be patched: {0}")]
     Document(String),
 }
@@ -45,7 +45,7 @@ pub enum WriteError {
 /// Error of reading a model as a pose of a cage.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PoseError {
-    /// The number of vertices differs.
+    /// The pose and the cage have different numbers of vertices.
     #[error(
         "pose {} has {given} vertices, but cage {} has {expected}: a pose keeps the cage's vertices and their order",
         shown(pose),

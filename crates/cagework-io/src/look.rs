@@ -8,7 +8,7 @@ use std::ops::Range;
 /// A model's triangles for drawing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
-    /// Corners of the triangles. `[n_corners]`
+    /// Vertices for drawing, which the corners of triangles refer to. `[n_corners]`
     pub vertices: Vec<LookVertex>,
     /// Duplicates of OBJ vertices at hard edges. Each entry is the model vertex whose position the duplicate takes.
     /// Duplicate `k` has index `n_vertices + k`. Empty for glTF, which stores split vertices.

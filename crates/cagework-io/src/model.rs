@@ -71,14 +71,14 @@ pub enum ReadError {
 /// A model read from bytes.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Name given by the caller.
+    /// Name that the caller gave the model.
     pub name: String,
     /// Positions in world space, Y up, relative to [`Self::origin`]. In file order (see the crate
     /// documentation), not welded. `[n_vertices]`
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise from outside; polygons are triangulated. `[n_triangles, 3]`
     pub triangles: Vec<[u32; 3]>,
-    /// Numbers of nodes, meshes, materials and so on.
+    /// Numbers of nodes, meshes, materials and other elements of the file.
     pub counts: Counts,
     /// Warnings for the user, one sentence each.
     pub notices: Vec<String>,
@@ -88,7 +88,7 @@ pub struct Model {
     pub(crate) origin: DVec3,
     bytes: u64,
     format: ModelFormat,
-    /// PLY, STL and OFF: number encoding, and whether vertices have normals.
+    /// Of PLY, STL and OFF files: the encoding of numbers, and whether vertices have normals.
     encoding: Encoding,
     has_normals: bool,
     pub(crate) document: Document,
@@ -121,7 +121,8 @@ impl Model {
             .map_or(Vec::new(), |format| (format.facts().named_files)(bytes, resolve, memory_limit))
     }
 
-    /// Reads a file of any [`ModelFormat`], detected from the content; `name` is used in messages. Models far from the world origin are stored relative to [`Self::origin`], without loss.
+    /// Reads a file of any [`ModelFormat`], detected from the content; `name` is used in messages. Models far from the
+    /// world origin are stored relative to [`Self::origin`], without loss.
     ///
     /// `resolve` is called once for each external file (buffers and textures of a `.gltf`, materials and textures of an
     /// OBJ) with its relative path; `data:` URIs are decoded here. A missing buffer is an error, other missing files
@@ -239,7 +240,7 @@ impl Model {
         }
     }
 
-    /// Format of the file.
+    /// Format of the file that the model was read from.
     #[must_use]
     pub fn format(&self) -> ModelFormat {
         self.format

@@ -10,7 +10,7 @@
 use cagework_core::mesh::weld;
 use glam::{DVec3, Quat, Vec3};
 
-/// Cosine of 2.5 degrees. Normals with a smaller angle between them differ only by rounding or 8-bit quantisation.
+/// Cosine of 2.5 degrees. Normals at a smaller angle differ only by rounding or by 8-bit quantisation.
 const MIN_SAME_NORMAL_COS: f32 = 0.999;
 /// Limit on normals compared per position. Without it, n vertices at one point cost O(n²).
 const MAX_CLUSTERS_AT_ONE_PLACE: usize = 64;
@@ -27,7 +27,7 @@ pub(crate) struct Shading {
 }
 
 impl Shading {
-    /// Surface of each shading vertex, numbered from 0.
+    /// For each shading vertex, the number of its smooth surface, from 0.
     pub(crate) fn clusters(&self) -> &[u32] {
         &self.cluster
     }
@@ -76,7 +76,7 @@ impl Shading {
         shading
     }
 
-    /// Rotation of each shading vertex's surface normal from rest to `positions`.
+    /// For each shading vertex, the rotation of the normal of its surface from rest to `positions`.
     pub(crate) fn rotations(&self, positions: &[Vec3]) -> Vec<Quat> {
         let now = self.area_weighted(positions, self.rest.len());
         let turns: Vec<Quat> = self
@@ -91,7 +91,7 @@ impl Shading {
         self.cluster.iter().map(|&c| turns[c as usize]).collect()
     }
 
-    /// Rotated unit normals.
+    /// Unit normals of the shading vertices, rotated by `rotations`.
     pub(crate) fn normals(&self, rotations: &[Quat]) -> Vec<Vec3> {
         rotations.iter().zip(&self.normal).map(|(&q, &n)| (q * n).normalize_or(n)).collect()
     }

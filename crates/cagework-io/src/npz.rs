@@ -38,7 +38,7 @@ pub enum NpzError {
         "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
     )]
     Missing(&'static str),
-    /// Offsets in the obsolete layout with `outside_corners`.
+    /// The file has offsets in the obsolete layout with `outside_corners`.
     #[error("the file was written by an earlier version with another layout of offsets: bind again")]
     Old,
     /// An array has a wrong type, shape or value.
@@ -68,9 +68,9 @@ impl From<ZipError> for NpzError {
 pub struct SavedWeights {
     /// One row per model vertex, then one per extra point.
     pub weights: Weights,
-    /// Meaning of the columns after those of the controls.
+    /// Meaning of the columns that follow those of the controls.
     pub frames: Frames,
-    /// Points outside the cage, by row.
+    /// Points outside the cage, by row of the weights.
     pub outside: Vec<OutsideVertex>,
     /// Rig points that were bound with the model, object units.
     pub extra_points: Vec<Vec3>,
@@ -157,7 +157,7 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
 pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     let lattice = &field.lattice;
     let [nx, ny, nz] = lattice.dims.to_array().map(|n| n as usize);
-    // z is the fastest axis of the arrays, x that of the field.
+    // z is the fastest axis of the arrays, but x is the fastest axis of the field.
     let nodes =
         || (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| x + nx * (y + ny * z))));
     let mut zip = NpzWriter::new(13 * 4 * field.values.len(), 9 * 4 * field.values.len());

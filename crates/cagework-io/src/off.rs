@@ -14,7 +14,7 @@ pub(crate) fn is_off(bytes: &[u8]) -> bool {
     word.is_some_and(|word| prefix(&bytes[word]).is_some())
 }
 
-/// Prefix letters before `OFF`.
+/// Letters before `OFF` in the keyword of a header.
 fn prefix(word: &[u8]) -> Option<&[u8]> {
     word.strip_suffix(b"OFF").filter(|letters| letters.iter().all(|b| b"STCN4n".contains(b)))
 }
@@ -37,7 +37,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
                 return Err(fault(line.number, "only three-dimensional vertices are supported"));
             }
             (has_colors, has_normals) = (letters.contains(&b'C'), letters.contains(&b'N'));
-            // The counts may be on the same line.
+            // The counts may follow on the line of the keyword.
             header = words.peek().is_some().then(|| (line, words.collect::<Vec<_>>()));
         }
     }
@@ -52,7 +52,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         return Err(fault(line.number, "it is a binary OFF file: save it as text"));
     }
     let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.into_iter())?;
-    // Each vertex and face takes a line of at least two bytes.
+    // A vertex or face takes at least two bytes, since each has a line.
     for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
         if count > n_bytes / 2 {
             return Err(PolygonsError::Count { name: name.into(), count, bytes: n_bytes });
@@ -74,7 +74,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         if has_colors {
             read.colors.push(numbers(bytes, &line, words.by_ref())?);
         }
-        // The fourth colour channel, opacity, is ignored.
+        // The fourth colour channel is the opacity, which is ignored.
         odd_words += words.skip(usize::from(has_colors)).count();
     }
     read.place(&positions, near);

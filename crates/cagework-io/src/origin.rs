@@ -8,10 +8,10 @@ use std::fmt;
 use cagework_core::Bounds;
 use glam::{DVec3, Vec3};
 
-/// Limit on |coordinate| / extent. Beyond it, rounding to f32 (2⁻²⁴ relative) exceeds 1e-6 of the extent.
+/// Limit on |coordinate| / extent. Beyond it, rounding to f32 (2⁻²⁴ of the coordinate) exceeds 1e-6 of the extent.
 const MAX_COORDINATE_TO_EXTENT: f32 = 16.0;
 
-/// An origin near the model, object units, exact in f32. Zero along each axis on which the model is near enough.
+/// An origin near the model, object units, exact in f32. It is zero along each axis on which no coordinate is too far.
 #[must_use]
 pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
@@ -22,7 +22,7 @@ pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     Vec3::from_array(center.to_array().map(of_axis)).as_dvec3()
 }
 
-/// The origin as a node translation in f32, and the remainder.
+/// The origin as the f32 translation of a node, and the remainder.
 pub(crate) fn translation(origin: DVec3) -> ([f32; 3], DVec3) {
     let narrow = origin.as_vec3();
     (narrow.to_array(), origin - narrow.as_dvec3())
@@ -33,10 +33,10 @@ pub(crate) fn relative(position: DVec3, origin: DVec3) -> Vec3 {
     (position - origin).as_vec3()
 }
 
-/// Limit on the step between f32 coordinates, as a fraction of the model's extent. Above it, the user gets a notice.
+/// Largest step between f32 coordinates without a notice, as a fraction of the model's extent.
 const MAX_STEP_TO_EXTENT: f32 = 1e-5;
 
-/// Notice that positions lose precision in f32, if they do.
+/// Notice that positions lose precision in f32; `None` if they do not.
 pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
     let extent = Bounds::of(positions)?.extent().max_element();
     let far = origin_near(positions).abs().max_element() as f32;
@@ -48,7 +48,7 @@ pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
     })
 }
 
-/// Text of a coordinate: f32 near the world origin, f64 otherwise.
+/// Text of a coordinate, with the digits of f32 near the world's origin and of f64 far from it.
 pub(crate) struct Coordinate {
     origin: f64,
     from_origin: f32,

@@ -1,4 +1,4 @@
-//! PLY reader and writer: vertices with colours, and polygons.
+//! Reads and writes PLY files: vertices with colours, and polygons.
 
 use glam::{DVec3, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -12,7 +12,7 @@ use crate::ply_text::{fault_of, readable, stray_line};
 use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, color_bytes};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Vertex properties that are read.
+// Names of the vertex properties that are read.
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOR: [&str; 3] = ["red", "green", "blue"];
@@ -21,14 +21,14 @@ const NO_VERTEX: u32 = u32::MAX;
 /// Names of the property that lists the vertices of a face. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// An element of any kind, with the supported properties.
+/// An element of a file. Properties that its kind does not have are empty.
 #[derive(Default)]
 struct Element {
     place: [f64; 3],
     normal: [f32; 3],
     color: [u8; 3],
     corners: Vec<u32>,
-    /// First corner that is not a valid index, as written.
+    /// The first corner that is not a valid index, as written.
     odd: Option<f64>,
 }
 
@@ -80,7 +80,7 @@ fn place(property: &Property) -> Option<f64> {
     }
 }
 
-/// Corners from a list of any numeric type, with [`NO_VERTEX`] for invalid indices, and the first invalid one.
+/// Reads corners from a list of any numeric type. Invalid indices become [`NO_VERTEX`]; also returns the first one.
 fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     let of = |numbers: &mut dyn Iterator<Item = f64>| {
         let whole = |x: f64| x >= 0.0 && x < f64::from(NO_VERTEX) && x.fract() == 0.0;
@@ -118,7 +118,7 @@ fn unstrip(strips: &[Element]) -> Vec<Element> {
         let [a, b, c] = [of[0], of[1 + k % 2], of[2 - k % 2]];
         Element { corners: vec![a, b, c], ..Element::default() }
     });
-    // Strips are joined by triangles with a repeated corner.
+    // Triangles with a repeated corner only join the parts of a strip.
     triangles
         .filter(|t| {
             t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2] && t.corners[2] != t.corners[0]

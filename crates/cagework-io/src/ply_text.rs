@@ -10,7 +10,7 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 /// Replacement for non-finite numbers of text files. The parser reads it as infinity.
 const INFINITY_TEXT: &[u8] = b"1e999";
 
-/// Keywords of header lines.
+/// Words that start the lines of a header.
 const STATEMENTS: [&[u8]; 7] =
     [b"ply", b"format", b"comment", b"obj_info", b"element", b"property", b"end_header"];
 
@@ -77,7 +77,7 @@ pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
 /// The file in the form that the parser accepts. Borrows if nothing has to change.
 pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    // Use the line end of the first line.
+    // The first line shows which line end the file uses.
     let is_old = bytes
         .iter()
         .position(|b| b"\r\n".contains(b))
@@ -120,7 +120,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
             out.extend(before.join(&b' '));
             out.push(b' ');
             out.extend(name.iter().map(|b| if is_plain(b) { *b } else { b'_' }));
-            // The line number keeps sanitised names distinct.
+            // The line number keeps names distinct whose odd characters were replaced.
             out.extend(format!("-{number}").into_bytes());
         } else {
             out.extend(line.iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
@@ -153,7 +153,7 @@ fn is_readable(line: &[u8]) -> bool {
     words(line).next().is_some() && words(line).all(is_number)
 }
 
-/// Appends a number in the parser's grammar.
+/// Appends a number in the form that the parser accepts.
 fn tidy(word: &[u8], out: &mut Vec<u8>) {
     let lower = word.to_ascii_lowercase();
     if lower.windows(3).any(|part| part == b"nan" || part == b"inf") {

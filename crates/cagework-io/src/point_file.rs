@@ -1,4 +1,4 @@
-//! Files of points: text with one point per line, and NumPy arrays.
+//! Files of points: text with one point per line, or a NumPy array.
 
 use std::ops::Range;
 
@@ -57,7 +57,7 @@ pub struct PointFile {
 enum Source {
     /// A text, with the byte ranges of the three numbers of each point.
     Text { text: String, places: Vec<[Range<usize>; 3]> },
-    /// A NumPy array. `is_wide`: whether its values have 64 bits.
+    /// A NumPy array. `is_wide`: whether its numbers have 64 bits.
     Array { is_wide: bool },
 }
 
@@ -69,15 +69,15 @@ impl PointFile {
         matches!(ending.as_deref(), Some("csv" | "txt" | "xyz" | "npy"))
     }
 
-    /// Reads a NumPy array `[n, 3]` of 32- or 64-bit floats, or a text file with one point per line. Numbers are separated
-    /// by commas, semicolons or blanks. x, y and z are the first three, or the columns with these names in a header.
-    /// Lines before the first point, lines that begin with `#` and empty lines are kept.
+    /// Reads a NumPy array `[n, 3]` of 32- or 64-bit floats, or a text file with one point per line. Numbers are
+    /// separated by commas, semicolons or blanks. x, y and z are the first three, or the columns with these names in a
+    /// header. Lines before the first point, lines that begin with `#` and empty lines are kept.
     ///
     /// # Errors
     /// [`PointFileError`]
     pub fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PointFileError> {
         let is_array = bytes.starts_with(b"\x93NUMPY");
-        // A point of an array takes at least 12 bytes, one of a text a line.
+        // A point takes at least 12 bytes in an array, and a line in a text.
         let lines = || 1 + bytes.iter().filter(|&&b| b == b'\n').count();
         let points = if is_array { bytes.len() / 12 } else { lines() };
         let needed = MEMORY_PER_BYTE * bytes.len() as u64 + MEMORY_PER_POINT * points as u64;

@@ -58,7 +58,7 @@ pub enum PolygonsError {
     Memory(#[from] MemoryError),
 }
 
-/// Encoding of numbers.
+/// How a file encodes numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Text,
@@ -67,7 +67,7 @@ pub(crate) enum Encoding {
     BigEndian,
 }
 
-/// Polygon mesh as read from a file.
+/// A polygon mesh as read from a PLY, STL or OFF file.
 #[derive(Debug, Default)]
 pub(crate) struct Polygons {
     pub(crate) positions: Vec<Vec3>,

@@ -1,9 +1,9 @@
-//! Poses as short byte strings for links: 16-bit offsets from rest.
+//! Poses as short byte strings for links: 16-bit displacements from rest.
 
 use glam::Vec3;
 use thiserror::Error;
 
-/// Bytes before the offsets: number of vertices and largest offset.
+/// Bytes before the displacements: number of vertices and largest displacement.
 const HEADER_BYTES: usize = 8;
 
 /// Bytes per vertex.

@@ -26,11 +26,11 @@ const VERSION_FAR_ORIGIN: u64 = 3;
 /// Contents of a project.
 #[derive(Clone, Debug)]
 pub struct Project {
-    /// At least one model. All share the up axis and the origin.
+    /// The models, at least one. All have the same up axis and origin.
     pub models: Vec<Model>,
     /// The cage; may be open or otherwise invalid.
     pub cage: PolygonMesh,
-    /// Names and cage positions of the poses. `[n_cage]` each
+    /// Name and cage positions of each pose. `[n_cage]`
     pub poses: Vec<(String, Vec<Vec3>)>,
     /// Settings of the program that wrote the project, opaque to this crate.
     pub settings: String,
@@ -79,7 +79,7 @@ pub fn write_project(
     let (model, more) =
         models.split_first().ok_or_else(|| WriteError::Document("there is no model".into()))?;
     let built;
-    // For a model in another format, build a GLB that viewers can show.
+    // A model in another format is stored beside a GLB built from it, which viewers can show.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
@@ -163,7 +163,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     let model_name = project["name"].as_str().unwrap_or(name);
     // Projects of early versions do not store an up axis.
     let up = project["up"].as_str().and_then(|up| up.parse().ok()).unwrap_or_default();
-    // Only projects far from the origin store it.
+    // Only projects far from the world's origin store their origin.
     let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
         .map_err(|_| damaged("its origin is not three numbers"))?;
     let origin = DVec3::from_array(origin.unwrap_or_default());
@@ -216,7 +216,7 @@ fn file_of(model: &Model) -> Result<Vec<u8>, WriteError> {
             pack.finish(json)
         }
         (Document::Obj(document), ModelFormat::Obj) => Ok(document.bytes.clone()),
-        // PLY, STL and OFF documents do not keep the original bytes.
+        // Documents of PLY, STL and OFF do not keep the bytes of their file: write it again.
         (_, format) => model.write(format, &model.positions),
     }
 }
@@ -250,7 +250,7 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     }
     edges.sort_unstable();
     edges.dedup();
-    // Without nodes, viewers show all meshes; adding a node would hide them.
+    // Viewers show all meshes of a file without nodes, but only nodes once there is one.
     if edges.is_empty() || json["nodes"].as_array().is_none_or(Vec::is_empty) {
         return None;
     }
@@ -274,7 +274,7 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     Some(node)
 }
 
-/// Removes the cage's node and mesh, if they are still the last ones.
+/// Removes the node and the mesh of the cage, if they are still the last in their lists.
 fn drop_cage(json: &mut Value, node: Option<u64>) {
     let Some(node) = node else { return };
     let is_cage = |list: &Value, index: u64| {

@@ -12,8 +12,7 @@ use crate::model::{Document, Model};
 use crate::origin::relative;
 use crate::shown::shown;
 
-/// Limits on the frames of a clip that a generated cage encloses: number of frames, and number of vertices of all
-/// frames.
+// Limits on the frames of a clip that a generated cage encloses: on their number, and on the vertices of all frames.
 const MAX_CLIP_FRAMES: usize = 32;
 const MAX_FRAME_VERTICES: usize = 1 << 24;
 
@@ -21,7 +20,7 @@ const MAX_FRAME_VERTICES: usize = 1 << 24;
 /// engines support only a limited number of them.
 const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
 const MAX_BAKED_FRAMES: f32 = 60.0;
-/// Limit on positions and normals of all baked frames, bytes.
+/// Limit on the positions and normals of all baked frames, bytes.
 const MAX_BAKED_BYTES: u64 = 512 << 20;
 
 /// No clip has the requested name.
@@ -226,7 +225,7 @@ impl Model {
         let player = self.player()?.ok_or(WriteError::NoRig)?;
         let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
         let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(1.0, MAX_BAKED_FRAMES) as usize + 1;
-        // Bytes of a position and a normal.
+        // 24 bytes for a position and a normal.
         let needed = (n * self.positions.len() * 24) as u64;
         if needed > MAX_BAKED_BYTES {
             return Err(WriteError::Document(format!(

@@ -1,4 +1,4 @@
-//! Selection of model parts by their names in the file.
+//! Selects parts of a model by their names in the file.
 
 use cagework_core::deform::deform_bound;
 use cagework_core::{Frames, Weights};
@@ -12,7 +12,7 @@ use crate::model::{Document, Model};
 use crate::part_kind::PartKind;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Limit on the names in an error message.
+/// Largest number of names that an error message lists.
 const MAX_LISTED_NAMES: usize = 20;
 
 /// Error of selecting a part by name.
@@ -94,7 +94,7 @@ impl Model {
             found.push((kind, self.vertices_of(kind, name)?));
         }
         if found.iter().all(|(_, vertices)| vertices.is_empty()) {
-            // Names may contain colons, so also search all kinds for the whole text.
+            // A name may contain a colon: also search for the whole text, in all kinds.
             for kind in kinds {
                 found.push((kind, self.vertices_of(kind, name)?));
             }

@@ -1,8 +1,8 @@
-//! Names and other text of files in messages.
+//! Shows names and other text of files in messages.
 
 use serde_json::error::Category;
 
-/// Bytes of context before a JSON error.
+/// Number of bytes before a JSON error that the message shows.
 const MAX_CONTEXT_BYTES: usize = 40;
 
 /// Limit on a text in a message, characters.

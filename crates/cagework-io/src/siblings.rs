@@ -1,4 +1,4 @@
-//! External files that a model refers to.
+//! Files that a model refers to: buffers, images and material files.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 /// error is the reason as a predicate, such as "is a folder".
 pub type Resolve<'a> = dyn FnMut(&str) -> Option<Result<Vec<u8>, String>> + 'a;
 
-/// Limit on the external files of one model, bytes: the limit on the model itself.
+/// Limit on the files that one model refers to, bytes. It equals the limit on the model itself.
 const MAX_BYTES: u64 = 2 << 30;
 
-/// An encoded image, recognised by its content.
+/// An encoded image; its format is recognised by its content.
 #[derive(Clone, Debug)]
 pub(crate) struct Image {
     /// Name in the model, shortened.
@@ -39,7 +39,7 @@ pub(crate) struct Siblings<'a> {
     resolve: &'a mut Resolve<'a>,
     files: BTreeMap<String, Result<Arc<Vec<u8>>, SiblingError>>,
     images: HashMap<String, Option<Image>>,
-    /// Bytes of all files read. A file with two names counts twice.
+    /// Bytes of all files read. A file that has two names counts twice.
     bytes: u64,
     /// Limit for `bytes`.
     limit: u64,
@@ -56,7 +56,7 @@ impl Image {
     }
 }
 
-/// Predicate for a file that is not an image.
+/// Says, as a predicate, that a file is not an image.
 pub(crate) const NOT_AN_IMAGE: &str = "is not a PNG, JPEG, WebP or KTX2 image";
 
 impl<'a> Siblings<'a> {

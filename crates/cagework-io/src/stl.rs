@@ -38,7 +38,7 @@ fn is_text(bytes: &[u8]) -> bool {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let start = &bytes[..bytes.len().min(4096)];
     bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
-        // A binary file can have both words in its header and bytes after its triangles, but it contains zeros.
+        // The header of a binary file can contain both words, but the file also contains zero bytes.
         && !start.contains(&0)
         && start.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
 }
@@ -123,7 +123,7 @@ fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, Po
     Ok(corners.collect())
 }
 
-/// Names of solids, with the index of their first triangle.
+/// Names of solids, each with the index of its first triangle.
 type Solids = Vec<(String, usize)>;
 
 /// Corners and solids of a text file. Normals are ignored; some programs write them as "nan".
@@ -184,7 +184,7 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
 /// Names and first triangles of the solids of a text file.
 fn solids<'a>(shape: &Shape<'a>) -> Vec<(&'a str, usize)> {
     let Some(document) = shape.document else { return Vec::new() };
-    // Triangles are in the order of faces.
+    // The triangles are in the order of the faces.
     let mut t = 0;
     let solid = |group: &'a Group| {
         let first = document.face_starts.get(group.first_face as usize).copied().unwrap_or(u32::MAX);

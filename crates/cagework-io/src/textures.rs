@@ -6,13 +6,13 @@ use thiserror::Error;
 
 use crate::look::{Look, LookImage};
 
-/// Limit on the longer side of a drawn texture, pixels: ten of them fit into a phone's memory.
+/// Limit on the longer side of a drawn texture, pixels. Ten such textures fit into a phone's memory.
 const MAX_SIDE: u32 = 2048;
 /// Limit on an image, pixels (8192 x 8192): 256 MiB when decoded.
 const MAX_PIXELS: u64 = 1 << 26;
-/// Limit on all images of a model together, pixels: a browser decodes them in about 5 s.
+/// Limit on all images of a model together, pixels. A browser decodes that many in about 5 s.
 const MAX_TOTAL_PIXELS: u64 = 1 << 29;
-/// Limit on all drawn textures together, pixels: 256 MiB, a third more on the GPU with mipmaps.
+/// Limit on all drawn textures together, pixels: 256 MiB, and a third more on the GPU for mipmaps.
 const MAX_DRAWN_PIXELS: u64 = 1 << 26;
 
 /// Why an image is not decoded.

@@ -1,4 +1,4 @@
-//! Up axis of files.
+//! The up axis of a file, and conversion to Y up.
 
 use std::borrow::Cow;
 
@@ -9,10 +9,10 @@ choice! {
     /// The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
     /// read and back when written. Both rotations are exact.
     UpAxis {
-        /// Y, as glTF prescribes.
+        /// Y is up, as glTF prescribes.
         #[default]
         Y = "y",
-        /// Z, as CAD programs and some OBJ files have it.
+        /// Z is up, as in CAD programs and in some OBJ files.
         Z = "z",
     }
 }

@@ -1,4 +1,7 @@
-/** The page around a fake session: shows each panel, step, dialog and message with made-up contents, for words.spec.ts. */
+/**
+ * For words.spec.ts: the page around a fake session. It shows each step, panel, dialog and message with made-up
+ * contents.
+ */
 
 import { sayGesture } from "../../src/actions/edit";
 import { createApp } from "../../src/app";
@@ -25,13 +28,13 @@ import { createFake, MODEL, memberOf, reportOf } from "../../test/fake";
 import { inspect } from "./inspect";
 
 declare global {
-  /** Shows everything, and returns the faults of its texts. */
+  /** Shows all states of the page, and returns the faults found in their texts. */
   var visitAll: (() => Promise<string[]>) | undefined;
 }
 
 type Patch = Partial<AppState>;
 
-// Names without letters, which no language changes.
+// Made-up names contain no letters, so that they are no faults in any language.
 const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
 const ONE = {
   ...memberOf(0, "01", 1234),
@@ -115,7 +118,7 @@ const selected = (count: number, last: number | null): AppState["selected"] => (
 const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
   values.map((value) => ({ ...also, [key]: value }) as Patch);
 
-/** States of each step, upon `BOUND`. */
+/** States of each step, as changes of `BOUND`. */
 const states = (): Record<AppState["step"], readonly Patch[]> => ({
   model: [
     { model: null, cage: null, bound: false },
@@ -257,7 +260,7 @@ const work = (where: "here" | "elsewhere" | "nowhere") => ({
   where,
   stopped: true as const,
 });
-/** Dialogs of the page, upon `BOUND`. */
+/** States that show a dialog, as changes of `BOUND`. */
 const DIALOGS: readonly Patch[] = [
   { sheetOpen: true },
   { waysOpen: true, lack: "NoDevice" },
@@ -289,7 +292,7 @@ async function start(): Promise<void> {
     recover: () => (isBroken ? Promise.reject(new Error("1")) : new Promise(() => {})),
   } as unknown as Session);
   mount({ app, Toasts, Lost: lost.Lost, byId });
-  // With weights, no state starts a bind.
+  // The model counts as bound, because the page would otherwise start a bind.
   fake.show({ bound: true });
   const show = (patch: Patch) => {
     legend = patch.legend ?? null;
@@ -301,7 +304,7 @@ async function start(): Promise<void> {
     const faults = new Set<string>();
     const seen = new Set<string>();
     const look = async (where: string) => {
-      // Components are rendered in microtasks, and effects run in a task.
+      // Wait until components are rendered (in microtasks) and effects have run (in a task).
       for (const _ of [1, 2]) await new Promise((done) => setTimeout(done));
       for (const fault of inspect(seen)) faults.add(`${where}: ${fault}`);
     };
@@ -353,7 +356,7 @@ async function start(): Promise<void> {
     }
     show({});
 
-    // Other sentences appear as messages, whose lines are as long as those of any panel.
+    // Sentences that no state shows appear as messages, whose lines are as long as those of any panel.
     for (const text of sentencesOf(T).filter((text) => !isSeen(seen, text))) {
       tell.say(text);
       await look("message");
@@ -384,7 +387,7 @@ const isSeen = (seen: ReadonlySet<string>, text: string) => {
   return false;
 };
 
-/** All sentences of a catalogue without values. */
+/** All sentences of a catalogue that take no values. */
 const sentencesOf = (words: unknown): string[] => {
   if (typeof words === "string") return words === "" ? [] : [words];
   return typeof words === "object" && words !== null ? Object.values(words).flatMap(sentencesOf) : [];

@@ -14,7 +14,7 @@ const NAMES = [
 ];
 const ATTRIBUTES = ["aria-label", "aria-valuetext", "title", "placeholder", "alt", "data-tip"];
 
-/** Tolerance, CSS pixels: glyphs reach beyond their line. */
+/** How far glyphs may reach beyond their box, CSS pixels: sideways (`ASIDE`), and above or below (`ABOVE`). */
 const ASIDE = 1.5;
 const ABOVE = 4;
 
@@ -25,7 +25,7 @@ const isPlain = (text: string) =>
 const isEnglish = (element: Element) => element.closest("[lang=en]") !== null;
 const isShown = (element: Element) => element.checkVisibility({ visibilityProperty: true });
 
-/** Inspects the page, and adds its texts to `seen`. */
+/** Inspects the page: adds its texts to `seen`, and returns a message for each fault. */
 export function inspect(seen: Set<string>): string[] {
   for (const fold of document.querySelectorAll("details")) fold.open = true;
   const faults: string[] = [];
@@ -59,7 +59,10 @@ export function inspect(seen: Set<string>): string[] {
 const overlap = (a: DOMRect, b: DOMRect) =>
   a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 
-/** Whether a text reaches beyond a box around it, or beyond the window. Scrolled boxes may be higher than what is visible. */
+/**
+ * Messages for a text that reaches beyond a box around it or beyond the window. A box that scrolls may be higher than
+ * its visible part.
+ */
 function cutOff(node: Node, parent: Element, text: string): string[] {
   const range = document.createRange();
   range.selectNodeContents(node);

@@ -17,7 +17,7 @@ pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 /// Limit on implicit zeros: elements of an accessor without buffer view that sparse values do not set.
 const MAX_IMPLICIT_ZEROS: u64 = 1 << 20;
 
-/// Data that accessors refer to.
+/// A document and its buffers, from which accessors are read.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) root: &'a Root,
@@ -55,7 +55,7 @@ fn unsigned(kind: ComponentType, bytes: &[u8]) -> u32 {
     }
 }
 
-/// Strided elements of a buffer.
+/// Bytes of `count` elements, at intervals of `stride` bytes in a buffer.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -207,7 +207,7 @@ impl<'a> Source<'a> {
         Ok(values)
     }
 
-    /// The bytes of `count` elements of `size` bytes, bounds-checked.
+    /// The bytes of `count` elements of `size` bytes. Checks that they are within the buffer.
     fn elements(
         self,
         accessor: u32,
@@ -231,7 +231,7 @@ impl<'a> Source<'a> {
         let start = view_start.checked_add(offset);
         let length = match count {
             0 => Some(0),
-            // `count` is limited, but the stride is not.
+            // `count` is limited, but `stride` is not: check for overflow.
             _ => (stride as u64).checked_mul(count as u64 - 1).and_then(|n| n.checked_add(size as u64)),
         };
         let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));

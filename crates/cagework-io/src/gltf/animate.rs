@@ -1,4 +1,4 @@
-//! Morph targets and animations of exports.
+//! Morph targets of exported poses, and the animation that plays them.
 
 use std::collections::HashSet;
 
@@ -10,20 +10,20 @@ use super::pack::{Pack, push};
 /// Time between poses in the animation, seconds.
 pub(super) const SECONDS_PER_POSE: f32 = 1.0;
 
-/// A named shape.
+/// A pose of the model: its name and vertex positions.
 #[derive(Clone, Copy)]
 pub(crate) struct Pose<'a> {
     pub(crate) name: &'a str,
     pub(crate) positions: &'a [Vec3],
 }
 
-/// Mesh and node of an instance in the exported document.
+/// Where an exported document has the mesh of an instance.
 pub(crate) struct MeshPlacement {
     pub(super) mesh: usize,
     pub(super) node: usize,
     /// Node of the instance in the original document; `None` in a file without nodes.
     pub(super) original: Option<usize>,
-    /// Whether the mesh has a new root node.
+    /// Whether the mesh was moved to a new root node.
     pub(super) detached: bool,
     /// Transform from world space, relative to the origin, to mesh space.
     pub(super) mesh_from_world: DMat4,
@@ -61,7 +61,7 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
     }
 }
 
-/// Times of poses in the animation of an export.
+/// When the animation of an export shows its poses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum PoseTiming<'a> {
     /// One pose per second, starting and ending at rest. Keeps the document's animations.
@@ -72,7 +72,7 @@ pub(crate) enum PoseTiming<'a> {
     Frames { clip: &'a str, seconds: f32 },
 }
 
-/// Names the morph targets and adds the animation that plays them.
+/// Names the morph targets after the poses, and adds an animation that plays them.
 pub(crate) fn play_poses(
     json: &mut Value,
     pack: &mut Pack<'_>,
@@ -90,7 +90,7 @@ pub(crate) fn play_poses(
         mesh["extras"]["targetNames"] = json!(names);
     }
     let every = |n: usize, step: f32| (0..n).map(|k| k as f32 * step).collect::<Vec<f32>>();
-    // Key times, and number of keys before the first pose.
+    // Key times, and the number of keys before that of the first pose.
     let (name, times, before) = match timing {
         PoseTiming::EverySecond => ("poses", every(poses.len() + 2, SECONDS_PER_POSE), 1),
         PoseTiming::At(times) => ("poses", times.to_vec(), 0),

@@ -150,7 +150,7 @@ pub fn write_mesh_glb(
         "NORMAL": pack.push_vec3(&mut json, &normals, false),
     });
     if colours.len() == mesh.positions.len() {
-        // glTF vertex colours are linear.
+        // OBJ colours are sRGB, glTF vertex colours linear.
         let linear: Vec<f32> = colours
             .iter()
             .flat_map(|&[r, g, b, a]| [to_linear(r), to_linear(g), to_linear(b), f32::from(a) / 255.0])
@@ -191,7 +191,7 @@ fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Va
     push(json, "skins", json!({ "joints": joints, "inverseBindMatrices": bind }));
     json["nodes"][0]["skin"] = 0.into();
 
-    // glTF requires joint 0 where the weight is 0.
+    // glTF requires joint 0 if the weight is 0.
     let of_vertex = |all: &[(u32, f32); 4]| all.map(|(j, w)| if w > 0.0 { j as u16 } else { 0 });
     let bytes = rig.influences.iter().flat_map(of_vertex).flat_map(u16::to_le_bytes).collect();
     let view = pack.push_view(json, bytes, Some(VERTICES));

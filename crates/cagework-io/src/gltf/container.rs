@@ -29,18 +29,18 @@ const LISTS: [&str; 9] =
 const GLB_HEADER_BYTES: usize = 12;
 pub(crate) struct GltfContents {
     pub(crate) json: Value,
-    /// JSON chunk of a self-contained GLB.
+    /// JSON chunk as read, if the file is a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
     /// Whether compressed geometry was decoded.
     pub(crate) is_decoded: bool,
     pub(crate) root: Root,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
-    /// Approximate memory, bytes.
+    /// Approximate memory of the document, its buffers and its images, bytes.
     pub(crate) bytes: u64,
 }
 
-/// JSON and binary chunk of a GLB.
+/// The JSON chunk of a GLB and, if present, its binary chunk.
 type Chunks<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
 
 /// Loads a document with its buffers and images.
@@ -84,7 +84,7 @@ pub(crate) fn load(
     drop_missing(&mut json, notices);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
-    // The caller still holds the file. Buffers and images can share bytes; count them once.
+    // Memory includes the caller's copy of the file. Buffers and images can share bytes: count those once.
     let mut seen = HashSet::new();
     let loaded = buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes));
     let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
@@ -133,7 +133,7 @@ fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
 /// Approximate memory of parsed JSON: its text twice, and per value a `serde_json::Value` and a typed copy.
 fn bytes_of_json(text: &[u8]) -> u64 {
     const VALUE_BYTES: u64 = 140;
-    // Also counts separators inside strings, which are rare.
+    // Separators inside strings, which are rare, are counted too.
     let values = text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64;
     2 * text.len() as u64 + VALUE_BYTES * values
 }
@@ -184,7 +184,7 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
             _ => "a chunk extends beyond the end of the file: it is cut off or damaged".to_owned(),
         })
     })?;
-    // Some writers pad the JSON chunk with zeros instead of spaces.
+    // Some exporters pad the JSON chunk with zeros instead of spaces.
     let json = match glb.json {
         Cow::Borrowed(json) => Cow::Borrowed(unpadded(json)),
         Cow::Owned(json) => unpadded(&json).to_vec().into(),
@@ -203,7 +203,7 @@ fn parsed(json: &[u8]) -> Result<Value, GltfError> {
     serde_json::from_slice(json).map_err(|e| GltfError::Json(json_fault(json, &e)))
 }
 
-/// JSON and binary chunk of a GLB, without loading external files.
+/// Splits a GLB into its JSON and its binary chunk, without loading external files.
 pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u8>), GltfError> {
     let (json, bin) = split(bytes)?;
     MemoryError::check(bytes_of_json(&json) + 2 * bytes.len() as u64, memory_limit)?;
@@ -331,7 +331,7 @@ fn load_buffers(
     Ok(buffers)
 }
 
-/// Fallback buffers of meshopt, which only compressed views refer to. They may be missing.
+/// Indices of fallback buffers of meshopt: only compressed buffer views refer to them, and their files may be missing.
 fn fallbacks(json: &Value) -> Vec<u64> {
     let views = || json["bufferViews"].as_array().into_iter().flatten();
     let is_packed = |view: &Value| MESHOPT.iter().any(|name| view["extensions"].get(name).is_some());
@@ -409,7 +409,7 @@ fn decoded(uri: &str) -> Cow<'_, str> {
     percent_decode_str(uri).decode_utf8_lossy()
 }
 
-/// A URI for a message, shortened: `data:` URIs can be megabytes long.
+/// A URI shortened for a message, since `data:` URIs can be megabytes long.
 fn shown_uri(uri: &str) -> String {
     shown_start(&decoded(uri), MAX_NAME_CHARS)
 }

@@ -17,10 +17,10 @@ use super::accessor::{MAX_ELEMENTS, Source};
 use super::pack::{INDICES, VERTICES, bounds, push};
 use super::root::{DRACO, MESHOPT, typed};
 
-/// Limit on the decompressed size of all streams, bytes. A few hundred bytes can claim any size.
+/// Limit on the decompressed size of all streams, bytes. A file of a few hundred bytes can claim any size.
 const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
 
-/// Rounding error of the sum of four f32 weights.
+/// A sum of four joint weights that differs from 1 by less is only rounded to f32.
 const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
@@ -53,7 +53,7 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
         }
     }
     if buffers.len() > n_in_file {
-        // Errors in the document itself are reported later.
+        // A document that cannot be parsed is reported when it is read.
         if let Ok(root) = typed(json) {
             correct_bounds(json, &root, buffers, n_in_file);
             normalise_weights(json, &root, buffers, n_in_file);
@@ -187,7 +187,7 @@ fn push_buffer(json: &mut Value, buffers: &mut Buffers, bytes: Vec<u8>) -> usize
     buffer
 }
 
-/// Bytes of a buffer view or of a meshopt extension.
+/// Bytes that a buffer view, or its meshopt extension, refers to.
 fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
     let number = |key: &str| view[key].as_u64().and_then(|n| usize::try_from(n).ok());
     let start = number("byteOffset").unwrap_or(0);
@@ -242,7 +242,7 @@ fn draco(
             return Err(format!("its stream has no attribute for {name}"));
         };
         let (kind, element) = layout(attribute).ok_or_else(|| format!("{name} has an unknown type"))?;
-        // Vertex attributes are aligned to 4 bytes.
+        // glTF aligns vertex attributes to 4 bytes.
         let stride = element.next_multiple_of(4);
         let mut bytes = Vec::with_capacity(stride * mesh.num_points());
         for point in 0..mesh.num_points() as u32 {

@@ -1,4 +1,4 @@
-//! Primitives: world-space positions, triangles, normals and tangents.
+//! Reads primitives: world-space positions, triangles, normals and tangents.
 
 use cagework_core::words::counted;
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ impl GltfDocument {
         Source { root: &self.root, buffers: &self.buffers }
     }
 
-    /// Default morph target weights of an instance.
+    /// Default weights of an instance's morph targets: those of its node, otherwise those of its mesh.
     pub(super) fn default_weights(&self, instance: &Instance) -> Option<&[f32]> {
         let node = instance.node.and_then(|n| self.root.nodes[n as usize].weights.as_ref());
         node.or(self.root.meshes[instance.mesh as usize].weights.as_ref()).map(Vec::as_slice)
@@ -135,7 +135,7 @@ fn others(n: usize) -> String {
     if n > 1 { format!(" (and {} more)", n - 1) } else { String::new() }
 }
 
-/// Validates the attributes that exports need, before a long bind.
+/// Checks that exports can read the attributes, so that errors are reported before a long bind.
 fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<(), GltfError> {
     if let Some(normals) = attribute(primitive, Semantic::Normals) {
         document.source().floats::<3>(normals, "NORMAL")?;
@@ -161,7 +161,7 @@ pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<u32
     primitive.attributes.get(&Checked::Valid(semantic)).map(|a| a.value() as u32)
 }
 
-/// Transform from mesh to world space, of a primitive or per vertex.
+/// Transform from mesh to world space: one for a primitive, or one per vertex if it is skinned.
 pub(super) enum Frame {
     Rigid(DMat4),
     Skinned(Vec<DMat4>),

@@ -16,17 +16,17 @@ use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, s
 use crate::normals::Shading;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Images used by materials, without duplicates.
+/// Images that the materials use, without duplicates.
 struct Images<'a> {
     document: &'a GltfDocument,
-    /// Index of each image in `found`, by address and length of the image's bytes.
+    /// Index in `found` of each image, by the address and length of its bytes.
     numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
     /// Bytes of buffers that are not yet copied to `found`. Views of images can overlap.
     left: usize,
 }
 
-/// Appearance of a document. `positions`, `triangles`: of the model.
+/// Appearance of a document. `positions` and `triangles` are those of the model.
 pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
     let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();
     let mut buffers: Vec<_> = document.buffers.iter().collect();

@@ -125,7 +125,7 @@ pub enum GltfError {
         /// Number of objects of that kind.
         count: usize,
     },
-    /// An accessor cannot be decoded.
+    /// An accessor cannot be decoded, for the reason given.
     #[error("accessor {accessor} {problem}")]
     Accessor {
         /// Accessor index.
@@ -165,7 +165,7 @@ pub enum GltfError {
         /// Problem, as a predicate.
         problem: &'static str,
     },
-    /// There are no triangles.
+    /// The default scene shows no triangles.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
     /// The memory limit is exceeded.
@@ -190,29 +190,29 @@ pub(crate) struct GltfDocument {
     pub(crate) json: Value,
     /// The members of the JSON that reading the geometry needs, as typed values.
     pub(crate) root: Root,
-    /// Contents of each buffer.
+    /// Contents of the buffers, by index.
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     /// External images, by index; `None` for images in buffer views and for images that could not be loaded.
     pub(crate) images: Vec<Option<Image>>,
-    /// Original JSON chunk of a self-contained GLB.
+    /// JSON chunk as read, if the file is a self-contained GLB.
     pub(crate) text: Option<Vec<u8>>,
     /// The compressed file that the caller decoded to get this document, if that file is a self-contained GLB.
     pub(crate) packed: Option<Vec<u8>>,
     /// Whether the document contains decoded geometry, in further buffers. The first buffer is still that of the file.
     pub(crate) is_decoded: bool,
-    /// Meshes of the default scene, in vertex order.
+    /// Instances of meshes in the default scene, in vertex order.
     instances: Vec<Instance>,
-    /// Meshes outside the default scene, such as levels of detail.
+    /// Instances of meshes outside the default scene, such as levels of detail.
     elsewhere: Vec<Instance>,
     /// Transform from bind space to world space of each joint of the skins in use. `[n_skins][n_joints]`
     joints: Vec<Vec<DMat4>>,
     /// Approximate memory of the document and its geometry, bytes.
     pub(crate) bytes: u64,
-    /// Vertex and triangle ranges of the primitives.
+    /// The triangle primitives of `instances`, with their ranges of vertices and triangles.
     slots: Vec<Slot>,
 }
 
-/// Vertex and triangle range of one primitive of one instance.
+/// Range of vertices and triangles that one primitive of one instance has in the model.
 #[derive(Clone, Debug)]
 struct Slot {
     instance: u32,

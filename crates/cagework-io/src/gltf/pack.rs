@@ -1,4 +1,4 @@
-//! Buffer of an export: adds accessors, drops unused ones and writes the GLB.
+//! The buffer of an export: adds accessors, drops unused ones, and writes the GLB.
 
 use std::borrow::Cow;
 
@@ -13,7 +13,7 @@ use crate::error::WriteError;
 pub(super) const F32: u32 = 5126;
 const U32: u32 = 5125;
 const U16: u32 = 5123;
-/// Buffer view targets.
+// Targets of buffer views, as glTF numbers them.
 pub(super) const VERTICES: u32 = 34962;
 pub(super) const INDICES: u32 = 34963;
 /// Multiple of all component sizes, bytes.
@@ -36,14 +36,14 @@ const KNOWN_EXTENSIONS: [&str; 9] = [
     PROJECT_EXTENSION,
 ];
 
-/// Buffer views of a document being written.
+/// The buffer views of a document that is being written.
 pub(crate) struct Pack<'a> {
     /// Bytes of each buffer view and their offset modulo [`ALIGN`]; `None` if out of bounds.
     views: Vec<Option<(Cow<'a, [u8]>, usize)>>,
 }
 
 impl<'a> Pack<'a> {
-    /// A pack without buffer views, for a new document.
+    /// A pack for a new document, which has no buffer views.
     pub(crate) fn empty() -> Self {
         Self { views: Vec::new() }
     }
@@ -68,7 +68,7 @@ impl<'a> Pack<'a> {
         Self { views: views.collect() }
     }
 
-    /// Adds a buffer view.
+    /// Adds a buffer view with these bytes; returns its index.
     pub(crate) fn push_view(&mut self, json: &mut Value, bytes: Vec<u8>, target: Option<u32>) -> usize {
         let mut view = json!({ "buffer": 0, "byteLength": bytes.len() });
         if let Some(target) = target {
@@ -109,7 +109,7 @@ impl<'a> Pack<'a> {
         self.push_floats(json, &flat, 3, true, bounds)
     }
 
-    /// Adds an index accessor of line segments.
+    /// Adds an accessor for the vertex indices of line segments; returns its index.
     pub(crate) fn push_lines(&mut self, json: &mut Value, lines: &[[u32; 2]]) -> usize {
         self.push_indices(json, lines.iter().flatten().copied())
     }
@@ -136,7 +136,7 @@ impl<'a> Pack<'a> {
         )
     }
 
-    /// Drops unused accessors and views, lays out the buffer and writes the GLB.
+    /// Drops unused accessors and buffer views, lays out the buffer and writes the GLB.
     pub(crate) fn finish(mut self, mut json: Value) -> Result<Vec<u8>, WriteError> {
         if only_known_extensions(&json) {
             drop_unused(&mut json, "accessors", each_accessor);
@@ -169,7 +169,7 @@ impl<'a> Pack<'a> {
             let Some((bytes, phase)) = view else {
                 return Err(WriteError::Document(format!("buffer view {number} is longer than its buffer")));
             };
-            // Accessors are aligned relative to the buffer, so preserve the original offset modulo 4.
+            // Alignment is relative to the buffer: keep the offset of the original view modulo 4.
             bin.resize(bin.len().next_multiple_of(ALIGN) + phase, 0);
             json["bufferViews"][number]["buffer"] = 0.into();
             json["bufferViews"][number]["byteOffset"] = bin.len().into();
@@ -180,7 +180,7 @@ impl<'a> Pack<'a> {
     }
 }
 
-/// Component-wise minimum and maximum.
+/// Minimum and maximum of the vectors' components.
 pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
     let fold = |f: fn(f32, f32) -> f32, start: f32| {
         values.iter().fold([start; N], |all, value| std::array::from_fn(|k| f(all[k], value[k])))
@@ -243,7 +243,7 @@ fn only_known_extensions(json: &Value) -> bool {
 
 pub(super) type Visit<'v> = &'v mut dyn FnMut(&mut Value);
 
-/// Removes items of `list` without references and renumbers the references. Returns whether each item is kept.
+/// Removes items of `list` to which nothing refers, and renumbers the references. Returns whether each item was kept.
 fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) -> Vec<bool> {
     let n = json[list].as_array().map_or(0, Vec::len);
     let mut used = vec![false; n];
@@ -272,7 +272,7 @@ fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) ->
     used
 }
 
-/// Visits all references to accessors.
+/// Calls `visit` with each reference to an accessor.
 pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
     fn items<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {
         value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
@@ -301,7 +301,7 @@ pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
     }
 }
 
-/// Visits all references to buffer views: members named `bufferView` outside `extras`.
+/// Calls `visit` with each reference to a buffer view: members named `bufferView` outside `extras`.
 fn each_view(json: &mut Value, visit: Visit<'_>) {
     match json {
         Value::Object(object) => {

@@ -25,11 +25,11 @@ use crate::origin::translation;
 /// Threshold for |det| / product of column lengths, below which a transform counts as singular in f32.
 const MIN_RELATIVE_DETERMINANT: f64 = 1e-9;
 
-/// The undeformed model.
+/// The model before its deformation.
 #[derive(Clone, Copy)]
 pub(crate) struct Rest<'a> {
     pub(crate) positions: &'a [Vec3],
-    /// Origin of all positions, in world space.
+    /// Point in world space to which all positions are relative.
     pub(crate) origin: DVec3,
     pub(crate) triangles: &'a [[u32; 3]],
 }
@@ -100,7 +100,7 @@ pub(crate) fn patch(
     pack.finish(json)
 }
 
-/// Gives every instance its own mesh, at a node with an invertible transform.
+/// Gives every instance a mesh of its own, at a node whose transform can be inverted.
 fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec<MeshPlacement> {
     let mut users = vec![0_usize; document.root.meshes.len()];
     for mesh in document.root.nodes.iter().filter_map(|n| n.mesh) {
@@ -185,7 +185,7 @@ fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usi
 
 struct Normals {
     shading: Shading,
-    /// Whether each slot has original normals.
+    /// Whether the file has normals for each slot.
     present: Vec<bool>,
 }
 
@@ -206,7 +206,7 @@ impl Normals {
     }
 }
 
-/// Deformed vertices of a primitive in mesh space.
+/// Vertices of a primitive after the deformation, in mesh space.
 struct Shape {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -262,7 +262,7 @@ fn tangents(
     Ok(Some(out))
 }
 
-/// Whether reading reversed the winding, because of a mirroring transform.
+/// Whether the reader has reversed the triangles, because the transform mirrors them.
 fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError> {
     let (instance, primitive) = document.primitive(slot);
     let (frame, _) = Frame::of(document, instance, primitive, slot.count as usize)?;
@@ -301,7 +301,7 @@ pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut
     embed_images_by(document, json, &mut |json, bytes| pack.push_view(json, bytes, None));
 }
 
-/// Like [`embed_images`], with a callback that adds buffer views.
+/// Like [`embed_images`]; `push_view` adds a buffer view and returns its index.
 pub(crate) fn embed_images_by(
     document: &GltfDocument,
     json: &mut Value,

@@ -1,4 +1,4 @@
-//! The typed part of a glTF document: the members that geometry needs.
+//! The members of a glTF document that geometry needs, as typed values.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use serde_json::{Map, Value, json};
 use super::GltfError;
 use crate::shown::shown;
 
-/// Compression extensions that need a decoder. Both meshopt names stand for the same streams.
+/// Names of compression extensions, which need a decoder. Both names of meshopt mean the same streams.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
-/// Members of the document that geometry does not need. Errors in them are ignored.
+/// Members of the document that geometry does not need. They are not parsed, so that errors in them have no effect.
 const OPTIONAL_MEMBERS: [&str; 8] =
     ["animations", "cameras", "extras", "images", "materials", "samplers", "textures", "extensions"];
 

@@ -15,14 +15,14 @@ use crate::counts::Counts;
 #[derive(Clone, Debug)]
 pub(crate) struct Worlds {
     pub(crate) world: Vec<DMat4>,
-    /// Nodes with their parents, parents first.
+    /// Nodes, each with its parent; parents come first.
     pub(super) order: Vec<(u32, Option<u32>)>,
 }
 
 /// A mesh shown by a node.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
-    /// Node; `None` in a file without nodes.
+    /// Node that shows the mesh; `None` in a file without nodes.
     pub(crate) node: Option<u32>,
     pub(crate) mesh: u32,
     pub(crate) skin: Option<u32>,
@@ -77,7 +77,7 @@ impl Worlds {
         }
     }
 
-    /// Marks the descendants of marked nodes. `nodes`: `[n_nodes]`.
+    /// Marks in `nodes` the descendants of marked nodes. `[n_nodes]`
     pub(super) fn mark_below(&self, nodes: &mut [bool]) {
         for &(node, parent) in &self.order {
             nodes[node as usize] |= parent.is_some_and(|p| nodes[p as usize]);
@@ -154,7 +154,7 @@ pub(crate) fn instances(
             counted(elsewhere.len(), "node with a mesh is", "nodes with a mesh are")
         ));
     }
-    // Sort integer arrays: reusing this instantiation of sort keeps the wasm module small.
+    // Sorting integer arrays uses code that the wasm module has anyway, which keeps the module small.
     let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
     Ok([shown, elsewhere].map(|list| {
         let mut order: Vec<[u32; 3]> = (0u32..).zip(&list).map(key).collect();
@@ -163,7 +163,7 @@ pub(crate) fn instances(
     }))
 }
 
-/// Statistics of the document.
+/// Numbers of the document's elements.
 pub(crate) fn counts(document: &GltfDocument) -> Counts {
     let count = |key: &str| document.json[key].as_array().map_or(0, Vec::len);
     let targets = document.root.meshes.iter().map(|mesh| {
@@ -185,7 +185,7 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
     }
 }
 
-/// Name of an object, or its kind and index.
+/// Name of an object, or its kind and index if it has none.
 pub(crate) fn name_of(json: &Value, list: &str, index: u32, kind: &str) -> String {
     json[list][index as usize]["name"].as_str().map_or_else(|| format!("{kind} {index}"), str::to_owned)
 }

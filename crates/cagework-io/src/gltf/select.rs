@@ -1,4 +1,4 @@
-//! Selection of vertices by names of materials, nodes and joints.
+//! Finds the vertices of materials, nodes and joints by name.
 
 use std::collections::HashSet;
 
@@ -8,7 +8,7 @@ use super::{GltfDocument, GltfError, Slot};
 use crate::part_kind::PartKind;
 
 impl GltfDocument {
-    /// Names of parts with vertices.
+    /// Names of the materials, nodes and joints that have vertices.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
         let (mut names, mut seen) = (Vec::new(), HashSet::new());
         let mut add = |kind: PartKind, list, number: usize| {
@@ -32,7 +32,7 @@ impl GltfDocument {
         names
     }
 
-    /// Vertices of the parts with this name, unsorted.
+    /// Vertices of all parts of this kind and name, unsorted.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Result<Vec<u32>, GltfError> {
         let named = |list: &str, number: u32| name_of(&self.json, list, number, kind.word()) == name;
         let of_slot = |slot: &Slot| slot.start..slot.start + slot.count;

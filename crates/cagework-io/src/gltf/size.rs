@@ -16,10 +16,10 @@ use super::scene::Instance;
 use super::{GltfDocument, GltfError};
 use crate::memory::MemoryError;
 
-/// Limit on triangles.
+/// Limit on the triangles of all instances.
 const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
-/// Limit on primitives and on morph targets of all nodes. Each takes several KB in an export.
+/// Limit on primitives, and limit on morph targets, summed over all nodes. Each takes several KB in an export.
 const MAX_PRIMITIVES: u64 = 1 << 17;
 
 /// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Takes 1 to 2 s.
@@ -41,16 +41,16 @@ const TRIANGLE_READ_BYTES: u64 = 12;
 const RIG_VERTEX_BYTES: u64 = 100;
 const SKIN_VERTEX_BYTES: u64 = 300;
 
-/// Memory per vertex moved by a morph target, in a player and, for both ends, while reshaping, bytes.
+/// Bytes per vertex that a morph target moves: in a player, and while reshaping, for both ends of the target.
 const MORPHED_VERTEX_BYTES: u64 = 96;
 
-/// Memory of the matrices of a joint, bytes.
+/// Bytes of the matrices of a joint.
 const JOINT_BYTES: u64 = 400;
 
-/// Memory of a number in a clip, decoded and stored, bytes.
+/// Bytes of a number in a clip, decoded and stored.
 const KEY_BYTES: u64 = 8;
 
-/// Counts that determine memory and work.
+/// Counts that determine the memory and time that a document needs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     primitives: u64,
@@ -82,7 +82,7 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
         model.add(shown.len() as u64, of_mesh(document, shown[0].mesh)?);
     }
     for hidden in by_mesh(&document.elsewhere) {
-        // Errors in meshes outside the scene are ignored.
+        // Meshes outside the scene that cannot be read count nothing.
         unseen.add(hidden.len() as u64, of_mesh(document, hidden[0].mesh).unwrap_or_default());
     }
     let keys = keys_of(document);
@@ -111,7 +111,7 @@ fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
     instances.chunk_by(|a, b| a.mesh == b.mesh)
 }
 
-/// Memory of skins and morph targets. Unreadable accessors count as if they were readable.
+/// Memory of skins and morph targets, bytes. An accessor that cannot be read counts by its declared size.
 fn rig_bytes(document: &GltfDocument) -> u64 {
     let mut moved: BTreeMap<u32, u64> = BTreeMap::new();
     let mut moved_by = |accessor: u32| {

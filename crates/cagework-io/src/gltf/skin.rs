@@ -8,7 +8,7 @@ use super::accessor::Source;
 use super::scene::Worlds;
 use super::{GltfDocument, GltfError, get};
 
-/// Limit on sets `JOINTS_n`: 32 joints per vertex.
+/// Largest number of sets `JOINTS_n` that are read, each with four joints per vertex.
 const MAX_SETS: u32 = 8;
 
 /// Transform from bind space to world space of each joint, `world_j * inverse_bind_j`; empty for unused skins. Joints
@@ -64,7 +64,7 @@ pub(crate) fn inverse_binds(document: &GltfDocument, number: u32) -> Result<Vec<
     }
 }
 
-/// Calls `visit` with vertex, joint of the skin and weight, for all positive weights.
+/// Calls `visit` with vertex, joint (index in the skin) and weight, for each positive weight.
 pub(crate) fn each_influence(
     source: Source<'_>,
     primitive: &Primitive,
@@ -115,7 +115,7 @@ pub(crate) fn matrices(
     if let Some(joint) = wrong {
         get(joints, joint as usize, "joint", || format!("a vertex of skin {skin}"))?;
     }
-    // Weights may not sum to one after quantisation.
+    // Divide by the sum of the weights, which quantisation may have changed from 1.
     let n_loose = sum.iter().filter(|(_, w)| *w <= 0.0).count();
     Ok((sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect(), n_loose))
 }

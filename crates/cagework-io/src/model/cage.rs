@@ -1,4 +1,4 @@
-//! Models as cages, and poses of those cages.
+//! Models used as cages or as poses of a cage.
 
 use std::collections::HashSet;
 
@@ -12,7 +12,7 @@ use crate::error::{PoseError, WriteError};
 use crate::gltf::Clip;
 use crate::memory::MemoryError;
 
-/// Limit for all states of one pose file, bytes.
+/// Limit on the positions of all states of a pose file, bytes.
 const MAX_STATES_BYTES: u64 = 512 << 20;
 
 /// One state of a pose file: a key of its clip, or a morph target.
@@ -91,7 +91,7 @@ impl Model {
         Ok((0..n).map(alone).collect())
     }
 
-    /// Index of the pose's vertex that corresponds to each vertex of this cage.
+    /// For each vertex of this cage, the index of the corresponding vertex of the pose.
     fn order_of(&self, pose: &Self) -> Result<Vec<u32>, PoseError> {
         let welded = matches!(self.document, Document::Gltf(_)).then(|| weld(&self.positions));
         let (n, given) = (self.positions.len(), pose.positions.len());
@@ -166,7 +166,7 @@ fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 
         region[a.max(b)] = a.min(b);
     }
     let mut regions = vec![(0, 0); cage.len()];
-    // Faces and regions of each vertex, ascending.
+    // For each vertex, its faces and the regions of these faces, ascending.
     let mut faces_of = vec![Vec::new(); n];
     for (f, face) in cage.iter().enumerate() {
         regions[root(&mut region, f)].0 += face.len() - 2;

@@ -16,7 +16,7 @@ use crate::{gltf, obj, off, ply, stl};
 pub struct FormatFacts {
     /// Extensions of readable files, lower case, without the dot. The first one is the extension of exported files.
     pub endings: &'static [&'static str],
-    /// Extensions among `endings` that exports cannot have.
+    /// Extensions among `endings` that files can be read with, but not written with.
     read_only: &'static [&'static str],
     /// MIME types, for file choosers that support MIME types better than extensions.
     pub mime_types: &'static [&'static str],
@@ -24,9 +24,9 @@ pub struct FormatFacts {
     pub naming: &'static [&'static str],
     /// Extensions of the other files that files of this format refer to.
     pub companions: &'static [&'static str],
-    /// Whether a file is of this format beyond doubt.
+    /// Whether the bytes can only be a file of this format.
     is: fn(&[u8]) -> bool,
-    /// Whether a text is of this format, without byte order mark and leading space.
+    /// Whether a text looks like this format. The text has no byte order mark and no leading space.
     is_text: fn(&[u8]) -> bool,
     /// Extensions whose files must satisfy `is` or `is_text`. Each entry is an extension, what a file that does not is,
     /// and why.
@@ -35,16 +35,16 @@ pub struct FormatFacts {
     pub(super) write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
     /// Names of the files that a file refers to.
     pub(super) named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
-    /// Approximate memory for writing a model, bytes. The number is the part that depends on vertices and triangles.
+    /// Approximate memory for writing a model, bytes. The argument is the part that depends on vertices and triangles.
     pub(super) bytes_to_write: fn(&Model, u64) -> u64,
-    /// What written files keep of a model of another format.
+    /// What a file in this format keeps of a model that was read from another format.
     keeps: &'static [Kept],
 }
 
-/// Something that files of a format keep.
+/// A property of a model that files of some formats keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kept {
-    /// Vertices and their order.
+    /// The order of the vertices.
     Order,
     /// All digits of positions far from the origin.
     Digits,
@@ -59,7 +59,7 @@ pub(crate) enum Kept {
     Poses,
 }
 
-/// Defaults of a row: a format without companions, recognised by its extension only.
+/// Defaults for the facts about a format: no companions, recognised by the extension only.
 const PLAIN: FormatFacts = FormatFacts {
     endings: &[],
     read_only: &[],
@@ -76,7 +76,7 @@ const PLAIN: FormatFacts = FormatFacts {
     keeps: &[],
 };
 
-/// Defines [`ModelFormat`] and the row of each format.
+/// Defines [`ModelFormat`] and the facts about each format.
 macro_rules! formats {
     ($($(#[$about:meta])* $format:ident = $name:literal: $row:expr;)+) => {
         /// File format of a model.
@@ -123,7 +123,7 @@ formats! {
         read: |source| source.gltf(),
         named_files: |bytes, _, memory_limit| gltf::named_files(bytes, memory_limit),
         write: Model::write_glb,
-        // Each primitive adds the JSON of new accessors and buffer views.
+        // Each primitive adds about 6000 bytes of JSON for new accessors and buffer views.
         bytes_to_write: |model, shape| shape + 6000 * model.counts.primitives as u64 + model.bytes,
         keeps: &[Kept::Digits, Kept::Colors, Kept::Texcoords, Kept::Materials, Kept::Rig, Kept::Poses],
     };
@@ -133,7 +133,7 @@ formats! {
         naming: &["obj"],
         companions: &["mtl"],
         named_files: obj::named_files,
-        // Without normals, writing an OBJ needs a third of the memory per vertex.
+        // A vertex of an OBJ without normals needs a third of the memory.
         bytes_to_write: |model, shape| shape / 3 + model.bytes,
         keeps: &[Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
         ..PLAIN
@@ -176,9 +176,9 @@ formats! {
 pub struct FormatError {
     /// Name given by the caller.
     pub name: String,
-    /// What the content looks like.
+    /// What the content seems to be.
     pub found: &'static str,
-    /// What to do.
+    /// What the user can do.
     pub hint: String,
 }
 
@@ -199,7 +199,7 @@ impl ModelFormat {
         self.facts().keeps.contains(&what)
     }
 
-    /// Extensions of the written files that keep `what`: "OBJ, PLY or OFF".
+    /// Extensions of the formats that can be written and keep `what`, as text: "OBJ, PLY or OFF".
     pub(crate) fn listed(what: Option<Kept>) -> String {
         let all = Self::ALL.into_iter().filter(|format| what.is_none_or(|what| format.keeps(what)));
         let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();

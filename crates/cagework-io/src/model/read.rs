@@ -1,4 +1,4 @@
-//! Models from the contents of files.
+//! Reads models from the contents of files.
 
 use glam::DVec3;
 
@@ -73,7 +73,7 @@ impl Source<'_, '_> {
         })
     }
 
-    /// Reads a format of polygons.
+    /// Reads a file of polygons (PLY, STL or OFF).
     pub(super) fn polygons(
         self,
         format: ModelFormat,

@@ -1,4 +1,4 @@
-//! Export of a model with new positions.
+//! Writes a model with new positions.
 
 use std::borrow::Cow;
 
@@ -22,7 +22,7 @@ impl Model {
         (format.facts().write)(self, positions)
     }
 
-    /// Sentence listing what an export to `format` loses; `None` if nothing.
+    /// A sentence that lists what an export to `format` loses; `None` if it loses nothing.
     #[must_use]
     pub fn lost_in(&self, format: ModelFormat) -> Option<String> {
         let is_same = self.format == format;
@@ -44,7 +44,7 @@ impl Model {
                 (
                     has("COLOR_") && !is_same,
                     has("TEXCOORD_") && loses(Kept::Texcoords),
-                    // An OBJ export keeps material names.
+                    // An OBJ export keeps the names of materials.
                     self.counts.materials > 0 && loses(Kept::Materials),
                     self.counts.nodes > 1 && loses(Kept::Names),
                     self.is_rigged() && loses(Kept::Rig),
@@ -177,7 +177,7 @@ impl Model {
             }
             Document::Obj(document) => document,
         };
-        // Deforming a GLB means patching it, so build one of the rest shape first.
+        // A deformed GLB is a patched GLB of the rest shape: build that first.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
         let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, Some(self.origin))?;
@@ -198,7 +198,7 @@ impl Model {
     }
 }
 
-/// Pairs the names of `poses` with positions.
+/// Combines the names of `poses` with converted positions.
 fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
     poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
 }

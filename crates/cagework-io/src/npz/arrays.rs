@@ -14,7 +14,7 @@ use super::NpzError;
 use crate::memory::MemoryError;
 use crate::shown::shown;
 
-/// Limit of an array header, bytes. NumPy's are 100 to 200.
+/// Limit on the size of an array's header, bytes. NumPy writes 100 to 200.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 /// Alignment of array data in NumPy's format, bytes.
 const NPY_ALIGN: usize = 64;
@@ -26,14 +26,14 @@ const HEADERS_BYTES: usize = 4096;
 /// Arrays larger than this number of bytes, half of the 32-bit limit, get zip64 headers.
 const MAX_ZIP32_ARRAY_BYTES: usize = (u32::MAX / 2) as usize;
 
-/// Archive writer.
+/// Writes an archive of arrays.
 pub(super) struct NpzWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
     options: SimpleFileOptions,
 }
 
 impl NpzWriter {
-    /// `bytes`: total size of the arrays; `longest`: size of the longest one.
+    /// A writer for arrays of `bytes` bytes in total, `longest` of them in the longest array.
     pub(super) fn new(bytes: usize, longest: usize) -> Self {
         Self {
             zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + HEADERS_BYTES))),
@@ -45,7 +45,7 @@ impl NpzWriter {
         }
     }
 
-    /// Returns the archive.
+    /// Ends the archive and returns its bytes.
     pub(super) fn finish(self) -> Vec<u8> {
         self.zip.finish().expect("writing to memory does not fail").into_inner()
     }
@@ -56,7 +56,7 @@ impl NpzWriter {
         self.put(name, "<f4", &[points.len(), 3], values);
     }
 
-    /// Adds an array, converting a few values at a time to avoid a second copy.
+    /// Adds an array. Values are converted a few at a time, which avoids a second copy of the array.
     pub(super) fn put<const N: usize>(
         &mut self,
         name: &str,
@@ -93,7 +93,7 @@ pub(super) fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     out
 }
 
-/// Archive reader.
+/// Reads an archive of arrays.
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
     /// Total bytes of the arrays read so far, counting raw and converted values.
@@ -116,7 +116,7 @@ impl<'a> Archive<'a> {
 pub(super) struct NpyArray {
     name: &'static str,
     dtype: String,
-    /// Lengths along the axes.
+    /// Length along each axis.
     pub(super) shape: Vec<usize>,
     pub(super) data: Vec<u8>,
 }
@@ -136,10 +136,10 @@ pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Opt
 
 /// Bytes that determine the header's length: magic, version, and a length of 2 or 4 bytes.
 const PREAMBLE_BYTES: u64 = 12;
-/// Offset of the header's text in version 1. Later versions have two more bytes of length here.
+/// Offset of the header's text in files of version 1. Later versions have two more bytes for its length.
 const HEADER_TEXT_OFFSET: usize = 10;
 
-/// End of the header of an `.npy` file, versions 1 to 3.
+/// Offset of the end of an `.npy` file's header, versions 1 to 3.
 fn header_end(bytes: &[u8]) -> Option<u64> {
     let rest = bytes.strip_prefix(NPY_MAGIC)?;
     match rest.first()? {
@@ -187,7 +187,7 @@ impl NpyArray {
             return Err(fault("is in Fortran order; save it in C order".into()));
         }
         let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
-        // The element size; unknown types are rejected when their values are converted.
+        // The element size. A type without a size is rejected when its values are converted.
         let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
         let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
         let needed = needed.ok_or_else(|| {
@@ -196,7 +196,7 @@ impl NpyArray {
         *unpacked = unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
         MemoryError::check(*unpacked, memory_limit)?;
         let mut data = Vec::new();
-        // One byte more than needed detects overlong streams.
+        // Reading one byte more than needed detects streams that are too long.
         unpack(needed.saturating_add(1), &mut data)?;
         if data.len() as u64 > needed {
             return Err(fault(format!("is longer than the {needed} bytes of its shape {shape:?}")));
@@ -204,7 +204,7 @@ impl NpyArray {
         Ok(Self { name, dtype, shape, data })
     }
 
-    /// Rows of three floats, and whether these have 64 bits.
+    /// The array's rows as points of three numbers, and whether the numbers have 64 bits.
     pub(super) fn wide_points(self) -> Result<(Vec<DVec3>, bool), NpzError> {
         let is_wide = self.dtype == "<f8";
         let rows = self.rows_of(&[3])?;
@@ -220,7 +220,7 @@ impl NpyArray {
         NpzError::Array { array: self.name, problem: problem.to_owned() }
     }
 
-    /// Checks the lengths of all axes except the first.
+    /// Checks that the array has these lengths along all axes except the first.
     pub(super) fn rows_of(self, lengths: &[usize]) -> Result<Self, NpzError> {
         if self.shape.get(1..) == Some(lengths) {
             return Ok(self);

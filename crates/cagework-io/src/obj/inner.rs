@@ -50,7 +50,7 @@ pub fn read_inner_controls(
                 let corner = |token: std::ops::Range<usize>| {
                     let token = &bytes[token];
                     let bad = || ObjError::Corner { line: line.number, found: shown(token) };
-                    // Texture coordinate and normal follow after slashes.
+                    // Slashes separate the vertex from texture coordinate and normal.
                     let index = token.split(|&b| b == b'/').next().and_then(integer).ok_or_else(bad)?;
                     let vertices = inner.positions.len();
                     resolve(index, vertices).ok_or(ObjError::Vertex { line: line.number, index, vertices })
@@ -76,7 +76,7 @@ pub fn read_inner_controls(
     if vertices == 0 {
         return Err(ObjError::Empty);
     }
-    // Elements may precede their vertices.
+    // Indices are checked at the end, because elements may precede their vertices.
     for (element, line) in inner.elements.iter().zip(lines_of) {
         if let Some(&v) = element.corners().iter().find(|&&v| v as usize >= vertices) {
             return Err(ObjError::Vertex { line, index: i64::from(v) + 1, vertices });

@@ -27,7 +27,7 @@ pub(crate) fn lines(bytes: &[u8]) -> Lines<'_> {
     Lines { bytes, at, number: 1 }
 }
 
-/// End of the physical line that starts at `at`: (end of its content, start of the next line).
+/// For the physical line that starts at `at`, the end of its content and the start of the next line.
 fn physical_end(bytes: &[u8], at: usize) -> (usize, usize) {
     match bytes[at..].iter().position(|&b| b == b'\n' || b == b'\r') {
         None => (bytes.len(), bytes.len()),
@@ -98,9 +98,9 @@ pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = R
     })
 }
 
-/// Text of a token for a message: lossy, short, escaped.
+/// Text of a token for a message: shortened, escaped, and with invalid UTF-8 replaced.
 pub(crate) fn shown(token: &[u8]) -> String {
-    /// Limit in characters.
+    /// Limit on the length, characters.
     const MAX_CHARS: usize = 40;
     shown_start(&String::from_utf8_lossy(token), MAX_CHARS)
 }

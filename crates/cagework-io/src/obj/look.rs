@@ -1,4 +1,4 @@
-//! Materials and appearance of an OBJ: base colours and textures of its `.mtl` files.
+//! Appearance of an OBJ: base colours and textures of the materials in its `.mtl` files.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::siblings::{Image, Resolve, Siblings};
 /// A material of an `.mtl` file.
 #[derive(Clone, Debug)]
 pub(crate) struct Material {
-    /// `Kd` and, as alpha, `d`; sRGB as written.
+    /// Colour `Kd`, with `d` as alpha; sRGB as written.
     pub(crate) color: [f32; 4],
     /// Texture of `map_Kd`, if any.
     pub(crate) image: Option<Image>,
@@ -59,7 +59,8 @@ pub(crate) fn read_materials(
             }
             b"d" => material.color[3] = number().unwrap_or(1.0),
             b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
-            // Only plain file names are read: options such as `-s 1 1 1` precede the name, which may contain blanks.
+            // A name that starts with an option such as `-s 1 1 1` is not read: where the name begins is unclear, since
+            // it may contain blanks.
             b"map_Kd" if !rest.starts_with('-') => {
                 material.image = siblings.image(&rest.replace('\\', "/"), "it is not drawn", notices);
             }

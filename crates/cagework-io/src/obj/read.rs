@@ -1,4 +1,4 @@
-//! OBJ reader: one vertex per `v` line, one polygon per `f` line, in file order.
+//! Reads an OBJ file: one vertex per `v` line, one polygon per `f` line, in file order.
 
 use cagework_core::words::counted;
 use std::collections::{HashMap, HashSet};
@@ -42,7 +42,7 @@ impl Group {
     }
 }
 
-/// Parsed OBJ file, as far as exports need it.
+/// The parts of an OBJ file that exports need.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObjDocument {
     /// Bytes of the original file.
@@ -78,7 +78,7 @@ impl ObjDocument {
         self.face_starts.windows(2).map(|ends| corners(ends).iter().map(|c| c.v).collect()).collect()
     }
 
-    /// Normal of a corner; zero where it has none.
+    /// Normal of a corner; zero if it has none.
     pub(crate) fn normal(&self, corner: &Corner) -> Vec3 {
         self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)
     }
@@ -119,7 +119,8 @@ impl ObjDocument {
         let mut group_of = HashMap::new();
         let mut face = 0;
         for t in &self.triangles {
-            // Triangles are in the order of faces, and face corners are contiguous.
+            // Triangles are in the order of the faces, whose corners are contiguous: advance to the face of this
+            // triangle.
             while self.face_starts[face + 1] <= t[0] {
                 face += 1;
             }
@@ -138,9 +139,9 @@ impl ObjDocument {
 pub(crate) struct ObjModel {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) document: ObjDocument,
-    /// Number of `o` and `g` lines.
+    /// Total number of `o` and `g` lines.
     pub(crate) groups: usize,
-    /// Approximate memory, bytes.
+    /// Approximate memory of the document, bytes.
     pub(crate) bytes: u64,
     pub(crate) notices: Vec<String>,
 }
@@ -151,17 +152,17 @@ struct Reader<'a> {
     document: ObjDocument,
     material_numbers: HashMap<&'a [u8], u32>,
     material: u32,
-    /// Current smoothing group. 0 means off, which is the format's default.
+    /// Smoothing group of the following faces. 0, the default of the format, means none.
     smoothing: u32,
     has_smoothing: bool,
-    /// Forward references: line and vertex index, checked at the end.
+    /// References to vertices that have not been read yet: line and vertex index. They are checked at the end.
     forward: Vec<(usize, u32)>,
     groups: usize,
     group_bytes: u64,
     bad_attributes: usize,
     ignored: usize,
     siblings: Siblings<'a>,
-    /// Names of `mtllib` lines read so far.
+    /// Names of the material files that were read.
     libraries: HashSet<String>,
     memory_limit: u64,
     notices: Vec<String>,
@@ -176,7 +177,7 @@ const MAX_MATERIALS: usize = 1 << 14;
 /// Minimum number of corners of a face. Faces with fewer corners are ignored, as are lines and points.
 pub(super) const MIN_CORNERS: usize = 3;
 
-/// Lines or corners between checks of the memory limit.
+/// Number of lines or corners after which the memory limit is checked again.
 const MEMORY_CHECK_INTERVAL: usize = 1 << 12;
 
 /// Reads an OBJ file using at most `memory_limit` bytes. `resolve` returns its material files and textures.
@@ -351,7 +352,7 @@ impl<'a> Reader<'a> {
         groups.push(Group { is_object, name, first_face: self.document.face_materials.len() as u32 });
     }
 
-    /// Reads a material file unless it was read before.
+    /// Reads a material file, unless it has been read before.
     fn library(&mut self, name: &str) {
         let name = name.replace('\\', "/");
         match self.libraries.insert(name.clone()).then(|| self.siblings.file(&name)) {
@@ -363,7 +364,7 @@ impl<'a> Reader<'a> {
                 let name = shown_start(&name, MAX_NAME_CHARS);
                 self.notices.push(format!("material file '{name}' {reason}: its materials are not drawn"));
             }
-            // A missing material file is common, so there is no notice.
+            // Material files are often missing, so that this deserves no notice.
             Some(Err(SiblingError::Missing)) | None => {}
         }
     }
@@ -437,7 +438,7 @@ impl<'a> Reader<'a> {
         );
         self.document.bytes = self.bytes.to_vec();
         let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
-        // Subtract what is freed after reading: the caller's bytes of the file, and the weld table.
+        // Subtract what the caller frees after reading: its bytes of the file, and the weld table.
         let bytes = reading - bytes - welding;
         Ok(ObjModel {
             positions: self.positions,

@@ -1,4 +1,4 @@
-//! Vertices of an OBJ's materials and groups, by name.
+//! Finds the vertices of an OBJ's materials, objects and groups by name.
 
 use std::collections::HashSet;
 
@@ -14,7 +14,7 @@ impl ObjDocument {
         materials.chain(groups.map(|group| (PartKind::Group, group.name.clone()))).collect()
     }
 
-    /// Vertices of the parts with this name, unsorted and with duplicates.
+    /// Vertices of all parts of this kind and name, unsorted and with duplicates.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Vec<u32> {
         let n_faces = self.face_materials.len();
         let mut is_of = vec![false; n_faces];

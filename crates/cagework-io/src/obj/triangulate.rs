@@ -1,4 +1,4 @@
-//! Triangulation of polygons.
+//! Splits polygons into triangles.
 
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
@@ -7,12 +7,12 @@ use glam::{DVec3, Vec3};
 /// at worst: 5 s for one polygon of 60,000 corners.
 const MAX_CLIP_WORK: u64 = 1 << 28;
 
-/// Triangulates polygons, reusing its buffers.
+/// Triangulates polygons one after the other, with reused buffers.
 pub(crate) struct Triangulator {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     corners: Vec<u32>,
-    /// Remaining part of [`MAX_CLIP_WORK`].
+    /// What is left of [`MAX_CLIP_WORK`].
     left: u64,
     /// Number of concave polygons that became fans because [`MAX_CLIP_WORK`] was used up.
     pub(crate) fans: usize,
@@ -54,7 +54,7 @@ impl Triangulator {
         left.is_some()
     }
 
-    /// Clips ears in the plane with the given normal. False if the triangles do not cover the polygon.
+    /// Clips ears in the plane with the given normal. Returns false if the triangles do not cover the polygon.
     fn clip_ears(&mut self, p: &[DVec3], normal: DVec3) -> bool {
         let (u, v) = normal.any_orthonormal_pair();
         self.flat.clear();
@@ -63,7 +63,7 @@ impl Triangulator {
         if self.corners.len() != 3 * (p.len() - 2) {
             return false;
         }
-        // `earcut` does not guarantee an orientation, so use the polygon's.
+        // `earcut` does not guarantee the orientation of its triangles: give each that of the polygon.
         for t in self.corners.chunks_exact_mut(3) {
             let [a, b, c] = [p[t[0] as usize], p[t[1] as usize], p[t[2] as usize]];
             if (b - a).cross(c - a).dot(normal) < 0.0 {

@@ -1,4 +1,4 @@
-//! OBJ writer: patches of the original file, new files and cages.
+//! Writes OBJ files: patches of the original file, new files, and cages.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::origin::Coordinate;
 
 /// Distinct pairs (vertex, normal) at the corners of a file; without normal, (vertex, smooth surface).
 pub(crate) struct Pairs {
-    /// Pairs as shading vertices.
+    /// The pairs as vertices with normals.
     pub(crate) shading: Shading,
     /// Pair index of each corner.
     pub(crate) of_corner: Vec<u32>,
@@ -22,7 +22,7 @@ pub(crate) struct Pairs {
 }
 
 impl ObjDocument {
-    /// Pairs in order of first use. `rest`: rest positions.
+    /// The pairs in the order of their first use. `rest`: positions of the vertices at rest.
     pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
         let mut numbers = HashMap::new();
         let (mut vertex, mut vn, mut normal, mut surface) = (vec![], vec![], vec![], vec![]);
@@ -98,10 +98,10 @@ pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3], o
 }
 
 struct PatchedNormals {
-    /// New normals that replace each `vn` line.
+    /// For each `vn` line, the normals that replace it.
     lines: Vec<Vec<Vec3>>,
     of_corner: Vec<u32>,
-    /// Number, from 1, of each pair's new `vn` line; 0 without normal.
+    /// For each pair, the number from 1 of its new `vn` line; 0 if it has no normal.
     line_of_pair: Vec<u32>,
     renumbered: bool,
 }
@@ -122,7 +122,7 @@ impl PatchedNormals {
             for (k, &pair) in users.iter().enumerate() {
                 line_of_pair[pair as usize] = next + k as u32;
             }
-            // Unused `vn` lines stay, to keep the numbering.
+            // Unused `vn` lines are kept, so that the numbers of later lines do not change.
             next += users.len().max(1) as u32;
         }
         Self {
@@ -143,7 +143,7 @@ impl PatchedNormals {
     }
 }
 
-/// Line terminator as read; LF for a last line without one.
+/// Line end as read. A last line without a line end gets LF.
 fn line_end(line: &[u8]) -> &[u8] {
     match line {
         [.., b'\r', b'\n'] => b"\r\n",
@@ -168,7 +168,7 @@ pub(crate) struct ObjGroup {
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
-/// Writes a new OBJ file: all vertices in the model's order, then each group.
+/// Writes a new OBJ file: all vertices in the model's order, then the groups.
 pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjGroup]) -> Vec<u8> {
     let mut text = String::with_capacity(64 * positions.len());
     for p in positions {
@@ -231,7 +231,7 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     text.push('\n');
 }
 
-/// A name on one line: control characters become spaces.
+/// Puts a name on one line: replaces control characters by spaces.
 fn one_line(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -24,11 +24,11 @@ pub struct Clip {
     tracks: Vec<(ChannelTarget, Track)>,
 }
 
-/// Keys of one channel.
+/// Keys of one animation channel.
 #[derive(Clone, Debug, PartialEq)]
 struct Track {
     times: Numbers,
-    /// `[n_keys, width]`, or `[n_keys, 3, width]` with tangents.
+    /// `[n_keys, width]`; for cubic splines, which have tangents, `[n_keys, 3, width]`.
     values: Numbers,
     width: usize,
     interpolation: Interpolation,
@@ -41,14 +41,14 @@ enum Interpolation {
     Cubic,
 }
 
-/// Numbers of an accessor, shared between tracks.
+/// Numbers of an accessor. Tracks that use the same accessor share them.
 type Numbers = Arc<[f32]>;
 
 /// Cache of decoded accessors by index and element width, with a flag for ascending values. `None` if
 /// decoding failed or a value is not finite.
 type Decoded = HashMap<(u32, usize), Option<(Numbers, bool)>>;
 
-/// Clips of a document, without unreadable channels.
+/// The clips of a document. Unreadable channels are left out.
 pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
     let mut decoded = Decoded::new();
     let animations = document.json["animations"].as_array().into_iter().flatten();
@@ -72,7 +72,7 @@ pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
 }
 
 impl Clip {
-    /// Times of all keys, seconds, ascending.
+    /// Times of all keys of all channels, seconds, ascending.
     pub(crate) fn times(&self) -> Vec<f32> {
         let mut times: Vec<f32> =
             self.tracks.iter().flat_map(|(_, track)| track.times.iter().copied()).collect();
@@ -81,7 +81,7 @@ impl Clip {
         times
     }
 
-    /// Value of each channel at a time, seconds.
+    /// The value of each channel at a time, seconds.
     pub(super) fn at(&self, time: f32) -> impl Iterator<Item = (ChannelTarget, Vec<f64>)> {
         self.tracks.iter().map(move |(driven, track)| (*driven, track.at(time, *driven)))
     }
@@ -123,7 +123,7 @@ impl Track {
         is_right.then_some(Self { times, values, width, interpolation })
     }
 
-    /// Interpolates as in glTF 2.0, appendix C.
+    /// Value at a time, interpolated as in glTF 2.0, appendix C.
     fn at(&self, time: f32, driven: ChannelTarget) -> Vec<f64> {
         let n = self.times.len();
         let time = time.clamp(self.times[0], self.times[n - 1]);
@@ -150,7 +150,7 @@ impl Track {
             }
             Interpolation::Linear if is_rotation => {
                 let [from, to] = [last, next].map(|k| quaternion(&of(k).collect::<Vec<_>>()));
-                // Take the shorter arc.
+                // Of the two arcs between the rotations, take the shorter one.
                 let to = if from.dot(to) < 0.0 { -to } else { to };
                 from.slerp(to, share).to_array().to_vec()
             }
@@ -159,7 +159,7 @@ impl Track {
     }
 }
 
-/// Numbers of an accessor with `width` components per element.
+/// Numbers of an accessor whose elements have `width` components.
 fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbers, GltfError> {
     let source = document.source();
     Ok(match width {
@@ -169,7 +169,7 @@ fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbe
     })
 }
 
-/// Unit quaternion; identity for zeros.
+/// The unit quaternion of the same direction; the identity for zeros.
 pub(super) fn quaternion(q: &[f64]) -> DQuat {
     let q = DQuat::from_xyzw(q[0], q[1], q[2], q[3]);
     if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }

@@ -18,7 +18,7 @@ const ALIGN: usize = 4;
 pub(super) struct Edit<'a> {
     document: &'a GltfDocument,
     pub(super) json: Value,
-    /// Bytes of all buffers, concatenated.
+    /// Bytes of the document's buffers, concatenated, then those of new accessors.
     bin: Vec<u8>,
     /// Whether any accessor was written.
     has_written: bool,
@@ -51,7 +51,7 @@ impl<'a> Edit<'a> {
         instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
     }
 
-    /// Recounts the references, after some were added.
+    /// Counts the references again, after references were added.
     pub(super) fn count_uses(&mut self) {
         let mut named = Vec::new();
         each_accessor(&mut self.json, &mut |reference| named.extend(reference.as_u64()));
@@ -61,7 +61,7 @@ impl<'a> Edit<'a> {
         }
     }
 
-    /// Counts one more reference to an accessor.
+    /// Counts one more reference to the location of an accessor.
     pub(super) fn use_again(&mut self, accessor: usize) {
         *self.uses.entry(self.place(accessor)).or_default() += 1;
     }
@@ -148,7 +148,7 @@ impl<'a> Edit<'a> {
         accessor
     }
 
-    /// Whether an accessor that was added has these bytes.
+    /// Whether the new accessor with this index has these bytes.
     fn has_bytes(&self, accessor: usize, bytes: &[u8]) -> bool {
         let view = self.json["accessors"][accessor]["bufferView"].as_u64().unwrap_or(0) as usize;
         let start = self.json["bufferViews"][view]["byteOffset"].as_u64().unwrap_or(0) as usize;
@@ -162,7 +162,7 @@ impl<'a> Edit<'a> {
         push(json, "bufferViews", view)
     }
 
-    /// Returns the GLB; the original file if nothing changed.
+    /// Returns the GLB, or the original file if nothing has changed.
     pub(super) fn finish(self) -> Result<Vec<u8>, WriteError> {
         let Self { document, mut json, mut bin, has_written, .. } = self;
         if let Some(file) = document.as_read().filter(|_| !has_written && json == joined(document)) {
@@ -170,10 +170,10 @@ impl<'a> Edit<'a> {
         }
         embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
         if document.is_decoded {
-            // The pack drops the compressed streams, to which nothing refers.
+            // Nothing refers to the compressed streams any more: the pack drops them.
             return Pack::of_bytes(&json, &bin).finish(json);
         }
-        // An unchanged buffer keeps its declared length; the chunk can include padding.
+        // If the buffer has not changed, keep its declared length: the chunk may be longer because of padding.
         let only = if let [only] = document.buffers.as_slice() { only.len() } else { 0 };
         if bin.is_empty() {
             json.as_object_mut().map(|object| object.shift_remove("buffers"));
@@ -184,7 +184,7 @@ impl<'a> Edit<'a> {
     }
 }
 
-/// JSON of a document with all buffers concatenated into one.
+/// The document's JSON, as if all buffers were concatenated into one.
 fn joined(document: &GltfDocument) -> Value {
     let mut json = document.json.clone();
     let (mut starts, mut end) = (Vec::new(), 0);

@@ -11,7 +11,7 @@ use glam::{DVec3, U64Vec3};
 
 use super::{Rig, RigPrimitive, Target};
 
-/// Limit on directly bound ends, about 0.4 GB of weights at 100 cage vertices.
+/// Largest number of morph target ends that are bound one by one: about 0.4 GB of weights at 100 cage vertices.
 pub(super) const MAX_ENDS: usize = 200_000;
 
 /// Limits on the lattice: nodes, and cells along the longest side. Finer cells than those of the solver's
@@ -19,13 +19,13 @@ pub(super) const MAX_ENDS: usize = 200_000;
 const MAX_NODES: usize = 60_000;
 const MAX_CELLS_PER_SIDE: f64 = 256.0;
 
-/// Bits of a cell coordinate.
+/// Number of bits of a cell's coordinate along one axis.
 const CELL_INDEX_BITS: u32 = 21;
 
 /// Occupied cells of a regular lattice.
 pub(super) struct Lattice {
     origin: DVec3,
-    /// Edge length of a cell, file units.
+    /// Edge length of a cell, in the units of the file.
     pub(super) cell: f64,
     /// Packed coordinates of the cells, ascending.
     cells: Vec<u64>,
@@ -35,7 +35,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice around `points`. `size`: longest side of the bounding box of the rest shape.
+    /// The lattice around `points`. `size`: longest side of the bounding box of the model at rest.
     fn new(points: &(impl Iterator<Item = DVec3> + Clone), size: f64) -> Self {
         let box_of = |[low, high]: [DVec3; 2], p| [low.min(p), high.max(p)];
         let [origin, high] = points.clone().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], box_of);
@@ -50,7 +50,7 @@ impl Lattice {
         let (mut cell, mut cells) = (finest, numbers(finest));
         loop {
             if let Some(lattice) = Self::of(origin, cell, &cells) {
-                // If the occupied cells fill a volume, this cell size uses up the node limit.
+                // If the occupied cells fill a volume, this cell size just reaches the node limit.
                 let share = (lattice.nodes.len() as f64 / MAX_NODES as f64).cbrt();
                 let finer = (cell * share).max(finest);
                 return Self::of(origin, finer, &numbers(finer)).unwrap_or(lattice);
@@ -121,7 +121,7 @@ fn corners(cell: u64) -> [u64; 8] {
 }
 
 impl Rig<'_> {
-    /// Builds the lattice if there are more than [`MAX_ENDS`] ends.
+    /// The lattice that replaces the ends of morph targets, if there are more than [`MAX_ENDS`].
     pub(super) fn lattice(&self) -> Option<Lattice> {
         if self.n_ends <= MAX_ENDS {
             return None;
@@ -163,7 +163,7 @@ impl Rig<'_> {
         self.spread(by, Lattice::at, |own, at_rest, at_end| own + (at_end - at_rest))
     }
 
-    /// Whether each point is outside the cage. An end is outside if all nodes of its lattice cell are outside.
+    /// Whether each point is outside the cage. With a lattice, an end is outside if all nodes of its cell are.
     pub(crate) fn all_outside(&self, is_outside: Vec<bool>) -> Vec<bool> {
         let read = |lattice: &Lattice, point, nodes: &[bool]| {
             lattice.around(point).0.iter().all(|&node| nodes[node as usize])

@@ -63,7 +63,8 @@ pub(crate) struct Rig<'a> {
     /// Nodes that follow the cage, parents first, each with the index of the first of its seven points: its origin,
     /// then the six points around the origin.
     follows: Vec<(u32, usize)>,
-    /// Sum of joint weights of each node, plus the vertices of unskinned meshes attached to it. `[n_nodes]`
+    /// For each node, the sum of its weights as a joint, plus the number of vertices of its unskinned meshes.
+    /// `[n_nodes]`
     held: Vec<f64>,
     /// Whether each node is a joint, a node animated by clips, a VRM bone, or a descendant of one of these. `[n_nodes]`
     on_skeleton: Vec<bool>,
@@ -71,16 +72,16 @@ pub(crate) struct Rig<'a> {
     n_vertices: usize,
     /// Origin of the model's positions, in world space. All other positions in this struct are absolute.
     origin: DVec3,
-    /// Diagonal of the bounding box of all states, object units.
+    /// Diagonal of the bounding box of the model in all its morph states, object units.
     diagonal: f64,
-    /// Points after the vertices, in the world space of the file.
+    /// World positions of the further points that are bound: ends of morph targets, points of nodes and VRM points.
     extras: Vec<DVec3>,
     n_ends: usize,
-    /// Lattice whose nodes are bound instead of the ends, if there are many ends.
+    /// Lattice whose nodes are bound instead of the ends of morph targets, if there are many of these.
     lattice: Option<Lattice>,
 }
 
-/// A primitive under one skin or node.
+/// A primitive, at a node or under a skin.
 struct RigPrimitive {
     instance: Instance,
     primitive: u32,
@@ -89,7 +90,7 @@ struct RigPrimitive {
     /// Index of the document's slot; `None` if the primitive has no triangles or is not visible.
     slot: Option<usize>,
     frame: Frame,
-    /// Positions in mesh space, as in the file.
+    /// Vertex positions in mesh space, as the file has them.
     local: Vec<DVec3>,
     targets: Vec<Target>,
 }
@@ -110,7 +111,7 @@ impl RigPrimitive {
         &document.root.meshes[self.instance.mesh as usize].primitives[self.primitive as usize]
     }
 
-    /// Rest positions, world space.
+    /// Vertex positions at rest, world space.
     fn rest(&self) -> Vec<DVec3> {
         let mut local = self.local.clone();
         for target in &self.targets {
@@ -157,7 +158,7 @@ impl<'a> Rig<'a> {
             if shown.is_some() {
                 added?;
             } else if added.is_err() {
-                // Unreadable meshes outside the scene stay unchanged.
+                // Meshes outside the scene that cannot be read stay unchanged.
                 continue;
             }
             seen.insert(key);
@@ -391,7 +392,7 @@ fn has_pivot(world: &DMat4) -> bool {
     world.w_axis.truncate() != DVec3::ZERO
 }
 
-/// Key of a shape: instances with equal keys deform identically.
+/// Key of an instance's deformation: instances with equal keys have the same.
 fn key_of(instance: &Instance) -> (u32, Option<u32>, Option<u32>) {
     (instance.mesh, instance.skin, instance.skin.is_none().then_some(instance.node).flatten())
 }

@@ -38,7 +38,7 @@ const MIN_RIGID_VERTICES: usize = 3;
 /// Range of the scale factor of clip translations.
 const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
-/// State of all nodes after the deformation.
+/// The nodes of a document after the deformation.
 pub(super) struct NodeUpdate {
     /// Change of each node; `None` for unchanged nodes. `[n_nodes]`
     pub(super) changes: Vec<Option<NodeChange>>,
@@ -52,7 +52,7 @@ pub(super) struct NodeUpdate {
     pub(super) n_loose: usize,
 }
 
-/// Input of the node update.
+/// The deformation that [`Rig::moved`] applies to the nodes.
 pub(super) struct Deformation<'a> {
     pub(super) by: &'a [DVec3],
     pub(super) is_outside: &'a [bool],
@@ -101,7 +101,7 @@ pub struct JointPoint {
     pub point: usize,
     /// Index of the parent in the list of joints, which lists parents first; `None` for roots.
     pub parent: Option<usize>,
-    /// Whether the node carries vertices. A joint outside the cage without vertices follows its parent.
+    /// Whether the node carries vertices. A joint outside the cage that carries none follows its parent.
     pub holds: bool,
 }
 
@@ -179,7 +179,7 @@ impl Rig<'_> {
             return moved;
         }
         let mut anchor = vec![None; n];
-        // Rigid meshes follow the cage even if the skeleton stays.
+        // Nodes of rigid meshes follow the cage even if the skeleton stays.
         let goes = |node: u32| !stays || given.rigid.contains_key(&node);
         self.follows
             .iter()
@@ -278,7 +278,7 @@ impl Rig<'_> {
         if moved.n_moved > 0 {
             let mut root = root.clone();
             root.nodes = std::mem::take(&mut moved.nodes);
-            // The hierarchy is unchanged, so this cannot fail.
+            // The hierarchy is that of the original document, so that this cannot fail.
             if let Ok(worlds) = Worlds::new(&root) {
                 moved.world = worlds.world;
             }

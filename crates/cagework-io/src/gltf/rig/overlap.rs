@@ -1,10 +1,10 @@
-//! Finds accessors that share bytes with others and cannot be overwritten in place.
+//! Finds accessors that cannot be overwritten in place, because they share bytes with others.
 
 use std::collections::{HashMap, HashSet};
 
 use serde_json::Value;
 
-/// Buffer view and offset in it.
+/// Location of an accessor: index of its buffer view, and its offset in it.
 pub(super) type ViewOffset = (u64, u64);
 
 /// Byte range `start..end` with elements of `size` bytes every `stride` bytes.
@@ -85,7 +85,7 @@ fn spans(json: &Value) -> Vec<Span> {
         let end = start.saturating_add(stride.saturating_mul(count.saturating_sub(1))).saturating_add(size);
         let place = (number_of_view, offset);
         let span = Span { place: Some(place), start, end, stride, size };
-        // Of several accessors at one location, use the largest extent.
+        // If several accessors start here, the span covers the longest.
         let at_place = at_places.entry(place).or_insert(span);
         (at_place.end, at_place.size) = (at_place.end.max(end), at_place.size.max(size));
     }

@@ -17,20 +17,20 @@ use ::gltf::json::mesh::Semantic;
 /// Plays the clips of a model.
 #[derive(Clone, Debug)]
 pub struct Player {
-    /// Vertices with joint weights and morph deltas.
+    /// Vertices of the model with their joint weights and morph deltas.
     pub skin: Skin,
     clips: Vec<Clip>,
     nodes: Vec<Node>,
-    /// Nodes with their parents, parents first.
+    /// Nodes, each with its parent; parents come first.
     order: Vec<(u32, Option<u32>)>,
-    /// Node and bind matrix of each palette entry.
+    /// Node and inverse bind matrix of each entry of the palette.
     palette: Vec<(Option<u32>, DMat4)>,
-    /// Default weights of all morph targets, and the index of the first target of each node and mesh.
+    /// Default weights of all morph targets, and for each node or mesh the index of its first target.
     defaults: Vec<f32>,
     of_nodes: HashMap<usize, usize>,
     of_meshes: HashMap<usize, Vec<usize>>,
     names: Vec<String>,
-    /// Origin of all positions, in world space.
+    /// Point in world space to which the model's positions are relative.
     origin: DVec3,
 }
 
@@ -96,7 +96,7 @@ impl Player {
             let Some(slot) = same.or_else(|| document.slots.get(number)) else { continue };
             let (instance, primitive) = document.primitive(slot);
             let own = player.palette.len() as u32;
-            // Meshes without nodes are in world space.
+            // A mesh without a node is in world space.
             player.palette.push((instance.node, DMat4::IDENTITY));
             let first_joint = match instance.skin {
                 None => 0,

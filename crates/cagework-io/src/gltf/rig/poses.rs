@@ -129,7 +129,8 @@ pub(super) fn append(
     Ok(())
 }
 
-/// Displacements of all points in a pose. Ends move with the rest shape, so existing targets stay unchanged.
+/// Displacements of all points in a pose. Ends of morph targets move with the rest shape, so that their deltas are
+/// unchanged.
 fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
     let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
     for part in &rig.parts {
@@ -148,7 +149,7 @@ fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> 
     all
 }
 
-/// Extends weights to the targets of the poses.
+/// Appends zero weights for the morph targets of the poses.
 fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
     let mut all = weights.as_array().cloned().unwrap_or_default();
     all.resize(n_before, json!(0.0));

@@ -1,4 +1,4 @@
-//! The report of a reshaped document.
+//! Report about the reshaping of a document.
 
 use cagework_core::words::counted;
 use serde::Serialize;
@@ -18,19 +18,19 @@ pub struct ReshapeReport {
     pub joints_loose: usize,
     /// Ends of morph targets: vertices with one target at weight 0 or 1.
     pub morph_ends: usize,
-    /// Ends outside the cage. They move like vertices outside the cage.
+    /// Ends of morph targets outside the cage. They move like vertices outside the cage.
     pub morph_ends_outside: usize,
     /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
     pub lattice_points: usize,
     /// Cell size of the lattice, as a fraction of the model's diagonal.
     pub lattice_cell: f64,
-    /// Animation tracks that changed.
+    /// Number of animation tracks that have changed.
     pub tracks: usize,
-    /// Unreadable animation tracks, which stay unchanged.
+    /// Number of unreadable animation tracks, which stay unchanged.
     pub tracks_unread: usize,
     /// Largest condition number of a skinning matrix.
     pub max_condition: f64,
-    /// Vertices with a singular skinning matrix, which follow their neighbours.
+    /// Number of vertices whose skinning matrix is singular; they follow their neighbours.
     pub singular_vertices: usize,
 }
 

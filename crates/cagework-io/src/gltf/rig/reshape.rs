@@ -1,4 +1,4 @@
-//! Writes a reshaped document.
+//! Reshapes a rigged document and writes it.
 
 use std::collections::HashMap;
 
@@ -27,7 +27,7 @@ pub struct ReshapeOptions {
     pub keep_travel: bool,
     /// Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
     pub rigid: Vec<String>,
-    /// Vertices that stay in place or rigid.
+    /// Vertices that stay in place or keep their shape.
     pub parts: Parts,
     /// Times of the poses in seconds, ascending. If empty, poses are played one per second, starting and
     /// ending at rest.
@@ -132,7 +132,7 @@ impl Rig<'_> {
         all[slot.triangles.clone()].iter().map(|t| t.map(|v| v - slot.start)).collect()
     }
 
-    /// Skinning matrices of a primitive with the updated nodes.
+    /// Skinning matrices of a primitive after the update of the nodes.
     fn frame(
         &self,
         part: &RigPrimitive,

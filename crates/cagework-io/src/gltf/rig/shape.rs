@@ -13,7 +13,7 @@ use crate::gltf::geometry::{Frame, attribute, vectors};
 /// Condition number above which a skinning matrix counts as singular.
 const MAX_CONDITION: f64 = 1e4;
 
-/// Deformed primitive in mesh space, as its accessors store it.
+/// A primitive after the deformation, in mesh space, as its accessors store it.
 pub(super) struct Shape {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Option<Vec<DVec3>>,
@@ -21,11 +21,11 @@ pub(super) struct Shape {
     pub(super) tangents: Option<Vec<(DVec3, f32)>>,
     pub(super) targets: Vec<Deltas>,
     pub(super) condition: f64,
-    /// Vertices with a singular skinning matrix.
+    /// Number of vertices whose skinning matrix is singular.
     pub(super) n_singular: usize,
 }
 
-/// Deltas of a morph target; normals and tangents are optional.
+/// Deltas of a morph target. Normals and tangents are present if the file has them.
 pub(super) struct Deltas {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Option<Vec<DVec3>>,
@@ -42,7 +42,7 @@ pub(super) struct SurfaceGradients<'a> {
 }
 
 impl<'a> SurfaceGradients<'a> {
-    /// `triangles`: of the model. `by`: displacements of all points.
+    /// `triangles` are those of the model, `by` the displacements of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }
@@ -65,7 +65,7 @@ impl<'a> SurfaceGradients<'a> {
     }
 }
 
-/// Positions of a primitive's vertices in one state, before and after the deformation. World space.
+/// World positions of a primitive's vertices in one morph state, before and after the deformation.
 struct State {
     from: Vec<DVec3>,
     to: Vec<DVec3>,
@@ -81,7 +81,8 @@ struct Directions {
 }
 
 impl Rig<'_> {
-    /// A primitive after the deformation; `None` if it is unchanged. `frame`: new skinning matrices of the primitive.
+    /// A primitive after the deformation; `None` if it does not change. `frame`: its skinning matrices after the
+    /// deformation.
     pub(super) fn shape(
         &self,
         part: &RigPrimitive,
@@ -239,7 +240,7 @@ impl Directions {
         Ok(Some(Self { normals, tangents, handedness, of_targets }))
     }
 
-    /// Normal (kind 0) or tangent (kind 1) with all targets at their defaults.
+    /// Normal (`kind` 0) or tangent (`kind` 1) of a vertex with all morph targets at their default weights.
     fn at_rest(&self, part: &RigPrimitive, kind: usize, v: usize) -> DVec3 {
         let own = [&self.normals, &self.tangents][kind].as_ref().map_or(DVec3::ZERO, |all| all[v]);
         part.targets.iter().enumerate().fold(own, |sum, (k, t)| {

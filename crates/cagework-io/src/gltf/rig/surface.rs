@@ -23,7 +23,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// `from`, `to`: positions before and after. `triangles`: of these vertices.
+    /// `from` and `to`: positions of the vertices before and after. `triangles` index these.
     pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
         let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let origin = origin_near(&world);
@@ -35,7 +35,7 @@ impl Surface {
             triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
         }
         normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
-        // For each position, its merged vertices: first vertex and merged index.
+        // For each position, the distinct vertices there: the first vertex of each, and its index after merging.
         let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_unique = 0;
         let mut unique_of = Vec::with_capacity(from.len());
@@ -136,7 +136,7 @@ impl Surface {
         self.unique_of.iter().enumerate().map(of).collect()
     }
 
-    /// Replaces values where `is_known` is false by the mean of the known neighbours.
+    /// Replaces each unknown value by the mean of the known values at adjacent vertices.
     pub(super) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
         let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
         for triangle in &self.triangles {

@@ -1,4 +1,4 @@
-//! Animation tracks of nodes that have moved.
+//! Adapts animation tracks of nodes that have moved.
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use crate::gltf::pack::push;
 /// A translation track whose range is below this fraction of the node's own translation counts as constant.
 const MIN_TRANSLATION_RANGE: f64 = 1e-3;
 
-/// Property animated by a channel.
+/// Property that an animation channel animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ChannelTarget {
     Translation(usize),
@@ -22,14 +22,14 @@ pub(super) enum ChannelTarget {
     MeshWeights(usize),
 }
 
-/// Change of a node's local transform, for its animation tracks.
+/// Change of a node's local transform, which its animation tracks must follow.
 pub(super) struct NodeChange {
     pub(super) from: DVec3,
     pub(super) to: DVec3,
     /// Linear maps for deviations from `from`: in tracks of constant translation, and in tracks that move the node.
     pub(super) still: DMat3,
     pub(super) moving: DMat3,
-    /// Rotation to apply to rotation keys from the left.
+    /// Rotation by which rotation keys are multiplied from the left.
     pub(super) turn: Option<DQuat>,
 }
 
@@ -63,7 +63,7 @@ pub(super) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
 pub(super) struct Output {
     pub(super) accessor: u32,
     pub(super) is_cubic: bool,
-    /// Number of keys.
+    /// Number of keys of the track.
     pub(super) n_keys: usize,
 }
 
@@ -106,7 +106,8 @@ fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Ve
     (values.len() == per_key * output.n_keys).then_some(values)
 }
 
-/// Whether the clips move each changed node. If no clip moves a node, its constant translations are bone lengths.
+/// For each changed node, whether a clip moves it. If none does, constant translation tracks set the length of its
+/// bone.
 fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<NodeChange>]) -> Vec<bool> {
     let mut moving = vec![false; changes.len()];
     for animation in edit.json["animations"].as_array().into_iter().flatten() {
@@ -188,7 +189,7 @@ fn moved(values: &[[f32; 3]], change: &NodeChange, linear: DMat3, output: &Outpu
 
 fn turned(values: &[[f32; 4]], change: &NodeChange) -> Vec<[f32; 4]> {
     let turn = change.turn.unwrap_or(DQuat::IDENTITY);
-    // Tangents are not unit quaternions, but the product is linear.
+    // Tangents are not unit quaternions, but they transform in the same way, because the product is linear.
     let value = |q: &[f32; 4]| (turn * DQuat::from_array(q.map(f64::from))).as_quat().to_array();
     values.iter().map(value).collect()
 }

@@ -12,7 +12,7 @@ use super::nodes::{Deformation, gradient, vector};
 use crate::gltf::GltfDocument;
 use crate::gltf::scene::Worlds;
 
-/// A point in a node's space, stored in a VRM extension.
+/// A point that a VRM extension stores relative to a node.
 pub(super) struct VrmPoint {
     node: usize,
     /// Position of the point in world space.
@@ -31,7 +31,7 @@ enum VrmField {
     Radius(String),
 }
 
-/// Offsets in a document. Their `bound_index` is not set yet.
+/// Points of the VRM extensions in a document. Their `bound_index` is set later.
 pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) -> Vec<VrmPoint> {
     let mut points = Vec::new();
     let json = &document.json;
@@ -40,7 +40,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
             return;
         };
         let at = world.transform_point3(offset);
-        // Ignore offsets larger than the model: such colliders are placeholders.
+        // Ignore offsets longer than the model: such colliders stand for planes.
         let is_near = at.distance(world.w_axis.truncate()) <= diagonal;
         if is_near {
             points.push(VrmPoint { node, at, bound_index: 0, what });
@@ -60,7 +60,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
         Some(DVec3::new(of["x"].as_f64()?, of["y"].as_f64()?, -of["z"].as_f64()?))
     };
 
-    // Offsets of VRM 0.
+    // Points of VRM 0.
     let person = "/extensions/VRM/firstPerson";
     let bone = number(&format!("{person}/firstPersonBone"));
     let offset = format!("{person}/firstPersonBoneOffset");
@@ -79,7 +79,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
     for group in items(format!("{springs}/boneGroups")) {
         add(number(&format!("{group}/bones/0")), DVec3::ZERO, VrmField::Radius(format!("{group}/hitRadius")));
     }
-    // Offsets of VRM 1.
+    // Points of VRM 1.
     let head = number("/extensions/VRMC_vrm/humanoid/humanBones/head/node");
     let offset = "/extensions/VRMC_vrm/lookAt/offsetFromHeadBone".to_owned();
     if let Some(at) = array(&offset) {
@@ -95,7 +95,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
             if !json.pointer(&shape).is_some_and(Value::is_object) {
                 continue;
             }
-            // Without offset, the shape is at the node.
+            // A shape without an offset is at the node's origin.
             let offset = array(&format!("{shape}/offset"));
             add(node, offset.unwrap_or(DVec3::ZERO), VrmField::Radius(format!("{shape}/radius")));
             if let Some(offset) = offset {
@@ -122,7 +122,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
 pub(super) fn write(rig: &Rig<'_>, given: &Deformation<'_>, world: &[DMat4], json: &mut Value) {
     let outside = rig.follows.iter().filter(|(_, at)| given.is_outside[*at]);
     let outside: HashSet<usize> = outside.map(|(node, _)| *node as usize).collect();
-    // Offsets from a joint outside the cage stay unchanged.
+    // Points at a node outside the cage stay unchanged.
     for point in rig.vrm_points.iter().filter(|point| !outside.contains(&point.node)) {
         let by = given.by[point.bound_index];
         let has_moved = by != DVec3::ZERO || world[point.node] != rig.worlds.world[point.node];
