@@ -24,10 +24,10 @@ const JACOBI_DECADES: f32 = 4.0;
 /// Typical number of V-cycles per batch, for the progress bar.
 const USUAL_CYCLES: f32 = 5.0;
 
-/// Name of the allocation in error messages.
+/// What error messages call the allocated buffers.
 const ALLOCATION_NAME: &str = "the fields of a bind";
 
-/// Results of a solve, besides the sampled weights.
+/// What the GPU's solve leaves besides the sampled weights.
 struct Outcome {
     report: SolveReport,
     iterations: u32,

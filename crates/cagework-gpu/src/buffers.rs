@@ -1,4 +1,4 @@
-//! Buffer allocation and readback, with out-of-memory as an error.
+//! Allocates and reads back buffers. Running out of memory is reported as an error.
 
 use bytemuck::Pod;
 use futures_channel::oneshot;
@@ -21,7 +21,7 @@ pub struct Allocator<'a> {
     context: &'a GpuContext,
     what: &'static str,
     allocated: u64,
-    // The error scopes, in reverse order of creation, in which they must be popped.
+    /// Error scopes, which must be popped in the reverse of the order in which they were pushed.
     memory: wgpu::ErrorScopeGuard,
     refused: wgpu::ErrorScopeGuard,
 }
@@ -43,7 +43,7 @@ impl<'a> Allocator<'a> {
         // Pop before awaiting: other tasks may push scopes of their own.
         let (memory, refused) = (self.memory.pop(), self.refused.pop());
         let (no_memory, refusal) = (memory.await, refused.await);
-        // A lost device rejects everything; report the loss instead.
+        // A lost device rejects every command: report the loss instead.
         self.context.check()?;
         if no_memory.is_some() {
             return Err(GpuError::OutOfMemory { what: self.what.to_owned(), bytes: self.allocated });
@@ -115,7 +115,7 @@ impl<'a> Allocator<'a> {
     }
 }
 
-/// A mappable buffer that results are copied to.
+/// A buffer to which results are copied, and which the CPU can map.
 #[derive(Debug)]
 pub struct Readback {
     pub(crate) buffer: wgpu::Buffer,

@@ -25,7 +25,7 @@ const WEIGHTS_PER_UPLOAD: u32 = 1 << 19;
 /// Weights of a bind on the GPU.
 #[derive(Debug)]
 pub struct GpuWeights {
-    /// Chunks of the weights, each of whole slices.
+    /// The weights in chunks, each of which consists of whole slices.
     chunks: Vec<WeightChunk>,
     frames: Frames,
     n_vertices: u32,
@@ -98,9 +98,9 @@ pub struct Deformer {
     cage: wgpu::Buffer,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
-    /// Kernels in order of execution; the last one computes the normals.
+    /// Kernels with their dispatch sizes, in order of execution. The last kernel computes the normals.
     steps: Vec<Step>,
-    /// Applies held and rigid parts before the normals are computed; `None` without such parts.
+    /// Moves parts that stay in place or are rigid, before the normals are computed; `None` if there are no such parts.
     holder: Option<Holder>,
     frames: Frames,
     n_vertices: u32,
@@ -189,7 +189,7 @@ impl Deformer {
         }
     }
 
-    /// Sets the parts that are held or rigid, from the next pose on.
+    /// Sets the parts that stay in place or are rigid. They take effect with the next pose.
     pub(crate) fn hold(&mut self, holder: Option<Holder>) {
         self.holder = holder;
     }
@@ -204,7 +204,7 @@ impl Deformer {
         });
     }
 
-    /// Like [`Self::encode`], with positions from skinning.
+    /// Like [`Self::encode`], but the positions come from skinning.
     pub(crate) fn encode_skinned(&self, encoder: &mut wgpu::CommandEncoder, skinner: &Skinner) {
         self.encode_steps(encoder, &[], |pass| skinner.encode(pass));
     }

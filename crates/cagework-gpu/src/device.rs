@@ -1,4 +1,4 @@
-//! GPU selection, limits and faults.
+//! Opens a GPU: selects the adapter, limits its use, and records faults.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -50,12 +50,12 @@ pub struct GpuContext {
 struct Fault {
     lost: OnceLock<String>,
     refused: OnceLock<String>,
-    /// Senders that are notified of a device loss.
+    /// Channels that report a device loss to those who wait for one.
     waiting: Mutex<Vec<oneshot::Sender<String>>>,
 }
 
 impl Fault {
-    /// Stores the reason of a device loss. Only the first report counts, because later reports are its consequences.
+    /// Stores the reason of a device loss. Only the first report is kept: later ones are consequences of it.
     fn lose(&self, message: &str) {
         let _ = self.lost.set(message.to_owned());
         if let Ok(mut waiting) = self.waiting.lock() {
@@ -187,7 +187,7 @@ impl GpuContext {
     /// # Errors
     /// [`GpuError::DeviceLost`], [`GpuError::Refused`].
     pub fn check(&self) -> Result<(), GpuError> {
-        // Runs pending callbacks, which set the fault.
+        // Polling runs the callbacks that record a fault.
         let _ = self.device.poll(wgpu::PollType::Poll);
         if let Some(reason) = self.fault.lost.get() {
             return Err(GpuError::DeviceLost { reason: reason.clone() });
@@ -229,13 +229,13 @@ pub fn instance() -> wgpu::Instance {
         // synchronise by themselves.
         descriptor.backend_options.gl.fence_behavior = wgpu::GlFenceBehavior::AutoFinish;
     } else {
-        // GLES lacks features that kernels need, and would list the same GPUs again.
+        // Without GLES, which lacks features that the kernels need and would list the same GPUs again.
         descriptor.backends = wgpu::Backends::PRIMARY;
     }
     wgpu::Instance::new(descriptor)
 }
 
-/// Baseline limits, except buffer sizes, which are those of the adapter. Memory plans adapt to these sizes.
+/// WebGPU's baseline limits, except for the sizes of buffers, which are the adapter's: memory plans adapt to them.
 fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
     if draws_only {
         let baseline = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(offered.clone());

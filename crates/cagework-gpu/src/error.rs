@@ -1,4 +1,4 @@
-//! Errors of the GPU. The CPU can be used instead in all cases.
+//! Errors of the GPU. In every case, the CPU can do the same work.
 
 use cagework_core::options::Solver;
 use cagework_core::{BindError, Cancelled};
@@ -33,13 +33,13 @@ pub enum GpuError {
         /// Reason given by the platform.
         reason: String,
     },
-    /// The device was removed, reset by the driver, or revoked by the browser.
+    /// The device was removed, reset by its driver, or revoked by the browser.
     #[error("the GPU was lost ({reason}): start again, or use the CPU")]
     DeviceLost {
         /// Reason given by the platform.
         reason: String,
     },
-    /// An allocation failed although it was within the plan.
+    /// An allocation failed although it was within the memory plan.
     #[error("the GPU is out of memory for {what} ({bytes} bytes): use a smaller grid, or the CPU")]
     OutOfMemory {
         /// Name of the allocation.
@@ -47,7 +47,7 @@ pub enum GpuError {
         /// Size of the allocation, bytes.
         bytes: u64,
     },
-    /// Validation error: a bug in this crate.
+    /// The GPU rejected a command: a bug in this crate.
     #[error(
         "the GPU rejected a command, which is a bug in Cagework: {reason}. Please report it, and use the CPU"
     )]
@@ -55,7 +55,7 @@ pub enum GpuError {
         /// Reason given by the platform.
         reason: String,
     },
-    /// A submission did not finish in time.
+    /// The GPU did not finish a submission in time.
     #[error(
         "the GPU did not answer within {seconds} s: its driver hangs, or it is too slow for this grid; use a smaller grid, or the CPU"
     )]
@@ -63,7 +63,7 @@ pub enum GpuError {
         /// Time limit, seconds.
         seconds: u64,
     },
-    /// The input is inconsistent.
+    /// Parts of the input contradict each other.
     #[error("cannot be drawn: {reason}")]
     Model {
         /// What is inconsistent.

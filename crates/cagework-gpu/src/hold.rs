@@ -1,4 +1,4 @@
-//! Applies held and rigid parts on the GPU, after the deformation and before the normals.
+//! Applies, on the GPU, parts that stay in place or are rigid: after the deformation, before the normals.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// Held and rigid parts of one mesh.
+/// The parts of one mesh that stay in place or are rigid, on the GPU.
 #[derive(Debug)]
 pub(crate) struct Holder {
     parts: Arc<BoundParts>,

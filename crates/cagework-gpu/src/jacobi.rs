@@ -1,8 +1,8 @@
 //! Jacobi smoothing on the GPU: the paper's Algorithm 3 with Eq. 2 as stopping criterion.
 //!
-//! Unlike the paper, two fields are swapped instead of copied, and only delta is read back, once every [`SWEEPS_PER_CHECK`] sweeps.
-//! Eq. 2 couples all columns of a cell, so the fields of all batches are kept, and every batch adds its changes to one shared
-//! buffer with a value per cell.
+//! Unlike the paper, two fields are swapped instead of copied, and only delta is read back, once every
+//! [`SWEEPS_PER_CHECK`] sweeps. Eq. 2 couples all columns of a cell, so the fields of all batches are kept, and every
+//! batch adds its changes to one shared buffer with a value per cell.
 
 use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;
@@ -19,7 +19,7 @@ use crate::pipelines::Launch;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Sweeps between checks of delta. Independent of the clock, so that results are reproducible.
+/// Number of sweeps between checks of delta. It does not depend on times, so that results are reproducible.
 pub const SWEEPS_PER_CHECK: u32 = 10;
 
 /// Fields of all batches, and the kernels bound to them.
@@ -34,7 +34,7 @@ pub struct Jacobi {
     readback: Readback,
 }
 
-/// One batch. Sweep k reads `fields[k % 2]` and writes the other field.
+/// Fields of one batch. Sweep k reads `fields[k % 2]` and writes the other one.
 #[derive(Debug)]
 struct BatchFields {
     fields: [wgpu::Buffer; 2],

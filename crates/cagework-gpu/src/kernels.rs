@@ -1,9 +1,9 @@
-//! Kernel table: each compute shader with its bindings and workgroup size. `tests/shaders.rs` compares it
-//! with the WGSL.
+//! Table of the compute shaders, each with its bindings and workgroup size. `tests/shaders.rs` compares it with the
+//! WGSL files.
 
 use Binding::{Read, ReadWrite, Uniform};
 
-/// Type of a binding. Bindings are in group 0, numbered in order.
+/// Type of a binding. The bindings of a kernel are in group 0, numbered in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binding {
     /// `var<uniform>`: the dispatch's [`crate::layout::Work`] at a dynamic offset.
@@ -20,7 +20,7 @@ pub struct Kernel {
     /// Name of the file, the entry point, and the CPU implementation in `cagework_core::stencil`, `parts`,
     /// `skin` or `dynamic`.
     pub name: &'static str,
-    /// Complete source in WGSL.
+    /// Complete source of the shader in WGSL.
     pub wgsl: &'static str,
     /// Invocations per workgroup. All kernels are one-dimensional.
     pub workgroup: u32,

@@ -11,17 +11,17 @@ use crate::error::GpuError;
 /// Bytes of a quad: four columns of a row.
 pub(crate) const QUAD_BYTES: u64 = 16;
 
-/// Stencils of a level.
+/// Stencils of a level on the GPU.
 #[derive(Debug)]
 pub struct GpuLevel {
     pub(crate) neighbours: wgpu::Buffer,
     pub(crate) diagonal: wgpu::Buffer,
     pub(crate) rhs_of_row: wgpu::Buffer,
     pub(crate) n_rows: u32,
-    /// First row and number of rows of each colour, excluding zero rows.
+    /// First row and number of rows of each colour. The row of zeros that follows each colour is not counted.
     pub(crate) colours: [(u32, u32); 2],
     pub(crate) n_unknowns: u32,
-    /// Rows of the right-hand side.
+    /// Number of rows of the right-hand side.
     pub(crate) n_rhs: u32,
 }
 

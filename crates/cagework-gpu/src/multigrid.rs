@@ -17,7 +17,7 @@ use crate::pipelines::Launch;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Indices of the numbers that are read back.
+// Indices in the buffer of numbers that are read back.
 const RESIDUAL: u32 = 0;
 const DELTA: u32 = 1;
 
@@ -32,7 +32,7 @@ pub struct Multigrid {
     scratch: Vec<f32>,
 }
 
-/// Fields and kernels of a level.
+/// Fields of one batch on one level, and the kernels bound to them.
 #[derive(Debug)]
 struct LevelWork {
     level: GpuLevel,
@@ -86,7 +86,8 @@ impl Multigrid {
             );
             levels.push(LevelWork { level, field, rhs, relax, coarser: None });
         }
-        // All levels share this buffer for red residuals, because the kernel writes the zero row of each level.
+        // All levels share this buffer for the residuals of red rows. Each level writes the row of zeros that follows
+        // its red rows.
         let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
         let numbers = allocator.storage("numbers", 8)?;
         let squares = if levels.len() == 1 {

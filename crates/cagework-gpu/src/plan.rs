@@ -12,14 +12,14 @@ const QUAD_BYTES: u64 = 16;
 /// Maximum columns of a batch. Larger batches are not faster, and the sampled block is read back at once.
 pub const MAX_LANES: u64 = 128;
 
-/// Sizes of a bind on the GPU.
+/// Batch size and memory of a bind on the GPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Columns per batch, a multiple of 4.
     pub n_lanes: u32,
     /// Number of batches.
     pub n_batches: u32,
-    /// Vertices sampled and read back at a time.
+    /// Number of vertices that are sampled and read back at a time.
     pub vertices_per_block: u32,
     /// Memory of stencils, transfers and sampling tables, bytes.
     pub table_bytes: u64,

@@ -57,7 +57,7 @@ struct SessionBind {
     weights: Arc<Weights>,
     frames: Arc<Frames>,
     mover: Mover,
-    /// Held and rigid parts, if any.
+    /// Parts that stay in place or are rigid, if there are any.
     parts: Option<Arc<BoundParts>>,
 }
 
@@ -108,7 +108,7 @@ impl Session {
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
         self.update_bounds();
-        // The scene's wireframe option may be older than the model.
+        // The scene may ask for a wireframe since before the model was set.
         self.write_scene();
         Ok(())
     }
@@ -365,7 +365,7 @@ impl Session {
         scale: f32,
     ) -> Result<(), GpuError> {
         self.context.check()?;
-        // A collapsed canvas has no area to draw into.
+        // A canvas that is collapsed on the page has no area.
         if size.contains(&0) {
             return Ok(());
         }

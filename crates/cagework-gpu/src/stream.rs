@@ -21,7 +21,8 @@ use crate::pipelines::Launch;
 /// Target time of a slice, ms: three frames at 60 Hz; watchdogs of drivers allow 2 s.
 const SLICE_MS: f64 = 50.0;
 
-/// Maximum number of pending slices: one running, one queued. Further slices delay cancellation, and crashed iOS 26.
+/// Maximum number of slices that are submitted but not finished: one runs, one is queued. More delay cancellation, and
+/// crashed iOS 26.
 const MAX_PENDING_SLICES: usize = 2;
 
 /// Initial budget, memory accesses: 10 to 100 ms on a software adapter with two threads, below 1 ms on a GPU.
@@ -33,7 +34,7 @@ const BUDGET_RANGE: [u64; 2] = [1 << 20, 1 << 36];
 /// Stride of dispatch parameters, bytes: the baseline's alignment of dynamic offsets.
 const WORK_STRIDE: u64 = 256;
 
-/// Maximum dispatches per slice.
+/// Maximum number of dispatches in a slice.
 const MAX_WORKS: u64 = 1024;
 
 /// Maximum workgroups per axis, the baseline's limit.
@@ -253,7 +254,7 @@ impl<'a> Stream<'a> {
         let now = self.now_ms();
         let elapsed = now - self.last_done_ms.max(slice.submitted_ms);
         self.last_done_ms = now;
-        // Only slices of at least half the budget are representative.
+        // The time of a small slice, below half the budget, is not representative.
         if elapsed > 0.0 && 2 * slice.cost >= self.budget {
             let wanted = (slice.cost as f64 * SLICE_MS / elapsed) as u64;
             let [least, most] = BUDGET_RANGE;

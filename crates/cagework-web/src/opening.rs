@@ -26,7 +26,7 @@ pub(crate) struct OpenContents {
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct CageContents {
-    /// `[n_controls, 3]`
+    /// Positions of the cage's vertices and interior controls. `[n_controls, 3]`
     #[cfg_attr(test, ts(type = "Float32Array"))]
     positions: Vec<f32>,
     /// For each face its corner count, then its vertex indices.
@@ -42,7 +42,7 @@ pub(crate) struct CageContents {
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct PoseContents {
     name: String,
-    /// `[n_controls, 3]`
+    /// Positions of the cage's vertices and interior controls. `[n_controls, 3]`
     #[cfg_attr(test, ts(type = "Float32Array"))]
     positions: Vec<f32>,
 }

@@ -88,7 +88,7 @@ pub(crate) struct BoundModels {
     pub(crate) outside: Vec<OutsideVertex>,
     /// Joints of the rigs; `None` if a rig cannot be read.
     pub(crate) joints: Option<JointDots>,
-    /// Bind report.
+    /// Report of the bind, as JavaScript receives it.
     pub(crate) report: JsValue,
 }
 

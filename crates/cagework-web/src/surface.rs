@@ -35,8 +35,8 @@ pub(crate) struct Surface {
     format: wgpu::TextureFormat,
     /// Textures that sessions draw into: one of the whole picture, or several side by side.
     ///
-    /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves into
-    /// such a view: a clear of 0.2 gives 51 instead of 124.
+    /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves
+    /// into such a view: a clear of 0.2 gives 51 instead of 124.
     parts: Vec<wgpu::Texture>,
     /// Draws the parts if the canvas does not support copies.
     painter: Option<PartPainter>,
@@ -55,7 +55,7 @@ pub(crate) enum FrameQuality {
     Sharp,
 }
 
-/// Outcome of drawing a frame.
+/// Result of drawing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameOutcome {
     /// Nothing was drawn: the canvas is unavailable, or too many frames are unfinished.

@@ -64,7 +64,7 @@ pub(crate) struct View {
     pub(crate) bound: bool,
 }
 
-/// Properties of all models in the cage.
+/// Properties of the models in the cage, taken together.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -89,7 +89,7 @@ pub(crate) struct ModelInfo {
     rigged: bool,
     bounds: BoundsView,
     notices: Vec<String>,
-    /// Properties of each single model.
+    /// Properties of each model.
     members: Vec<MemberInfo>,
 }
 

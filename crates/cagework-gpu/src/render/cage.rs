@@ -16,7 +16,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// GPU data of the cage and of controls inside it.
+/// GPU data of the cage and of the controls inside it.
 #[derive(Debug)]
 pub(super) struct CageView {
     pub(super) positions: Table,
@@ -78,7 +78,7 @@ impl CageView {
         self.positions.write(context, bytemuck::cast_slice(&padded));
     }
 
-    /// All line overlays, topmost last.
+    /// All overlays that consist of lines. The last one is drawn on top.
     pub(super) fn all_lines(&self) -> impl Iterator<Item = &Overlay> {
         let surface = self.surface.iter().flat_map(|surface| [&surface.shells, &surface.curves]);
         surface.chain([&self.bones, &self.lines])

@@ -9,10 +9,10 @@ pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
 /// Weights below this value are drawn as negative; smaller deviations are rounding.
 pub const NEGATIVE_THRESHOLD: f32 = -1e-5;
 
-/// Minimum upper end of the colour range for weights.
+/// Smallest value that the last colour of the map for weights may stand for.
 pub const MIN_WEIGHT_RANGE: f32 = 1e-3;
 
-/// Ten equidistant samples, sRGB.
+/// The colour map cividis at ten equidistant values, sRGB.
 pub const STOPS: [[u8; 3]; 10] = [
     [0x00, 0x22, 0x4e],
     [0x12, 0x35, 0x70],

@@ -24,7 +24,7 @@ pub(super) struct SurfaceView {
 }
 
 impl SurfaceView {
-    /// `None` for a plain cage, which is its own surface.
+    /// Creates the view; `None` for a plain cage, which is its own surface.
     pub(super) fn new(
         context: &GpuContext,
         layouts: &Layouts,

@@ -39,7 +39,7 @@ pub struct Target<'a> {
     pub scale: f32,
 }
 
-/// Multisampled colour and depth attachments.
+/// Multisampled attachments for colour and depth.
 #[derive(Debug)]
 struct Targets {
     format: wgpu::TextureFormat,

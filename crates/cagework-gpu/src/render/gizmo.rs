@@ -130,7 +130,7 @@ pub(super) struct GizmoShape {
     vertices: wgpu::Buffer,
     /// Number of vertices in the gizmo's frame, and of the subsequent vertices in the frame that faces the eye.
     counts: [u32; 2],
-    /// Transforms of both frames.
+    /// Transforms of the gizmo's two frames: its own, and the one that faces the eye.
     transforms: [FrameTransform; 2],
     shape: Option<(GizmoMode, Option<GizmoPart>)>,
 }

@@ -1,4 +1,4 @@
-//! Overdraw limit for software rasterisers.
+//! Limit on the overdraw of pictures that a software rasteriser draws.
 
 use glam::Vec3;
 

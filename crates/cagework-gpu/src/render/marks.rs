@@ -39,7 +39,7 @@ impl MarksView {
             view
         };
         let SceneOptions { marks, held, joints, .. } = scene;
-        // Joints are inside the model and visible through it.
+        // Joints are inside the model, and are drawn as strongly behind its surface as in front of it.
         let joints = (joints, [palette.joints(); 2]);
         [(marks, with_behind(palette.marks())), (held, with_behind(palette.held())), joints].map(view).into()
     }

@@ -22,11 +22,11 @@ pub(super) struct Mesh {
     pub(super) rest: Table,
     /// Normals at rest.
     pub(super) rest_normals: Table,
-    /// Weight, error or greying of each vertex.
+    /// Value of each vertex: its weight, its error, or how grey it is.
     pub(super) values: Table,
     /// Bind group of the vertices' positions, normals and values.
     vertices: wgpu::BindGroup,
-    /// Positions in use: rest or deformed.
+    /// The positions that are drawn, at rest or deformed.
     pub(super) positions: Table,
     pub(super) n_vertices: u32,
 }

@@ -26,7 +26,7 @@ pub(super) struct Overlay {
     positions: Table,
     items: Table,
     count: u32,
-    /// Styles in front of and behind surfaces.
+    /// Style in front of surfaces, and style behind them.
     styles: [wgpu::Buffer; 2],
     bind_groups: [wgpu::BindGroup; 2],
 }

@@ -42,7 +42,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Shader, depth test, and whether colours are blended.
+    /// Shader, depth test, and whether colours are blended with what is behind.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
             Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
@@ -78,7 +78,7 @@ const GIZMO_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
 const MESH_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
     wgpu::vertex_attr_array![0 => Uint32, 1 => Float32x2, 2 => Unorm16x4];
 
-/// Depth test and write.
+/// How a primitive is tested against depth, and whether it writes depth.
 #[derive(Clone, Copy)]
 struct Depth {
     compare: CompareFunction,

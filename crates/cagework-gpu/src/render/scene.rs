@@ -49,8 +49,8 @@ pub struct SceneOptions {
     pub mesh: MeshStyle,
     /// Whether colours of weights span 0 to 1 instead of 0 to the maximum.
     pub weights_to_one: bool,
-    /// Greying of each vertex in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], 0 to 1, for held vertices.
-    /// `[n_vertices]`
+    /// How grey each vertex is in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], from 0 to 1; shows which vertices stay
+    /// in place. `[n_vertices]`
     pub greyed: Option<Arc<Vec<f32>>>,
     /// Whether the mesh's edges are drawn.
     pub mesh_edges: bool,

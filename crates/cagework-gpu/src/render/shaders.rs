@@ -70,7 +70,7 @@ shaders! {
     /// Draws the mesh.
     MESH = "draw_mesh" + ["camera", "colormap", "light"] + ("mesh_buffers", "mesh_textures"),
         &[&[Table(Entry::Point), Table(Entry::Point), Table(Entry::Value)], &[Uniform, Texture, Sampler]];
-    /// Edges of cage and mesh, segments of marks.
+    /// Draws edges of cage and mesh, and segments of marks.
     LINES = "draw_lines" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
     /// Draws handles and marks.
     POINTS = "draw_points" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
@@ -83,7 +83,7 @@ shaders! {
         &[&[Uniform, Table(Entry::Pair)]];
     /// Draws the transform gizmo.
     GIZMO = "draw_gizmo" + ["camera"], &[&[Uniform]];
-    /// A texture on a part of a canvas; without camera.
+    /// Draws a texture on a part of a canvas. Has no camera.
     PART = "draw_part" + [], &[&[Texture]];
 }
 

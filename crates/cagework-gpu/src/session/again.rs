@@ -1,4 +1,4 @@
-//! Copies of a session: on the same GPU, or on another one.
+//! Copies a session, on the same GPU or to another one.
 
 use std::sync::Arc;
 

@@ -57,8 +57,8 @@ impl Mover {
         Ok(Self::Kernels { deformer: Box::new(deformer), tables })
     }
 
-    /// Sets or removes held and rigid parts, from the next pose on. Does nothing on the CPU, where each deformation
-    /// gets the parts.
+    /// Sets or removes parts that stay in place or are rigid; they take effect with the next pose. Does nothing on the
+    /// CPU, where each deformation is given the parts.
     pub(super) async fn hold(
         &mut self,
         context: &GpuContext,
@@ -119,7 +119,7 @@ impl Mover {
         }
     }
 
-    /// Prepares playing a clip. `skin`: of the model's vertices.
+    /// Prepares the playback of a clip. `skin` is that of the model's vertices.
     pub(super) async fn skinner(
         &self,
         context: &GpuContext,

@@ -1,4 +1,4 @@
-//! Held and rigid parts of the model.
+//! Parts of the model that stay in place or are rigid.
 
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use crate::render::{Target, divide_by_alpha};
 /// Format of pictures.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
-/// Maximum side of a picture, pixels: the baseline's texture size. Less if the GPU supports less.
+/// Maximum side of a picture, pixels: the texture size of WebGPU's baseline. A GPU may support less.
 pub const MAX_PICTURE: u32 = 8192;
 
 impl Session {

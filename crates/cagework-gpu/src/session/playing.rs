@@ -1,4 +1,4 @@
-//! Clips: the mesh follows its skin.
+//! Playback of clips: the mesh follows its skeleton instead of the cage.
 
 use cagework_core::field::Field;
 use cagework_core::skin::Skin;

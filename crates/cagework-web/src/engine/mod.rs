@@ -275,10 +275,10 @@ impl Engine {
         self.read(|state| state.bound.is_some())
     }
 
-    /// Resolves with the reason when the GPU device is lost. Calls wait until then.
+    /// Resolves with the reason when the GPU device is lost.
     ///
     /// # Errors
-    /// Never while the engine is alive.
+    /// If no device is open.
     pub async fn lost(&self) -> Result<String, JsValue> {
         let receiver = {
             let gpu = self.gpu.lock().await;

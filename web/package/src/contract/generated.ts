@@ -573,7 +573,7 @@ first_triangle: number, options: PartOptions,
  */
 painted: Array<[number, number]>, };
 /**
- * Properties of all models in the cage.
+ * Properties of the models in the cage, taken together.
  */
 export type ModelInfo = {
 /**
@@ -593,7 +593,7 @@ props: Array<string>,
  */
 rigged: boolean, bounds: Bounds, notices: Array<string>,
 /**
- * Properties of each single model.
+ * Properties of each model.
  */
 members: Array<MemberInfo>, };
 /**
@@ -849,7 +849,7 @@ forgotten: number, };
  */
 export type CageContents = {
 /**
- * `[n_controls, 3]`
+ * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
  */
 positions: Float32Array,
 /**
@@ -861,7 +861,7 @@ corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
  */
 export type PoseContents = { name: string,
 /**
- * `[n_controls, 3]`
+ * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
  */
 positions: Float32Array, };
 /**
