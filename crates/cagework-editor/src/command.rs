@@ -72,15 +72,15 @@ pub enum Command {
         /// Index of the pose.
         index: usize,
     },
-    /// Changes the share of a saved pose in the blend. Other edits since the last step are kept.
+    /// Changes the share of a saved pose in the blend, and keeps other changes of the pose since the last step.
     Blend {
         /// Index of the pose.
         index: usize,
         /// Share, 0 to 1.
         share: f32,
     },
-    /// Sets poses that were transferred from another cage of the same models: the current pose, then each saved pose with
-    /// `from` controls.
+    /// Sets poses that were transferred from another cage of the same models: the current pose, then each saved pose
+    /// with `from` controls.
     CarryPoses {
         /// Number of controls of the other cage.
         from: usize,
@@ -130,7 +130,7 @@ pub enum Command {
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         places: Vec<Vec3>,
     },
-    /// Adds the largest rectangular sheet that fits, and selects it.
+    /// Adds the largest rectangular sheet that fits in the cage, and selects it.
     AddSheet {
         /// Centre of the sheet.
         #[cfg_attr(feature = "typescript", ts(type = "readonly [number, number, number]"))]
@@ -174,7 +174,7 @@ impl Editor {
     /// # Errors
     /// If the command cannot be applied. Nothing changes then.
     pub fn apply(&mut self, command: Command) -> Result<(), EditError> {
-        // Each arm checks everything before its first change.
+        // Each arm of the match checks its command before it changes anything.
         match command {
             Command::SetPose { positions } => self.set_pose(positions)?,
             Command::ResetPose => self.reset_pose(),
@@ -407,7 +407,7 @@ impl Editor {
     }
 }
 
-/// Applies an edit to each item; `None` if there are no items. An edit must keep the indices of later items.
+/// Applies an edit to one item after another; `None` if there are none. The edit must keep the indices of later items.
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],

@@ -141,8 +141,8 @@ impl Editor {
         first..self.document.models.next_id()
     }
 
-    /// Changes the painted amounts of a model, 0 to 255. The key of the models changes only at the next step, so that the
-    /// dabs of a stroke do not trigger updates of derived data.
+    /// Changes the painted amounts of a model, 0 to 255. The key of the models changes only at the next step, so that
+    /// the dabs of a stroke do not trigger updates of derived data.
     pub fn paint(&mut self, id: u32, change: impl FnOnce(&mut Vec<u8>)) {
         if let Some(painted) = self.document.models.painted_mut(id) {
             change(painted);
@@ -358,7 +358,7 @@ impl Editor {
         let poses: Vec<Vec<Vec3>> =
             self.document.fitting_poses().map(|pose| pose.positions.to_vec()).collect();
         if let Ok(positions) = moment(&self.document.cage.mesh.positions, &poses, seconds) {
-            // The number of positions matches, so this cannot fail.
+            // `moment` returns one position per control, so this cannot fail.
             let _ = self.set_pose(positions);
         }
     }
@@ -398,7 +398,7 @@ impl Editor {
             change(&mut gesture);
             let positions = gesture.positions(view);
             self.gesture = Some(gesture);
-            // Positions are not finite if the pointer is on the horizon; the cage keeps its pose then.
+            // If the pointer is on the horizon, positions are not finite and are rejected: the cage keeps its pose.
             let _ = self.set_pose(positions);
         }
     }
@@ -412,7 +412,7 @@ impl Editor {
         }
     }
 
-    /// Ends the gesture and keeps or reverts its movement. True if a movement was kept.
+    /// Ends the gesture; keeps its movement, or reverts it if `keep` is false. True if a movement was kept.
     pub fn end(&mut self, keep: bool) -> bool {
         let Some(gesture) = self.gesture.take() else { return false };
         let moved = gesture.start() != &*self.document.pose;

@@ -1,7 +1,8 @@
 //! The models in one cage, joined to one mesh: vertices and triangles are concatenated in the order of the models.
 //!
-//! A surface point is stored as a triangle number and barycentric coordinates. Triangle numbers are unique among all models
-//! that a document has ever contained, so that a point keeps its triangle when other models are added or removed.
+//! A surface point is stored as a triangle number and barycentric coordinates. Triangle numbers are unique among all
+//! models that a document has ever contained, so that a point keeps its triangle when other models are added or
+//! removed.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -59,7 +60,8 @@ pub struct Member {
     pub model: Arc<Model>,
     /// Visibility and parts.
     pub options: PartOptions,
-    /// Painted amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted model
+    /// Painted amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted
+    /// model
     pub painted: Arc<Vec<u8>>,
     first_triangle: u32,
     /// Range of vertices in the joined mesh.
@@ -92,7 +94,7 @@ pub struct Models {
     mesh: Arc<TriMesh>,
     next_id: u32,
     next_triangle: u32,
-    /// Origin of the first model that was opened; kept when that model is removed.
+    /// Origin of the model that was opened first. It stays the same when that model is removed.
     origin: DVec3,
 }
 
@@ -365,7 +367,7 @@ impl Models {
         Err(EditError::NoModel)
     }
 
-    /// Held and rigid parts of all models.
+    /// Parts of all models that stay in place or are rigid.
     #[must_use]
     pub fn parts(&self) -> Parts {
         let mut all = Parts::default();
@@ -420,7 +422,7 @@ impl Member {
         name == WHOLE || self.model.select(name).is_ok()
     }
 
-    /// Held and rigid parts. Vertex indices are relative to the model.
+    /// Parts that stay in place or are rigid. Vertex indices are relative to the model.
     ///
     /// # Errors
     /// If a name selects no part.

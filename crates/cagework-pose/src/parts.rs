@@ -20,7 +20,8 @@ const IDENTITY_WEIGHT: f64 = 1e-9;
 /// Vertices that do not follow the cage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Share of each vertex's displacement that is suppressed, 0 to 1. `[n_vertices]`, or empty if all vertices follow the cage.
+    /// Share of each vertex's displacement that is suppressed, 0 to 1. `[n_vertices]`, or empty if all vertices follow
+    /// the cage.
     pub stays: Vec<f32>,
     /// Vertices of each rigid piece: a buckle, an eye, a tooth. [`pieces`] finds them in a selection.
     pub rigid: Vec<Vec<u32>>,
@@ -61,8 +62,9 @@ impl Motion {
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    /// Kabsch's rotation from sums over the points: `centre`, their mean; `shift`, their mean displacement; `at_rest`, the sum of
-    /// `from from^T`; `moved`, the sum of `by from^T`, with `from` the position minus the centre and `by` the displacement.
+    /// Kabsch's rotation from sums over the points: `centre`, their mean; `shift`, their mean displacement; `at_rest`,
+    /// the sum of `from from^T`; `moved`, the sum of `by from^T`, with `from` the position minus the centre and `by`
+    /// the displacement.
     fn from_sums(centre: DVec3, shift: DVec3, at_rest: DMat3, moved: DMat3) -> Self {
         let size = at_rest.x_axis.x + at_rest.y_axis.y + at_rest.z_axis.z;
         let rotation =
@@ -144,7 +146,7 @@ impl Parts {
     }
 }
 
-/// [`Parts`] applied to one deformation: a rigid motion for each piece.
+/// [`Parts`] under one deformation: the rigid motion of each piece, and the vertices that stay in place.
 #[derive(Clone, Debug)]
 pub struct HeldMotion {
     motions: Vec<Motion>,
@@ -153,7 +155,8 @@ pub struct HeldMotion {
 }
 
 impl HeldMotion {
-    /// Whether a vertex is partly fixed or belongs to a rigid piece, so that its motion differs from the cage's.
+    /// Whether a vertex stays in place, wholly or in part, or belongs to a rigid piece: it does not move as the cage
+    /// does.
     #[must_use]
     pub fn is_held(&self, vertex: u32) -> bool {
         self.piece_of.contains_key(&vertex) || self.stays.get(vertex as usize).is_some_and(|&s| s > 0.0)

@@ -16,7 +16,8 @@ pub struct Symmetry {
 }
 
 impl Symmetry {
-    /// Pairs the vertices of a rest cage. The plane is x = 0 or x at the centre of the bounds, whichever gives more pairs.
+    /// Pairs the vertices of a rest cage. The plane is x = 0 or x at the centre of the bounds, whichever gives more
+    /// pairs.
     #[must_use]
     pub fn new(rest: &[Vec3]) -> Self {
         let Some(bounds) = Bounds::of(rest) else { return Self::default() };
@@ -34,7 +35,7 @@ impl Symmetry {
             (distance <= tolerance).then_some(j)
         };
         let nearest: Vec<Option<usize>> = (0..rest.len()).map(nearest).collect();
-        // Two vertices are a pair if each is nearest to the other's image.
+        // Two vertices are a pair if each is the vertex nearest to the mirror image of the other.
         let partner = (0..rest.len())
             .map(|i| nearest[i].filter(|&j| nearest[j] == Some(i)).map(|j| j as u32))
             .collect();
@@ -47,7 +48,7 @@ impl Symmetry {
         self.plane
     }
 
-    /// Mirror image of a vertex. A vertex on the plane is its own image; `None` without an image.
+    /// The vertex at the mirror image of a vertex; `None` if there is none. A vertex on the plane is its own partner.
     #[must_use]
     pub fn partner(&self, vertex: u32) -> Option<u32> {
         self.partner.get(vertex as usize).copied().flatten()

@@ -17,12 +17,12 @@ impl Edges {
         Self { sides: sides_of(&mesh.faces, sound.iter().copied()) }
     }
 
-    /// Groups of sides with the same edge.
+    /// Groups of sides that belong to the same edge.
     pub(super) fn groups(&self) -> impl Iterator<Item = &[Side]> {
         self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
     }
 
-    /// Edges of exactly one face, in the direction in which the missing neighbour would traverse them.
+    /// Edges with exactly one face, in the direction in which a face that fills the hole would traverse them.
     pub(super) fn open(&self) -> Vec<[u32; 2]> {
         self.groups()
             .filter(|g| g.len() == 1)

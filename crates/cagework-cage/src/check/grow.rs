@@ -9,7 +9,7 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::geometry::closest_point_on_triangle;
 use cagework_core::mesh::{Bounds, PolygonMesh};
 
-/// Limit on rounds. Each round moves the cage past the vertices that are still outside.
+/// Limit on rounds. Each round moves the cage's surface past the vertices that are still outside.
 const MAX_ROUNDS: usize = 40;
 
 /// Gap that is left beyond each point, as a fraction of the cage's diagonal.
@@ -23,7 +23,8 @@ fn outside(mesh: &PolygonMesh, smooth: u32, model: &[Vec3]) -> Result<Vec<u32>, 
     Ok(Enclosure::new(Controls::from(&control_set(mesh, smooth)?).surface(), model).outside())
 }
 
-/// Moves vertices outward until the surface, subdivided `smooth` times, encloses the model. Returns the number of moved vertices.
+/// Moves vertices outward until the surface, subdivided `smooth` times, encloses the model. Returns the number of moved
+/// vertices.
 pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<usize, RepairError> {
     let before = mesh.positions.clone();
     let mut left = 0;
@@ -46,7 +47,8 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
     Ok(before.iter().zip(&mesh.positions).filter(|(a, b)| a != b).count())
 }
 
-/// Moves the triangle nearest to each point outward past it: its corners, or those of its cage face if the surface is subdivided.
+/// Moves the triangle nearest to each point outward past it: its corners, or those of its cage face if the surface is
+/// subdivided.
 fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<Item = DVec3>) {
     let (cage, is_smooth) = (controls.surface(), controls.smooth() > 0);
     let margin = MARGIN * f64::from(cage.diagonal());
@@ -68,7 +70,8 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
         };
         for &i in corners {
             let so_far = &mut offset[i as usize];
-            // Add only the part of the offset that earlier moves of the corner do not cover in this direction.
+            // Moves towards earlier points may already displace the corner in this direction: add only the missing
+            // part.
             let missing = needed.length() - so_far.dot(direction);
             if missing > 0.0 {
                 *so_far += direction * missing;

@@ -62,7 +62,7 @@ pub enum RepairError {
     /// Model vertices are still outside the grown cage.
     #[error("{} still outside after growing: make a new cage", counted(*left, "model vertex is", "model vertices are"))]
     StillOutside {
-        /// Number of model vertices outside.
+        /// Number of model vertices that are still outside.
         left: usize,
     },
 }

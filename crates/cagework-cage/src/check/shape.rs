@@ -99,7 +99,7 @@ pub(super) fn report_thickness(
             }
         }
         if normal.dot(facing(triangles[nearest])) > -MIN_OPPOSITION_COSINE {
-            // The ray hit the other side of a corner.
+            // The two faces form a corner of the cage: they do not bound a thin part.
             continue;
         }
         thinnest = thinnest.min(way);

@@ -10,7 +10,7 @@ pub(super) struct Buckets {
     origin: DVec3,
     dims: [usize; 3],
     lists: Vec<Vec<u32>>,
-    /// For each triangle, the numbers of the list reading and of the search that last met it.
+    /// For each triangle, the last list reading and the last search that found it, as values of the two counters below.
     met: Vec<(u32, u32)>,
     lists_read: u32,
     searches: u32,

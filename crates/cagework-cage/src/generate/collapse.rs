@@ -28,7 +28,7 @@ pub(super) const MIN_QUALITY: f64 = 0.12;
 /// Largest number of triangles around a vertex.
 const MAX_VALENCE: usize = 11;
 
-/// An edge returns to the heap if it costs more than this factor times the expected cost.
+/// An edge whose collapse costs more than this factor times the expected cost returns to the heap.
 const MAX_COST_RATIO: f64 = 1.2;
 
 /// Number of collapses between polls for cancellation.
@@ -39,7 +39,7 @@ const COLLAPSES_PER_CHECK: usize = 64;
 struct HeapEdge {
     cost: f64,
     edge: [u32; 2],
-    /// Versions of both vertices when the cost was computed; the entry is stale if either has changed.
+    /// Versions of both vertices when the cost was computed. The cost is out of date if either version has changed.
     version: [u32; 2],
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Collapser<'g, 'a> {
     pub(super) budget: Option<f64>,
     /// Whether the spacing of vertices on plates is limited.
     pub(super) keeps_plates: bool,
-    /// Limit on the distance of each vertex from its neighbours.
+    /// Limit on the distance of each vertex from its neighbours, if it lies on a limb or plate.
     spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
     heap: BinaryHeap<HeapEdge>,
@@ -208,7 +208,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
     }
 
-    /// Pushes an edge to the heap with the cost of its merged vertex, as if nothing blocked it.
+    /// Pushes an edge to the heap with the cost of its best merged vertex. Whether the edge can be collapsed is tested
+    /// later.
     fn wait(&mut self, edge: [u32; 2]) {
         let [a, b] = edge;
         let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
@@ -250,7 +251,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
             return true;
         }
         if !on_mirror(gone) {
-            // A new edge between two vertices of the mirror plane would coincide with its image.
+            // The collapse must not create an edge between two vertices of the mirror plane: its image would be the
+            // same edge.
             let (near_kept, near_gone) = if kept == a { (&*near_a, &*near_b) } else { (&*near_b, &*near_a) };
             if near_gone.iter().any(|&v| v != kept && on_mirror(v) && near_kept.binary_search(&v).is_err()) {
                 return false;
@@ -305,7 +307,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
         candidates.retain(|&c| !self.surface.is_blocked(c));
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
-        // Find the cheapest valid candidate; it is mostly the first one tested.
+        // Test candidates from the cheapest up. The first one is mostly valid, so they are not sorted.
         while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
             let (cost, place) = priced.remove(k);
             if self.is_place(kept, place) {

@@ -19,7 +19,7 @@ pub(crate) struct Footprint {
     /// Bounds on x that depend on y and z; the first `n_slanted` are used.
     slanted: [RowBound; 10],
     n_slanted: usize,
-    /// Bounds on y and z alone; the first `n_across` are used.
+    /// Bounds on combinations of y and z without x; the first `n_across` are used.
     across: [RowBound; 10],
     n_across: usize,
     min: DVec3,
@@ -59,7 +59,7 @@ impl Footprint {
         footprint
     }
 
-    /// Adds the bounds of one separating axis.
+    /// Adds the bounds that one separating axis sets.
     fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64) {
         let [p, q, r] = triangle.map(|v| axis.dot(v));
         let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());

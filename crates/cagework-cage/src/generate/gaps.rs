@@ -36,7 +36,8 @@ const MIN_OPEN_NARROW_WIDTH: f64 = 7.0;
 /// Share of a gap's sheet that counts as the narrow part.
 const NARROW_SHARE: f64 = 0.1;
 
-/// A gap is measured again on a stretched lattice if the mean `cos^2` between its direction and the thin axis is at least this.
+/// A gap is measured again on a stretched lattice if the mean `cos^2` between its direction and the thin axis is at
+/// least this.
 const MIN_ACROSS: f64 = 0.7;
 
 /// Voxels are stretched rather than refined if gaps need more than this factor times the voxels of the target.
@@ -48,7 +49,7 @@ const MAX_STRETCHED_SHARE: f64 = 0.66;
 /// Number of sample points of a sheet at which a cage is tested for closing the gap.
 const SAMPLES: usize = 32;
 
-/// Marks a voxel without a wall within reach.
+/// Stands for the number of a wall at a voxel that no wall reaches.
 const NO_WALL: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
@@ -58,7 +59,7 @@ pub(super) struct Gap {
     pub(super) area: f64,
     /// Mean distance between the gap's two walls, voxels.
     width: f64,
-    /// Distance between the walls at the narrow part of the gap, voxels: the quantile [`NARROW_SHARE`].
+    /// Distance between the two walls, voxels: the quantile [`NARROW_SHARE`] over the sheet, at its narrow part.
     narrow_width: f64,
     /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
@@ -90,8 +91,8 @@ pub(super) struct NarrowGaps {
 }
 
 /// Finds the large gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a
-/// lattice with at most `most` voxels along that side that leaves them open. Gaps narrower than twice the `clearance` of
-/// the cage from the model (object units) are left out, because they close on any lattice.
+/// lattice with at most `most` voxels along that side that leaves them open. Gaps narrower than twice the `clearance`
+/// of the cage from the model (object units) are left out, because they close on any lattice.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -177,7 +178,7 @@ fn most_voxels(stretch: DVec3) -> usize {
 /// Stretch of the voxels. If most gaps have the same direction, fewer voxels that are thin in this direction are needed
 /// than cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
-    // Number of gaps that stay closed, and number of voxels that the other gaps need.
+    // Number of gaps that stay closed, and number of voxels with which all other gaps stay open.
     let closed_and_finest = |stretch: DVec3| {
         let most = most_voxels(stretch).min(MAX_VOXELS);
         let needed = || gaps.iter().map(|gap| gap.voxels_of(stretch));

@@ -25,14 +25,14 @@ pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
 #[derive(Debug)]
 pub(super) struct Obstacle {
     pub(super) voxels: Voxels,
-    /// Distance to keep from the voxels along each axis, in voxels.
+    /// Distance that triangles keep from the voxels along each axis, in voxels.
     pub(super) clearance: f64,
     /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
 }
 
 impl Obstacle {
-    /// Whether a triangle (centred coordinates) keeps the clearance.
+    /// Whether a triangle (centred coordinates) keeps this distance.
     pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         !overlaps(&self.voxels, triangle, self.clearance)
     }

@@ -74,7 +74,8 @@ const LATER_RATIO: f64 = 3.7;
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
-/// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps: two seconds of collapses.
+/// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps: two seconds of
+/// collapses.
 const MAX_HULL: usize = 20_000;
 
 /// Limit on the gaps that a report names.
@@ -85,8 +86,9 @@ const MAX_SPLIT_ROUNDS: usize = 4;
 
 /// Generates a cage that strictly encloses a model.
 ///
-/// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`: `[n_triangles]`, any
-/// soup. Takes 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
+/// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
+/// `[n_triangles]`, any soup. Takes 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps
+/// between limbs.
 ///
 /// # Errors
 /// [`CageGenError`]: the model is empty, numbers or options are out of range, no cage passes verification, or the work
@@ -190,9 +192,9 @@ fn first_voxels(target: usize) -> usize {
 
 /// Outcome of simplifying a hull.
 enum Simplification {
-    /// The verified cage, and whether it is the hull itself.
+    /// The verified cage, and whether it is the hull without simplification.
     Cage(Box<Cage>, bool),
-    /// Too many vertices are left (their number): try a coarser lattice.
+    /// The simplified surface has too many vertices (their number): try a coarser lattice.
     TooMany(usize),
 }
 
@@ -205,7 +207,7 @@ fn simplify_hull(
 ) -> Result<Simplification, CageGenError> {
     let n_hull = shell.hull.n_whole();
     let mut target = options.target as usize;
-    // The budget is a share of the model's size, so its value in voxels depends on the lattice.
+    // The allowed distance is a share of the model's size, so its value in voxels depends on the lattice.
     let mut budget = Some(f64::from(options.detail) * shell.longest / shell.lattice.cell);
     while target < n_hull {
         let mut guarded = GuardedSurface::new(shell.hull.clone(), &shell.obstacle);
@@ -213,7 +215,8 @@ fn simplify_hull(
         let has_plates = spacings.iter().flatten().any(|spacing| spacing.along.is_none());
         let mut collapser = Collapser::new(&mut guarded, spacings);
         let mut left = n_hull;
-        // First collapse within the budget, in narrow bands; then down to the target, in any band.
+        // The first passes collapse edges within the allowed distance, in narrow bands; then down to the target, in any
+        // band.
         let narrow = BAND_LAYERS[..N_NARROW_BANDS]
             .iter()
             .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false, true));

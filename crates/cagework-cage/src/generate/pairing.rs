@@ -27,13 +27,13 @@ pub(super) enum Partner {
     /// No partner.
     #[default]
     None,
-    /// The triangle's own mirror image.
+    /// The triangle's own mirror image: the quad crosses the mirror plane.
     Image,
     /// Another triangle.
     Triangle(u32),
 }
 
-/// Partner of every triangle, and the weight of its quad.
+/// Partner of every triangle, and the weight of the quad that both form.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing {
     pub(super) partner: Vec<Partner>,
@@ -128,7 +128,7 @@ pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f
         return 0.0;
     }
     let worth = 0.25 + 1.0 / (1.0 + badness) + 0.3 * fold;
-    // The quad is shared with the mirrored half of the surface, so each half counts half of the weight.
+    // The quad lies in both halves of the surface, so each half counts half of its weight.
     if partner == Partner::Image { 0.5 * worth } else { worth }
 }
 

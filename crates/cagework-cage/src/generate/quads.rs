@@ -61,7 +61,7 @@ pub(super) fn quads(
 /// Faces around a vertex: quads, unpaired triangles, and all triangles.
 struct Star {
     quads: Vec<Quad>,
-    /// Both triangles of each quad that does not cross the mirror plane.
+    /// The two triangles of each quad that does not cross the mirror plane.
     pairs: Vec<[u32; 2]>,
     alone: Vec<u32>,
     all: Vec<u32>,
@@ -187,7 +187,7 @@ fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
         let Some(quad) = quad_of(surface, t, partner).filter(|_| u > t) else { continue };
         let p = places(surface, &quad);
         if worth(surface, t, partner) <= 0.0 {
-            // Vertex moves have made the quad invalid.
+            // Moves of its vertices have made the quad invalid.
             pairing.part(t);
             continue;
         }
@@ -247,7 +247,7 @@ pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
             is_guarded || warp(&p) <= MAX_PLANAR_WARP
         });
         let corners: Vec<(u32, bool)> = match (quad, partner) {
-            // The quad was added with its other triangle.
+            // The quad was added with the first of its triangles.
             (Some(_), Partner::Triangle(u)) if u < t => continue,
             (Some(quad), Partner::Image) => {
                 faces.push(of(&quad, false));

@@ -32,7 +32,7 @@ const MAX_GAP_HALF: f64 = 0.12;
 /// Minimum clearance in voxels.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// Clearance of a hull dilated by one voxel, in voxels: what remains after smoothing and rounding.
+/// Clearance of a hull dilated by one voxel, in voxels: one voxel minus the reach of smoothing and rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
 /// Smallest ratio of length to thickness of a limb.
@@ -101,7 +101,7 @@ pub(super) struct Shell {
     pub(super) stairs: Surface,
     /// Number of components of the hull before bridging.
     pub(super) separate: usize,
-    /// One voxel of each component of the solid.
+    /// One voxel of each connected component of the solid.
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
     pub(super) clearance: f64,
@@ -155,7 +155,7 @@ impl Shell {
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
-        // The obstacle is dilated by whole voxels and keeps the remainder of the clearance as a distance.
+        // Dilate the obstacle by the whole voxels of the clearance; triangles keep the fraction as a distance.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
         for _ in 0..whole as usize {
@@ -370,7 +370,7 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
 /// Voxels of components that are already joined, and voxels that the search has visited.
 struct JoinedVoxels<'a> {
     hull: &'a Voxels,
-    /// Predecessor of each visited voxel; a joined voxel is its own predecessor.
+    /// Predecessor of each visited voxel on the search's path. A joined voxel is its own predecessor.
     from: Vec<[usize; 3]>,
 }
 
@@ -401,14 +401,15 @@ impl JoinedVoxels<'_> {
     }
 }
 
-/// Voxels inside the model's 26-DOP, bounded by planes across the faces, edges and corners of a cube (Klosowski et al. 1998).
+/// Voxels inside the model's 26-DOP, bounded by planes across the faces, edges and corners of a cube (Klosowski et al.
+/// 1998).
 fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
     let mut axes = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {
             for z in 0..=1 {
                 let axis = [x, y, z];
-                // Take one axis of each opposite pair.
+                // Of two opposite directions, keep the one whose last nonzero component is positive.
                 if axis.iter().rev().find(|&&k| k != 0) == Some(&1) {
                     axes.push(DVec3::from_array(axis.map(f64::from)));
                 }

@@ -45,7 +45,7 @@ fn run(surface: &mut GuardedSurface<'_>, all_ways: bool) {
     }
 }
 
-/// Swaps the edge from corner `k` of a triangle if that reduces the excess of the folds around it.
+/// Swaps the edge from corner `k` of a triangle if that reduces the excess of the folds around the edge.
 fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
     let Some((other, new)) = surface.swapped(t, k) else { return false };
     let before = [t, other].map(|t| surface.corners(t));

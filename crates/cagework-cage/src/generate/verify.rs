@@ -13,7 +13,7 @@ use cagework_core::mesh::PolygonMesh;
 /// Smallest share of the clearance that must remain after rounding to f32.
 const MIN_CLEARANCE_SHARE: f64 = 0.98;
 
-/// As [`MIN_CLEARANCE_SHARE`], for facets of bent faces, which lie slightly inside the guarded triangles.
+/// Smallest share of the clearance at facets of bent faces, which lie slightly inside the guarded triangles.
 const MIN_FACET_CLEARANCE_SHARE: f64 = 0.1;
 
 /// Largest allowed distance of a winding number from 1; off the surface, winding numbers are integers.

@@ -49,10 +49,10 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
 struct Blocks {
     origin: Vec3,
     cell: f32,
-    /// Numbers of lattice points and of blocks along each axis.
+    /// Numbers of lattice points and of blocks, each along x, y and z.
     n: UVec3,
     n_blocks: UVec3,
-    /// Distance at each block's centre. If the surface can reach the block, also the solids that affect it.
+    /// Distance at the centre of each block. If the surface may pass through the block, also the solids that affect it.
     blocks: Vec<(f32, Option<Body>)>,
 }
 

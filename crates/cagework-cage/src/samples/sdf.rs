@@ -8,13 +8,13 @@ use glam::{Quat, Vec3};
 pub(super) enum Solid {
     /// A segment with a radius that varies linearly from `ra` at `a` to `rb` at `b`.
     Cone { a: Vec3, b: Vec3, ra: f32, rb: f32 },
-    /// An ellipsoid. Its distance is a bound, exact on the surface.
+    /// An ellipsoid. Its distance function is a lower bound, exact on the surface.
     Ellipsoid { center: Vec3, radii: Vec3, turn: Quat },
     /// A box with rounded edges; `half` includes the rounding.
     Block { center: Vec3, half: Vec3, round: f32 },
 }
 
-/// A solid with its colour and the width over which it blends into earlier solids.
+/// A solid with its colour and the width over which it blends into the solids before it.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     solid: Solid,
@@ -52,7 +52,7 @@ impl Solid {
     fn steepness(&self) -> f32 {
         match *self {
             Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
-            // The distance function is only a bound; a test checks this constant.
+            // The distance function is only a bound; a test checks this Lipschitz constant.
             Self::Ellipsoid { .. } => 2.0,
             Self::Block { .. } => 1.0,
         }
@@ -120,7 +120,7 @@ impl Body {
         let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
         for part in &self.parts {
             let d = part.solid.distance(p);
-            // Bound on how much closer the two distances can get within reach.
+            // Bound on how much the difference between the two distances changes within reach.
             let slack = reach * (steepest + part.solid.steepness());
             steepest = steepest.max(part.solid.steepness());
             if d - distance >= part.blend + slack {

@@ -234,7 +234,7 @@ mod tests {
         let pick = |at, with_hidden| pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, with_hidden);
         assert_eq!(pick(pixel(0.5, 0.5), false), Some(8));
         assert_eq!(pick(pixel(0.5, 0.5), true), Some(8));
-        // Next to a vertex in front, the one nearer to the pointer is picked.
+        // A vertex of a front face and the control inside: the click picks the nearer one on the screen.
         cube.positions[8] = Vec3::new(0.97, 1.0, 0.5);
         let pick = |x| pick_vertex(&cube.positions, &topology, &Flat, pixel(x, 1.0), 5.0, false);
         assert_eq!((pick(0.975), pick(0.995)), (Some(8), Some(7)));
@@ -262,7 +262,7 @@ mod tests {
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
         assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, true), Some(7));
         assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9, true), None);
-        // At the same depth, the one nearer to the pointer is picked.
+        // Of two vertices at the same depth, the click picks the one that is nearer on the screen.
         let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
         let none = Topology::default();
         assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0, true), Some(1));

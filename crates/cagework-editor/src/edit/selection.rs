@@ -16,7 +16,7 @@ pub enum SelectMode {
     Add,
     /// Removes the set.
     Remove,
-    /// Removes the set if all of it is selected, otherwise adds it.
+    /// Removes the set if all of it is selected; otherwise adds the set.
     Toggle,
 }
 
@@ -34,7 +34,7 @@ pub enum Pivot {
     Last,
 }
 
-/// Selected vertices and the one selected last.
+/// Selected vertices, and the vertex that was selected last.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     selected: Vec<bool>,

@@ -1,4 +1,5 @@
-//! Editing of the rest cage: each operation takes a mesh and returns a new one, or an error if the result would be invalid.
+//! Editing of the rest cage: each operation takes a mesh and returns a new one, or an error if the result would be
+//! invalid.
 //!
 //! Nothing changes in place, so callers implement undo by keeping the meshes. Every result is a cage ([`Cage::new`]
 //! accepts it without flipping a face) with no more self-intersections than the input. Vertices keep their order;
@@ -63,7 +64,7 @@ pub enum RestEditError {
         operation: &'static str,
         /// A face of the result.
         first: u32,
-        /// A face of the result that intersects the first one.
+        /// A face of the result that intersects face `first`.
         second: u32,
     },
     /// The hole has too many edges.

@@ -47,7 +47,7 @@ pub enum Reach {
     Automatic,
     /// A multiple of the model's size.
     Of(f64),
-    /// No limit: only pins stay in place.
+    /// The whole model moves: only pins stay in place.
     Whole,
 }
 
@@ -87,7 +87,7 @@ pub struct Drag {
     pub(super) inverse: DMatrix<f64>,
     pub(super) spread: DMatrix<f64>,
     pub(super) hold: DMatrix<f64>,
-    /// Rotation-independent part of the right-hand side. `[n, 3]`
+    /// Part of the right-hand side that does not depend on rotations. `[n, 3]`
     pub(super) constant: DMatrix<f64>,
     /// Moments (see [`Pull::moments`]) of the start pose, the moments that full relaxation adds, and their current
     /// blend.
@@ -154,7 +154,7 @@ impl Drag {
         for i in 0..n {
             matrix[(i, i)] += REGULARISATION * mean;
         }
-        // Scale by the whole matrix, because a coarse cage couples all of it to each handle.
+        // Scale by the trace of the whole matrix: in a coarse cage, each handle is coupled to all of it.
         let firm = HANDLE_STIFFNESS * matrix.trace() / n as f64;
         let constant = &held * (&pull.sample_rows * &cage) + REGULARISATION * mean * &cage;
         let inverse = matrix.cholesky().ok_or(PullError::Singular)?.inverse();

@@ -112,7 +112,7 @@ impl Pull {
         let [least, most] = LAMBDA_RANGE;
         let mut fitted = self.fit_with(&goals, least)?;
         for _ in 0..MAX_LAMBDA_ROUNDS {
-            // The cage's n degrees of freedom fit a part of the noise: divide by the others for an unbiased variance.
+            // The n degrees of freedom of the cage absorb part of the noise: `used - n` gives an unbiased variance.
             let noise = fitted.rms * fitted.rms * used as f64 / (used - n) as f64;
             let lambda = (noise * n as f64 / (used as f64 * fitted.energy)).clamp(least, most);
             let ratio = lambda / fitted.lambda;

@@ -115,7 +115,7 @@ impl Drag {
         for (h, target) in to.iter().enumerate() {
             (0..3).for_each(|x| self.targets[(h, x)] = target[x]);
         }
-        // The map of the iteration changes with the targets, so its history no longer applies.
+        // New targets change the map that is iterated, so the history of iterates no longer applies.
         self.anderson.forget();
         let drag = to.iter().zip(&self.start).map(|(to, from)| to.distance(*from)).fold(0.0, f64::max);
         let relax = self.relax * smooth(drag / (RELAX_LENGTH * self.size));
@@ -133,7 +133,7 @@ impl Drag {
     }
 }
 
-/// Paths of the grabs: a common rigid motion, plus the part of each displacement that it does not explain.
+/// Paths of the grabs: a common rigid motion, plus what each displacement has beyond this motion.
 struct GrabPath<'a> {
     from: &'a [DVec3],
     to: &'a [DVec3],

@@ -14,7 +14,7 @@ const MIN_BRIDGE_LENGTH: f32 = 1e-9;
 /// Graph of the model's edges. Vertices at equal positions are one node. A bridge joins each component to the largest
 /// one, between the nearest nodes of both.
 pub(super) struct Geodesic {
-    /// Node of each vertex of the model.
+    /// Node at the position of each vertex. `[n_vertices]`
     unique_of: Vec<u32>,
     starts: Vec<u32>,
     neighbours: Vec<(u32, f32)>,
