@@ -11,10 +11,10 @@ use glam::DVec3;
 /// rounding, far below the resolution of f32 coordinates.
 const PLANE_TOLERANCE: f64 = 1e-7;
 
-/// Distance below which triangles touch, over their size: f64 rounding with a margin.
+/// Distance below which triangles touch, as a fraction of their size: f64 rounding with a margin.
 const TOUCH_TOLERANCE: f64 = 1e-10;
 
-/// Cosine of the smallest angle between two faces with a common edge (2 degrees).
+/// Cosine of the angle between two faces with a common edge, above which they are folded (2 degrees).
 const MAX_FOLD_COSINE: f64 = 0.9994;
 
 /// Limit on the pairs that [`meeting`] lists, against memory exhaustion.

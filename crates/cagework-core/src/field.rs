@@ -30,8 +30,8 @@ pub const CELLS_RANGE: Number = Number {
     is_allowed: |n| n.fract() == 0.0 && (8.0..=256.0).contains(&n),
     slider: None,
 };
-/// Memory of a lattice and its field, bytes per node: flags and index while the lattice is built (6), displacement (16),
-/// gradient (36), and the arrays of a file of the field (49).
+/// Memory of a lattice and its field, bytes per node: flags and index while the lattice is built (6), displacement
+/// (16), gradient (36), and the arrays of a file of the field (49).
 const NODE_BYTES: u64 = 107;
 /// Margin of the lattice on each side of the cage's box, as a fraction of the box's longest side.
 const MARGIN: f32 = 0.25;
@@ -289,7 +289,7 @@ impl Field {
         Mat3::IDENTITY + self.gradients[node]
     }
 
-    /// Displacement and columns of F - I of a node, each with a fourth component of no meaning.
+    /// Displacement of a node and columns of F - I at the node; the fourth component of each has no meaning.
     #[inline(always)]
     pub(crate) fn lanes(&self, node: usize) -> [f32; 16] {
         let Mat3 { x_axis, y_axis, z_axis } = self.gradients[node];

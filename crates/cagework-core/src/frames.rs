@@ -83,7 +83,7 @@ impl Frames {
         if self.is_used() { HOLD_COLUMN + 3 * self.holds().count() } else { 0 }
     }
 
-    /// All holds: each joint paired with each of its bones, or with `None` if no bone ends at it.
+    /// All holds as pairs of a joint and a bone that ends at the joint; the bone is `None` if there is no such bone.
     fn holds(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         (0..self.joints.len()).flat_map(move |joint| {
             let of_joint = move |bone: &usize| self.bones[*bone].contains(&(joint as u32));

@@ -32,22 +32,22 @@ pub trait Boundary: Sync {
 /// Every second cell of a row along x: unknowns of one colour whose six neighbours are all unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// Index of the first cell within its colour.
+    /// Index of the run's first cell among the cells of its colour.
     pub start: u32,
     /// Number of cells.
     pub len: u32,
-    /// Index of the first cell's -x neighbour within the other colour; the +x neighbour follows it.
+    /// Index of the first cell's -x neighbour among the cells of the other colour; the +x neighbour follows.
     pub x: u32,
-    /// Indices of the first cell's -y, +y, -z, +z neighbours within the other colour.
+    /// Indices of the first cell's -y, +y, -z, +z neighbours among the cells of the other colour.
     pub yz: [u32; 4],
 }
 
 /// An unknown next to the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutCell {
-    /// Index within its colour.
+    /// Index of the unknown among the cells of its colour.
     pub cell: u32,
-    /// Indices of the neighbours within the other colour; the zero row if the arm ends on the cage.
+    /// Indices of the six neighbours among the cells of the other colour; the zero row if the arm ends on the cage.
     pub neighbours: [u32; 6],
     /// Sum of the weights of the six arms.
     pub diagonal: f32,

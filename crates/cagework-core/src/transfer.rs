@@ -1,9 +1,10 @@
 //! Transfers between a level and the next coarser one.
 //!
 //! Prolongation is trilinear, with zero in cells outside the cage, as the error is zero on the cage. Restriction is its
-//! transpose, scaled by 1/2: the coarse operator is `(2h)^2` times the Laplacian, and a coarse cell gathers the weight of eight
-//! fine ones, `4 / 8`. A red-black sweep that ends with black leaves no residual on black cells, and one that starts with red
-//! overwrites red cells. Restriction therefore reads only red cells, and prolongation writes only black ones.
+//! transpose, scaled by 1/2: the coarse operator is `(2h)^2` times the Laplacian, and a coarse cell gathers the weight
+//! of eight fine ones, `4 / 8`. A red-black sweep that ends with black leaves no residual on black cells, and one that
+//! starts with red overwrites red cells. Restriction therefore reads only red cells, and prolongation writes only black
+//! ones.
 
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
@@ -19,12 +20,13 @@ pub type RestrictRow = [u32; 13];
 /// A black fine cell between two coarse cells (one odd coordinate) or eight (three odd coordinates).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProlongRow<const N: usize> {
-    /// Index of the fine cell within black.
+    /// Index of the fine cell among the black cells.
     pub cell: u32,
-    /// Rows of these coarse cells; the coarse level's zero row for cells that are not unknowns.
+    /// Rows of the coarse cells around the fine cell; the coarse level's zero row for cells that are not unknowns.
     pub coarse: [u32; N],
-    /// Inverse of the number of these coarse cells that are unknowns; 0 if none is. Full multigrid starts from the mean
-    /// of the coarse values, because the solution, unlike the error, is not zero on the cage.
+    /// Inverse of the number of coarse cells around the fine cell that are unknowns; 0 if there are none. Full
+    /// multigrid starts from the mean of the coarse values, because the solution, unlike the error, is not zero on the
+    /// cage.
     pub mean: f32,
 }
 

@@ -4,14 +4,14 @@ use crate::solve::rows::{LANES, Row};
 
 /// Destination of a run's column indices and weights.
 pub(super) enum Entries<'a> {
-    /// The part of the run's range in the matrix that is not yet written.
+    /// The rest of the run's range in the matrix, which is not written yet.
     Part { indices: &'a mut [u32], data: &'a mut [f32] },
-    /// A whole matrix that grows.
+    /// A whole matrix, to which entries are appended.
     All { indices: Vec<u32>, data: Vec<f32> },
 }
 
 impl Entries<'_> {
-    /// Appends entries; false if they exceed the run's range.
+    /// Appends entries; false if the run's range has no room for them.
     #[inline(always)]
     fn put(&mut self, columns: &[u32], weights: &[f32]) -> bool {
         match self {

@@ -63,15 +63,16 @@ pub struct AssembledWeights {
 struct VertexRun<'a> {
     first: usize,
     points: &'a [Vec3],
-    /// The run's slice of each batch. `[n_batches]`
+    /// The rows of the run in each batch. `[n_batches]`
     blocks: Vec<&'a mut [Row]>,
     lengths: Vec<u32>,
     facts: Vec<RowFacts>,
     entries: Entries<'a>,
 }
 
-/// Assembles the weight matrix. `blocks[batch][vertex]`: sampled values, overwritten as scratch; `points`: rest positions;
-/// `has_offset(vertex)`: whether a constant offset compensates the row's error, so that the row is not corrected.
+/// Assembles the weight matrix. `blocks[batch][vertex]`: sampled values, overwritten as scratch; `points`: rest
+/// positions; `has_offset(vertex)`: whether a constant offset compensates the row's error, so that the row is not
+/// corrected.
 pub fn assemble(
     controls: Controls<'_>,
     blocks: &mut [Vec<Row>],

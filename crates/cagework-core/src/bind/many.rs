@@ -26,7 +26,7 @@ pub struct SolvedCage<'a> {
     voxelized: Arc<VoxelizedCage>,
     /// Solved fields. `[n_batches][n_rows]`
     fields: Vec<Vec<Row>>,
-    /// Report of the solve; its `blocks` are empty.
+    /// Report of the solve. Its `blocks` are empty, because [`Self::bind`] samples them for each model.
     solved: Solution,
     elapsed_ms: f64,
 }
@@ -93,7 +93,7 @@ impl<'a> SolvedCage<'a> {
         let options = BindOptions { held: held + self.bytes(), extra_points, ..self.options };
         let mesh = WeldedPoints::new(positions)?;
         let grid = Voxelization::grid(self.controls.surface(), &options);
-        // 0 threads: the fields exist already.
+        // The fields are solved already, so the estimate counts no solving threads.
         let needed = estimate(self.controls, &grid, mesh.count(), 0, &options);
         needed.check(mesh.count(), self.controls.n_controls(), options.memory_limit)?;
         let voxelized = Arc::clone(&self.voxelized);

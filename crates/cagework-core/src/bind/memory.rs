@@ -54,7 +54,7 @@ pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MemoryEstimate {
     pub(super) bytes: u64,
-    /// Part of `bytes` that grows with the number of points rather than with the grid.
+    /// Share of `bytes` that grows with the number of points rather than with the grid, bytes.
     of_points: u64,
 }
 

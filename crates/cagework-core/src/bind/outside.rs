@@ -143,7 +143,7 @@ pub(super) fn oversized(
     for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
-        // The first few vertices usually differ by more than this.
+        // In most models, the weights of the first few vertices already differ by more than this.
         if *high - low.max(0.0) > MAX_OVERSIZE_SPREAD {
             return None;
         }
@@ -216,7 +216,8 @@ mod tests {
         assert!(beside.contains("outside the cage's interior"), "{beside}");
     }
 
-    /// The notice depends on the enclosed part of the model only, not on the size of the model or of other parts of the cage.
+    /// The notice depends on the enclosed part of the model only, not on the size of the model or of other parts of the
+    /// cage.
     #[test]
     fn oversize_is_judged_by_the_enclosed_part() {
         let box_of = |center: f32, size: f32, cuts: u32| {
@@ -239,7 +240,8 @@ mod tests {
         };
         let tiny = [Vec3::ZERO, 0.3 * Vec3::X, 0.3 * Vec3::Y];
         let with = |p: Vec3| [&tiny[..], &[p]].concat();
-        // 45 times larger, with vertices so dense that none has a large weight in the middle.
+        // A cage 45 times larger than the model, with vertices so dense that none has a large weight at the cage's
+        // centre.
         let fine = said(&[box_of(0.0, 11.0, 12)], &tiny).unwrap();
         assert!(fine.starts_with("The cage is 45 times larger than what it encloses"), "{fine}");
         // A second part of the model is ignored if it is outside the cage. Inside, it bends, so there is no notice.

@@ -144,8 +144,8 @@ impl<'a> PreparedBind<'a> {
 
     /// Assembles weights and report from the sampled columns.
     ///
-    /// If the bind is cancelled.
-    /// Cancelled.
+    /// # Errors
+    /// [`BindError::Cancelled`] if the bind is cancelled.
     pub fn finish(self, mut solved: Solution, watch: &Watch<'_>) -> Result<Binding, BindError> {
         let sampled = watch.now_ms();
         watch.report(Stage::Sample, 0.5, solved.iterations, None)?;

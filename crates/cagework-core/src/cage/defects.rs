@@ -21,7 +21,7 @@ pub enum CageError {
     TooFewCorners {
         /// Index of the face.
         face: u32,
-        /// Number of its corners.
+        /// Number of the face's corners.
         corners: usize,
     },
     /// A face has the index of a vertex that does not exist.
@@ -75,7 +75,7 @@ pub enum CageError {
     /// The cage has too many faces.
     #[error("cage has {} faces, more than {}: use a simpler mesh around the model", grouped(*faces), grouped(MAX_FACES))]
     TooManyFaces {
-        /// Number of its faces.
+        /// Number of faces of the cage.
         faces: usize,
     },
     /// An edge belongs to only one face.
@@ -97,7 +97,7 @@ pub enum CageError {
     NonManifoldEdge {
         /// Vertex indices of the edge, the lower one first.
         edge: [u32; 2],
-        /// Number of faces that share it.
+        /// Number of faces that share the edge.
         faces: usize,
     },
     /// Faces cannot be oriented consistently, as on a Moebius strip or a Klein bottle.
@@ -116,7 +116,7 @@ pub enum CageError {
     Flat {
         /// Index of the component, in the order of first faces.
         component: u32,
-        /// Index of its first face.
+        /// Index of the component's first face.
         face: u32,
     },
 }

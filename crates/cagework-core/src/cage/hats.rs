@@ -52,10 +52,11 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     normalize(values);
 }
 
-/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that contains it: the mean over all chords
-/// through the point of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))` with the distances
-/// r and s to the ends. The weight `1 / (r s)` would make them harmonic on a circle; the root reduces the influence of distant
-/// corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))` if a line through the point crosses `c` sides.
+/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that contains it: the mean over all
+/// chords through the point of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))`
+/// with the distances r and s to the ends. The weight `1 / (r s)` would make them harmonic on a circle; the root
+/// reduces the influence of distant corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))` if a line through
+/// the point crosses `c` sides.
 pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
     let n = outline.len();
     let next = |k: usize| if k + 1 == n { 0 } else { k + 1 };
@@ -95,7 +96,7 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
         let end = corners.get(rank + 1).map_or(corners[0].0 + PI, |&(end, _)| end);
         let width = end - start;
         let ways = GAUSS.map(|node| DVec2::from_angle(start + node * width));
-        // Nearest side in each direction.
+        // Nearest side of the polygon ahead of the point, and behind it.
         let (mut ends, mut distances) = ([None; 2], [f64::INFINITY; 2]);
         for &k in &crossed {
             let distance = to(k).perp_dot(side(k)) / ways[0].perp_dot(side(k));
@@ -113,7 +114,7 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
             let chord = hits[0].2 + hits[1].2;
             for (k, share, distance) in hits {
                 let weight = width / (distance * chord * chord.sqrt());
-                // NaN if the direction is parallel to the side, in a sector of zero width.
+                // The share is NaN if the direction is parallel to the side, which happens in a sector of zero width.
                 if weight * share >= 0.0 {
                     values[k] += weight * (1.0 - share);
                     values[next(k)] += weight * share;

@@ -71,7 +71,7 @@ struct Solid {
     triangles: Vec<[DVec3; 3]>,
     min: DVec3,
     max: DVec3,
-    /// Positive if the triangles are counter-clockwise seen from outside.
+    /// Signed volume, positive if the triangles are counter-clockwise seen from outside.
     volume: f64,
     area: f64,
 }

@@ -76,7 +76,7 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
         Err(open @ CageError::Open { .. }) => {
             let notice = weld_seams(&mesh.positions, &mut faces).ok_or(open.clone())?;
             let sides = check_repeats(&faces).and_then(|()| check_edges(&faces)).map_err(|welded| {
-                // Any other fault was created by welding: report the original one.
+                // Welding created any other fault: report the open edges of the input instead.
                 if matches!(welded, CageError::Open { .. }) { welded } else { open }
             })?;
             notices.push(notice);

@@ -30,7 +30,7 @@ pub enum InnerElement {
     Point(u32),
     /// A polyline of tubes, at least two corners.
     Line(Vec<u32>),
-    /// A face of a sheet with values on both sides, at least three corners.
+    /// A face of a sheet, at least three corners. Values are prescribed on both of its sides.
     Face(Vec<u32>),
 }
 

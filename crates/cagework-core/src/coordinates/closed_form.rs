@@ -12,7 +12,7 @@ type PoseTriangles = fn(&Cage, &[Vec3]) -> Vec<Vec3>;
 
 /// Formula of coordinates in a cage without inner controls.
 pub(super) struct ClosedForm {
-    /// Fills a row of zeros, `[n_columns]`, at a point; returns whether the coordinates are defined there.
+    /// Computes the coordinates at a point in a row of zeros, `[n_columns]`. Returns whether they are defined there.
     pub(super) row: fn(DVec3, &Cage, &mut [f64]) -> bool,
     /// If set, columns for the triangles come after those of the vertices, and this function computes their vectors.
     pub(super) triangles: Option<PoseTriangles>,
@@ -94,7 +94,7 @@ pub(super) fn dense(
     if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
         return Err(ClosedFormError::TooMany { rows, columns });
     }
-    // Each weight needs a value and a column index.
+    // A weight takes 8 bytes with its column index.
     let needed = 8 * (rows * columns) as u64;
     if needed > memory_limit {
         return Err(ClosedFormError::Memory { needed, limit: memory_limit });

@@ -48,7 +48,7 @@ pub(super) struct Passage {
     /// Offset from the ray to the edge as two steps `(axis, signed length)`. The second length is 0 unless the ray
     /// passes beyond an end of the edge.
     pub(super) steps: [(usize, f64); 2],
-    /// Share of the ray that ends at this edge.
+    /// Share that ends at this edge, of the ray's weight that nearer edges let pass.
     pub(super) share: f64,
     /// Facet and barycentric coordinates of the nearest point on the edge.
     pub(super) facet: u32,
@@ -128,8 +128,8 @@ impl EdgeLists {
             let Some(across) = edge.across[axis] else { continue };
             let [a, b] = edge.ends;
             let along = 3 - axis - across;
-            // Beyond an end of the edge, the nearest point is that end, so the share fades with the distance from it. Values
-            // then stay continuous at the tips of spikes and the corners of sheets, where edges end.
+            // Beyond an end of the edge, the nearest point is that end, so the share fades with the distance from it.
+            // Values then stay continuous at the tips of spikes and the corners of sheets, where edges end.
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };

@@ -59,7 +59,7 @@ pub struct Sampler<'a> {
 struct Scratch {
     near: Vec<u32>,
     edges: Vec<u32>,
-    /// Facets in the cube of a point beside an edge, and facets in the cube of the point on the far side of it.
+    /// Facets in the cube that contains a point beside an edge, and facets in the cube across the edge.
     here: Vec<u32>,
     other: Vec<u32>,
     stencil: Stencil,
@@ -86,14 +86,14 @@ struct Query<'a> {
     splits: bool,
 }
 
-/// Where one part of a split ray ends.
+/// Where a part of a split ray ends.
 #[derive(Clone, Copy)]
 enum Stop<'a> {
     /// Beside a re-entrant edge.
     Beside(&'a Passage),
     /// At a wall beyond the cube between centres.
     Wall(Wall),
-    /// Where the unsplit ray ends.
+    /// At the end of the unsplit ray.
     End,
 }
 
@@ -239,14 +239,14 @@ impl<'a> Sampler<'a> {
     /// axis.
     fn descend_past(&self, at: Query<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
         let (p, axis) = (at.p, at.order[0]);
-        // (share, length, end) of each part.
+        // Share of the ray, length and end of each part.
         let parts = [0, 1].map(|side| {
             let mut left = 1.0;
             let mut parts = Vec::new();
             for passage in &passed[side] {
                 let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
-                    // The edge lies beyond the cube: a wall may stop the ray before it.
+                    // The edge lies beyond the cube, and a wall between them may stop the ray.
                     let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
@@ -331,7 +331,7 @@ impl<'a> Sampler<'a> {
 
     /// Adds the value of a wall at which a ray up (`side` 1) or down (0) ends.
     fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
-        // From inside, the ray hits the back of a face: going up, a face that faces up.
+        // A ray from inside hits the back of a face: on the way up, of a face that faces up.
         if faces_up == (side == 1) {
             self.add_wall(facet, barycentric, weight, scratch);
         } else {

@@ -56,13 +56,13 @@ pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     sum
 }
 
-/// A cell as a kernel visits it.
+/// What a kernel reads at a cell.
 struct Visit {
-    /// Index within its colour.
+    /// Index of the cell among the cells of its colour.
     cell: usize,
-    /// Its old value if requested, otherwise zero.
+    /// Value of the cell before the kernel changes it; zero unless requested.
     old: Row,
-    /// Sum of its neighbours and right-hand side.
+    /// Sum of the neighbours' values and the right-hand side.
     sum: Row,
     diagonal: f32,
 }

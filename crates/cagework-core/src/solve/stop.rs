@@ -80,7 +80,7 @@ impl SolveReport {
     pub fn together(batches: &[Self]) -> Self {
         let history = |of: fn(&Self) -> &[f64]| -> Vec<f64> {
             let longest = batches.iter().map(|r| of(r).len()).max().unwrap_or(0);
-            // A batch that ended earlier keeps its last value.
+            // A batch that needed fewer iterations counts with its last value.
             let at = |r: &Self, k: usize| of(r).get(k).or(of(r).last()).copied();
             (0..longest)
                 .map(|k| batches.iter().filter_map(|r| at(r, k)).map(|x| x * x).sum::<f64>().sqrt())
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn batches_add_in_squares_and_finished_ones_keep_their_last_value() {
         let rule = StopRule { tolerance: 5.0, max_iterations: 9 };
-        // sqrt(3^2 + 4^2) = 5: two batches that each meet their share meet the tolerance together.
+        // sqrt(3^2 + 4^2) = 5: if two batches meet their shares of the tolerance, both together meet the tolerance.
         assert_eq!(rule.of_batch(4).tolerance, 2.5);
         let batch = |deltas: &[f64]| SolveReport {
             deltas: deltas.to_vec(),

@@ -54,8 +54,9 @@ pub struct SamplingTable {
     pub hats: Vec<[u32; 2]>,
 }
 
-/// Weights in bundles of [`BUNDLE`] rows with a common list of columns. [`SLICE`] bundles form a slice, padded to its longest
-/// list and stored column by column, so that neighbouring GPU invocations read neighbouring entries (sliced ELLPACK).
+/// Weights in bundles of [`BUNDLE`] rows with a common list of columns. [`SLICE`] bundles form a slice, padded to its
+/// longest list and stored column by column, so that neighbouring GPU invocations read neighbouring entries (sliced
+/// ELLPACK).
 #[derive(Clone, Debug, Default)]
 pub struct SlicedWeights {
     /// Start of each slice in `columns` and `weights`, divided by [`SLICE`]. `[n_slices + 1]`
@@ -165,7 +166,7 @@ impl SlicedWeights {
     pub fn of_rows(weights: &Weights, range: Range<usize>) -> Self {
         let n_slices = range.len().div_ceil(BUNDLE * SLICE);
         let mut sliced = Self { slices: vec![0], ..Self::default() };
-        // For each column, the bundle that listed it last, and its position in that list.
+        // For each column, the last bundle with this column in its list, and the column's position in the list.
         let mut listed = vec![(u32::MAX, 0); weights.n_columns()];
         let mut lists: [Vec<u32>; SLICE] = Default::default();
         let rows = |slice: usize, lane: usize| {

@@ -46,9 +46,9 @@ pub struct Lines {
 pub struct Overlaps {
     /// Pairs of overlapping components; a component that intersects itself is paired with itself.
     pub parts: Vec<[u32; 2]>,
-    /// Bounding box of all walls inside other parts, in cells: lowest corner.
+    /// Lowest corner of the bounding box of all walls inside other parts, in cells.
     pub low: DVec3,
-    /// Highest corner.
+    /// Highest corner of this box, in cells.
     pub high: DVec3,
 }
 
@@ -225,7 +225,7 @@ fn cover(
         let (lo, hi, sign) = if corners[a] < corners[b] { (p[a], p[b], 1.0) } else { (p[b], p[a], -1.0) };
         let (du, dv) = (hi[u] - lo[u], hi[v] - lo[v]);
         let e = du * (c.1 - lo[v]) - dv * (c.0 - lo[u]);
-        // On the edge: displace the line by an infinitesimal step along u and a smaller one along v.
+        // A line on the edge: displace it by an infinitesimal step along u and a smaller one along v.
         let left = if e != 0.0 { e > 0.0 } else { dv < 0.0 || (dv == 0.0 && du > 0.0) };
         (sign * e, left == (sign > 0.0))
     };

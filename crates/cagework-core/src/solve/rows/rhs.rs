@@ -7,9 +7,9 @@ use crate::levels::Level;
 /// Right-hand side of a level.
 #[derive(Clone, Copy, Debug)]
 pub enum Rhs<'a> {
-    /// One row per cut cell, red before black; zero elsewhere. For the finest level.
+    /// One row per cut cell, red cells before black ones; zero at all other cells. For the finest level.
     Cut(&'a [Row]),
-    /// One row per cell, in field order. For coarse levels.
+    /// One row per cell, in the order of the field. For coarse levels.
     Dense(&'a [Row]),
     /// Zero everywhere.
     Zero,
