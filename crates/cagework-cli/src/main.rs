@@ -1,6 +1,7 @@
 //! The `cagework` command: binds a mesh to a cage by harmonic coordinates, deforms it, and reports the accuracy.
 //!
-//! Results go to stdout (as JSON with `--json`), errors to stderr. Exit codes: 0 success, 1 error, 2 invalid command line.
+//! Results go to stdout (as JSON with `--json`), errors to stderr. Exit codes: 0 success, 1 error, 2 invalid command
+//! line.
 
 mod args;
 mod bench;

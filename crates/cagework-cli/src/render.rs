@@ -32,7 +32,8 @@ struct RenderSummary {
     /// Coordinates of the left and of the right picture, with `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
     compared: Option<[String; 2]>,
-    /// Time to draw the picture and to read it back from the GPU, ms. Binding, and reading and writing files, are not included.
+    /// Time to draw the picture and to read it back from the GPU, ms. Binding, and reading and writing files, are not
+    /// included.
     render_ms: f64,
     notices: Vec<String>,
 }

@@ -1,10 +1,11 @@
 //! The cage: a polygon mesh that is closed and oriented by construction, with its boundary values.
 //!
-//! [`Cage::new`] establishes the invariants of all later stages: every edge belongs to two faces with opposite directions along
-//! it, every face has an area, every component encloses a volume and faces away from the solid. The solid consists of the points
-//! enclosed by an odd number of components, so a component inside another one bounds a cavity. Faults that can be repaired
-//! without changing the solid are repaired with a [`CageNotice`]; all others are a [`CageError`] with their location. Indices of
-//! vertices, faces and components start at 0. Self-intersection is not checked.
+//! [`Cage::new`] establishes the invariants of all later stages: every edge belongs to two faces with opposite
+//! directions along it, every face has an area, every component encloses a volume and faces away from the solid. The
+//! solid consists of the points enclosed by an odd number of components, so a component inside another one bounds a
+//! cavity. Faults that can be repaired without changing the solid are repaired with a [`CageNotice`]; all others are a
+//! [`CageError`] with their location. Indices of vertices, faces and components start at 0. Self-intersection is not
+//! checked.
 //!
 //! [`Cage::hats_at`] gives the boundary values ("hats").
 
@@ -270,11 +271,12 @@ impl Cage {
     /// barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. They sum to 1 and reproduce
     /// the point (on a bent face up to 2 % of its bend).
     ///
-    /// Hats are linear on triangles. On planar quads they are the coordinates of Meyer et al. 2002 (bilinear on a rectangle),
-    /// blended with pseudo-harmonic coordinates where a corner is nearly straight. On all other polygons they are pseudo-harmonic
-    /// coordinates (after Gordon and Wixom 1974: means over the chords through the point), which depend continuously on the
-    /// corners. A bent face is a patch over its best-fitting plane, with the coordinates of its projected outline. All hats are
-    /// non-negative and linear along edges, so neighbouring faces agree.
+    /// Hats are linear on triangles. On planar quads they are the coordinates of Meyer et al. 2002 (bilinear on a
+    /// rectangle), blended with pseudo-harmonic coordinates where a corner is nearly straight. On all other polygons
+    /// they are pseudo-harmonic coordinates (after Gordon and Wixom 1974: means over the chords through the point),
+    /// which depend continuously on the corners. A bent face is a patch over its best-fitting plane, with the
+    /// coordinates of its projected outline. All hats are non-negative and linear along edges, so neighbouring faces
+    /// agree.
     ///
     /// # Panics
     /// If there is no such facet.

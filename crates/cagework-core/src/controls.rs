@@ -106,8 +106,8 @@ impl<'a> Controls<'a> {
         self.origins.map_or(Some(face), |origins| origins[face as usize])
     }
 
-    /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it. Calls
-    /// `each(control, value)` for non-zero values, possibly several times per control. All values sum to 1.
+    /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it.
+    /// Calls `each(control, value)` for non-zero values, possibly several times per control. All values sum to 1.
     ///
     /// # Panics
     /// If the triangle does not exist.

@@ -74,8 +74,8 @@ impl Coordinates {
     /// Coordinates at `points` (`[n_points]`, object units) by a closed form, dense. `[n_points, n_columns]`
     ///
     /// # Errors
-    /// [`ClosedFormError`]: the kind has no closed form, a point is not finite or has no coordinates, the weights exceed
-    /// `memory_limit` bytes, or `progress` cancelled.
+    /// [`ClosedFormError`]: the kind has no closed form, a point is not finite or has no coordinates, the weights
+    /// exceed `memory_limit` bytes, or `progress` cancelled.
     pub fn weights(
         self,
         points: &[Vec3],

@@ -41,7 +41,8 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
     ClosestPoint { point: u * a + v * b + w * c, barycentric }
 }
 
-/// Distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if the ray misses.
+/// Distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if the ray
+/// misses.
 ///
 /// Source: Moeller and Trumbore 1997, "Fast, minimum storage ray-triangle intersection".
 #[must_use]

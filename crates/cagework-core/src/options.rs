@@ -285,7 +285,8 @@ pub struct BindOptions {
     pub tau: f32,
     /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
     pub max_iterations: u32,
-    /// Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all. Default 0.
+    /// Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all.
+    /// Default 0.
     pub sparsify: f32,
     /// Fails before the bind if it needs more bytes of memory, including `held`. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
@@ -295,7 +296,8 @@ pub struct BindOptions {
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub held: u64,
-    /// Trailing points that are not mesh vertices. They are bound, but excluded from the check for vertices outside. Default 0.
+    /// Trailing points that are not mesh vertices. They are bound, but excluded from the check for vertices outside.
+    /// Default 0.
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub extra_points: usize,

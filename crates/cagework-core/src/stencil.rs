@@ -56,7 +56,8 @@ pub fn relax_cells(
     }
 }
 
-/// A Jacobi sweep (Algorithm 3 of the paper) from `u_in` to `u_out`, both `[row][lane]`. GPU twin: `shaders/jacobi_cells.wgsl`.
+/// A Jacobi sweep (Algorithm 3 of the paper) from `u_in` to `u_out`, both `[row][lane]`. GPU twin:
+/// `shaders/jacobi_cells.wgsl`.
 pub fn jacobi_cells(
     rows: Range<usize>,
     n_lanes: usize,
@@ -199,7 +200,8 @@ pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [
     }
 }
 
-/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU twin: `shaders/vertex_normals.wgsl`.
+/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU twin:
+/// `shaders/vertex_normals.wgsl`.
 pub fn vertex_normals(table: &NormalTable, positions: &[Vec3], normals: &mut [Vec3]) {
     for (vertex, normal) in normals.iter_mut().enumerate() {
         let p = positions[vertex];

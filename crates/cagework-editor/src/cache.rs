@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use crate::document::Key;
 
-/// Results by the [`Key`] of the document they were computed from. Evicts the least recently used results above a limit in
-/// bytes.
+/// Results by the [`Key`] of the document they were computed from. Evicts the least recently used results above a limit
+/// in bytes.
 #[derive(Debug)]
 pub struct Cache<T> {
     /// Entries, most recently used last.

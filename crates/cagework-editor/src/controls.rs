@@ -1,7 +1,7 @@
 //! The cage at rest, with its subdivision and its interior controls.
 //!
-//! Interior controls are the last of the cage's positions and belong to no face. Selection, gestures, poses, undo and projects
-//! treat them as they treat the cage's own vertices.
+//! Interior controls are the last of the cage's positions and belong to no face. Selection, gestures, poses, undo and
+//! projects treat them as they treat the cage's own vertices.
 
 use cagework_core::{Cage, CageError, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh};
 use glam::Vec3;

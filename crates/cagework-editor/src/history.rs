@@ -36,8 +36,8 @@ impl History {
         Self { limit, ..Self::default() }
     }
 
-    /// Records a step from `before` to `after`, and drops undone steps. Above the limit, drops the oldest steps, but never the
-    /// latest.
+    /// Records a step from `before` to `after`, and drops undone steps. Above the limit, drops the oldest steps, but
+    /// never the latest.
     pub(crate) fn push(&mut self, label: String, before: Document, after: &Document) {
         let bytes = before.bytes_beyond(after);
         self.undone.clear();

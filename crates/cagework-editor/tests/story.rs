@@ -289,8 +289,8 @@ fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
         editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
         assert!(editor.commit(format!("cage {k}")));
     }
-    // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first step replaced
-    // no cage, so the four steps take 78 kB.
+    // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first step
+    // replaced no cage, so the four steps take 78 kB.
     assert_eq!(editor.view().forgotten, 0);
     for k in 5..=9 {
         let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);

@@ -27,8 +27,8 @@ pub struct Allocator<'a> {
 }
 
 impl<'a> Allocator<'a> {
-    /// `what`: name in error messages. Until [`Self::settle`], nothing may be awaited, because the error
-    /// scopes belong to the device.
+    /// Begins an allocation. `what`: name of the object in error messages. Until [`Self::settle`], nothing may be
+    /// awaited, because the error scopes belong to the device.
     pub fn new(context: &'a GpuContext, what: &'static str) -> Self {
         let refused = context.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = context.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);

@@ -22,8 +22,8 @@ pub(crate) struct Holder {
 }
 
 impl Holder {
-    /// `copies`: source vertices of the duplicates that follow the mesh's vertices. `positions`: vertex
-    /// buffer to modify.
+    /// Uploads parts. `copies`: source vertices of the duplicates that follow the mesh's vertices. `positions`:
+    /// vertex buffer to modify.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].

@@ -70,7 +70,7 @@ pub fn field_table(field: &Field) -> Vec<[u32; 4]> {
 }
 
 impl Skinner {
-    /// `positions`: vertex buffer that the kernels write; `None` if the CPU skins.
+    /// Uploads a skin. `positions`: vertex buffer that the kernels write; `None` if the CPU skins.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].

@@ -199,8 +199,8 @@ impl Binder {
     /// Transfers poses from an old cage to a new one around the same model: binds the new controls to the old cage and
     /// deforms them by each pose. `poses`: `[n_poses, n_old, 3]`; returns `[n_poses, n_new, 3]`.
     ///
-    /// The reverse, binding the old vertices to the new cage, would need a linear solve, and would bend the new cage where
-    /// the old one extends beyond it.
+    /// The reverse, binding the old vertices to the new cage, would need a linear solve, and would bend the new cage
+    /// where the old one extends beyond it.
     ///
     /// # Errors
     /// If the arrays are not a valid cage. Those of a bind.

@@ -305,7 +305,8 @@ fn run_mask(w: usize, first: usize, last: usize) -> u64 {
     (u64::MAX << low) & (u64::MAX >> (WORD - 1 - high))
 }
 
-/// Whether a block of 2 x 2 x 2 voxels (bit index x + 2 y + 4 z) has voxels, or gaps, that share only an edge or a corner.
+/// Whether a block of 2 x 2 x 2 voxels (bit index x + 2 y + 4 z) has voxels, or gaps, that share only an edge or a
+/// corner.
 fn is_critical(block: usize) -> bool {
     let has = |i: usize| block >> i & 1 == 1;
     let edge = [(0, 3, 1, 2), (4, 7, 5, 6), (0, 5, 1, 4), (2, 7, 3, 6), (0, 6, 2, 4), (1, 7, 3, 5)]

@@ -23,8 +23,8 @@ pub(super) struct Offsets<'a> {
 }
 
 impl<'a> Offsets<'a> {
-    /// `blocks`: sampled values, `[n_batches][n_points]`. `joints`: joints of balls and tubes, if any, and weights of
-    /// their points.
+    /// Collects the points that may have offsets, and the frames. `blocks`: sampled values, `[n_batches][n_points]`.
+    /// `joints`: joints of balls and tubes, if any, and weights of their points.
     pub(super) fn new(
         controls: Controls<'a>,
         stencils: &Stencils,

@@ -36,7 +36,8 @@ pub(super) struct Polygon {
     meyer: f64,
     /// Triangulation of the face, as indices of its corners, with its orientation.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The surface on which hats are prescribed: the triangles, or those of a patch. Indices of corners and inner points.
+    /// The surface on which hats are prescribed: the triangles, or those of a patch. Indices of corners and inner
+    /// points.
     pub(super) facets: Vec<[u32; 3]>,
     /// Hats at the inner points of the patch. `[n_inner][n_corners]`
     pub(super) inner: Vec<Vec<f64>>,
@@ -127,7 +128,8 @@ fn meyer_share(quad: &[DVec2]) -> f64 {
     if share < MIN_SHARE { 0.0 } else { share }
 }
 
-/// Coordinates in the plane with this normal, with an axis along the longest side, so that rectangles remain axis-aligned.
+/// Coordinates in the plane with this normal, with an axis along the longest side, so that rectangles remain
+/// axis-aligned.
 fn project(arms: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let n = arms.len();
     let side = (0..n)

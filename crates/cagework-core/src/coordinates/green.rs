@@ -1,8 +1,9 @@
 //! Green coordinates, a closed form that preserves details, for comparison with harmonic and mean value coordinates.
 //!
-//! A point is a combination of the cage's vertices and of its faces' normals. The columns of the weights are therefore the cage's
-//! vertices, then its triangles. The control of a triangle is its normal scaled by the stretch of the posed triangle, so that
-//! poses are applied by the same product as for other coordinates. Deformed points may leave the cage.
+//! A point is a combination of the cage's vertices and of its faces' normals. The columns of the weights are therefore
+//! the cage's vertices, then its triangles. The control of a triangle is its normal scaled by the stretch of the posed
+//! triangle, so that poses are applied by the same product as for other coordinates. Deformed points may leave the
+//! cage.
 //!
 //! Source: Lipman, Levin and Cohen-Or 2008, "Green coordinates"; integrals over triangles as in its appendix, angles by
 //! arctangent.

@@ -5,13 +5,14 @@
 //!
 //! Changes versus the paper:
 //! - Two buffers are swapped instead of copied.
-//! - Each thread owns whole batches of columns, so no two threads write the same cell. This avoids the paper's locks and queue of cells,
-//!   which made its threads slower than one.
-//! - A batch runs several sweeps while it is in the cache. The changes of each sweep are stored separately and summed over batches
-//!   afterwards, so delta is known after every sweep. The number of sweeps per round is predicted from delta's decay, so that the last round
-//!   ends at the sweep at which the rule holds.
+//! - Each thread owns whole batches of columns, so no two threads write the same cell. This avoids the paper's locks
+//!   and queue of cells, which made its threads slower than one.
+//! - A batch runs several sweeps while it is in the cache. The changes of each sweep are stored separately and summed
+//!   over batches afterwards, so delta is known after every sweep. The number of sweeps per round is predicted from
+//!   delta's decay, so that the last round ends at the sweep at which the rule holds.
 //!
-//! Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, unlike in multigrid.
+//! Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, unlike in
+//! multigrid.
 
 use super::hierarchy::Hierarchy;
 use super::rows::{Changes, LANES, Rhs, Row, ZERO, jacobi_plane};

@@ -1,7 +1,8 @@
 //! Solvers of Laplace's equation with one right-hand side per control.
 //!
-//! A solver uses a level's operator ([`operator`]), right-hand sides ([`hierarchy::Hierarchy`]) and the stopping rule ([`stop`]).
-//! Solvers that work batch by batch implement [`BatchSolver`]; Jacobi does not, since its stopping rule couples all columns.
+//! A solver uses a level's operator ([`operator`]), right-hand sides ([`hierarchy::Hierarchy`]) and the stopping rule
+//! ([`stop`]). Solvers that work batch by batch implement [`BatchSolver`]; Jacobi does not, since its stopping rule
+//! couples all columns.
 
 pub mod centres;
 pub mod conjugate_gradient;

@@ -12,8 +12,9 @@
 //! cheaper: the Armadillo's 14 batches take 42 cycles instead of 43, and end at an error of 4e-6 instead of 7e-6 (5e-6
 //! with the shorter last cycle, see [`Convergence::is_nearly_done`]).
 //!
-//! Coarse grids do not resolve balls and cavities smaller than their cells, and overcorrect there. If cycles converge slowly or
-//! diverge ([`Convergence::stalls`]), conjugate gradients preconditioned by the cycles continue from the latest iterate.
+//! Coarse grids do not resolve balls and cavities smaller than their cells, and overcorrect there. If cycles converge
+//! slowly or diverge ([`Convergence::stalls`]), conjugate gradients preconditioned by the cycles continue from the
+//! latest iterate.
 //!
 //! All passes between two restrictions are streamed through memory together (`stream`): coarse correction,
 //! post-smoothing, the next cycle's two pre-smoothing sweeps and the residual of the red cells each run one z-plane

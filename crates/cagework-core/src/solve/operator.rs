@@ -1,9 +1,10 @@
 //! The discrete Laplace operator of a level.
 //!
-//! Each unknown has an arm to each of its six neighbours. A whole arm has weight a = 1. An arm that the cage cuts ends there
-//! and has weight a >= 1, the inverse of its length in cells. For cell c, `(A u)_c = (sum of a over all arms) u_c - sum of u
-//! over the neighbours at the ends of whole arms`. Arms that end on the cage contribute to the right-hand side. A is
-//! symmetric positive definite for both methods. Source: Gibou et al. 2002.
+//! Each unknown has an arm to each of its six neighbours. A whole arm has weight a = 1. An arm that the cage cuts ends
+//! there and has weight a >= 1, the inverse of its length in cells. For cell c,
+//! `(A u)_c = (sum of a over all arms) u_c - sum of u over the neighbours at the ends of whole arms`. Arms that end on
+//! the cage contribute to the right-hand side. A is symmetric positive definite for both methods. Source: Gibou et al.
+//! 2002.
 
 use super::rows::{Rhs, Row, ZERO, residual_plane};
 use crate::levels::Level;

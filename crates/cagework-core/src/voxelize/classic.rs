@@ -6,13 +6,14 @@
 //! - A triangle is tested only against the cells that its part in each row of the grid spans (the paper proposes all
 //!   cells of its bounding box). Slices of the grid are independent, so they run in parallel, and the result does not
 //!   depend on the number of threads.
-//! - A cell's values are taken at the triangle's point closest to its centre. Barycentric coordinates of the centre itself can be negative or
-//!   exceed 1, as it need not lie over the triangle.
+//! - A cell's values are taken at the triangle's point closest to its centre. Barycentric coordinates of the centre
+//!   itself can be negative or exceed 1, as it need not lie over the triangle.
 //! - Of several triangles in a cell, the one closest to the cell's centre gives the values (the first one in a tie). In
 //!   the paper each triangle overwrites the values of its own vertices, and the sum of a cell's values can exceed 1.
 //! - Faces may be polygons of any size, with the values of [`Cage::hats_at`].
 //! - The grid extends 1/1000 cell beyond the cage's box, so that no face lies on its outermost plane.
-//! - Cells can be cubes. With the paper's rectangular cells, the average over six neighbours does not discretise Laplace's equation.
+//! - Cells can be cubes. With the paper's rectangular cells, the average over six neighbours does not discretise
+//!   Laplace's equation.
 //! - The exterior is flooded from all outermost cells (as the paper proposes), row by row, without recursion.
 
 use glam::{DVec3, UVec3};

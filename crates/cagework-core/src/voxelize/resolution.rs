@@ -1,4 +1,5 @@
-//! Detection of parts of a cage that the grid does not resolve: faces without grid lines, and parts thinner than a cell.
+//! Detection of parts of a cage that the grid does not resolve: faces without grid lines, and parts thinner than a
+//! cell.
 //!
 //! Values on such faces reach the grid by chance. Weights then depend on the cage's orientation, and a vertex whose
 //! faces meet no grid line has no influence. The weights are still valid; a finer grid gives better ones.

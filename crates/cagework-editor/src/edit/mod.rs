@@ -1,7 +1,7 @@
 //! Picking, selecting and moving the vertices of a cage.
 //!
-//! Functions take cage positions `[n_cage]` in object units and the faces of a [`cagework_core::Cage`]. Pixels are those of the
-//! [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
+//! Functions take cage positions `[n_cage]` in object units and the faces of a [`cagework_core::Cage`]. Pixels are
+//! those of the [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
 
 mod gesture;
 mod pick;

@@ -9,7 +9,8 @@ use super::selection::Selection;
 /// Options for the vertices that move together with the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPull<'a> {
-    /// Radius of proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for none.
+    /// Radius of proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for
+    /// none.
     pub radius: f32,
     /// Mirror images of the vertices; `None` if movements are not mirrored.
     pub symmetry: Option<&'a Symmetry>,

@@ -275,8 +275,8 @@ mod tests {
         assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
     }
 
-    /// Joins a model of two triangles with a hard edge (two copies) and, twice, a model of one triangle with one copy and a
-    /// texture.
+    /// Joins a model of two triangles with a hard edge (two copies) and, twice, a model of one triangle with one copy
+    /// and a texture.
     #[test]
     fn joined_models_keep_their_corners_copies_and_textures() {
         let mut first = DrawModel::plain(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2], [2, 1, 0]]);

@@ -30,7 +30,7 @@ pub(super) enum Mover {
 }
 
 impl Mover {
-    /// `on_gpu`: the same weights, if they are on the GPU already.
+    /// Prepares a bound model for deformation. `on_gpu`: the same `weights`, if they are on the GPU already.
     pub(super) async fn new(
         context: &GpuContext,
         model: &Arc<DrawModel>,

@@ -103,8 +103,8 @@ pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
     uris.map(|uri| decoded(uri).into_owned()).collect()
 }
 
-/// Removes optional vertex attributes whose accessor does not exist. Otherwise, accessors appended by an
-/// export could take their index.
+/// Removes optional vertex attributes whose accessor does not exist. Otherwise, an accessor that an export
+/// appends could get the missing index.
 fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
     let n_accessors = json["accessors"].as_array().map_or(0, Vec::len) as u64;
     let mut missing = Vec::new();

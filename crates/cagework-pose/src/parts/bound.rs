@@ -40,8 +40,8 @@ struct PieceSums {
 }
 
 impl BoundParts {
-    /// `rest`: the model's vertices; `weights`, `frames`: results of its bind; `controls`: rest positions of the
-    /// controls. Object units.
+    /// Precomputes the sums of all pieces. `rest`: the model's vertices; `weights`, `frames`: results of its bind;
+    /// `controls`: rest positions of the controls. Object units.
     ///
     /// # Panics
     /// If `weights` or `parts.stays` does not have one entry per vertex.

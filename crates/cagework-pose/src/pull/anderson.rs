@@ -1,4 +1,5 @@
-//! Anderson acceleration of a fixed-point iteration (Peng et al. 2018, "Anderson acceleration for geometry optimization").
+//! Anderson acceleration of a fixed-point iteration (Peng et al. 2018, "Anderson acceleration for geometry
+//! optimization").
 
 use nalgebra::{DMatrix, DVector};
 

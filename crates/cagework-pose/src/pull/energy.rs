@@ -34,7 +34,7 @@ pub struct Pull {
 }
 
 impl Pull {
-    /// `weights`: weights of the controls at [`Probes::points`].
+    /// Prepares a model and its cage. `weights`: weights of the controls at [`Probes::points`].
     ///
     /// # Errors
     /// [`PullError::Shape`] if `weights` do not have one row per probe and one column per control.

@@ -21,7 +21,7 @@ pub(super) struct Geodesic {
 }
 
 impl Geodesic {
-    /// `size`: diagonal of the model's box.
+    /// Builds the graph of a model. `size`: diagonal of the model's box.
     pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]], size: f32) -> Self {
         let welded = weld(positions);
         let points: Vec<Vec3> = welded.first.iter().map(|&v| positions[v as usize]).collect();

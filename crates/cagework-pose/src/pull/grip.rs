@@ -39,7 +39,8 @@ impl Grip {
     /// Grip of a handle. `triangles` and `weights`: those of the model.
     ///
     /// # Errors
-    /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another model or cage.
+    /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another
+    /// model or cage.
     pub fn new(
         handle: Handle,
         pull: &Pull,

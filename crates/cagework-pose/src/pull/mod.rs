@@ -1,8 +1,8 @@
 //! Direct manipulation of the model: the user moves points of the model, and the cage is solved for so that the rest of
 //! the model bends as little as possible.
 //!
-//! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is as rigid as possible (Sorkine and Alexa 2007), with
-//! rotation groups and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
+//! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is as rigid as possible (Sorkine and Alexa 2007),
+//! with rotation groups and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
 //!
 //! ```text
 //! E(c) = sum_r sum_{e in r} w_e |D_e c - R_r d_e|^2    groups r with one rotation each

@@ -69,7 +69,8 @@ tau: number,
  */
 max_iterations: number,
 /**
- * Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all. Default 0.
+ * Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all.
+ * Default 0.
  */
 sparsify: number,
 /**

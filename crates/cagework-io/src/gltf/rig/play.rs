@@ -46,8 +46,8 @@ pub struct Posed {
 }
 
 impl Player {
-    /// `like`: document that defines the vertex order: either `document` itself, or the original from which it was
-    /// exported.
+    /// A player of `document`. `like`: document that defines the vertex order, either `document` itself or the original
+    /// from which it was exported.
     pub(crate) fn new(
         document: &GltfDocument,
         like: &GltfDocument,

@@ -42,7 +42,7 @@ pub(super) struct SurfaceGradients<'a> {
 }
 
 impl<'a> SurfaceGradients<'a> {
-    /// `triangles` are those of the model, `by` the displacements of all points.
+    /// Gradients are computed when first needed. `triangles`: of the model; `by`: displacements of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }
