@@ -80,14 +80,14 @@ test("a gap between legs stays open by default and at a chosen width", async ({ 
   await expect(page).toHaveTitle(/legs/);
   await bound(page);
   await page.getByRole("button", { name: /^Cage/ }).first().click();
-  const gaps = page.getByLabel("Gaps that stay open");
+  const gaps = page.getByLabel("Gaps left open");
   await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertices allow");
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
   const primary = page.locator(".panel-foot .primary");
   await expect(primary).toHaveText("Pose it");
   await gaps.fill("128");
-  await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of its size");
+  await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of the model's size");
   await expect(primary).toHaveText("Make this cage");
   await shoot(page, "cage-unmade");
   await primary.click();
@@ -102,7 +102,9 @@ test("a gap between legs stays open by default and at a chosen width", async ({ 
     await gaps.fill("16");
     await primary.click();
     await bound(page);
-    await expect(page.getByText(/For more of the 400, move Closeness to the right/)).toBeVisible();
+    await expect(
+      page.getByText(/To use more of the 400 vertices, move Closeness to the right/),
+    ).toBeVisible();
     await shoot(page, "cage-fewer");
   });
 

@@ -100,7 +100,7 @@ function Radius({ app, cage }: { app: App; cage: CageState }) {
       min={THINNEST}
       max={THICKEST}
       step={0.0025}
-      format={(share) => T.cage.ofSize(percent(share, 1))}
+      format={(share) => T.pose.ofCage(percent(share, 1))}
       value={held ?? cage.radius / longest}
       onInput={setHeld}
       onCommit={(share) => {

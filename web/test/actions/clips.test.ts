@@ -140,7 +140,7 @@ it("with the option `dynamic`, a clip starts once the lattice is ready; the latt
   teach({ hasLattice: false });
   const chosen = clips.choose(0);
   await settled();
-  expect([starts(), said.at(-1)]).toEqual([0, "Preparing the space around the cage"]);
+  expect([starts(), said.at(-1)]).toEqual([0, "Computing how the cage bends the moving model"]);
   asked.at(-1)?.resolve(undefined);
   teach({ hasLattice: true });
   await chosen;

@@ -10,7 +10,7 @@ export const bind = {
   ours: "Ours",
   oursTip: "Embedded boundary, multigrid",
   papers: "The paper's",
-  papersTip: "Rectangular cells and Jacobi sweeps, as published",
+  papersTip: "Rectangular cells and Jacobi sweeps, as published by Joshi et al. (2007)",
   grid: "Grid cells along the longest side",
   method: "Method",
   methods: { embedded: "Embedded", classic: "Classic" },
@@ -41,8 +41,8 @@ export const bind = {
   sparsifies: ["Keep all", "Up to 1e-5 per row", "Up to 1e-3 per row"],
   cells: "Cells of the classic method",
   cellShapes: { box: "Fit the cage's box", cubic: "Cubes" },
-  norm: "Reading of Eq. 2",
-  norms: { euclidean: "As intended", literal: "As printed" },
+  norm: "Norm in the paper's Eq. 2",
+  norms: { euclidean: "Euclidean", literal: "As printed" },
   outside: "Vertices outside the cage",
   outsides: { extend: "Extrapolate", stay: "Stay", refuse: "Refuse" },
   stages: {
@@ -85,7 +85,7 @@ export const report = {
   vCycles: " with V-cycles",
   backends: { gpu: "GPU", cpu: "CPU" },
   boundIn: (ms: number) => `Bound in ${duration(ms)}`,
-  roundOff: "Converged to f32",
+  roundOff: "At 32-bit precision",
   converged: "Converged",
   notConverged: "Not converged",
   gpu: (adapter: string | null | undefined) => (adapter ? `GPU (${adapter})` : "GPU"),
@@ -93,7 +93,7 @@ export const report = {
   verdicts: {
     stopped: "Stopped at the iteration limit. Raise it to get converged weights.",
     invisible:
-      "With the cage at rest the model visibly stays in place: after the solve, each vertex's weights are corrected so that they sum to 1 and reproduce its position. The solver error is the size of that correction.",
+      "With the cage at rest, no vertex moves visibly. After the solve, each vertex's weights are corrected so that they sum to 1 and reproduce its position. The solver error is the size of that correction.",
     off: (percents: string) =>
       `With the cage at rest, the model is off by up to ${percents} % of the cage's size.`,
   },

@@ -10,30 +10,30 @@ export const cage = {
   about: {
     auto: "Follows the limbs of the model and encloses every vertex. It is checked before you see it.",
     hull: "A rough hull of about 24 vertices: good for bodies without limbs, and quick to pose.",
-    box: "A box around the model, its sides divided into squares: free-form deformation, good for studying.",
+    box: "A box around the model, its sides divided into squares, as in free-form deformation.",
     get file() {
-      return `A closed mesh that you modelled around it, as a ${endings("disjunction")} file.`;
+      return `A closed mesh that you made around the model, as a ${endings("disjunction")} file.`;
     },
   },
   wanted: "Vertices, at most",
   closeness: "Closeness",
-  within: (share: string) => `within ${share} of its size`,
+  within: (share: string) => `within ${share} of the model's size`,
   quads: "Quads",
   quadsSentence: "Four-sided faces where two triangles make a good one.",
   ofQuads: "Quads",
   margin: "Margin around the model",
   tight: "as tight as possible",
-  ofSize: (share: string) => `${share} of its size`,
-  gaps: "Gaps that stay open",
+  ofSize: (share: string) => `${share} of the model's size`,
+  gaps: "Gaps left open",
   asVertices: "as the vertices allow",
-  from: (share: string) => `from ${share} of its size`,
+  from: (share: string) => `from ${share} of the model's size`,
   symmetry: "Symmetric left and right",
   symmetries: { auto: "If the model is", on: "Yes", off: "No" },
   around: "Enclose",
   aroundRest: "The model at rest and its morph targets",
   perPart: "A cage for each part",
   perPartSentence: "For models made of separate parts. Off: one cage around all of them.",
-  divisions: "Squares along each side",
+  divisions: "Squares along the longest side",
   make: "Make this cage",
   load: "Open a cage file",
   making: "Making the cage",
@@ -41,7 +41,7 @@ export const cage = {
   smooth: "Smooth cage",
   smoothOn: "Smooth its surface",
   smoothSentence:
-    "Binds to a smooth subdivision surface, so that edges of the cage do not show on the model. The cage's vertices stay the handles.",
+    "Binds to a smooth subdivision surface, so that edges of the cage do not show on the model. You still drag the cage's vertices.",
   steps: "Subdivision steps",
   inside: "Controls inside",
   insideSentence:
@@ -49,7 +49,7 @@ export const cage = {
   kinds: { point: "Point", line: "Bone", face: "Sheet" },
   kindTips: {
     point: "A ball that moves the model around it. Click to place it.",
-    line: "A line that bends at its corners. Click each corner; end with Done, Enter or a second click on the last one.",
+    line: "A line that bends at its corners. Click each corner; end with Done, Enter or a second click on the last corner.",
     face: "A wall: the model on one side does not follow the other side. Click to place its middle.",
   },
   radius: "Radius",
@@ -83,7 +83,7 @@ export const cage = {
     edge: "Click an edge to split it in the middle or to collapse it into one vertex.",
     face: "Click a face to extrude or delete it. The gap left by deleting it is filled.",
   },
-  none: "No cage yet. Make one: it takes less than a second.",
+  none: "There is no cage yet. Make one with the button below.",
   needsRepair: "Needs repair",
   checking: "Checking…",
   outside: "Vertices outside",
@@ -95,7 +95,7 @@ export const cage = {
   posesWait: "The pose and saved poses belong to the previous cage and are kept with it.",
   bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>
-    `These vertices follow the shape within ${share} of its size. For more of the ${wanted}, move Closeness to the right.`,
+    `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices, move Closeness to the right.`,
   sparsest: (share: string) =>
     `These vertices follow the shape within ${share} of its size, the closest setting.`,
   fineEnough: "Fine enough",

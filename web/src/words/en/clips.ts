@@ -23,10 +23,11 @@ export const clips = {
   rigidSentence: "Buckles, eyes, weapons: each moves with its bone and does not bend.",
   advanced: "More about joints",
   turn: "Bones turn with the shape",
-  turnSentence: "For shapes that are poses. The rotations in clips are rewritten.",
+  turnSentence:
+    "For deformed shapes that are poses, such as a raised arm. The rotations in clips are rewritten.",
   travel: "Keep travel distance",
   travelSentence: "Off: longer legs walk farther.",
-  keep: "Keep skeleton, targets and clips",
+  keep: "Keep skeleton, morph targets and clips",
   keepSentence: (joints: number, targets: number, clips: number) =>
     [
       joints > 0 && plural(joints, "joint"),
@@ -38,7 +39,7 @@ export const clips = {
   dynamic: "The cage bends the moving model",
   dynamicSentence:
     "Experimental: the skeleton moves the model, then the cage bends it, for example for squash and stretch. Works best with a cage around the clip (step Cage).",
-  preparing: "Preparing the space around the cage",
+  preparing: "Computing how the cage bends the moving model",
   baked: (name: string) =>
     `The cage bends the moving model: the frames of ${name ? `“${name}”` : "its clip"} are exported as morph targets, without a skeleton.`,
   bindFirst: "Bind the model first: clips play on the deformed shape.",

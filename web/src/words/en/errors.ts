@@ -59,7 +59,7 @@ export const lost = {
   notBack: "The graphics device could not be restored",
   kept: "Your work is kept in this browser.",
   again: "The graphics device was lost again",
-  others: "Close other programs that use it, then try again.",
+  others: "Close other programs that use the graphics card, then try again.",
 };
 
 export const crash = {

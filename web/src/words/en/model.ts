@@ -37,12 +37,12 @@ export const samples: Readonly<Record<string, Sample>> = {
   rat: {
     name: "Rat",
     poses: ["Tail up, head turned", "Looking round"],
-    tip: "The paper's rat. Pull its nose to turn its head: the feet stay.",
+    tip: "The paper's rat. Pull its nose to turn its head: the feet stay in place.",
   },
   humanoid: {
     name: "Legs close together",
     poses: ["A step", "Knee up"],
-    tip: "Lift a knee: the other leg, a hand's breadth away, stays.",
+    tip: "Lift a knee: the other leg, a hand's breadth away, stays in place.",
   },
   clamp: {
     name: "Clamp",
@@ -52,7 +52,7 @@ export const samples: Readonly<Record<string, Sample>> = {
   strider: {
     name: "Strider",
     poses: ["Front legs raised", "One leg up"],
-    tip: "Legs as thin as a grid cell. Pull one foot: the other legs stay.",
+    tip: "Legs as thin as a grid cell. Pull one foot: the other legs stay in place.",
   },
 };
 

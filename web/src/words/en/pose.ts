@@ -29,7 +29,7 @@ export const pose = {
   pivots: { middle: "Middle", border: "Border", last: "Last" },
   pivotTips: {
     middle: "The middle of the selection",
-    border: "Where the selection meets the rest: a knee turns about it",
+    border: "The border of the selection: a lower leg turns about its knee",
     last: "The last selected vertex",
   },
   poses: "Poses",
@@ -47,7 +47,7 @@ export const pose = {
   reset: "Reset",
   resetTip: (key: string) => `Back to the rest pose (${key})`,
   waiting: (n: number) =>
-    `${plural(n, "pose belongs", "poses belong")} to another cage and ${n === 1 ? "waits" : "wait"} for it.`,
+    `${plural(n, "pose belongs", "poses belong")} to another cage and ${n === 1 ? "returns" : "return"} with it.`,
   backToCage: "Back to that cage",
   carry: "Carry over",
   saved: (name: string) => `Saved as "${name}".`,
@@ -62,13 +62,14 @@ export const pull = {
   sentence: (pin: string) =>
     `Drag any point of the model. Grey areas stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
   sentenceTouch: "Drag any point of the model with a finger. Grey areas stay. A long press pins a point.",
-  off: "Only handles can be dragged now. Choose the tool Pull the model to pull.",
+  off: "Only handles can be dragged now. To pull the model, choose the tool Pull the model.",
   whole: "The whole model follows",
-  wholeSentence: "Only pins stay: good for turning a body with its feet pinned.",
+  wholeSentence: "Only pins stay in place: good for turning a body with its feet pinned.",
   pins: (n: number) => `${plural(n, "pin")} on the model`,
   unpinAll: "Remove all pins",
   pulling: "Pulling; Esc cancels",
-  nothingThere: "No model in the middle of the view. Point at the model and press an arrow key again.",
+  nothingThere:
+    "There is no model in the middle of the view. Drag a point of the model first, then press the arrow keys.",
 };
 
 /** Status line during a gesture. `by`: formatted numbers. */
@@ -118,7 +119,7 @@ export const did = {
   repairCage: "Repair the cage",
   addModels: (n: number) => (n === 1 ? "Add a model" : `Add ${n} models`),
   binModel: (name: string) => `Remove ${name}`,
-  parts: (name: string) => `Change how ${name} follows`,
+  parts: (name: string) => `Change how ${name} follows the cage`,
   paint: "Paint fixed areas",
   erase: "Erase fixed areas",
   clearPaint: "Clear painted areas",

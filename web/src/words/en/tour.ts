@@ -52,7 +52,7 @@ export const tourWords = {
     paper: {
       title: "The paper's method, with 16 cells",
       claim: () =>
-        "The paper gives every point the weights of its grid cell. With 16 cells along each side, all points of a cell land on one spot (the wireframe shows where they should be).",
+        "The paper (Joshi et al. 2007) gives every point the weights of its grid cell. With 16 cells along each side, all points of a cell land on one spot (the wireframe shows where they should be).",
       task: "choose 32 cells. The steps get smaller but do not vanish.",
     },
     smoothing: {

@@ -27,7 +27,7 @@ export const view = {
 };
 
 export const status = {
-  original: "Showing the original while Space is held",
+  original: "Showing the model at rest while Space is held",
   boxArmed: "Drag a box to select",
   playing: (pose: string) => `Playing: ${pose}`,
   rest: "the rest pose",
@@ -50,7 +50,7 @@ export const hints = {
   clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose None.",
   clipTouch: "A clip is shown: one finger turns, two move and zoom. To pose the model, choose None.",
   noCage: "A model needs a cage around it before it can be posed.",
-  placing: "It is placed in the middle of the model, under the pointer. Drag to turn the view.",
+  placing: "The control is placed under the pointer, in the middle of the model. Drag to turn the view.",
   restHidden: "The cage is hidden: show it in See, then drag its handles.",
   restTouch: "Drag a handle to reshape the cage; the model stays still.",
   rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",

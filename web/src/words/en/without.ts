@@ -13,14 +13,15 @@ export const without = {
     NoAdapter: "This browser has WebGPU but found no graphics card that it may use.",
     NoDevice: "The graphics card was found but did not start.",
   },
-  insecure: "This page was not opened over https or from localhost; browsers offer WebGPU only there.",
+  insecure: "Browsers offer WebGPU only to pages that are opened over https or from localhost.",
   notice: (short: string) => `${short}: drawn with WebGL2, computed on the processor. `,
   how: "How to switch it on",
   title: "How to switch WebGPU on",
   steps: "Steps",
   closeNotice: "Close this notice",
   needs: "Cagework needs WebGPU",
-  noWebGl: (why: string) => `${why} The alternative, WebGL2, is missing as well. Fixing this takes a minute:`,
+  noWebGl: (why: string) =>
+    `${why} The alternative, WebGL2, is missing as well. These steps switch WebGPU on:`,
   command:
     " If no browser works, use the cagework command, which does the same on the processor. See the project's README.",
   others: "Other browsers",

@@ -29,7 +29,7 @@ export const works = {
   left: (name: string) => `Your work on ${name} is kept in this browser.`,
   back: "Bring it back",
   restored: (name: string, ago: string) =>
-    `Your work on ${name} is back as you left it ${ago}. Undo history starts here.`,
+    `Your work on ${name} is back as you left it ${ago}. Earlier changes cannot be undone.`,
   fresh: "Start fresh",
   moment: "a moment ago",
 };
