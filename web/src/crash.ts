@@ -56,7 +56,7 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
   };
 }
 
-/** What was open or in progress. */
+/** Sentence that says what was open or in progress when the page crashed. */
 export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): string {
   if (busy) return T.crash.while(busy);
   return model ? T.crash.with(model.name) : T.crash.nothing;

@@ -14,7 +14,7 @@ export interface Seen {
 /** Smoothing of the cage and controls inside it, with their rest positions. */
 export interface SharedControls {
   readonly controls: CageControls;
-  /** `[n_inner, 3]` */
+  /** Rest positions of the controls inside, object units. `[n_inner, 3]` */
   readonly inner: readonly number[];
 }
 

@@ -277,12 +277,12 @@ export interface Painting {
 
 /** A clip and its playback state. */
 export interface ClipState {
-  /** Index of the clip; null for the rest pose. */
+  /** Index of the clip; null if no clip is shown. */
   readonly clip: number | null;
   readonly seconds: number;
   readonly playing: boolean;
   readonly speed: number;
   readonly loop: boolean;
-  /** Weights of the morph targets; empty for the file's weights. */
+  /** Weights of the morph targets that the clip does not animate; empty for the file's weights. */
   readonly targets: readonly number[];
 }

@@ -57,7 +57,7 @@ export function markSeen(notice: string): void {
   writeItem(SEEN + notice, "yes");
 }
 
-/** The last stop of the tour, from 0. */
+/** The stop at which the user left the tour, from 0. */
 export function loadStop(): number {
   return Number(readItem(TOUR)) || 0;
 }

@@ -22,7 +22,7 @@ export function messageOf(error: unknown): Message {
 export function sentence(text: string): Message {
   const trimmed = text.trim();
   if (trimmed === "") return T.somethingWrong;
-  // File names keep their case.
+  // Do not capitalise a file name at the start of the message.
   const isName = /^\S*\.\w/.test(trimmed);
   const first = isName ? trimmed : trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
   return { english: /[.!?:]$/.test(first) ? first : `${first}.` };

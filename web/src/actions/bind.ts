@@ -163,7 +163,10 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
   };
 }
 
-/** Whether two reports are of the same method, solver, grid and backend. The newer one then replaces the older one. */
+/**
+ * Whether two binds had the same method, solver, grid and backend. The report of the newer bind then replaces the
+ * other.
+ */
 export function sameWay(a: BindReport, b: BindReport): boolean {
   return (
     a.method === b.method &&

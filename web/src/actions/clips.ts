@@ -9,7 +9,7 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface ClipActions {
-  /** Shows the clip with this index, and plays it unless the user prefers reduced motion; null shows the rest pose. */
+  /** Shows the clip with this index, and plays it unless the user prefers reduced motion; null calls `stop`. */
   choose(clip: number | null): Promise<void>;
   toggle(): Promise<void>;
   /** Seeks to a time in seconds and pauses. */

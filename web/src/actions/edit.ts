@@ -32,7 +32,7 @@ export interface Edit {
   /** Like `apply`, for a method of the engine that adds an undo step itself. */
   step(work: () => void, failed: string): boolean;
   restEdit(edit: RestEdit): void;
-  /** Finishes the gesture in progress, then turns editing of the cage at rest on or off. */
+  /** Turns reshaping of the cage on or off. Calls `settle` first. */
   setEditingRest(on: boolean): void;
 }
 

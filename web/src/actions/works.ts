@@ -120,7 +120,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       for (const { id } of works.filter(isOver)) await deleteEntry(id);
       store.set({ works: works.filter((work) => !isOver(work)) });
     } catch {
-      // Storage is forbidden: nothing is kept.
+      // The browser forbids storage, so nothing is saved.
       store.set({ works: [] });
     }
   };

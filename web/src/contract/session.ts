@@ -24,7 +24,7 @@ import type {
   UpAxis,
 } from "@cagework/core/contract";
 
-/** "The worker" is the one that all jobs share for which no other is named. It runs them in sequence. */
+/** Methods that work "in the worker" share one worker, which runs their jobs in sequence. */
 export interface Session {
   /** The part of the session without workers: document, picking, gestures, exports. */
   readonly engine: Engine;
@@ -83,9 +83,9 @@ export interface Session {
   takeCage(cage: CheckedCage, label?: string): CageState;
 
   /**
-   * Binds in the worker: first on a coarse grid (g = 32) if the requested grid is finer, then on the requested grid.
-   * Each result is adopted as soon as it is ready; the pose stays. After `cancel()`, `done` rejects with name
-   * "Cancelled" and adopted results stay.
+   * Binds in the worker: first with 32 cells along the cage's longest side if the requested grid is finer, then on the
+   * requested grid. Each result is adopted as soon as it is ready; the pose stays. After `cancel()`, `done` rejects
+   * with name "Cancelled" and adopted results stay.
    */
   bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;
   /**

@@ -12,7 +12,7 @@ import { Segments, Slider, Toggle } from "./controls";
  * resolution.
  */
 const COARSEST = SLIDERS.voxels.min;
-/** Gaps narrower than this many voxels are closed. */
+/** Width below which gaps of the model are closed, voxels. */
 const GAP_VOXELS = 3;
 
 /** The slider for closeness is logarithmic in `detail`: 0 is the coarsest detail, 1 the finest. */

@@ -16,7 +16,7 @@ const KINDS: readonly (readonly [InnerKind, IconName])[] = [
   ["line", "bone"],
   ["face", "face"],
 ];
-/** Range of the radius slider, relative to the longest side of the cage. */
+/** Range of the slider for the radius of controls inside, as fractions of the cage's longest side. */
 const THINNEST = 0.005;
 const THICKEST = 0.12;
 

@@ -7,7 +7,7 @@ import { T } from "../words";
 import { Button, Say } from "./controls";
 import { Icon } from "./icons";
 
-/** Interval between two losses below which the page asks before it recovers again, ms: the device may be broken. */
+/** If a device is lost again within this time, ms, the page asks before it recovers: the device may be broken. */
 const AGAIN_MS = 10_000;
 
 interface Loss {

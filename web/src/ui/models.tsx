@@ -9,7 +9,7 @@ import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls"
 import { Icon, type IconName } from "./icons";
 import { useTouch } from "./touch";
 
-/** Range of the brush radius, relative to the model's size. */
+/** Range of the slider for the radius of the brush, as fractions of the model's size. */
 const THINNEST = 0.01;
 const THICKEST = 0.3;
 const ALL = "all";
@@ -119,7 +119,7 @@ function Ways(props: { app: App; member: MemberInfo; part: string; label: string
   ));
 }
 
-/** Lists the parts of a model, and offers to paint which vertices stay. */
+/** Lists the parts of a model, and offers to paint which vertices stay in place. */
 function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo; isAlone?: boolean }) {
   const { rigid, stays } = member.options;
   const isWhole = rigid.includes(ALL) || stays.includes(ALL);

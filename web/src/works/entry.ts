@@ -24,8 +24,9 @@ const DAY_MS = 86_400_000;
 /** Number of days after the last save for which work is kept. */
 export const KEPT_DAYS = 30;
 
-/** Magic number and position of the length field in a GLB header (glTF 2.0, section 4.4.1). */
+/** Magic number of a GLB (glTF 2.0, section 4.4.1). */
 const GLB = 0x46546c67;
+/** Position of the file's length in the header, and length of the header, bytes. */
 const GLB_LENGTH_AT = 8;
 const GLB_HEAD = 12;
 

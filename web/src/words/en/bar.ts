@@ -32,7 +32,7 @@ export const panel = {
   newCage: "Make a new cage",
 };
 
-/** Entry points of the tour. Its own sentences are in tour.ts. */
+/** Sentences about the tour that are shown while it is not downloaded. Its other sentences are in tour.ts. */
 export const tour = {
   begin: "Take the tour",
   copied: "Link copied. It opens the tour at this stop.",

@@ -1,4 +1,4 @@
-/** Clips and morph targets of a rigged model. */
+/** Clips, morph targets and skeleton of a rigged model. */
 
 import { plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Errors and their remedies. */
+/** Titles of errors, labels of their remedies, and messages about lost connections, devices and crashes. */
 
 export const fixes = {
   coarser: "Use a coarser grid",
@@ -41,7 +41,7 @@ export const offline = {
   reload: "Reload for the new version",
 };
 
-/** What is wrong with a link. */
+/** Faults of a share link. */
 export const link = {
   noSample: "It does not say which sample it shows.",
   long: (most: number) => `It is longer than ${most} characters.`,

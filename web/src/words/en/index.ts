@@ -60,9 +60,9 @@ const words = {
 };
 
 export const EN = {
-  /** Language of numbers, units and lists, and of the document. */
+  /** Language tag of the page, which also determines how numbers, units and lists are written. */
   locale: "en",
   words,
-  /** Downloads the sentences of the tour, which starts later or never. */
+  /** Downloads the sentences of the tour, which many users never start. */
   tourWords: async () => (await import("./tour")).tourWords,
 };

@@ -5,7 +5,7 @@ import { plural } from "../../format";
 export const models = {
   title: "In this cage",
   vertices: (n: number) => plural(n, "vertex", "vertices"),
-  /** "body.glb", "body.glb and 2 more" */
+  /** Name of one or several models: "body.glb", "body.glb and 2 more". */
   several: (first: string, more: number) => (more > 0 ? `${first} and ${more} more` : first),
   hide: (name: string) => `Hide ${name}`,
   hideTip: "Hide it; it is still bound and exported",

@@ -72,7 +72,7 @@ export const pull = {
     "There is no model in the middle of the view. Drag a point of the model first, then press the arrow keys.",
 };
 
-/** Status line during a gesture. `by`: formatted numbers. */
+/** Status line during a gesture. `by`: amounts of the gesture, formatted. */
 export const gesture = {
   grab: (by: string) => `Move ${by}`,
   rotate: (by: string) => `Rotate ${by}°`,
@@ -82,7 +82,7 @@ export const gesture = {
   within: (what: string, plane: string) => `${what} in ${plane}`,
 };
 
-/** Undo steps. */
+/** Labels of undo steps. */
 export const did = {
   forgotten: "The oldest steps can no longer be undone: the history is limited to 256 MB.",
   carry: "Carry poses over",

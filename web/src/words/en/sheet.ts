@@ -2,7 +2,7 @@
 
 import type { Command } from "../../input/shortcuts";
 
-/** Commands without a row of their own on the sheet are missing. */
+/** What commands do. A command that is missing here has no row of its own on the sheet. */
 const commands: { readonly [command in Command]?: string } = {
   grab: "Move the selection",
   rotate: "Rotate",

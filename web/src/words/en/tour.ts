@@ -1,4 +1,4 @@
-/** The tour. A separate chunk: it is downloaded when the tour starts. */
+/** Sentences of the tour, which are downloaded when it starts. */
 
 import type { BindReport } from "../../contract";
 import { count, duration, scientific } from "../../format";

@@ -39,7 +39,7 @@ export const status = {
     line: "Click each joint, then Done",
     face: "Click the model to put a sheet there",
   },
-  /** Handles: cage vertices and controls inside. */
+  /** Handles are cage vertices and controls inside. */
   manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
   reshaping: "Reshaping the cage",
   ready: "Ready",
@@ -56,7 +56,7 @@ export const hints = {
   rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
   unbound: "Bind the model so that it follows its cage.",
-  /** What a drag does, by the tool and by what is visible. */
+  /** What a drag does. It depends on the tool and on whether the cage is visible. */
   drags: {
     pull: "Pull the model",
     pullOrHandle: "Pull the model, or drag a handle",

@@ -1,4 +1,4 @@
-/** Browsers without WebGPU. */
+/** Sentences for browsers without WebGPU. */
 
 export const without = {
   different:

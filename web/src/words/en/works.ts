@@ -1,4 +1,4 @@
-/** Work kept in the browser. */
+/** Work saved in the browser. */
 
 import { bytes } from "../../format";
 
