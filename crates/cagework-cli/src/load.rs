@@ -81,7 +81,7 @@ pub(crate) struct BuiltInSample {
 /// Builds the first sample, which the page also opens first.
 ///
 /// # Errors
-/// Never for the present samples: a test of cagework-core binds each of them.
+/// Never for the present samples: a test of cagework-cage binds each of them.
 pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     let missing = || CliError::Cage { name: "built-in sample".into(), source: CageError::Empty };
     let id = samples::all().first().ok_or_else(missing)?.id;
