@@ -57,7 +57,7 @@ pub(crate) fn memory_limit_is_kept_and_named(back_end: &BackEnd) {
     let limit = 3 << 20;
     let error = back_end.try_bind(&points, &cage, |o| (o.grid, o.memory_limit) = (512, limit)).unwrap_err();
     let BindError::Memory { needed, limit: named } = error else { panic!("{error:?}") };
-    // The octants of the cells of a 4 x 3 x 1 box at g = 512 take far more: one byte per cell.
+    // The box of 4 x 3 x 1 has 25 million cells at g = 512, each of several bytes.
     assert!(named == limit && needed > 50 << 20, "{needed} of {named} bytes");
     let message = BindError::Memory { needed, limit }.to_string();
     assert!(message.contains(&format!("{} MiB", needed >> 20)) && message.contains("3 MiB"), "{message}");

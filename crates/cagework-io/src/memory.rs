@@ -19,6 +19,8 @@ pub struct MemoryError {
 const MIB: u64 = 1 << 20;
 
 impl MemoryError {
+    /// Checks that memory suffices. `needed`, `limit`: bytes.
+    ///
     /// # Errors
     /// [`MemoryError`] if `needed` is more than `limit`.
     pub fn check(needed: u64, limit: u64) -> Result<(), Self> {

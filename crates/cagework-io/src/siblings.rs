@@ -46,6 +46,8 @@ pub(crate) struct Siblings<'a> {
 }
 
 impl Image {
+    /// Recognises an image by its content. `name`: name of the file.
+    ///
     /// # Errors
     /// [`SiblingError`] if the bytes are not an image.
     pub(crate) fn new(name: &str, bytes: Arc<Vec<u8>>) -> Result<Self, SiblingError> {

@@ -94,6 +94,8 @@ pub(crate) struct ModelInfo {
 }
 
 impl ModelInfo {
+    /// Collects the properties of the open models.
+    ///
     /// # Errors
     /// If no model is open.
     pub(crate) fn of(models: &Models) -> Answer<Self> {

@@ -10,6 +10,8 @@ use serde_json::Value;
 
 use crate::command::{output, root};
 
+/// Checks all packages.
+///
 /// # Errors
 /// Lists every package that breaks a rule.
 pub(crate) fn check() -> Result<(), String> {

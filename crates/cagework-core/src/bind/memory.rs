@@ -59,6 +59,8 @@ pub(super) struct MemoryEstimate {
 }
 
 impl MemoryEstimate {
+    /// Checks the estimate against a limit, bytes.
+    ///
     /// # Errors
     /// [`BindError`] with the main use of the memory, if it exceeds the limit.
     pub(super) fn check(self, vertices: VertexCounts, n_columns: usize, limit: u64) -> Result<(), BindError> {

@@ -22,6 +22,8 @@ pub(super) struct WeldedPoints<'a> {
 }
 
 impl<'a> WeldedPoints<'a> {
+    /// Checks positions and joins equal ones.
+    ///
     /// # Errors
     /// [`BindError`] if there are no vertices, or if one is not finite.
     pub(super) fn new(positions: &'a [Vec3]) -> Result<Self, BindError> {

@@ -43,6 +43,8 @@ pub(super) struct VoxelizedCage {
 }
 
 impl VoxelizedCage {
+    /// Voxelizes a cage in a grid.
+    ///
     /// # Errors
     /// [`BindError::NoInterior`], or the bind is cancelled.
     pub(super) fn new(

@@ -31,6 +31,8 @@ pub(crate) struct Instance {
 }
 
 impl Worlds {
+    /// Computes the world transforms of all nodes.
+    ///
     /// # Errors
     /// If an index is out of range, a node has two parents, there is a cycle, or a transform is not finite.
     pub(crate) fn new(root: &Root) -> Result<Self, GltfError> {

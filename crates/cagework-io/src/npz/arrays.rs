@@ -102,6 +102,8 @@ pub(super) struct Archive<'a> {
 }
 
 impl<'a> Archive<'a> {
+    /// Opens an archive. `memory_limit`: for the arrays that are read from it, bytes.
+    ///
     /// # Errors
     /// [`NpzError::Zip`] if the bytes are not a zip archive.
     pub(super) fn new(bytes: &'a [u8], memory_limit: u64) -> Result<Self, NpzError> {

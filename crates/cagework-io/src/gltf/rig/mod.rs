@@ -124,6 +124,8 @@ impl RigPrimitive {
 }
 
 impl<'a> Rig<'a> {
+    /// Reads the rig of a document. `rest`: vertices of the model, relative to `origin`.
+    ///
     /// # Errors
     /// If a primitive cannot be read. Those of visible meshes were validated when the file was read.
     pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3], origin: DVec3) -> Result<Self, GltfError> {
