@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn pose_comes_back_to_half_a_step() {
+    fn decoded_pose_differs_by_at_most_half_a_step() {
         let rest = rest();
         let pose: Vec<Vec3> = rest
             .iter()
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn rest_comes_back_exactly() {
+    fn decoded_rest_pose_is_exact() {
         assert_eq!(decode_pose(&rest(), &encode_pose(&rest(), &rest())), Ok(rest()));
     }
 

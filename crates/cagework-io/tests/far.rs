@@ -71,7 +71,7 @@ fn assert_near(found: &[DVec3], expected: &[DVec3], tolerance: f64) {
 }
 
 #[test]
-fn texts_far_from_the_origin_are_read_and_written_without_loss() {
+fn text_files_far_from_the_origin_are_read_and_written_without_loss() {
     let triangles = read("x.obj", common::CUBE_OBJ.as_bytes()).unwrap().triangles;
     let expected: Vec<DVec3> = triangles.iter().flatten().map(|&v| corners()[v as usize]).collect();
     for format in [ModelFormat::Obj, ModelFormat::Ply, ModelFormat::Stl, ModelFormat::Off] {

@@ -25,7 +25,7 @@ fn square() -> Model {
 }
 
 #[test]
-fn deformed_positions_come_back() {
+fn exported_positions_are_those_of_the_deformed_model() {
     let models = [plain_cube(), textured_square(), instanced(), skinned(), quantized()];
     for (k, b) in models.iter().enumerate() {
         let model = read("x.glb", &b.glb()).unwrap();

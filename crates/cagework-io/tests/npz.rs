@@ -112,7 +112,7 @@ fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
 }
 
 #[test]
-fn weights_survive_and_bytes_repeat() {
+fn weights_round_trip_and_bytes_are_reproducible() {
     let (weights, frames, outside) = sample();
     let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);
     assert_eq!(bytes, write_weights_npz(&weights, &frames, &outside, &[], &[]));
@@ -123,7 +123,7 @@ fn weights_survive_and_bytes_repeat() {
 }
 
 #[test]
-fn headers_are_what_numpy_writes() {
+fn headers_equal_those_of_numpy() {
     let (weights, frames, _) = sample();
     let bytes = write_weights_npz(&weights, &frames, &[], &[], &[]);
     let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
@@ -160,7 +160,7 @@ fn deflated_files_with_wide_numbers_are_read() {
 }
 
 #[test]
-fn faults_are_named() {
+fn errors_name_the_array_at_fault() {
     let message = |bytes: &[u8]| read_weights_npz(bytes, LIMIT).unwrap_err().to_string();
     assert!(message(b"no zip").contains("not an .npz"));
     for name in ["format", "shape", "indptr", "indices", "data"] {

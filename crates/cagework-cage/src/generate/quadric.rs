@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_costs_nothing_and_a_plane_nothing_on_it() {
+    fn empty_quadric_is_zero_and_that_of_a_plane_is_zero_on_the_plane() {
         for p in [DVec3::ZERO, DVec3::new(3.0, -20.0, 7.0)] {
             assert_eq!(Quadric::default().at(p), 0.0);
         }

@@ -303,7 +303,7 @@ fn separate_parts_get_one_cage_or_one_each() {
 }
 
 #[test]
-fn hull_is_coarse_and_convex_in_the_large() {
+fn hull_spans_the_gap_between_the_legs() {
     let hull = CageOptions { shape: Shape::Hull, ..options(16) };
     let made = make(&trousers(), &hull);
     assert!(made.report.target_met);

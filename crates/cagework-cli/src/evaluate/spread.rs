@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn disjoint_ranges_decide_and_overlapping_ones_do_not() {
+    fn disjoint_ranges_are_faster_or_slower_and_overlapping_ones_neither() {
         let fast = spread(&[12.0, 10.0, 11.0]);
         let slow = spread(&[30.0, 24.0]);
         assert_eq!(fast.against(slow), Comparison::Faster { least: 2.0, most: 3.0 });
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_measurement_decides_nothing() {
+    fn comparison_with_a_single_measurement_is_unknown() {
         assert_eq!(spread(&[1.0]).against(spread(&[1e6, 2e6])), Comparison::Unknown);
         assert_eq!(spread(&[1e6, 2e6]).against(spread(&[1.0])), Comparison::Unknown);
         assert_eq!(Spread::of(std::iter::empty()), None);

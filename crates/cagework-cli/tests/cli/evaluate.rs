@@ -171,7 +171,7 @@ fn assert_errors_agree(report: &str, table: &Table) {
 }
 
 #[test]
-fn a_single_run_decides_nothing() {
+fn report_of_a_single_run_calls_no_time_shorter() {
     let sandbox = Sandbox::with_sphere_in_box();
     let mut command = sandbox.command("evaluate --mesh mesh.obj --cage cage.obj -g 32 --runs 1 -o out");
     command.env("CAGEWORK_ADAPTER", "no such adapter").assert().success();

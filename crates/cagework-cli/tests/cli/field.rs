@@ -94,7 +94,7 @@ fn the_lattice_is_written_without_weights() {
 }
 
 #[test]
-fn wrong_points_are_refused() {
+fn invalid_points_and_outputs_of_map_are_refused() {
     let sandbox = posed();
     let map = |points: &str, output: &str| {
         sandbox.run(&format!("map {points} --cage cage.obj --pose posed.obj -o {output}"))

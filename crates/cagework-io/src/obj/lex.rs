@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn continued_lines_are_one_and_keep_their_first_number() {
+    fn continued_lines_count_as_one_with_the_number_of_the_first() {
         assert_eq!(
             words("f 1 2\\\r\n 3\r\n# c:\\\r\nv 1"),
             [

@@ -48,7 +48,7 @@ fn pointers_to_nodes_are_tracks_as_well() {
 }
 
 #[test]
-fn clips_do_not_change_what_becomes_of_the_shape() {
+fn clips_do_not_affect_the_reshaped_positions() {
     let mut still = rigged();
     still.json.as_object_mut().unwrap().shift_remove("animations");
     let [with, without] = [rigged().glb(), still.glb()].map(|bytes| {
