@@ -140,8 +140,8 @@ test("saved work that crashes the page twice is not opened a third time, and sta
   expect(await visits()).toBe(3);
   await drag(page, 20, 10);
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  await page.getByRole("button", { name: /^Kept in this browser/ }).click();
-  await expect(page.getByRole("dialog", { name: "Kept in this browser" })).toContainText(
+  await page.getByRole("button", { name: /^Work kept in this browser/ }).click();
+  await expect(page.getByRole("dialog", { name: "Work kept in this browser" })).toContainText(
     "Cagework stopped the last time this was open.",
   );
   complaints.length = 0;

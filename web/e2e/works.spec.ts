@@ -18,12 +18,12 @@ async function leave(page: Page): Promise<void> {
   await page.goto("./licences.txt");
 }
 
-const listOf = (page: Page) => page.getByRole("dialog", { name: "Kept in this browser" });
+const listOf = (page: Page) => page.getByRole("dialog", { name: "Work kept in this browser" });
 
 /** Opens the list of saved work from the Model step. */
 async function showList(page: Page): Promise<void> {
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  await page.getByRole("button", { name: /^Kept in this browser/ }).click();
+  await page.getByRole("button", { name: /^Work kept in this browser/ }).click();
 }
 
 test("each tab reopens its own work, and a new tab lists or opens the others", async ({ page, context }) => {

@@ -14,7 +14,7 @@ export const model = {
     return `${endings("disjunction")}, together with the files they refer to, or a whole folder. Several models share one cage.`;
   },
   openFolder: "Open a folder",
-  kept: (n: number) => `Kept in this browser (${n})`,
+  kept: (n: number) => `Work kept in this browser (${n})`,
   samples: "Samples",
   up: "Up axis",
   upY: "The standard of glTF",

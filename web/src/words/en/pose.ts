@@ -7,7 +7,7 @@ export const pose = {
   sentence: "Pull the model itself, or drag the handles of its cage.",
   cage: "The cage",
   none: "Nothing selected. Click a handle in the view, or press ] to step through them.",
-  noneHidden: "Nothing selected. The cage is hidden: show it in See.",
+  noneHidden: "Nothing selected. The cage is hidden: show it in the See panel.",
   noneTouch: "Nothing selected. Tap a handle in the view.",
   vertex: (i: number) => `Vertex ${i} of the cage`,
   inner: (i: number) => `Control ${i} inside`,

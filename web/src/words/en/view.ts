@@ -51,7 +51,7 @@ export const hints = {
   clipTouch: "A clip is shown: one finger turns, two move and zoom. To pose the model, choose None.",
   noCage: "A model needs a cage around it before it can be posed.",
   placing: "The control is placed under the pointer, in the middle of the model. Drag to turn the view.",
-  restHidden: "The cage is hidden: show it in See, then drag its handles.",
+  restHidden: "The cage is hidden: show it in the See panel, then drag its handles.",
   restTouch: "Drag a handle to reshape the cage; the model stays still.",
   rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
@@ -62,7 +62,7 @@ export const hints = {
     pullOrHandle: "Pull the model, or drag a handle",
     handle: "Drag a handle",
     gizmo: "Drag the gizmo or a handle",
-    nothing: "The cage is hidden: show it in See, or choose Pull",
+    nothing: "The cage is hidden: show it in the See panel, or choose Pull",
   },
   touch: (drag: string) => `${drag}. On the background, one finger turns, two move and zoom.`,
   mouse: (drag: string) =>

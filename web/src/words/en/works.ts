@@ -5,11 +5,11 @@ import { bytes } from "../../format";
 const SAVE_A_FILE = "Save a project file (step Export) before you close the page.";
 
 export const works = {
-  title: "Kept in this browser",
+  title: "Work kept in this browser",
   about: (days: number) =>
     `Your work is kept automatically, for ${days} days after its last change, on this computer only.`,
   sample: "Start with a sample",
-  none: "Nothing is kept yet.",
+  none: "No work is kept yet.",
   where: { here: "open here", elsewhere: "open in another tab", nowhere: "" },
   openCopy: "Open a copy",
   open: "Open",
