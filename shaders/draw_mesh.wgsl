@@ -79,7 +79,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
     if dot(normal, normal) < 1e-6 { normal = faceForward(flat_normal, -to_eye(in.world), flat_normal); }
     if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }
     var lit = studio_light(base.rgb, in.world, normalize(normal));
-    // Shade colours of values weakly, so that they match the legend.
+    // Shade colours of weights and errors weakly, so that they match the legend.
     if is_value { lit = mix(lit, base.rgb, 0.35); }
     return to_target(lit, base.a);
 }

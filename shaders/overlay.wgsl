@@ -10,7 +10,7 @@ struct Style {
     rim_color: vec4f,
     /// Width of the rim of points, CSS pixels.
     rim: f32,
-    /// Offset towards the eye, as a fraction of the view depth. It draws lines on a surface in front of the surface.
+    /// Offset towards the eye, as a fraction of the view depth, so that lines on a surface appear in front of it.
     lift: f32,
     /// Factor for the alpha of all colours.
     opacity: f32,

@@ -1,4 +1,4 @@
-/** Decompresses glTF files with Draco or meshopt compression. The module is downloaded when the first one is opened. */
+/** Decompresses glTF files with Draco or meshopt compression. Downloaded when the first such file is opened. */
 
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";

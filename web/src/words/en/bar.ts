@@ -32,7 +32,7 @@ export const panel = {
   newCage: "Make a new cage",
 };
 
-/** Sentences about the tour that are shown while it is not downloaded. Its other sentences are in tour.ts. */
+/** Sentences about the tour that appear outside its card. Those of the card are in tour.ts. */
 export const tour = {
   begin: "Take the tour",
   copied: "Link copied. It opens the tour at this stop.",

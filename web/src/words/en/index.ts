@@ -63,6 +63,6 @@ export const EN = {
   /** Language tag of the page, which also determines how numbers, units and lists are written. */
   locale: "en",
   words,
-  /** Downloads the sentences of the tour, which many users never start. */
+  /** Downloads the sentences of the tour. They are needed only if the tour is started. */
   tourWords: async () => (await import("./tour")).tourWords,
 };
