@@ -72,7 +72,7 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let positions = model.positions.clone();
     let (copies, triangles) = (look.copies, look.triangles);
     let textures = textures.into_iter().map(Arc::new).collect();
-    (DrawModel { positions, copies, vertices, triangles, groups, textures }, notices)
+    (DrawModel { positions, copies, vertices, triangles, groups, textures, splats: None }, notices)
 }
 
 fn wrap(wrap: LookWrap) -> Wrap {

@@ -17,8 +17,7 @@ pub enum Binding {
 /// A compute shader.
 #[derive(Debug)]
 pub struct Kernel {
-    /// Name of the file, the entry point, and the CPU implementation in `cagework_core::stencil`, `parts`,
-    /// `skin` or `dynamic`.
+    /// Name of the file and the entry point. The file names the CPU implementation.
     pub name: &'static str,
     /// Complete source of the shader in WGSL.
     pub wgsl: &'static str,
@@ -79,7 +78,15 @@ kernels! {
     /// Computes skinned positions.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
     /// Adds the cage's displacement field to skinned positions.
-    BEND_VERTICES = "bend_vertices" + ["work"], 64, 12, &[Uniform, Read, ReadWrite];
+    BEND_VERTICES = "bend_vertices" + ["work", "field"], 64, 12, &[Uniform, Read, ReadWrite];
+    /// Deforms splats.
+    DEFORM_SPLATS = "deform_splats" + ["work", "field"], 64, 80, &[Uniform, Read, Read, ReadWrite];
+    /// Counts the splats of each block and bin of depth.
+    COUNT_SPLATS = "count_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, ReadWrite];
+    /// Computes the places of blocks and bins.
+    SCAN_SPLATS = "scan_splats" + ["work", "depths"], 128, 8192, &[Uniform, Read, ReadWrite];
+    /// Writes splats in the order of their bins.
+    SCATTER_SPLATS = "scatter_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, Read, ReadWrite, ReadWrite];
     /// Computes normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];
 }

@@ -23,6 +23,7 @@ pub mod render;
 pub mod sample;
 pub mod session;
 pub mod skin;
+pub mod splats;
 pub mod stream;
 pub mod table;
 

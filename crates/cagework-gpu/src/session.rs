@@ -13,6 +13,7 @@ mod playing;
 use std::sync::Arc;
 
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::field::Field;
 use cagework_core::options::BindOptions;
 use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Coordinates, Frames, Progress, Weights};
 use cagework_pose::parts::{BoundParts, Parts};
@@ -232,6 +233,17 @@ impl Session {
             bound.mover.pose(&self.context, &self.columns(bound.kind, cage_positions));
             self.moved = true;
         }
+    }
+
+    /// Sets which splats are floaters: outside the cage.
+    pub fn set_floaters(&mut self, floaters: &[u32]) {
+        self.renderer.set_floaters(&self.context, floaters);
+    }
+
+    /// Sets the field that deforms the splats in the current pose; `None` for splats at rest.
+    pub fn set_field(&mut self, field: Option<Field>) {
+        let posed = Bounds::of(&self.pose).or_else(|| self.bounds());
+        self.renderer.set_field(&self.context, field.zip(posed));
     }
 
     /// Draws the cage at other positions without deforming the mesh, for editing the rest cage.

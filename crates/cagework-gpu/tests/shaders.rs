@@ -6,6 +6,7 @@ use cagework_core::stencil;
 use cagework_gpu::kernels::{self, ALL, Binding, Kernel};
 use cagework_gpu::layout::{Work, mode};
 use cagework_gpu::render::shaders::ALL as DRAWN;
+use cagework_gpu::splats::{BINS, Depths};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
 
@@ -65,28 +66,34 @@ fn bindings_and_workgroups_equal_the_table() {
 }
 
 #[test]
-fn work_mirrors_its_wgsl_struct() {
-    macro_rules! fields {
-        ($($field:ident),+) => { [$((stringify!($field).to_owned(), offset_of!(Work, $field))),+] };
+fn structs_mirror_their_wgsl() {
+    macro_rules! same {
+        ($kernel:expr, $type:ident, $($field:ident),+) => {
+            let mirror = vec![$((stringify!($field).to_owned(), offset_of!($type, $field))),+];
+            let (wgsl, span) = members($kernel, stringify!($type));
+            assert_eq!(wgsl, mirror, "{} in {}", stringify!($type), $kernel.name);
+            assert_eq!(span, size_of::<$type>(), "{} in {}", stringify!($type), $kernel.name);
+        };
     }
-    let mirror = fields!(first, count, stride, n_quads, first_row, first_quad, mode, n_sources, omega);
     for kernel in ALL {
-        let module = parse(kernel);
-        let (members, span) = module
-            .types
-            .iter()
-            .find_map(|(_, t)| match &t.inner {
-                TypeInner::Struct { members, span } if t.name.as_deref() == Some("Work") => {
-                    Some((members.clone(), *span))
-                }
-                _ => None,
-            })
-            .unwrap_or_else(|| panic!("{} has no struct Work", kernel.name));
-        let wgsl: Vec<_> =
-            members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize)).collect();
-        assert_eq!(wgsl, mirror, "{}", kernel.name);
-        assert_eq!(span as usize, size_of::<Work>(), "{}", kernel.name);
+        same!(kernel, Work, first, count, stride, n_quads, first_row, first_quad, mode, n_sources, omega);
     }
+    for kernel in [&kernels::COUNT_SPLATS, &kernels::SCAN_SPLATS, &kernels::SCATTER_SPLATS] {
+        same!(kernel, Depths, axis, offset, n_splats, per_block, n_blocks, hides);
+    }
+}
+
+/// Names and offsets of the members of a WGSL struct, and its size.
+fn members(kernel: &Kernel, name: &str) -> (Vec<(String, usize)>, usize) {
+    let module = parse(kernel);
+    let found = module.types.iter().find_map(|(_, t)| match &t.inner {
+        TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
+            let of = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset as usize);
+            Some((members.iter().map(of).collect(), *span as usize))
+        }
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("{} has no struct {name}", kernel.name))
 }
 
 /// Value of a constant in the shader.
@@ -119,6 +126,7 @@ fn constants_equal_those_of_rust() {
     same(&kernels::DEFORM_VERTICES, "SLICE", stencil::tables::SLICE as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_LANES", stencil::REDUCE_LANES as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);
+    same(&kernels::COUNT_SPLATS, "BINS", f64::from(BINS));
     let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_CENTRE", centre);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_EDGE", f64::from(cagework_core::transfer::RESTRICT_EDGE));

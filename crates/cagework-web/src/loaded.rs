@@ -292,6 +292,7 @@ impl Loaded {
             groups: groups.collect(),
             triangles: look.triangles,
             textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).map(Arc::new).collect(),
+            splats: None,
         }
     }
 }

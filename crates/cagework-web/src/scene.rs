@@ -47,6 +47,7 @@ impl State {
             slice: self.shown_slice(),
             marks: self.marks(),
             hidden: self.models().hidden(),
+            floaters_hidden: false,
             greyed: self
                 .painting
                 .as_ref()

@@ -28,9 +28,15 @@ impl SortedSplats {
     /// Sorts splats by the cells of a lattice.
     #[must_use]
     pub fn new(splats: &Splats, lattice: &Lattice) -> Self {
+        Self::of_pose(&splats.rest_pose(), lattice)
+    }
+
+    /// Sorts the rest pose of splats by the cells of a lattice.
+    #[must_use]
+    pub fn of_pose(rest: &SplatPose, lattice: &Lattice) -> Self {
         let cell = |&p: &Vec3| lattice.cell_of(p).map_or(u32::MAX, |(first, _)| first as u32);
-        let cells: Vec<u32> = splats.positions.iter().map(cell).collect();
-        let mut order: Vec<u32> = (0..splats.len() as u32).collect();
+        let cells: Vec<u32> = rest.positions.iter().map(cell).collect();
+        let mut order: Vec<u32> = (0..cells.len() as u32).collect();
         order.sort_by_key(|&splat| cells[splat as usize]);
         let mut runs: Vec<(Option<u32>, u32)> = Vec::new();
         for (k, &splat) in order.iter().enumerate() {
@@ -39,7 +45,6 @@ impl SortedSplats {
                 runs.push((cell, k as u32));
             }
         }
-        let rest = splats.rest_pose();
         let rest = SplatPose {
             positions: order.iter().map(|&splat| rest.positions[splat as usize]).collect(),
             covariances: order.iter().map(|&splat| rest.covariances[splat as usize]).collect(),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use cagework_core::field::Field;
 use cagework_core::{Bounds, Controls};
 use glam::Vec3;
 
@@ -15,6 +16,7 @@ use super::model::DrawModel;
 use super::pipelines::{DEPTH_FORMAT, Kind, Layouts, Pipelines, SAMPLES};
 use super::scene::{MeshStyle, SceneOptions};
 use super::slice::SlicePlane;
+use super::splats::SplatLayer;
 use super::theme::linear;
 use crate::device::GpuContext;
 use crate::error::GpuError;
@@ -65,6 +67,7 @@ pub struct Renderer {
     camera_group: wgpu::BindGroup,
     targets: Option<Targets>,
     mesh: Option<Mesh>,
+    splats: Option<SplatLayer>,
     wires: Option<Wires>,
     cage: Option<CageView>,
     slice: Option<SlicePlane>,
@@ -99,6 +102,7 @@ impl Renderer {
             camera_group,
             targets: None,
             mesh: None,
+            splats: None,
             wires: None,
             cage: None,
             slice: None,
@@ -118,6 +122,10 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let padded: Vec<[f32; 4]> = normals.iter().map(|n| n.extend(0.0).to_array()).collect();
         self.wires = None;
+        self.splats = match &model.splats {
+            Some(splats) => Some(SplatLayer::new(context, &self.layouts, splats).await?),
+            None => None,
+        };
         self.mesh = Some(Mesh::new(context, &self.layouts, model, &padded).await?);
         self.apply(context, Some(model), None);
         Ok(())
@@ -151,6 +159,22 @@ impl Renderer {
     pub(crate) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
         if let Some(cage) = &self.cage {
             cage.pose(context, positions);
+        }
+    }
+
+    /// Sets which splats are floaters.
+    pub(crate) fn set_floaters(&mut self, context: &GpuContext, floaters: &[u32]) {
+        if let Some(splats) = &mut self.splats {
+            splats.mover.set_floaters(context, floaters);
+            splats.drawn = None;
+        }
+    }
+
+    /// Sets the field that deforms the splats, and the bounds of the posed cage; `None` for the rest pose.
+    pub(crate) fn set_field(&mut self, context: &GpuContext, field: Option<(Field, Bounds)>) {
+        if let Some(splats) = &mut self.splats {
+            splats.mover.set_field(context, field);
+            splats.drawn = None;
         }
     }
 
@@ -248,6 +272,11 @@ impl Renderer {
         else {
             return;
         };
+        if let Some(splats) = self.splats.as_mut().filter(|_| self.scene.mesh == MeshStyle::Solid) {
+            let pipeline = pipelines.get(Kind::Splats);
+            let hides = self.scene.floaters_hidden;
+            splats.encode(context, &self.layouts, encoder, pipeline, &self.camera_group, &uniform, hides);
+        }
         let [color, depth] = [&targets.color, &targets.depth]
             .map(|texture| texture.create_view(&wgpu::TextureViewDescriptor::default()));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -289,9 +318,21 @@ impl Renderer {
             pass.set_pipeline(pipelines.get(Kind::Background));
             pass.draw(0..3, 0..1);
         }
+        let floor = |pass: &mut wgpu::RenderPass<'_>| {
+            if scene.floor {
+                pass.set_pipeline(pipelines.get(Kind::Floor));
+                pass.draw(0..6, 0..1);
+            }
+        };
         let mesh = self.mesh.as_ref().filter(|_| scene.mesh != MeshStyle::Hidden);
+        let splats = self.splats.as_ref().filter(|_| scene.mesh == MeshStyle::Solid);
+        if let Some(splats) = splats {
+            floor(pass);
+            pass.set_pipeline(pipelines.get(Kind::Layer));
+            splats.draw(pass);
+        }
         if let Some(mesh) = mesh {
-            pass.set_pipeline(pipelines.get(Kind::Mesh));
+            pass.set_pipeline(pipelines.get(if splats.is_some() { Kind::MeshDepth } else { Kind::Mesh }));
             mesh.draw(pass, scene.mesh, false, &scene.hidden);
         }
         if let Some(slice) = &self.slice {
@@ -302,9 +343,8 @@ impl Renderer {
             pass.set_pipeline(pipelines.get(Kind::MeshBlended));
             mesh.draw(pass, scene.mesh, true, &scene.hidden);
         }
-        if scene.floor {
-            pass.set_pipeline(pipelines.get(Kind::Floor));
-            pass.draw(0..6, 0..1);
+        if splats.is_none() {
+            floor(pass);
         }
         if let Some(wires) = &self.wires {
             pass.set_pipeline(pipelines.get(Kind::Lines));

@@ -5,7 +5,7 @@
 //! linear, blended premultiplied, with 4x multisampling. Data that rarely changes (selection, styles, heat map) is
 //! uploaded on change.
 //!
-//! Drawing order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
+//! Drawing order: background, splats (the mesh then only fills the depth buffer), opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
 //! mesh, fainter), controls inside the cage, handles, marks, gizmo.
 //!
 //! **Target format.** To sRGB formats (`rgba8unorm-srgb`), shaders write linear colours and the GPU encodes.
@@ -31,6 +31,7 @@ mod pipelines;
 pub mod scene;
 pub mod shaders;
 mod slice;
+mod splats;
 mod texture;
 mod theme;
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use cagework_core::Weights;
+use cagework_core::splats::Splats;
 use glam::Vec3;
 
 /// Default base colour, linear: light, slightly warm grey.
@@ -28,6 +29,8 @@ pub struct DrawModel {
     pub groups: Vec<DrawGroup>,
     /// Textures of the groups.
     pub textures: Vec<Arc<DrawTexture>>,
+    /// Splats, drawn instead of the triangles, which then stand for them in depth tests.
+    pub splats: Option<Arc<Splats>>,
 }
 
 /// A corner of a triangle.
@@ -135,6 +138,7 @@ impl DrawModel {
             all.vertices.extend(model.vertices.iter().map(|v| DrawVertex { source: source(v.source), ..*v }));
             all.triangles.extend(model.triangles.iter().map(|t| t.map(|c| corner + c)));
             all.textures.extend(model.textures.iter().cloned());
+            all.splats = all.splats.or_else(|| model.splats.clone());
             // Triangles without a group get one, so that no group spans two models.
             all.groups.extend(model.whole_groups().into_iter().map(|group| DrawGroup {
                 triangles: triangle + group.triangles.start..triangle + group.triangles.end,

@@ -14,6 +14,9 @@ pub(super) const SAMPLES: u32 = 4;
 /// Depth format: 32-bit floats, so that distant handles are still separated from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
+/// Format of the layer of splats: sRGB values that are blended as they are.
+pub(super) const LAYER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
 /// Bind group layouts, which do not depend on the target's format.
 #[derive(Debug)]
 pub(super) struct Layouts {
@@ -23,6 +26,8 @@ pub(super) struct Layouts {
     pub(super) overlay: wgpu::BindGroupLayout,
     pub(super) slice: wgpu::BindGroupLayout,
     pub(super) gizmo: wgpu::BindGroupLayout,
+    pub(super) splats: wgpu::BindGroupLayout,
+    pub(super) layer: wgpu::BindGroupLayout,
 }
 
 /// Kinds of primitives, each with its pipeline.
@@ -31,6 +36,10 @@ pub(super) enum Kind {
     Background,
     Mesh,
     MeshBlended,
+    /// The mesh, into the depth buffer alone.
+    MeshDepth,
+    Splats,
+    Layer,
     Lines,
     LinesBehind,
     Points,
@@ -46,7 +55,9 @@ impl Kind {
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
             Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
-            Self::Mesh => (&shaders::MESH, DEPTH_NEAREST, false),
+            Self::Mesh | Self::MeshDepth => (&shaders::MESH, DEPTH_NEAREST, false),
+            Self::Splats => (&shaders::SPLATS, DEPTH_IGNORED, true),
+            Self::Layer => (&shaders::LAYER, DEPTH_IGNORED, true),
             Self::MeshBlended => (&shaders::MESH, DEPTH_VISIBLE, true),
             Self::Lines => (&shaders::LINES, DEPTH_VISIBLE, true),
             Self::LinesBehind => (&shaders::LINES, DEPTH_HIDDEN, true),
@@ -66,7 +77,7 @@ pub(super) struct Pipelines {
     context: GpuContext,
     layouts: Arc<Layouts>,
     pub(super) format: wgpu::TextureFormat,
-    made: [OnceLock<wgpu::RenderPipeline>; 11],
+    made: [OnceLock<wgpu::RenderPipeline>; 14],
 }
 
 /// Bytes of a gizmo vertex: position, normal, colour.
@@ -130,6 +141,8 @@ impl Layouts {
             overlay: layout_of(context, "overlay", shaders::LINES.groups[0]),
             slice: layout_of(context, "slice", shaders::SLICE.groups[0]),
             gizmo: layout_of(context, "gizmo", shaders::GIZMO.groups[0]),
+            splats: layout_of(context, "splats", shaders::SPLATS.groups[0]),
+            layer: layout_of(context, "layer", shaders::LAYER.groups[0]),
         }
     }
 
@@ -139,6 +152,8 @@ impl Layouts {
             "draw_mesh" => vec![&self.vertices, &self.material],
             "draw_slice" => vec![&self.slice],
             "draw_gizmo" => vec![&self.gizmo],
+            "draw_splats" => vec![&self.splats],
+            "draw_layer" => vec![&self.layer],
             "draw_lines" | "draw_points" | "draw_faces" => vec![&self.overlay],
             _ => Vec::new(),
         }
@@ -151,13 +166,12 @@ impl Pipelines {
     }
 
     pub(super) fn get(&self, kind: Kind) -> &wgpu::RenderPipeline {
-        self.made[kind as usize].get_or_init(|| {
-            let (shader, depth, blend) = kind.recipe();
-            self.make(shader, depth, blend)
-        })
+        self.made[kind as usize].get_or_init(|| self.make(kind))
     }
 
-    fn make(&self, shader: &DrawShader, depth: Depth, blend: bool) -> wgpu::RenderPipeline {
+    fn make(&self, kind: Kind) -> wgpu::RenderPipeline {
+        let (shader, depth, blend) = kind.recipe();
+        let (is_layer, is_depth) = (kind == Kind::Splats, kind == Kind::MeshDepth);
         let device = &self.context.device;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(shader.name),
@@ -193,22 +207,25 @@ impl Pipelines {
                 topology: PrimitiveTopology::TriangleList,
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: Some(wgpu::DepthStencilState {
+            depth_stencil: (!is_layer).then(|| wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(depth.write),
                 depth_compare: Some(depth.compare),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
-            multisample: wgpu::MultisampleState { count: SAMPLES, ..wgpu::MultisampleState::default() },
+            multisample: wgpu::MultisampleState {
+                count: if is_layer { 1 } else { SAMPLES },
+                ..wgpu::MultisampleState::default()
+            },
             fragment: Some(wgpu::FragmentState {
                 module: &module,
                 entry_point: Some("fragment"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: self.format,
+                    format: if is_layer { LAYER_FORMAT } else { self.format },
                     blend: blend.then_some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::ALL,
+                    write_mask: if is_depth { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL },
                 })],
             }),
             multiview_mask: None,

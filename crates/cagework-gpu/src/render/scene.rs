@@ -64,6 +64,8 @@ pub struct SceneOptions {
     pub cage_faint: bool,
     /// Hidden ranges of [`super::DrawModel::triangles`], each of whole groups.
     pub hidden: Vec<Range<u32>>,
+    /// Whether splats outside the cage are hidden.
+    pub floaters_hidden: bool,
     /// Whether the floor grid is drawn.
     pub floor: bool,
     /// Selected and hovered elements of the cage.
@@ -94,6 +96,7 @@ impl Default for SceneOptions {
             handles: true,
             cage_faint: false,
             hidden: Vec::new(),
+            floaters_hidden: false,
             floor: true,
             selection: Selection::default(),
             gizmo: None,

@@ -83,6 +83,11 @@ shaders! {
         &[&[Uniform, Table(Entry::Pair)]];
     /// Draws the transform gizmo.
     GIZMO = "draw_gizmo" + ["camera"], &[&[Uniform]];
+    /// Draws Gaussian splats into a layer.
+    SPLATS = "draw_splats" + ["camera"] + ("splat_buffers", "splat_textures"),
+        &[&[Table(Entry::Point), Table(Entry::Pair)]];
+    /// Draws the layer of splats into the picture.
+    LAYER = "draw_layer" + ["camera"], &[&[Texture]];
     /// Draws a texture on a part of a canvas. Has no camera.
     PART = "draw_part" + [], &[&[Texture]];
 }

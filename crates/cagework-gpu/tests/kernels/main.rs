@@ -2,6 +2,7 @@
 //! workgroups.
 
 mod deforming;
+mod splats;
 #[path = "../support/mod.rs"]
 mod support;
 

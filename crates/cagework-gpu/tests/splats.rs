@@ -1,0 +1,178 @@
+//! Pictures of splats: shape and order, deformed by a field, and without storage buffers.
+
+mod support;
+
+use std::sync::Arc;
+
+use cagework_core::field::{Field, FieldWeights};
+use cagework_core::options::BindOptions;
+use cagework_core::progress::Silent;
+use cagework_core::splats::Splats;
+use cagework_core::{Bounds, Cage, subdivided_box};
+use cagework_gpu::render::{DrawModel, Projection, SceneOptions};
+use cagework_gpu::{GpuContext, Session};
+use glam::{Quat, Vec2, Vec3};
+use support::{Rng, gpu};
+
+const SIZE: [u32; 2] = [160, 160];
+
+/// A session with splats and no mesh, seen from the front.
+fn session(context: &GpuContext, splats: Splats) -> Session {
+    let mut session = Session::new(context.clone());
+    let model = DrawModel { splats: Some(Arc::new(splats)), ..DrawModel::default() };
+    pollster::block_on(session.set_model(model)).unwrap();
+    let nothing = SceneOptions { backdrop: false, floor: false, ..SceneOptions::default() };
+    session.set_scene(nothing);
+    let camera = session.camera_mut();
+    (camera.yaw, camera.pitch, camera.projection) = (0.0, 0.0, Projection::Orthographic);
+    camera.set_viewport(Vec2::from(SIZE.map(|s| s as f32)));
+    let bounds = Bounds { min: Vec3::splat(-1.5), max: Vec3::splat(1.5) };
+    camera.set_scene(bounds);
+    camera.frame(bounds);
+    session
+}
+
+fn picture(session: &mut Session) -> Vec<[u8; 4]> {
+    pollster::block_on(session.picture(SIZE, 1.0)).unwrap().as_chunks().0.to_vec()
+}
+
+fn pixel(picture: &[[u8; 4]], x: u32, y: u32) -> [u8; 4] {
+    picture[(y * SIZE[0] + x) as usize]
+}
+
+fn one(position: Vec3, scale: Vec3, color: Vec3, opacity: f32) -> Splats {
+    Splats {
+        positions: vec![position],
+        scales: vec![scale],
+        rotations: vec![Quat::IDENTITY],
+        opacities: vec![opacity],
+        colors: vec![color],
+        ..Splats::default()
+    }
+}
+
+fn joined(parts: &[Splats]) -> Splats {
+    let mut all = Splats::default();
+    for part in parts {
+        all.positions.extend(&part.positions);
+        all.scales.extend(&part.scales);
+        all.rotations.extend(&part.rotations);
+        all.opacities.extend(&part.opacities);
+        all.colors.extend(&part.colors);
+    }
+    all
+}
+
+/// Alpha of one splat is opacity exp(-d^2 / 2), with the standard deviations of its axes in pixels and the variance of
+/// 0.3 square pixels that 3DGS adds.
+#[test]
+fn splat_is_a_gaussian() {
+    let context = gpu();
+    let turn = Quat::from_rotation_z(0.5);
+    let mut splats = one(Vec3::ZERO, Vec3::new(0.4, 0.1, 0.2), Vec3::new(1.0, 0.5, 0.0), 0.8);
+    splats.rotations[0] = turn;
+    let mut session = session(&context, splats);
+    let drawn = picture(&mut session);
+    let unit = session.camera().units_per_pixel(Vec3::ZERO);
+    for (x, y) in [(80, 80), (90, 75), (60, 85), (85, 95), (100, 70), (20, 80)] {
+        let at = Vec2::new(x as f32 + 0.5 - 80.0, 80.0 - (y as f32 + 0.5));
+        let along = (turn.inverse() * at.extend(0.0)).truncate();
+        let variance = (Vec2::new(0.4, 0.1) / unit).powf(2.0) + 0.3;
+        let alpha = 0.8 * (-0.5 * (along * along / variance).element_sum()).exp();
+        let [r, g, b, a] = pixel(&drawn, x, y);
+        // The layer and the picture are rounded to bytes.
+        assert!((f32::from(a) - 255.0 * alpha).abs() <= 2.0, "{x}, {y}: {a}, not {}", 255.0 * alpha);
+        if a > 100 {
+            assert!(r >= 252 && g.abs_diff(128) <= 4 && b == 0, "{:?}", [r, g, b]);
+        }
+    }
+}
+
+#[test]
+fn near_splats_cover_far_ones_from_every_side() {
+    let context = gpu();
+    let color = |z: f32| if z > 0.0 { Vec3::X } else { Vec3::Y };
+    let disc = |z: f32| one(Vec3::new(0.0, 0.0, z), Vec3::splat(0.3), color(z), 1.0);
+    let mut session = session(&context, joined(&[disc(0.5), disc(-0.5)]));
+    assert!(pixel(&picture(&mut session), 80, 80)[0] > 240, "red is in front");
+    session.camera_mut().yaw = std::f32::consts::PI;
+    assert!(pixel(&picture(&mut session), 80, 80)[1] > 240, "green is in front");
+    session.set_floaters(&[1]);
+    session.set_scene(SceneOptions { floaters_hidden: true, ..session.scene().clone() });
+    assert!(pixel(&picture(&mut session), 80, 80)[0] > 240, "green is hidden");
+}
+
+/// A bar of splats along y and a box cage that bends by 90 degrees.
+fn bent_bar() -> (Splats, Cage, Vec<Vec3>, Field) {
+    let mut rng = Rng(31);
+    let dot = |k: u32, rng: &mut Rng| {
+        let y = k as f32 / 300.0 - 1.0;
+        let side = if k % 2 == 0 { Vec3::X } else { Vec3::Y };
+        one(
+            Vec3::new(0.4 * rng.unit() - 0.2, y, 0.4 * rng.unit() - 0.2),
+            Vec3::new(0.05, 0.02, 0.01),
+            side,
+            0.9,
+        )
+    };
+    let splats = joined(&(0..600).map(|k| dot(k, &mut rng)).collect::<Vec<_>>());
+    let bounds = Bounds { min: Vec3::new(-0.4, -1.2, -0.4), max: Vec3::new(0.4, 1.2, 0.4) };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 8, 1])).unwrap();
+    // A circular arc of length 2.4 about a point at x = 2.4 / (pi / 2).
+    let radius = 2.4 / std::f32::consts::FRAC_PI_2;
+    let bend = |p: &Vec3| {
+        let (sin, cos) = (p.y / radius).sin_cos();
+        Vec3::new(radius - (radius - p.x) * cos, (radius - p.x) * sin, p.z)
+    };
+    let pose: Vec<Vec3> = cage.positions().iter().map(bend).collect();
+    let options = BindOptions { grid: 48, ..BindOptions::default() };
+    let weights = FieldWeights::bind(&cage, 32, &options, &Silent).unwrap();
+    let field = weights.pose(cage.positions(), &pose);
+    (splats, cage, pose, field)
+}
+
+/// Sum of the differences of all bytes, relative to the sum of both pictures.
+fn difference(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
+    let pairs = || a.as_flattened().iter().zip(b.as_flattened());
+    let total: f64 = pairs().map(|(a, b)| f64::from(*a) + f64::from(*b)).sum();
+    pairs().map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / total
+}
+
+/// The picture of splats that kernels bend equals that of the bent splats as they are exported.
+#[test]
+fn bent_splats_look_like_their_export() {
+    let context = gpu();
+    let (splats, cage, pose, field) = bent_bar();
+    let exported = picture(&mut session(&context, splats.deformed(&field)));
+    let mut session = session(&context, splats);
+    pollster::block_on(session.set_cage(&cage)).unwrap();
+    session.set_scene(SceneOptions { cage_lines: false, handles: false, ..session.scene().clone() });
+    let at_rest = picture(&mut session);
+    session.pose(&pose);
+    session.set_field(Some(field));
+    let bent = picture(&mut session);
+    assert!(difference(&bent, &exported) < 2e-3, "{}", difference(&bent, &exported));
+    assert!(difference(&bent, &at_rest) > 0.3, "the pose is visible");
+    // The same frame again, and the rest pose.
+    assert_eq!(picture(&mut session), bent);
+    session.set_field(None);
+    assert!(difference(&picture(&mut session), &at_rest) < 1e-3);
+}
+
+/// Without storage buffers, the CPU deforms and sorts.
+#[cfg(feature = "webgl")]
+#[test]
+fn splats_look_the_same_without_kernels() {
+    let (splats, cage, pose, field) = bent_bar();
+    let options = cagework_gpu::ContextOptions { draws_only: true, ..Default::default() };
+    let pictures = [gpu(), support::gpu_with(&options)].map(|context| {
+        let mut session = session(&context, splats.clone());
+        pollster::block_on(session.set_cage(&cage)).unwrap();
+        session.set_scene(SceneOptions { cage_lines: false, handles: false, ..session.scene().clone() });
+        session.pose(&pose);
+        session.set_field(Some(field.clone()));
+        picture(&mut session)
+    });
+    let [with, without] = &pictures;
+    assert!(difference(with, without) < 2e-3, "{}", difference(with, without));
+}

@@ -1,0 +1,56 @@
+// Deforms splats by the cage's field: centres move by u, covariances S become F S F^T. Both u and F are interpolated
+// trilinearly between the nodes; F at a node comes from differences of u, as in Field::node_gradients. One invocation per
+// splat. CPU: cagework_core::splats::deform_splats.
+//
+// A splat has three rows: centre; xx, xy, xz, yy of the covariance; yz, zz of it.
+
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(2) var<storage, read> rest: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> splats: array<vec4f>;
+
+/// Nodes between which u is differentiated at node `k` along an axis, and their distance in cells: the neighbours, or
+/// the node itself where the lattice ends or, at a bound node, where the neighbour is not bound.
+fn slope(k: u32, at: u32, n: u32, step: u32, is_bound: bool) -> vec3f {
+    var before = k;
+    var after = k;
+    if at > 0u && (!is_bound || field.values[k - step].w > 0.0) { before = k - step; }
+    if at + 1u < n && (!is_bound || field.values[k + step].w > 0.0) { after = k + step; }
+    let n_cells = f32(u32(before != k) + u32(after != k));
+    return (field.values[after] - field.values[before]).xyz / (field.cell * max(n_cells, 1.0));
+}
+
+@compute @workgroup_size(64)
+fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
+    let splat = invocation(id, work.stride);
+    if splat >= work.count { return; }
+    let center = rest[3u * splat];
+    let low = rest[3u * splat + 1u];
+    let high = rest[3u * splat + 2u];
+    var by = vec3f(0.0);
+    var f = mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    let at = (center.xyz - field.origin) / field.cell;
+    // Splats outside the lattice stay.
+    if all(at >= vec3f(0.0)) && all(at <= vec3f(field.dims - 1u)) {
+        let place = place_in_lattice(center.xyz);
+        for (var c = 0u; c < 8u; c += 1u) {
+            let side = vec3u(c & 1u, (c >> 1u) & 1u, c >> 2u);
+            let node = place.corner + side;
+            let share = select(1.0 - place.share, place.share, side == vec3u(1u));
+            let weight = share.x * share.y * share.z;
+            let k = index_of(node);
+            let value = field.values[k];
+            let is_bound = value.w > 0.0;
+            by += weight * value.xyz;
+            f += weight * mat3x3f(
+                slope(k, node.x, field.dims.x, 1u, is_bound),
+                slope(k, node.y, field.dims.y, field.dims.x, is_bound),
+                slope(k, node.z, field.dims.z, field.dims.x * field.dims.y, is_bound),
+            );
+        }
+    }
+    let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
+    let bent = f * covariance * transpose(f);
+    splats[3u * splat] = vec4f(center.xyz + by, center.w);
+    splats[3u * splat + 1u] = vec4f(bent[0], bent[1].y);
+    splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, 0.0, 0.0);
+}

@@ -1,0 +1,68 @@
+// Draws Gaussian splats (Kerbl et al. 2023) from back to front into a layer of their own: one instance per splat, six
+// vertices each. Colours stay in sRGB and are blended there, as captures are trained.
+
+/// Variance added on screen, square pixels, so that no splat is smaller than a pixel (Kerbl et al. 2023).
+const PIXEL_VARIANCE = 0.3;
+/// Smallest alpha that is drawn.
+const MIN_ALPHA = 1.0 / 255.0;
+/// Largest half axis of a splat, pixels.
+const MAX_REACH = 1024.0;
+/// Splats are projected as if they were within this multiple of the picture, so that those beside it stay small.
+const MAX_OFF_CENTER = 1.3;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    /// Offset from the centre, standard deviations. Interpolation is linear: all corners have the same depth.
+    @location(0) place: vec2f,
+    @location(1) @interpolate(flat) color: vec4f,
+}
+
+fn row_of_clip(k: u32) -> vec3f {
+    return vec3f(camera.clip_from_world[0][k], camera.clip_from_world[1][k], camera.clip_from_world[2][k]);
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
+    let entry = entry_at(instance);
+    let color = unpack4x8unorm(entry.y);
+    let center = row_at(3u * entry.x).xyz;
+    let clip = camera.clip_from_world * vec4f(center, 1.0);
+    if color.a < MIN_ALPHA || clip.z < 0.0 || clip.w <= 0.0 {
+        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), vec4f(0.0));
+    }
+    let low = row_at(3u * entry.x + 1u);
+    let high = row_at(3u * entry.x + 2u);
+    let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
+    // Rows of the derivative of the pixel position.
+    let at = clamp(clip.xy / clip.w, vec2f(-MAX_OFF_CENTER), vec2f(MAX_OFF_CENTER));
+    let along_w = row_of_clip(3u);
+    let x = 0.5 * camera.viewport.x / clip.w * (row_of_clip(0u) - at.x * along_w);
+    let y = 0.5 * camera.viewport.y / clip.w * (row_of_clip(1u) - at.y * along_w);
+    let a = dot(x, covariance * x) + PIXEL_VARIANCE;
+    let b = dot(x, covariance * y);
+    let c = dot(y, covariance * y) + PIXEL_VARIANCE;
+    let mean = 0.5 * (a + c);
+    let spread = sqrt(max(0.25 * (a - c) * (a - c) + b * b, 0.0));
+    // Direction of the longer axis of the ellipse: an eigenvector of [[a, b], [b, c]].
+    var axis = vec2f(1.0, 0.0);
+    if spread > 1e-6 * mean {
+        axis = normalize(select(vec2f(b, spread + 0.5 * (c - a)), vec2f(spread + 0.5 * (a - c), b), a >= c));
+    }
+    let corner = vec2f(
+        select(-1.0, 1.0, index == 1u || index == 3u || index == 5u),
+        select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
+    );
+    // Beyond this many standard deviations, alpha is below the limit.
+    let place = corner * sqrt(2.0 * log(color.a / MIN_ALPHA));
+    let sigmas = sqrt(vec2f(mean + spread, max(mean - spread, PIXEL_VARIANCE)));
+    let along = min(sigmas, vec2f(MAX_REACH)) * place;
+    let pixels = along.x * axis + along.y * vec2f(-axis.y, axis.x);
+    return Varying(vec4f(clip.xy + pixels * camera.pixel * clip.w, clip.zw), place, color);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    let alpha = in.color.a * exp(-0.5 * dot(in.place, in.place));
+    if alpha < MIN_ALPHA { discard; }
+    return vec4f(in.color.rgb * alpha, alpha);
+}
