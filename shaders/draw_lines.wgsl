@@ -34,7 +34,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
     let offset = (along * beyond + across * up) * camera.pixel;
-    // Divide by w here, so that interpolation is linear on the screen: WebGL2 lacks `linear` interpolation.
+    // Divide by w here, so that `place` is interpolated linearly on the screen. `@interpolate(linear)` would do the
+    // same, but WebGL2 lacks it.
     let clip = vec4f(own.xy / own.w + offset, lifted(own).z / own.w, 1.0);
     return Varying(clip, vec2f(select(0.0, length, is_b) + beyond, up), length, half_width, state_color(state));
 }

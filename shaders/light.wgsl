@@ -1,9 +1,10 @@
 // Studio lighting. The key light from the upper left and the weak fill light from the right are fixed to the camera.
 // The light from sky and ground is fixed to the world.
 
-/// Directions to the two lights, view space, and colours, linear.
+/// Directions to the key light and the fill light, unit, view space.
 const KEY_DIRECTION = vec3f(-0.43, 0.56, 0.71);
 const FILL_DIRECTION = vec3f(0.81, 0.05, 0.58);
+/// Colours of the four lights, linear.
 const KEY_COLOR = vec3f(0.90, 0.88, 0.84);
 const FILL_COLOR = vec3f(0.14, 0.16, 0.20);
 const SKY_COLOR = vec3f(0.26, 0.28, 0.32);

@@ -7,7 +7,8 @@
 @group(0) @binding(1) var<storage, read> starts: array<vec2u>;
 /// Field entries of the stencils: (row of the field, weight as bits).
 @group(0) @binding(2) var<storage, read> nodes: array<vec2u>;
-/// Boundary entries of the stencils: (control vertex, weight as bits). Each control's boundary value is 1 at itself.
+/// Boundary entries of the stencils: (control vertex, weight as bits). The boundary value there is 1 in the column of
+/// this control and 0 in all other columns.
 @group(0) @binding(3) var<storage, read> hats: array<vec2u>;
 @group(0) @binding(4) var<storage, read> field: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> block: array<vec4f>;

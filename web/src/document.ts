@@ -13,7 +13,7 @@ const KEPT_CHECKS = 32;
 export interface DocumentMirror {
   /** Updates the state after a change of the document. */
   take(view: View): void;
-  /** Uses a check that came with the cage instead of running a new one. */
+  /** Stores and shows the result of a check. Cancels a check in progress. */
   know(check: Check): void;
   /** Resolves when the current cage has been checked. */
   checked(): Promise<unknown>;

@@ -19,14 +19,14 @@ export interface SharedControls {
 }
 
 export interface Shared {
-  /** Id of the sample. Links contain no files, so only samples can be shared. */
+  /** Identifier of the sample. Links contain no files, so only samples can be shared. */
   sample: string;
   /** Options of the cage, in the form of the page's settings. */
   cage?: string;
   /** The pose, packed by `Engine.encodePose`. */
   pose?: Uint8Array;
   seen?: Seen;
-  /** Set if the cage is smooth or has controls inside. */
+  /** Smoothing and controls inside; undefined for a plain cage without controls inside. */
   controls?: SharedControls;
 }
 

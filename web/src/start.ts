@@ -54,7 +54,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
     // Do not save a sample that was not modified.
     const isUntouched = sampleCage && undoLabel === null;
     const isWork = bound && !isUntouched && tour === null;
-    // Reading these keys subscribes to their changes: all of them are part of the work.
+    // Reading these keys subscribes this effect to their changes, after which the work must be saved.
     if (isWork && [model, cage, steps, appliedOptions, symmetry]) untracked(() => app.works.touch());
   });
   effect(() => {

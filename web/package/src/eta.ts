@@ -2,9 +2,9 @@
 
 /** Weight of a new speed measurement in the moving average, which follows changes of speed between stages. */
 const SMOOTHING = 0.25;
-/** No time is estimated below this fraction, because the speed varies too much at first. */
+/** Fraction done below which no time is estimated, because the speed varies too much at first. */
 const FIRST_SHARE = 0.04;
-/** No time is estimated before this time since the start, ms. */
+/** Time since the start before which no time left is estimated, ms. */
 const FIRST_MS = 250;
 
 export interface Eta {

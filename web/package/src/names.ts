@@ -9,7 +9,9 @@ export function extension(name: string): string {
   return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
 }
 
-/** Rank of a file's model format, 0 for the format that can store most information; -1 if the file is not a model. */
+/**
+ * Rank of a file's model format, 0 for the format that can store the most information; -1 if the file is not a model.
+ */
 export function rankOf(name: string): number {
   return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));
 }

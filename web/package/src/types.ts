@@ -79,7 +79,7 @@ export interface Bound {
   readonly report: BindReport;
 }
 
-/** Content of a file. */
+/** The bytes of a file. */
 export type File = Uint8Array | ArrayBuffer | Blob;
 export interface Named {
   /** Name of the file, whose extension determines the format. Default "model.glb". */

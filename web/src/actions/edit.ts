@@ -36,7 +36,7 @@ export interface Edit {
   setEditingRest(on: boolean): void;
 }
 
-/** Arrow keys that are pressed at shorter intervals than this become one undo step, ms. */
+/** Longest interval between two presses of arrow keys that become one undo step, ms. */
 const NUDGE_PAUSE_MS = 600;
 
 export function createEdit(ctx: Context): Edit {

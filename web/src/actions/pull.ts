@@ -39,7 +39,7 @@ const OFF = 0.01;
 const SETTLING = 30;
 /** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
 const WIDEST = 1.2;
-/** Arrow keys that are pressed at shorter intervals than this are one pull, ms. */
+/** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
 const NUDGE_PAUSE_MS = 600;
 /** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
 const ON_CAGE = 0xffffffff;

@@ -10,7 +10,7 @@ import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
 import { attempt, type Context } from "./context";
 
 export interface WorkActions {
-  /** Saves the open work after a pause; repeated calls are merged. */
+  /** Saves the open work when no further call has come for `PAUSE_MS`. */
   touch(): void;
   /** Saves pending changes, and a model that was never saved, before something else is opened. */
   flush(): Promise<void>;

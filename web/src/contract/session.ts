@@ -26,7 +26,7 @@ import type {
 
 /** Methods that work "in the worker" share one worker, which runs their jobs in sequence. */
 export interface Session {
-  /** The part of the session without workers: document, picking, gestures, exports. */
+  /** The engine on the page's thread: document, picking, gestures, drawing, exports. */
   readonly engine: Engine;
   /** Name of the GPU, as the report card shows it. */
   readonly adapter: string;
@@ -41,9 +41,9 @@ export interface Session {
    * crashes, the open model is not affected.
    */
   readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
-  /** Opens a file that was read; of a project, also cage and poses. Call it once for each file. */
+  /** Opens a file that was read; a project brings its cage and poses. Call it once for each file. */
   open(read: ReadFile): Promise<Opened>;
-  /** Until the returned function is called, one worker reads all files. It is replaced only after a failure. */
+  /** Until the returned function is called, one worker reads all files. The worker is replaced only after a failure. */
   shareReader(): () => void;
   /**
    * Adds models to the open cage; cage and pose stay. `label` returns the name of the undo step for a number of models;

@@ -2,7 +2,7 @@
 
 import type { Client } from "@cagework/core/session/client";
 
-/** Runs `work` on the first call only. */
+/** Returns a function that calls `work` the first time it is called. */
 export function once(work: () => void): () => void {
   let done = false;
   return () => {

@@ -1,4 +1,4 @@
-/** Overlay while files are dragged over the window: says what dropping them does. */
+/** Overlay that says, while files are dragged over the window, what dropping them does. */
 
 import type { App } from "../app";
 import { hoverSentence } from "../drop";

@@ -17,7 +17,7 @@ import type { BoundArrays } from "./messages";
 /** Number of cells along the cage's longest side in the coarse pass. */
 const COARSE = 32;
 
-/** Errors after which the bind is repeated on the CPU. */
+/** Names of errors after which the bind is repeated on the CPU. */
 const GPU_ERRORS: readonly string[] = [
   "NoAdapter",
   "NoDevice",

@@ -1,4 +1,4 @@
-/** The step bar, and the buttons at the foot of each panel. */
+/** Sentences of the step bar and of the buttons at the foot of each panel. */
 
 export const bar = {
   steps: "Steps",

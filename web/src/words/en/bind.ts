@@ -1,4 +1,4 @@
-/** Step Bind and its report. */
+/** Sentences of step Bind and of its report. */
 
 import { bytes, duration, plural, scientific } from "../../format";
 

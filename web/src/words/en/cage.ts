@@ -1,4 +1,4 @@
-/** Step Cage. */
+/** Sentences of step Cage. */
 
 import { count, endings, plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Clips, morph targets and skeleton of a rigged model. */
+/** Sentences about clips, morph targets and skeletons of rigged models. */
 
 import { plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Step Export. */
+/** Sentences of step Export. */
 
 import { bytes, list, plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Step Model and opening of files. */
+/** Sentences of step Model, and about opening files. */
 
 import { count, endings, percent, plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** The models that share the cage. */
+/** Sentences about the models that share the cage. */
 
 import { plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Step Pose, pulling, and the names of undo steps. */
+/** Sentences of step Pose and about pulling, and labels of undo steps. */
 
 import { plural } from "../../format";
 

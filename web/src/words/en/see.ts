@@ -1,4 +1,4 @@
-/** The See panel and its legends. */
+/** Sentences of the See panel and of legends. */
 
 import { count, scientific } from "../../format";
 

@@ -1,4 +1,4 @@
-/** The shortcut sheet. */
+/** Sentences of the shortcut sheet. */
 
 import type { Command } from "../../input/shortcuts";
 

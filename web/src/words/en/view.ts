@@ -1,4 +1,4 @@
-/** The view and its status line. */
+/** Sentences of the view and of its status line. */
 
 import { plural } from "../../format";
 

@@ -1,4 +1,4 @@
-/** Work saved in the browser. */
+/** Sentences about work saved in the browser. */
 
 import { bytes } from "../../format";
 
