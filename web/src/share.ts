@@ -21,8 +21,6 @@ export interface SharedControls {
 export interface Shared {
   /** Identifier of the sample. Links contain no files, so only samples can be shared. */
   sample: string;
-  /** Options of the cage, in the form of the page's settings. */
-  cage?: string;
   /** The pose, packed by `Engine.encodePose`. */
   pose?: Uint8Array;
   seen?: Seen;
