@@ -18,7 +18,7 @@ fn along_y(corner: vec3u, share: vec3f) -> vec3f {
 fn bend_vertices(@builtin(global_invocation_id) id: vec3u) {
     let v = invocation(id, work.stride);
     if v >= work.count { return; }
-    // Outside the lattice, use its boundary values, which are zero.
+    // A vertex outside the lattice gets the displacement of the lattice's boundary, which is zero.
     let place = place_in_lattice(positions[v].xyz);
     let by = mix(along_y(place.corner, place.share), along_y(place.corner + vec3u(0u, 0u, 1u), place.share), place.share.z);
     positions[v] += vec4f(by, 0.0);

@@ -1,9 +1,9 @@
-// Counts the splats of each block in each bin of depth: the first of three steps of sorting. One invocation per block,
-// without atomics. CPU: cagework_gpu::splats::sort_splats.
+// First of three kernels that sort splats by depth: counts the splats of each block of splats in each bin of depth. One
+// invocation per block, so that no atomics are needed. CPU: cagework_gpu::splats::sort_splats.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> splats: array<vec4f>;
-/// Number of splats, for each block and bin. `[n_blocks, BINS]`
+/// Number of splats in each block and bin. `[n_blocks, BINS]`
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 
 @compute @workgroup_size(64)

@@ -1,15 +1,16 @@
-// Deforms splats by the cage's field: centres move by u, covariances S become F S F^T. Both u and F are interpolated
-// trilinearly between the nodes; F at a node comes from differences of u, as in Field::node_gradients. One invocation per
-// splat. CPU: cagework_core::splats::deform_splats.
+// Deforms splats by the cage's displacement field u: centres move by u, and covariances S become F S F^T, where F = I +
+// du/dx. Both u and F are interpolated trilinearly between the nodes of the lattice. F at a node comes from differences
+// of u, as in Field::node_gradients. One invocation per splat. CPU: cagework_core::splats::deform_splats.
 //
-// A splat has three rows: centre; xx, xy, xz, yy of the covariance; yz, zz of it.
+// A splat has three rows: its centre; the entries xx, xy, xz, yy of its covariance; and the entries yz, zz.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> rest: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> splats: array<vec4f>;
 
-/// Nodes between which u is differentiated at node `k` along an axis, and their distance in cells: the neighbours, or
-/// the node itself where the lattice ends or, at a bound node, where the neighbour is not bound.
+/// Derivative of u at node `k` along an axis, by central differences. A neighbour beyond the end of the lattice is
+/// replaced by the node itself; at a bound node, also a neighbour that is not bound. `at`: coordinate of the node along
+/// the axis; `n`: number of nodes along it; `step`: index difference of neighbours.
 fn slope(k: u32, at: u32, n: u32, step: u32, is_bound: bool) -> vec3f {
     var before = k;
     var after = k;
@@ -29,7 +30,7 @@ fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
     var by = vec3f(0.0);
     var f = mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
     let at = (center.xyz - field.origin) / field.cell;
-    // Splats outside the lattice stay.
+    // Splats outside the lattice do not move.
     if all(at >= vec3f(0.0)) && all(at <= vec3f(field.dims - 1u)) {
         let place = place_in_lattice(center.xyz);
         for (var c = 0u; c < 8u; c += 1u) {

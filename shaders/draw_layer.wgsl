@@ -1,4 +1,5 @@
-// Draws the layer of splats into the picture: sRGB colours, premultiplied in sRGB. One triangle.
+// Draws the layer that draw_splats.wgsl has drawn into the picture. The layer's colours are in sRGB and multiplied by
+// alpha in sRGB. Draws one triangle.
 
 @group(1) @binding(0) var layer: texture_2d<f32>;
 

@@ -1,22 +1,26 @@
-// Draws Gaussian splats (Kerbl et al. 2023) from back to front into a layer of their own: one instance per splat, six
-// vertices each. Colours stay in sRGB and are blended there, as captures are trained.
+// Draws Gaussian splats (Kerbl et al. 2023) from back to front into a layer of their own. Colours are blended in sRGB,
+// because splats are trained that way. One instance of six vertices per splat.
 
-/// Variance added on screen, square pixels, so that no splat is smaller than a pixel (Kerbl et al. 2023).
+/// Variance that is added to each splat on the screen, square pixels, so that no splat is smaller than about a pixel
+/// (Kerbl et al. 2023).
 const PIXEL_VARIANCE = 0.3;
-/// Smallest alpha that is drawn.
+/// Alpha below which nothing is drawn.
 const MIN_ALPHA = 1.0 / 255.0;
-/// Largest half axis of a splat, pixels.
+/// Largest standard deviation of a splat on the screen, pixels.
 const MAX_REACH = 1024.0;
-/// Splats are projected as if they were within this multiple of the picture, so that those beside it stay small.
+/// Limit of the normalised device coordinates at which the projection of a covariance is linearised. It prevents huge
+/// ellipses of splats far beside the picture.
 const MAX_OFF_CENTER = 1.3;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// Offset from the centre, standard deviations. Interpolation is linear: all corners have the same depth.
+    /// Offset from the centre, standard deviations. Interpolated linearly on the screen, because all corners have the
+    /// same w.
     @location(0) place: vec2f,
     @location(1) @interpolate(flat) color: vec4f,
 }
 
+/// Row k of the upper left part of `clip_from_world`.
 fn row_of_clip(k: u32) -> vec3f {
     return vec3f(camera.clip_from_world[0][k], camera.clip_from_world[1][k], camera.clip_from_world[2][k]);
 }
@@ -33,7 +37,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let low = row_at(3u * entry.x + 1u);
     let high = row_at(3u * entry.x + 2u);
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
-    // Rows of the derivative of the pixel position.
+    // Derivatives of the pixel position (x, y) by the position in world space.
     let at = clamp(clip.xy / clip.w, vec2f(-MAX_OFF_CENTER), vec2f(MAX_OFF_CENTER));
     let along_w = row_of_clip(3u);
     let x = 0.5 * camera.viewport.x / clip.w * (row_of_clip(0u) - at.x * along_w);
@@ -52,7 +56,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
         select(-1.0, 1.0, index == 1u || index == 3u || index == 5u),
         select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
     );
-    // Beyond this many standard deviations, alpha is below the limit.
+    // At this many standard deviations from the centre, alpha falls below MIN_ALPHA.
     let place = corner * sqrt(2.0 * log(color.a / MIN_ALPHA));
     let sigmas = sqrt(vec2f(mean + spread, max(mean - spread, PIXEL_VARIANCE)));
     let along = min(sigmas, vec2f(MAX_REACH)) * place;

@@ -1,14 +1,15 @@
-// The deformation as a field, in the layout of cagework_gpu::skin::field_table. It is in a storage buffer, because
-// 16-bit textures are too coarse and not every device can filter 32-bit textures.
+// The cage's displacement field u on a lattice, in the layout of cagework_gpu::skin::field_table. The field is in a
+// storage buffer, because 16-bit textures are too coarse and not every device can filter 32-bit textures.
 
 struct Field {
     /// Position of the first node, object units.
     origin: vec3f,
     /// Edge of a cell, object units.
     cell: f32,
-    /// Nodes along each axis, x fastest.
+    /// Number of nodes along each axis.
     dims: vec3u,
-    /// Displacements, object units. The fourth component is 1 at bound nodes, otherwise 0.
+    /// Displacement of each node, object units; x varies fastest. The fourth component is 1 at nodes that have weights
+    /// of the controls (bound nodes) and 0 at the others.
     values: array<vec4f>,
 }
 
@@ -22,13 +23,14 @@ struct Place {
     share: vec3f,
 }
 
-/// Place of a point, clamped to the lattice.
+/// The cell that contains a point, and the point's coordinates in it. A point outside the lattice is clamped to it.
 fn place_in_lattice(point: vec3f) -> Place {
     let at = (point - field.origin) / field.cell;
     let corner = clamp(floor(at), vec3f(0.0), vec3f(field.dims - 2u));
     return Place(vec3u(corner), clamp(at - corner, vec3f(0.0), vec3f(1.0)));
 }
 
+/// Index of a node in `field.values`.
 fn index_of(node: vec3u) -> u32 {
     return node.x + field.dims.x * (node.y + field.dims.y * node.z);
 }

@@ -1,5 +1,6 @@
-// Replaces the counts of count_splats by the place of the first splat of each block and bin: exclusive sums over bins,
-// then blocks. One workgroup. CPU: cagework_gpu::splats::sort_splats.
+// Second of three kernels that sort splats by depth: replaces the count of each block and bin by the position of its
+// first splat in the sorted order, which is the sum of all counts in earlier bins and of earlier blocks in the same
+// bin. One workgroup; each invocation handles 32 bins. CPU: cagework_gpu::splats::sort_splats.
 
 const LANES = 128u;
 

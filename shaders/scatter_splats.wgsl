@@ -1,12 +1,13 @@
-// Writes the splats in the order of their bins: the last step of sorting. One invocation per block. CPU:
-// cagework_gpu::splats::sort_splats.
+// Last of three kernels that sort splats by depth: writes the splats of each block to their positions in the sorted
+// order. One invocation per block. CPU: cagework_gpu::splats::sort_splats.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> splats: array<vec4f>;
-/// Red, green, blue in sRGB and opacity of each splat, 8 bits each.
+/// Red, green and blue in sRGB, and opacity of each splat, 8 bits each.
 @group(0) @binding(3) var<storage, read> colors: array<u32>;
+/// Position of the next splat of each block and bin. `[n_blocks, BINS]`
 @group(0) @binding(4) var<storage, read_write> counts: array<u32>;
-/// Number and colour of each splat, farthest first. A colour of 0 hides the splat.
+/// Index and colour of each splat, farthest first. The colour 0 hides a splat.
 @group(0) @binding(5) var<storage, read_write> order: array<vec2u>;
 
 @compute @workgroup_size(64)

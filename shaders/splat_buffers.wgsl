@@ -1,4 +1,5 @@
-// Splats as written by deform_splats and scatter_splats. See also splat_textures.wgsl.
+// Splats and their order in storage buffers, which deform_splats and scatter_splats write. See also
+// splat_textures.wgsl.
 
 @group(1) @binding(0) var<storage, read> splats: array<vec4f>;
 @group(1) @binding(1) var<storage, read> order: array<vec2u>;

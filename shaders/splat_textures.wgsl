@@ -1,4 +1,4 @@
-// Splats in textures, uploaded by the CPU. See also splat_buffers.wgsl.
+// Splats and their order in textures, which the CPU uploads. See also splat_buffers.wgsl.
 
 @group(1) @binding(0) var splats: texture_2d<f32>;
 @group(1) @binding(1) var order: texture_2d<u32>;
