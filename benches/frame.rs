@@ -58,7 +58,10 @@ fn summary(mut times: Vec<f64>) -> String {
 /// Times the start of a grab, and the frames of a pull that moves the animal's first vertex on a circle.
 fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindOptions) {
     let mesh = TriMesh { positions: positions.to_vec(), triangles: triangles.to_vec() };
-    let weights = |points: &[Vec3]| bind(points, cage, options, &Silent).expect("it binds").weights;
+    let weights = |points: &[Vec3]| {
+        let binding = bind(points, cage, options, &Silent).expect("it binds");
+        binding.frames.folded(&binding.weights)
+    };
     let probes = Probes::new(&mesh, cage).expect("it has a surface");
     let of_probes = weights(probes.points());
     let began = Instant::now();

@@ -48,19 +48,18 @@ impl Rng {
     }
 }
 
-/// Fails if a value differs by more than `tolerance`; reports the largest difference.
+/// Fails if a value differs by more than `tolerance` and by more than 2 ulp; reports the value that exceeds this the most.
 #[track_caller]
 pub(crate) fn assert_close(gpu: &[f32], cpu: &[f32], tolerance: f32) {
     assert_eq!(gpu.len(), cpu.len(), "lengths");
-    let worst = (0..gpu.len()).max_by(|&a, &b| {
-        // The total order puts NaN last, so a NaN is reported.
-        (gpu[a] - cpu[a]).abs().total_cmp(&(gpu[b] - cpu[b]).abs())
-    });
-    if let Some(i) = worst {
-        let difference = (gpu[i] - cpu[i]).abs();
+    let allowed = |i: usize| tolerance.max(2.0 * f32::EPSILON * cpu[i].abs());
+    let excess = |i: usize| (gpu[i] - cpu[i]).abs() - allowed(i);
+    // The total order puts NaN last, so a NaN is reported.
+    if let Some(i) = (0..gpu.len()).max_by(|&a, &b| excess(a).total_cmp(&excess(b))) {
+        let (difference, allowed) = ((gpu[i] - cpu[i]).abs(), allowed(i));
         assert!(
-            difference <= tolerance,
-            "value {i} of {}: GPU {}, CPU {}, difference {difference:e} > {tolerance:e}",
+            difference <= allowed,
+            "value {i} of {}: GPU {}, CPU {}, difference {difference:e} > {allowed:e}",
             gpu.len(),
             gpu[i],
             cpu[i]
