@@ -66,7 +66,7 @@ for (const [how, address] of [
     const page = await visit("webgl", address);
     await page.waitForFunction(() => "weights" in globalThis);
     const rest = await page.evaluate(() => Array.from((globalThis as unknown as Example).posed.array));
-    // The first frame sets the camera's matrices.
+    // Wait for the first frame, which sets the camera's matrices.
     await page.waitForTimeout(200);
     const place = await page.evaluate(() => {
       const { camera, posed } = globalThis as unknown as Example;

@@ -5,9 +5,10 @@ import { fetchPart } from "./parts";
 /** The exports that both builds share. */
 export type Package = typeof import("../pkg/cagework");
 
+/** One build of the module. */
 export interface Artifact {
   readonly pkg: Package;
-  /** URL of its wasm file. */
+  /** URL of the build's wasm file. */
   readonly wasm: string;
   openWorker(): Worker;
 }
