@@ -19,7 +19,7 @@ fn studio_light(color: vec3f, point: vec3f, normal: vec3f) -> vec3f {
     let view = to_eye(point);
     let in_view = (camera.view_from_world * vec4f(normal, 0.0)).xyz;
     let view_in_view = (camera.view_from_world * vec4f(view, 0.0)).xyz;
-    // Half Lambert for the key light makes the terminator soft.
+    // Wrapped diffuse reflection, squared below, gives the key light a soft terminator.
     let key = max(0.0, (dot(in_view, KEY_DIRECTION) + 0.25) / 1.25);
     let fill = max(0.0, dot(in_view, FILL_DIRECTION));
     let sky = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * normal.y);

@@ -120,7 +120,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         let both = cage(&together(&body, &arm));
         let points: Vec<Vec3> = [
             [3.0, 2.0, 2.0],
-            // These points are next to walls inside the union, which sampling rays may hit.
+            // The next three points are 0.001 from a wall inside the union, which sampling rays may hit.
             [3.999, 1.9, 1.9],
             [4.001, 2.0, 1.8],
             [2.001, 2.0, 2.1],

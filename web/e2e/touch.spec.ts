@@ -30,7 +30,7 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
     }));
   const send = (type: "touchStart" | "touchMove" | "touchEnd", share?: number) =>
     cdp.send("Input.dispatchTouchEvent", { type, touchPoints: share === undefined ? [] : at(share) });
-  // All events are sent at once: delays between them could make the touch a long press.
+  // The start and the moves are sent at once: a delay between them could make the touch a long press.
   await Promise.all([
     send("touchStart", 0),
     ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share)),

@@ -30,6 +30,9 @@ impl<T> Cache<T> {
     /// Inserts a result, replacing an earlier one of the same key. Ignores results larger than the limit.
     pub fn insert(&mut self, key: Key, result: T, bytes: usize) {
         self.entries.retain(|entry| entry.key != key);
+        if bytes > self.limit {
+            return;
+        }
         self.entries.push_back(Entry { key, bytes, result });
         while self.entries.iter().map(|entry| entry.bytes).sum::<usize>() > self.limit {
             self.entries.pop_front();
@@ -76,5 +79,6 @@ mod tests {
         assert_eq!(cache.get(key(3)), Some(&"again"));
         cache.insert(key(4), "too large", 101);
         assert_eq!(cache.get(key(4)), None);
+        assert_eq!(cache.get(key(3)), Some(&"again"), "a result that is too large evicts nothing");
     }
 }

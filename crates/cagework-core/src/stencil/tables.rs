@@ -1,4 +1,4 @@
-//! Geometry as flat arrays of numbers, for upload and for the kernels' twins.
+//! Geometry as flat arrays of numbers: input of the GPU kernels and of their CPU counterparts.
 
 use std::ops::Range;
 

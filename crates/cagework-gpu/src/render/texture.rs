@@ -4,8 +4,8 @@ use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 
-/// Number of entries of the table for encoding sRGB. Adjacent entries differ by less than one byte, even at sRGB's
-/// steepest slope.
+/// Number of entries of the table for encoding sRGB. Adjacent entries differ by at most 1 (0.4 before rounding at sRGB's
+/// steepest slope), so that no byte value is missing.
 const ENCODE_STEPS: usize = 8192;
 
 /// Lookup tables for decoding and encoding sRGB bytes.

@@ -349,7 +349,7 @@ impl Engine {
         let _ = self.invalidate.call0(&JsValue::NULL);
     }
 
-    /// Starts an upload of the document to the GPU, unless one is in progress.
+    /// Starts an upload of the document to the GPU if the GPU's copy is out of date and no upload is in progress.
     fn start_upload(&self) {
         {
             let mut state = self.state.borrow_mut();
