@@ -1,5 +1,5 @@
-//! Difficult cages: thresholds, parts that share faces or overlap, re-entrant edges, bent quads, and faces that the
-//! grid cannot resolve. Figures at g = 64 are in `docs/notes/any-cage.md`.
+//! Difficult cages: parts that share faces or overlap, re-entrant edges, bent quads, and faces that the grid cannot
+//! resolve; also the threshold of sparse weights. Figures at g = 64 are in `docs/notes/any-cage.md`.
 
 use cagework_core::{Cage, PolygonMesh, Weights};
 use cagework_tests::cages::{cage, cuboid, icosphere, l_shape, moved, sphere, together};

@@ -132,7 +132,7 @@ mod tests {
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
-    /// Tolerance for f32 rounding of weights, and the solver's tolerance.
+    /// Largest error that f32 rounding and the solver's tolerance cause together.
     const ROUNDING: f32 = 2e-5;
 
     /// Trilinear coordinates of a point in the unit cube: 8 corners, x fastest.

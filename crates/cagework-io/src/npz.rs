@@ -68,13 +68,14 @@ impl From<ZipError> for NpzError {
 pub struct SavedWeights {
     /// One row per model vertex, then one per extra point.
     pub weights: Weights,
-    /// Meaning of the columns that follow those of the controls.
+    /// Meaning of the columns that follow those of cage and inner controls: offsets of vertices, moved by the controls.
     pub frames: Frames,
     /// Points outside the cage, by row of the weights.
     pub outside: Vec<OutsideVertex>,
     /// Rig points that were bound with the model, object units.
     pub extra_points: Vec<Vec3>,
-    /// Rest positions of the controls inside the cage, object units; their weights are the last columns.
+    /// Rest positions of the controls inside the cage, object units. Their columns follow those of the
+    /// cage's vertices.
     pub inner_controls: Vec<Vec3>,
 }
 
