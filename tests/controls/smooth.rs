@@ -120,8 +120,9 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
     }
 }
 
-/// Before rows are restored, the samples on both sides of the comparison are the same linear map of the same fields, so
-/// they agree to 1e-5 for any bend of the quads.
+/// Before weights are corrected to reproduce the rest positions, those of a smooth cage and those of the subdivided cage
+/// times the subdivision matrix are the same linear combinations of the same fields. They agree to 1e-5 even if quads
+/// are bent.
 #[test]
 fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in

@@ -167,7 +167,7 @@ const SQUARE: &str = "mtllib paint box.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n
 fn obj_gets_the_colours_of_its_materials() {
     let mtl = b"# by hand\nnewmtl blue\nKd 0.5 0 1\nd 0.5\nnewmtl unused\nKd 1 1 1\n";
     let look = obj(SQUARE, &[("paint box.mtl", mtl)]);
-    // Triangles are grouped by material; those without a material have no group.
+    // Triangles are grouped by material. The library lacks `plain`, so its triangle has no group.
     assert_eq!((look.triangles.len(), look.groups.len()), (3, 1));
     let group = &look.groups[0];
     assert_eq!((group.triangles.clone(), group.alpha), (0..2, LookAlpha::Blend));

@@ -263,8 +263,8 @@ fn a_cube_with_a_far_vertex_is_checked() {
     mesh.positions[0].y = -1_429_490.6;
     let found = check(&mesh, Some(&[Vec3::ZERO]), Some(64));
     assert!(found.valid, "closed and free of intersections: {:?}", found.problems);
-    // The tolerance, 2e-6 of the diagonal, is 2.86. Of the seven other corners, all but the first one's opposite (at
-    // 3.46) are within it.
+    // The tolerance, 2e-6 of the diagonal, is 2.86. Of the other six corners near corner 1, five are within it and count
+    // as its duplicates. The sixth is opposite and 3.46 away.
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 5);
     // Two corners of a face are at the same position, as in a damaged file.
     let mut mesh = box_mesh(1);

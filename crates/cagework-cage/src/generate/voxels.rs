@@ -1,4 +1,4 @@
-//! Sets of voxels as bit arrays, one row of words along x, with morphological operations.
+//! Sets of voxels as bit arrays, with morphological operations. Each line of voxels along x starts with a new word.
 
 /// Bits per word.
 const WORD: usize = u64::BITS as usize;

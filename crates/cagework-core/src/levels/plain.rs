@@ -1,4 +1,5 @@
-//! Reference stencils, computed directly from the boundary, for comparison with runs and tables.
+//! Reference for tests: the stencil of each cell, computed from the boundary without the runs of equal stencils and the
+//! tables that [`Level`] stores.
 
 use glam::{DQuat, DVec3};
 
