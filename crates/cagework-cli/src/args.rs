@@ -19,7 +19,7 @@ use cagework_core::field as field_options;
 use cagework_core::options::{self, BindOptions, Choice, Number};
 use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use field::MapArgs;
@@ -134,8 +134,8 @@ pub(crate) struct BindArgs {
 /// Options for reading files. All commands that read a model or a cage share them.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct ReadArgs {
-    /// Up axis of the files. With z, models, cages and poses are rotated to y up when they are read, and rotated back when
-    /// they are written.
+    /// Up axis of the files. With z or y-down, models, cages and poses are rotated to y up when they are read, and rotated
+    /// back when they are written.
     #[arg(long, default_value_t, value_name = "AXIS", value_parser = words::<UpAxis>())]
     up: UpAxis,
     #[command(flatten)]
@@ -149,12 +149,21 @@ impl ReadArgs {
     }
 }
 
+/// Formats of `cagework deform --lattice`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LatticeFormat {
+    #[default]
+    Npz,
+    Blender,
+}
+
 /// Arguments of `cagework deform`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "One pose gives the deformed model. Several give a GLB with one morph target per pose and an \
-    animation that plays them.\n\n\
+    animation that plays them. Gaussian splats and point clouds take one pose and no weights.\n\n\
     Examples:\n  \
+    cagework deform plant.ply --cage cage.obj --pose bent.obj -o bent.ply\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb"
 )]
@@ -167,8 +176,9 @@ pub(crate) struct DeformArgs {
     /// Cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// Weights that `cagework bind --weights` wrote; not needed with --dynamic or for --lattice alone.
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["dynamic", "lattice"])]
+    /// Weights that `cagework bind --weights` wrote; not for splats and points, and not needed with --dynamic or for
+    /// --lattice alone.
+    #[arg(long, value_name = "FILE")]
     pub(crate) weights: Option<PathBuf>,
     /// Moved cage: the same vertices in the same order. May be given several times. Each keyframe of a clip and each shape
     /// key in the file is a pose.
@@ -182,10 +192,13 @@ pub(crate) struct DeformArgs {
     pub(crate) output: Option<ModelOutput>,
     /// Write the deformation of the space around the cage (.npz): displacements `u` and gradients `F` at the nodes of a
     /// lattice. Takes one pose.
-    #[arg(long, value_name = "FILE", value_parser = npz_output, conflicts_with = "dynamic")]
+    #[arg(long, value_name = "FILE", value_parser = lattice_output, conflicts_with = "dynamic")]
     pub(crate) lattice: Option<PathBuf>,
-    /// Cells of the lattice along the longest side of the cage, 8 to 256.
-    #[arg(long, default_value_t = field_options::CELLS, value_name = "N", requires = "lattice", value_parser = number::<u32>(field_options::CELLS_RANGE))]
+    /// Format of the lattice: arrays (.npz), or a script (.py) that makes a lattice object in Blender.
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT", requires = "lattice")]
+    pub(crate) lattice_format: LatticeFormat,
+    /// Cells of the lattice of --lattice, splats and points along the longest side of the cage, 8 to 256.
+    #[arg(long, default_value_t = field_options::CELLS, value_name = "N", value_parser = number::<u32>(field_options::CELLS_RANGE))]
     pub(crate) lattice_cells: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
@@ -193,7 +206,7 @@ pub(crate) struct DeformArgs {
     /// targets, without a skeleton.
     #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only"])]
     pub(crate) dynamic: Option<String>,
-    /// With --dynamic or --lattice: steps of Catmull-Clark subdivision of the cage, as for `bind`.
+    /// With --dynamic or --lattice, and for splats and points: steps of Catmull-Clark subdivision of the cage, as for `bind`.
     #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = number::<u32>(options::SMOOTH))]
     pub(crate) smooth: u32,
 }
@@ -318,6 +331,10 @@ fn positive(text: &str) -> Result<f32, String> {
 
 fn npz_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["npz"])
+}
+
+fn lattice_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["npz", "py"])
 }
 
 fn obj_output(text: &str) -> Result<PathBuf, String> {

@@ -10,7 +10,7 @@ use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
-use crate::load::{box_mesh, generate_for, load_model};
+use crate::load::{box_mesh, generate_for, load_any};
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
@@ -34,7 +34,7 @@ struct CageSummary {
 /// If the model cannot be read, or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output.path], &[&args.model])?;
-    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
+    let model = load_any(&args.model, args.read.axis(), args.read.memory)?;
     let mut summary = CageSummary {
         output: args.output.path.display().to_string(),
         kind: "box",

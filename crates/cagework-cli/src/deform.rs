@@ -17,8 +17,8 @@ use crate::controls::{inner_controls_text, rest_of, with_inner};
 use crate::error::CliError;
 use crate::field::{self, LatticeSummary};
 use crate::files::{check_outputs, json, print, read, shown_path, write};
-use crate::load::{load_cage, load_model};
-use crate::{dynamic, rig};
+use crate::load::{load_any, load_cage};
+use crate::{capture, dynamic, rig};
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
@@ -49,12 +49,6 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     if let (Some(clip), Some(output)) = (&args.dynamic, &args.output) {
         return dynamic::run(args, clip, output, as_json);
     }
-    if args.smooth > 0 && args.lattice.is_none() {
-        return Err(CliError::Mismatch {
-            message: "--smooth applies to --dynamic and --lattice only: weights contain their steps".into(),
-            hint: "leave out --smooth",
-        });
-    }
     let mut inputs = vec![args.mesh.as_path()];
     inputs.extend(args.weights.as_deref());
     inputs.extend(args.pose.iter().chain(&args.pose_controls).map(AsRef::<Path>::as_ref));
@@ -63,14 +57,23 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     }
     let outputs = args.output.iter().map(|output| output.path.as_path()).chain(args.lattice.as_deref());
     check_outputs(&outputs.collect::<Vec<_>>(), &inputs)?;
-    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
+    let model = load_any(&args.mesh, args.read.axis(), args.read.memory)?;
+    let is_capture = model.n_faces() == 0;
+    if args.smooth > 0 && args.lattice.is_none() && !is_capture {
+        return Err(CliError::Mismatch {
+            message: "--smooth applies to --dynamic, --lattice, splats and points only: weights contain their steps"
+                .into(),
+            hint: "leave out --smooth",
+        });
+    }
     let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;
     match (&args.output, &args.weights, &lattice) {
+        (Some(output), _, _) if is_capture => capture::deform(args, &model, output, lattice, as_json),
         (Some(output), Some(weights), _) => deform(args, &model, weights, output, lattice, as_json),
         (None, _, Some(lattice)) => print(&if as_json { json(lattice) } else { lattice.text() }),
         _ => Err(CliError::Mismatch {
             message: "the mesh can only be deformed with its weights".into(),
-            hint: "give --weights, or leave out --output",
+            hint: "give --weights, which `cagework bind` writes",
         }),
     }
 }

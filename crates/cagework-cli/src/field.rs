@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use cagework_core::BindOptions;
 use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
 use cagework_core::team::Team;
-use cagework_io::{Model, PointFile, UpAxis, shown, write_field_npz};
+use cagework_core::{BindOptions, Cage};
+use cagework_io::{Model, PointFile, UpAxis, shown, write_field_blender, write_field_npz};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, MapArgs, MemoryArgs, ModelOutput, SmoothArgs};
+use crate::args::{
+    CageSource, ControlArgs, DeformArgs, LatticeFormat, MapArgs, MemoryArgs, ModelOutput, SmoothArgs,
+};
 use crate::bind::export;
 use crate::controls::with_inner;
 use crate::error::CliError;
@@ -68,6 +70,12 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
     } else {
         let output: ModelOutput = args.output.display().to_string().parse().map_err(wrong)?;
         let model = load_any(&args.points, up, memory)?;
+        if model.splats().is_some() {
+            return Err(CliError::Mismatch {
+                message: "`map` would move the centres of the splats and leave their shapes".into(),
+                hint: "use `cagework deform`, which takes splats without weights",
+            });
+        }
         let cage = load_cage(&CageSource::File(args.cage.clone()), &model, memory, &args.controls)?;
         let held = (model.bytes(), args.cells);
         let field = field_of(&cage, &args.pose, args.pose_controls.as_deref(), (up, memory), held)?;
@@ -121,15 +129,41 @@ pub(crate) fn write_lattice(
     output: &Path,
     model: &Model,
 ) -> Result<LatticeSummary, CliError> {
+    let (wanted, hint) = match args.lattice_format {
+        LatticeFormat::Npz => ("npz", "name it .npz, or add --lattice-format blender"),
+        LatticeFormat::Blender => ("py", "name it .py, or leave out --lattice-format"),
+    };
+    if ending(output).as_deref() != Some(wanted) {
+        let message = format!("{}: a lattice of this format ends in .{wanted}", shown_path(output));
+        return Err(CliError::Mismatch { message, hint });
+    }
+    let (_, field) = field_of_deform(args, model)?;
+    let bytes = match args.lattice_format {
+        LatticeFormat::Npz => write_field_npz(&field, model.origin()),
+        LatticeFormat::Blender => write_field_blender(&field, model.up().vector_turned(model.origin())),
+    };
+    write(output, &bytes)?;
+    let Lattice { dims, cell, .. } = field.lattice;
+    Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
+}
+
+/// The cage and the field of `cagework deform`.
+///
+/// # Errors
+/// If a file cannot be read, files do not match, or the bind fails.
+pub(crate) fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<(Cage, Field), CliError> {
     let [pose] = args.pose.as_slice() else {
         return Err(CliError::Mismatch {
-            message: format!("--lattice takes one pose, but {} were given", args.pose.len()),
+            message: format!(
+                "a lattice, splats and points take one pose, but {} were given",
+                args.pose.len()
+            ),
             hint: "run the command once per pose",
         });
     };
     if !args.pose_controls.is_empty() {
         return Err(CliError::Mismatch {
-            message: "--lattice does not take --pose-controls".into(),
+            message: "a lattice, splats and points do not take --pose-controls".into(),
             hint: "`cagework map` takes inner controls",
         });
     }
@@ -137,9 +171,7 @@ pub(crate) fn write_lattice(
     let cage = load_cage(&args.cage, model, args.read.memory, &controls)?;
     let held = (model.bytes(), args.lattice_cells);
     let field = field_of(&cage, pose, None, (model.up(), args.read.memory), held)?;
-    write(output, &write_field_npz(&field, model.origin()))?;
-    let Lattice { dims, cell, .. } = field.lattice;
-    Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
+    Ok((cage.cage, field))
 }
 
 /// The field of a pose of a cage. `held`: memory in use, bytes; `cells`: those of the lattice along the longest side.

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::files::{json, print, read};
-use crate::load::{cage_mesh, load_model};
+use crate::load::{cage_mesh, load_any};
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
@@ -32,11 +32,24 @@ struct Info {
     clips: Vec<Clip>,
     /// Names of meshes that are attached to a joint but not skinned, such as a hat; `--rigid` accepts them.
     props: Vec<String>,
+    /// `None` unless the file is a capture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    splats: Option<SplatInfo>,
     bounds: BoundsInfo,
     /// Whether every edge belongs to two triangles after vertices at equal positions are merged.
     closed: bool,
     cage: CageInfo,
     notices: Vec<String>,
+}
+
+/// Gaussian splats.
+#[derive(Debug, Serialize)]
+struct SplatInfo {
+    /// Degree of the spherical harmonics.
+    degree: u8,
+    median_opacity: f32,
+    /// Median of the largest standard deviation of each splat, object units.
+    median_size: f32,
 }
 
 /// Bounding box of the model, object units.
@@ -62,11 +75,12 @@ struct CageInfo {
 /// If the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
     let inner = inner_info(args)?;
-    let model = match (load_model(&args.model, args.read.axis(), args.read.memory), &inner) {
-        // A file of inner controls may contain only points and lines, which `load_model` rejects.
-        (Err(_), Some(inner)) => return print(&if as_json { json(inner) } else { inner.to_string() }),
-        (model, _) => model?,
-    };
+    let model = load_any(&args.model, args.read.axis(), args.read.memory);
+    let has_faces = model.as_ref().is_ok_and(|model| model.n_faces() > 0);
+    if let Some(inner) = inner.filter(|_| !has_faces) {
+        return print(&if as_json { json(&inner) } else { inner.to_string() });
+    }
+    let model = model?;
     let info = inspect(&args.model.display().to_string(), &model)?;
     print(&if as_json { json(&info) } else { text(&info) })
 }
@@ -129,6 +143,11 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         clips: model.clips(),
         // Ignore errors of the rig here; commands that deform it report them.
         props: model.props().unwrap_or_default(),
+        splats: model.splats().map(|splats| SplatInfo {
+            degree: splats.degree,
+            median_opacity: median(splats.opacities.clone()),
+            median_size: median(splats.scales.iter().map(|scale| scale.max_element()).collect()),
+        }),
         bounds: BoundsInfo {
             min: in_world(model, bounds.min),
             max: in_world(model, bounds.max),
@@ -138,6 +157,11 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         cage,
         notices: model.notices.clone(),
     })
+}
+
+fn median(mut numbers: Vec<f32>) -> f32 {
+    let middle = numbers.len() / 2;
+    if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// World position with Y up, rounded to the decimal digits of the file.
@@ -190,11 +214,17 @@ fn text(info: &Info) -> String {
     }
     let [min, max] = [info.bounds.min, info.bounds.max];
     row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));
-    row("surface", if info.closed { "closed".into() } else { "open".into() });
-    row(
-        "as a cage",
-        info.cage.problem.as_ref().map_or_else(|| "valid".into(), |why| format!("not valid: {why}")),
-    );
+    if let Some(SplatInfo { degree, median_opacity, median_size }) = info.splats {
+        row("splats", format!("spherical harmonics of degree {degree}"));
+        row("medians", format!("opacity {median_opacity:.2}, largest standard deviation {median_size:.2e}"));
+    }
+    if info.triangles > 0 {
+        row("surface", if info.closed { "closed".into() } else { "open".into() });
+        let problem = info.cage.problem.as_ref();
+        row("as a cage", problem.map_or_else(|| "valid".into(), |why| format!("not valid: {why}")));
+    } else {
+        row("surface", "none: points".into());
+    }
     for notice in info.notices.iter().chain(&info.cage.notices) {
         let _ = writeln!(out, "note: {notice}");
     }

@@ -7,6 +7,7 @@ mod args;
 mod bench;
 mod bind;
 mod cage;
+mod capture;
 mod card;
 mod check;
 mod controls;

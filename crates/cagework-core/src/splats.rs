@@ -5,9 +5,10 @@
 mod harmonics;
 mod sorted;
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{IVec3, Mat3, Quat, Vec3};
 
 use crate::field::Field;
+use crate::mesh::Bounds;
 use crate::rotation::nearest_rotation;
 use crate::team::map_indices;
 
@@ -173,8 +174,6 @@ impl Splats {
     /// largest ones are left out, unless nothing remains: captures contain haze and background.
     #[must_use]
     pub fn shells(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        const FACES: [[u32; 3]; 8] =
-            [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
         let mut sizes: Vec<f32> = self.scales.iter().map(|s| s.max_element()).collect();
         let last = sizes.len().saturating_sub(1);
         let rank = ((1.0 - LARGEST_SHARE) * last as f64).ceil() as usize;
@@ -186,14 +185,55 @@ impl Splats {
         if kept.is_empty() {
             kept = (0..self.len()).collect();
         }
-        let corners = |&splat: &usize| {
-            let [x, y, z] = (SHELL_SIGMAS * self.axes(splat)).to_cols_array_2d().map(Vec3::from_array);
-            [x, -x, y, -y, z, -z].map(|axis| self.positions[splat] + axis)
-        };
-        let positions = kept.iter().flat_map(corners).collect();
-        let of_splat = |k: u32| FACES.map(|face| face.map(|corner| 6 * k + corner));
-        (positions, (0..kept.len() as u32).flat_map(of_splat).collect())
+        let corners = |&splat: &usize| octahedron(self.positions[splat], SHELL_SIGMAS * self.axes(splat));
+        (kept.iter().flat_map(corners).collect(), octahedra(kept.len()))
     }
+}
+
+/// Octahedra around the corners' mean of every cell of a grid that contains points: the shells of a point cloud. The grid
+/// is the finest one of a cascade whose cells have six occupied neighbours or more on average, as those of a sampled
+/// surface do.
+#[must_use]
+pub fn shells_of_points(points: &[Vec3]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    /// Cells along the longest side of the box, finest first.
+    const CELLS: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
+    /// Half diagonal of an octahedron that covers a cell, cells.
+    const REACH: f32 = 1.5;
+    let Some(bounds) = Bounds::of(points) else { return (Vec::new(), Vec::new()) };
+    let longest = bounds.extent().max_element();
+    for cells in CELLS {
+        let size = (longest / cells).max(f32::MIN_POSITIVE);
+        let mut occupied: Vec<[i32; 3]> =
+            points.iter().map(|&p| ((p - bounds.min) / size).floor().as_ivec3().to_array()).collect();
+        occupied.sort_unstable();
+        occupied.dedup();
+        let is_neighbour = |&[x, y, z]: &[i32; 3], k: i32| {
+            let other = [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1];
+            occupied.binary_search(&other).is_ok()
+        };
+        let neighbours = |cell: &[i32; 3]| (0..27).filter(|&k| k != 13 && is_neighbour(cell, k)).count();
+        let total: usize = occupied.iter().map(neighbours).sum();
+        if total >= 6 * occupied.len() || cells == CELLS[CELLS.len() - 1] {
+            let center = |cell: &[i32; 3]| bounds.min + size * (IVec3::from_array(*cell).as_vec3() + 0.5);
+            let of_cell =
+                |cell: &[i32; 3]| octahedron(center(cell), Mat3::from_diagonal(Vec3::splat(REACH * size)));
+            return (occupied.iter().flat_map(of_cell).collect(), octahedra(occupied.len()));
+        }
+    }
+    (Vec::new(), Vec::new())
+}
+
+/// Corners of an octahedron with the given half diagonals.
+fn octahedron(center: Vec3, half: Mat3) -> [Vec3; 6] {
+    let [x, y, z] = half.to_cols_array_2d().map(Vec3::from_array);
+    [x, -x, y, -y, z, -z].map(|half| center + half)
+}
+
+/// Faces of `n` octahedra.
+fn octahedra(n: usize) -> Vec<[u32; 3]> {
+    const FACES: [[u32; 3]; 8] =
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    (0..n as u32).flat_map(|k| FACES.map(|face| face.map(|corner| 6 * k + corner))).collect()
 }
 
 /// Covariance matrix A A^T of a splat with axes A: xx, xy, xz, yy, yz, zz.

@@ -25,6 +25,28 @@ pub enum WriteError {
     /// The model has no triangles, which a GLB export needs.
     #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
     NoFaces,
+    /// A splat does not fit into the format.
+    #[error(
+        "splat {splat} has {what} {value}, more than the limit of {limit}: scale the capture, or write another format"
+    )]
+    Splat {
+        /// Index of the splat, from 0.
+        splat: usize,
+        /// Name of the number.
+        what: &'static str,
+        /// The number.
+        value: String,
+        /// The largest number that can be written.
+        limit: &'static str,
+    },
+    /// The format stores splats, but the model has none.
+    #[error("the model has no splats, but a {} stores nothing else: export {}", format.to_uppercase(), others)]
+    NoSplats {
+        /// Extension of the format.
+        format: &'static str,
+        /// Formats that store faces.
+        others: String,
+    },
     /// The operation needs a rig, but the model is not a glTF.
     #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,

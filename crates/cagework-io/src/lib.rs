@@ -1,4 +1,4 @@
-//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF), weights (NPZ) and projects, as bytes.
+//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF), Gaussian splats (3DGS PLY, .splat, SPZ, GLB), weights (NPZ) and projects, as bytes.
 //!
 //! The crate uses no file system and no clock, so it compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the
 //! document it was read from, and an export is that document with new vertex positions: materials, texture coordinates,
@@ -8,6 +8,7 @@
 //! then by ascending index of the nodes that show the mesh, then by triangle primitive of the mesh. If each
 //! mesh is shown once, this is document order.
 
+mod blender;
 mod counts;
 mod error;
 mod gltf;
@@ -30,10 +31,12 @@ mod rigged;
 mod select;
 mod shown;
 mod siblings;
+mod splats;
 mod stl;
 mod textures;
 mod up;
 
+pub use blender::write_field_blender;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
 pub use gltf::{
@@ -55,6 +58,7 @@ pub use rigged::UnknownClip;
 pub use select::SelectError;
 pub use shown::{escaped, json_fault, shown, value_fault};
 pub use siblings::Resolve;
+pub use splats::SplatError;
 pub use textures::TexturePlan;
 pub use up::UpAxis;
 

@@ -9,9 +9,11 @@ pub use cage::PoseState;
 pub use format::{FormatError, FormatFacts, ModelFormat};
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
+use cagework_core::splats::Splats;
 use cagework_core::{PolygonMesh, TriMesh};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use thiserror::Error;
 
 use crate::counts::Counts;
@@ -22,6 +24,7 @@ use crate::origin::{far_notice, relative};
 use crate::polygons::{Encoding, PolygonsError};
 use crate::shown::shown;
 use crate::siblings::Resolve;
+use crate::splats::{Capture, SplatError};
 use crate::up::UpAxis;
 use read::Source;
 
@@ -58,6 +61,14 @@ pub enum ReadError {
         /// What is wrong in the file.
         source: PolygonsError,
     },
+    /// Error in a file of splats.
+    #[error("{}: {source}", shown(name))]
+    Splats {
+        /// Name given by the caller.
+        name: String,
+        /// What is wrong in the file.
+        source: SplatError,
+    },
     /// Error in a glTF file.
     #[error("{}: {source}", shown(name))]
     Gltf {
@@ -91,7 +102,9 @@ pub struct Model {
     /// Of PLY, STL and OFF files: the encoding of numbers, and whether vertices have normals.
     encoding: Encoding,
     has_normals: bool,
+    /// Without faces for a capture.
     pub(crate) document: Document,
+    pub(crate) capture: Option<Arc<Capture>>,
 }
 
 #[derive(Clone, Debug)]
@@ -159,6 +172,21 @@ impl Model {
         Ok(Self { origin, ..model })
     }
 
+    /// A capture of splats, whose positions are relative to `origin`.
+    ///
+    /// # Errors
+    /// [`ReadError`] if there are no splats, or a number is not finite.
+    ///
+    /// # Panics
+    /// If the arrays have different numbers of splats.
+    pub fn of_splats(name: &str, splats: Splats, origin: DVec3) -> Result<Self, ReadError> {
+        if splats.is_empty() {
+            return Err(ReadError::Splats { name: name.into(), source: SplatError::Empty });
+        }
+        let source = Source { name, bytes: &[], resolve: &mut |_| None, memory_limit: u64::MAX, near: false };
+        source.new_capture(splats, origin)
+    }
+
     fn read_from(
         name: &str,
         bytes: &[u8],
@@ -205,6 +233,14 @@ impl Model {
     /// Sets the up axis of the file and converts the positions to Y up. Exports use the file's axes.
     pub fn set_up(&mut self, up: UpAxis) {
         self.positions = up.turned(&self.positions_in_file()).into_owned();
+        if up != self.up
+            && let Some(capture) = &mut self.capture
+        {
+            let [from, to] = [self.up, up].map(|up| Quat::from_mat4(&up.turn()));
+            let capture = Arc::make_mut(capture);
+            capture.splats = capture.splats.rotated(to * from.inverse());
+            capture.splats.positions.clone_from(&self.positions);
+        }
         self.up = up;
     }
 
@@ -222,8 +258,17 @@ impl Model {
             let positions: Vec<Vec3> = self.positions_in_file().iter().map(from).collect();
             self.positions = self.up.turned(&positions).into_owned();
             self.origin = origin;
+            if let Some(capture) = &mut self.capture {
+                Arc::make_mut(capture).splats.positions.clone_from(&self.positions);
+            }
             self.notices.extend(far_notice(&self.positions));
         }
+    }
+
+    /// The splats of a capture, in the axes of [`Self::positions`], which are their centres.
+    #[must_use]
+    pub fn splats(&self) -> Option<&Splats> {
+        self.capture.as_ref().map(|capture| &capture.splats)
     }
 
     /// Rest positions in the file's axes, relative to the origin.

@@ -1,6 +1,7 @@
 //! Rigged models: skeleton, morph targets and clips.
 
 use cagework_core::skin::skin_vertices;
+use cagework_core::splats::{Splats, shells_of_points};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
@@ -173,11 +174,17 @@ impl Model {
     }
 
     /// Vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
-    /// weights 0 and 1, and frames of a clip.
+    /// weights 0 and 1, and frames of a clip. For splats and points, octahedra around them.
     ///
     /// # Errors
     /// [`UnknownClip`] if there is no such clip. If the rig cannot be read, the result contains the rest shape only.
     pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), UnknownClip> {
+        if self.n_faces() == 0 {
+            if let Some(asked) = clip {
+                Clip::named(&[], asked)?;
+            }
+            return Ok(self.splats().map_or_else(|| shells_of_points(&self.positions), Splats::shells));
+        }
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         if let Ok(Some(rig)) = self.rig() {
             let ends: Vec<Vec3> = rig.shown_ends().filter(|end| end.is_finite()).collect();

@@ -6,14 +6,16 @@ use cagework_core::{PolygonMesh, choice};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
 choice! {
-    /// The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
-    /// read and back when written. Both rotations are exact.
+    /// The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
+    /// they are read, and back when they are written. The rotations are exact.
     UpAxis {
         /// Y is up, as glTF prescribes.
         #[default]
         Y = "y",
         /// Z is up, as in CAD programs and in some OBJ files.
         Z = "z",
+        /// -Y, as captures of Gaussian splats often have it.
+        YDown = "y_down",
     }
 }
 
@@ -24,6 +26,7 @@ impl UpAxis {
         match self {
             Self::Y => positions.into(),
             Self::Z => positions.iter().map(|p| Vec3::new(p.x, p.z, -p.y)).collect(),
+            Self::YDown => positions.iter().map(|p| Vec3::new(p.x, -p.y, -p.z)).collect(),
         }
     }
 
@@ -33,6 +36,7 @@ impl UpAxis {
         match self {
             Self::Y => positions.into(),
             Self::Z => positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect(),
+            Self::YDown => self.turned(positions),
         }
     }
 
@@ -42,6 +46,7 @@ impl UpAxis {
         match self {
             Self::Y => v,
             Self::Z => DVec3::new(v.x, v.z, -v.y),
+            Self::YDown => DVec3::new(v.x, -v.y, -v.z),
         }
     }
 
@@ -51,6 +56,7 @@ impl UpAxis {
         match self {
             Self::Y => v,
             Self::Z => DVec3::new(v.x, -v.z, v.y),
+            Self::YDown => self.vector_turned(v),
         }
     }
 
@@ -60,6 +66,7 @@ impl UpAxis {
         match self {
             Self::Y => Mat4::IDENTITY,
             Self::Z => Mat4::from_cols(Vec4::X, Vec4::NEG_Z, Vec4::Y, Vec4::W),
+            Self::YDown => Mat4::from_cols(Vec4::X, Vec4::NEG_Y, Vec4::NEG_Z, Vec4::W),
         }
     }
 

@@ -159,7 +159,7 @@ fn generated_types_are_up_to_date() {
     text += &constant("COORDINATES", "readonly Coordinates[]", &kinds);
     let all =
         |of: fn(&FormatFacts) -> &'static [&'static str]| ModelFormat::ALL.map(|f| of(f.facts())).concat();
-    let shapes = ModelFormat::ALL.into_iter().filter(|format| !format.holds_poses());
+    let shapes = ModelFormat::ALL.into_iter().filter(|format| format.holds_faces() && !format.holds_poses());
     for (about, name, values) in [
         ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(|facts| facts.endings)),
         ("MIME types of models.", "MODEL_TYPES", all(|facts| facts.mime_types)),

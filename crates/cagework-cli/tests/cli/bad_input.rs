@@ -58,7 +58,6 @@ fn files_that_are_not_models_are_rejected() {
         "huge.glb",
         "huge.gltf",
         "nan.obj",
-        "faceless.obj",
         "index.obj",
         "folder.obj",
         "missing.obj",
@@ -71,7 +70,8 @@ fn files_that_are_not_models_are_rejected() {
     assert_refused(&sandbox, "info folder.obj", &["is a folder"]);
     assert_refused(&sandbox, "info missing.obj", &["no such file"]);
     assert_refused(&sandbox, "info empty.obj", &["is empty"]);
-    assert_refused(&sandbox, "info faceless.obj", &["3 vertices", "no faces"]);
+    assert_refused(&sandbox, "bind faceless.obj --cage cage.obj", &["3 vertices", "no faces"]);
+    assert_refused(&sandbox, "bind mesh.obj --cage faceless.obj", &["3 vertices", "no faces"]);
 }
 
 #[test]

@@ -20,5 +20,6 @@ mod refit;
 mod render;
 mod rigs;
 mod siblings;
+mod splats;
 mod support;
 mod usage;

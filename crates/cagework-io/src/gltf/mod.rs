@@ -23,6 +23,7 @@ mod scene;
 mod select;
 mod size;
 mod skin;
+mod splats;
 
 use std::sync::Arc;
 
@@ -36,6 +37,7 @@ use crate::memory::MemoryError;
 use crate::origin::origin_near;
 use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
+use crate::splats::{RawSplats, SplatError};
 use scene::{Instance, Worlds};
 
 pub(crate) use animate::{Pose, PoseTiming};
@@ -49,6 +51,7 @@ pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Rest, embed_images, patch};
 pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape};
+pub(crate) use splats::write as write_splats;
 
 /// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
 fn size_of_total(found: u64, declared: u64) -> String {
@@ -165,6 +168,9 @@ pub enum GltfError {
         /// Problem, as a predicate.
         problem: &'static str,
     },
+    /// The splats cannot be read.
+    #[error(transparent)]
+    Splats(#[from] SplatError),
     /// The default scene shows no triangles.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
@@ -231,6 +237,8 @@ pub(crate) struct GltfModel {
     pub(crate) document: GltfDocument,
     pub(crate) counts: Counts,
     pub(crate) notices: Vec<String>,
+    /// Splats of a file without triangles. All other members except the notices are empty.
+    pub(crate) splats: Option<RawSplats>,
 }
 
 /// Reads a glTF or GLB file using at most `memory_limit` bytes. `resolve` returns external files by decoded
@@ -260,6 +268,17 @@ pub(crate) fn read(
         bytes: loaded.bytes,
         slots: Vec::new(),
     };
+    if let Some(splats) = splats::read(&document, loaded.bytes, memory_limit)? {
+        return Ok(GltfModel {
+            origin: DVec3::ZERO,
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            document,
+            counts: Counts::default(),
+            notices,
+            splats: Some(splats),
+        });
+    }
     // The caller frees the file after reading, so the document's memory does not include it.
     let model = size::check(&document, loaded.bytes, memory_limit)?;
     document.bytes = loaded.bytes - bytes.len() as u64 + model;
@@ -283,6 +302,7 @@ pub(crate) fn read(
         document,
         counts,
         notices,
+        splats: None,
     })
 }
 

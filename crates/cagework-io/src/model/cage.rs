@@ -113,7 +113,7 @@ impl Model {
             let hint = if pose.format.keeps(Kept::Order) {
                 "export it from the cage itself, with the settings of the cage's export".to_owned()
             } else {
-                format!("write it as {}, which keep the order", ModelFormat::listed(Some(Kept::Order)))
+                format!("write it as {}, which keep the order", ModelFormat::listed(Kept::Order))
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }

@@ -9,6 +9,7 @@ use crate::error::WriteError;
 use crate::polygons::Shape;
 use crate::shown::shown;
 use crate::siblings::Resolve;
+use crate::splats::{records, spz};
 use crate::{gltf, obj, off, ply, stl};
 
 /// Facts about a format, and its functions.
@@ -39,11 +40,19 @@ pub struct FormatFacts {
     pub(super) bytes_to_write: fn(&Model, u64) -> u64,
     /// What a file in this format keeps of a model that was read from another format.
     keeps: &'static [Kept],
+    /// Whether a file is recognised by its extension alone, whatever its bytes look like.
+    is_unmarked: bool,
 }
 
 /// A property of a model that files of some formats keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kept {
+    /// Meshes, and not splats alone.
+    Faces,
+    /// Gaussian splats.
+    Splats,
+    /// Spherical harmonics of splats.
+    Harmonics,
     /// The order of the vertices.
     Order,
     /// All digits of positions far from the origin.
@@ -74,6 +83,7 @@ const PLAIN: FormatFacts = FormatFacts {
     write: Model::write_obj,
     bytes_to_write: |_, shape| shape,
     keeps: &[],
+    is_unmarked: false,
 };
 
 /// Defines [`ModelFormat`] and the facts about each format.
@@ -125,7 +135,18 @@ formats! {
         write: Model::write_glb,
         // Each primitive adds about 6000 bytes of JSON for new accessors and buffer views.
         bytes_to_write: |model, shape| shape + 6000 * model.counts.primitives as u64 + model.bytes,
-        keeps: &[Kept::Digits, Kept::Colors, Kept::Texcoords, Kept::Materials, Kept::Rig, Kept::Poses],
+        keeps: &[
+            Kept::Faces,
+            Kept::Splats,
+            Kept::Harmonics,
+            Kept::Digits,
+            Kept::Colors,
+            Kept::Texcoords,
+            Kept::Materials,
+            Kept::Rig,
+            Kept::Poses,
+        ],
+        is_unmarked: false,
     };
     /// Wavefront OBJ.
     Obj = "obj": FormatFacts {
@@ -135,7 +156,7 @@ formats! {
         named_files: obj::named_files,
         // A vertex of an OBJ without normals needs a third of the memory.
         bytes_to_write: |model, shape| shape / 3 + model.bytes,
-        keeps: &[Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
+        keeps: &[Kept::Faces, Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
         ..PLAIN
     };
     /// Stanford PLY, text or binary.
@@ -143,9 +164,16 @@ formats! {
         endings: &["ply"],
         is: ply::is_ply,
         marked: &[["ply", "not a PLY", "its first line is not 'ply'"]],
-        read: |source| source.polygons(ModelFormat::Ply, ply::read),
+        read: |source| source.ply(),
         write: |model, positions| model.shape(positions).map(|shape| ply::write(&shape)),
-        keeps: &[Kept::Order, Kept::Digits, Kept::Colors],
+        keeps: &[
+            Kept::Faces,
+            Kept::Splats,
+            Kept::Harmonics,
+            Kept::Order,
+            Kept::Digits,
+            Kept::Colors,
+        ],
         ..PLAIN
     };
     /// STL, text or binary.
@@ -154,6 +182,7 @@ formats! {
         is: stl::is_stl,
         read: |source| source.polygons(ModelFormat::Stl, stl::read),
         write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),
+        keeps: &[Kept::Faces],
         ..PLAIN
     };
     /// Geomview OFF, text: OFF, COFF, NOFF.
@@ -165,7 +194,24 @@ formats! {
             let has_normals = model.has_normals && model.format == ModelFormat::Off;
             model.shape(positions).map(|shape| off::write(&Shape { has_normals, ..shape }))
         },
-        keeps: &[Kept::Order, Kept::Digits, Kept::Colors],
+        keeps: &[Kept::Faces, Kept::Order, Kept::Digits, Kept::Colors],
+        ..PLAIN
+    };
+    /// Gaussian splats of 32 bytes each.
+    Splat = "splat": FormatFacts {
+        endings: &["splat"],
+        read: |source| source.splats(ModelFormat::Splat, records::read),
+        keeps: &[Kept::Splats],
+        is_unmarked: true,
+        ..PLAIN
+    };
+    /// Compressed Gaussian splats by Niantic Labs.
+    Spz = "spz": FormatFacts {
+        endings: &["spz"],
+        is: spz::is_spz,
+        marked: &[["spz", "not an SPZ", "it is not a gzip stream that begins with 'NGSP'"]],
+        read: |source| source.splats(ModelFormat::Spz, spz::read),
+        keeps: &[Kept::Splats, Kept::Harmonics],
         ..PLAIN
     };
 }
@@ -199,9 +245,21 @@ impl ModelFormat {
         self.facts().keeps.contains(&what)
     }
 
+    /// Whether a file can store meshes, and not splats alone.
+    #[must_use]
+    pub fn holds_faces(self) -> bool {
+        self.keeps(Kept::Faces)
+    }
+
+    /// Whether a file can store Gaussian splats.
+    #[must_use]
+    pub fn holds_splats(self) -> bool {
+        self.keeps(Kept::Splats)
+    }
+
     /// Extensions of the formats that can be written and keep `what`, as text: "OBJ, PLY or OFF".
-    pub(crate) fn listed(what: Option<Kept>) -> String {
-        let all = Self::ALL.into_iter().filter(|format| what.is_none_or(|what| format.keeps(what)));
+    pub(crate) fn listed(what: Kept) -> String {
+        let all = Self::ALL.into_iter().filter(|format| format.keeps(what));
         let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();
         names.split_last().map_or(String::new(), |(last, others)| format!("{} or {last}", others.join(", ")))
     }
@@ -223,9 +281,17 @@ impl ModelFormat {
     /// [`FormatError`] if the content contradicts the file's extension or is known to be something else.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint: &str| Err(FormatError { name: name.into(), found, hint: hint.into() });
-        let export = format!("export it as {}", Self::listed(None));
-        let unmarked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let text = unmarked.trim_ascii_start();
+        let export = format!("export it as {}", Self::listed(Kept::Faces));
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let ending = extension(name);
+        if ["sog", "ksplat", "lcc"].contains(&ending.as_str()) {
+            let hint = format!("convert it with `splat-transform IN.{ending} OUT.ply`");
+            return fault("a compressed capture of Gaussian splats", &hint);
+        }
+        let unmarked = |format: &Self| format.facts().is_unmarked && !bytes.is_empty();
+        if let Some(format) = Self::of_ending(&ending).filter(unmarked) {
+            return Ok(format);
+        }
         if let Some(found) = Self::ALL.into_iter().find(|format| (format.facts().is)(bytes)) {
             return Ok(found);
         }
@@ -248,12 +314,11 @@ impl ModelFormat {
         if let Some(found) = Self::ALL.into_iter().find(|format| (format.facts().is_text)(text)) {
             return Ok(found);
         }
-        let extension = extension(name);
-        if ["fbx", "dae", "usdz", "usd", "3ds", "blend"].contains(&extension.as_str()) {
+        if ["fbx", "dae", "usdz", "usd", "3ds", "blend"].contains(&ending.as_str()) {
             return fault("in an unsupported format", &export);
         }
-        let format = Self::of_ending(&extension).unwrap_or(Self::Obj);
-        match format.facts().marked.iter().find(|[ending, ..]| *ending == extension) {
+        let format = Self::of_ending(&ending).unwrap_or(Self::Obj);
+        match format.facts().marked.iter().find(|[of, ..]| *of == ending) {
             Some([_, found, sign]) => fault(found, &format!("{sign}: it is damaged or has the wrong name")),
             None => Ok(format),
         }
@@ -287,7 +352,7 @@ mod tests {
 
     #[test]
     fn lists_name_the_formats_that_keep_something() {
-        assert_eq!(ModelFormat::listed(None), "GLB, OBJ, PLY, STL or OFF");
-        assert_eq!(ModelFormat::listed(Some(Kept::Order)), "OBJ, PLY or OFF");
+        assert_eq!(ModelFormat::listed(Kept::Faces), "GLB, OBJ, PLY, STL or OFF");
+        assert_eq!(ModelFormat::listed(Kept::Order), "OBJ, PLY or OFF");
     }
 }

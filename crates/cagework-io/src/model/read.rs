@@ -1,14 +1,18 @@
 //! Reads models from the contents of files.
 
-use glam::DVec3;
+use std::sync::Arc;
+
+use cagework_core::splats::Splats;
+use glam::{DVec3, Vec3};
 
 use super::{Document, Model, ModelFormat, ReadError};
 use crate::counts::Counts;
 use crate::origin::origin_near;
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::siblings::Resolve;
+use crate::splats::{self, Capture, RawSplats, ReadSplats, Records, SplatError};
 use crate::up::UpAxis;
-use crate::{gltf, obj};
+use crate::{gltf, obj, ply};
 
 /// A file to read.
 pub(super) struct Source<'a, 'b> {
@@ -23,8 +27,13 @@ pub(super) struct Source<'a, 'b> {
 impl Source<'_, '_> {
     pub(super) fn gltf(self) -> Result<Model, ReadError> {
         let origin = (!self.near).then_some(DVec3::ZERO);
-        let model = gltf::read(self.name, self.bytes, self.resolve, self.memory_limit, origin)
+        let mut model = gltf::read(self.name, self.bytes, self.resolve, self.memory_limit, origin)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
+        if let Some(raw) = model.splats.take() {
+            let mut read = raw.finish(self.near, Records::New).map_err(|e| self.splat_fault(e))?;
+            read.notices.append(&mut model.notices);
+            return Ok(self.capture(ModelFormat::Gltf, read));
+        }
         Ok(Model {
             name: self.name.into(),
             positions: model.positions,
@@ -38,6 +47,7 @@ impl Source<'_, '_> {
             encoding: Encoding::default(),
             has_normals: false,
             document: Document::Gltf(Box::new(model.document)),
+            capture: None,
         })
     }
 
@@ -70,7 +80,58 @@ impl Source<'_, '_> {
             encoding: Encoding::default(),
             has_normals: false,
             document: Document::Obj(Box::new(model.document)),
+            capture: None,
         })
+    }
+
+    /// Reads a PLY: splats, polygons or points.
+    pub(super) fn ply(self) -> Result<Model, ReadError> {
+        if splats::ply::is_splats(self.bytes) {
+            return self.splats(ModelFormat::Ply, splats::ply::read);
+        }
+        self.polygons(ModelFormat::Ply, ply::read)
+    }
+
+    /// Reads a format of splats.
+    pub(super) fn splats(
+        self,
+        format: ModelFormat,
+        read: fn(&[u8], u64, bool) -> Result<ReadSplats, SplatError>,
+    ) -> Result<Model, ReadError> {
+        let read = read(self.bytes, self.memory_limit, self.near).map_err(|e| self.splat_fault(e))?;
+        Ok(self.capture(format, read))
+    }
+
+    fn splat_fault(&self, source: SplatError) -> ReadError {
+        ReadError::Splats { name: self.name.into(), source }
+    }
+
+    fn capture(&self, format: ModelFormat, read: ReadSplats) -> Model {
+        let splats = read.splats;
+        let each = Splats::bytes_per_splat(splats.degree) + size_of::<Vec3>() as u64;
+        Model {
+            name: self.name.into(),
+            positions: splats.positions.clone(),
+            triangles: Vec::new(),
+            counts: Counts { nodes: 1, meshes: 1, primitives: 1, ..Counts::default() },
+            notices: read.notices,
+            up: UpAxis::Y,
+            origin: read.origin,
+            bytes: 2 * self.bytes.len() as u64 + each * splats.len() as u64,
+            format,
+            encoding: Encoding::default(),
+            has_normals: false,
+            document: Document::Obj(Box::default()),
+            capture: Some(Arc::new(Capture { splats, file: self.bytes.to_vec(), records: read.records })),
+        }
+    }
+
+    /// A capture that was not read from a file.
+    pub(super) fn new_capture(self, splats: Splats, origin: DVec3) -> Result<Model, ReadError> {
+        let positions = splats.positions.iter().map(|p| p.as_dvec3()).collect();
+        let read =
+            RawSplats { splats, positions }.finish(false, Records::New).map_err(|e| self.splat_fault(e))?;
+        Ok(self.capture(ModelFormat::Ply, ReadSplats { origin, ..read }))
     }
 
     /// Reads a file of polygons (PLY, STL or OFF).
@@ -102,6 +163,7 @@ impl Source<'_, '_> {
             has_normals: read.has_normals,
             positions: read.positions,
             document: Document::Obj(Box::new(document)),
+            capture: None,
         })
     }
 }

@@ -4,7 +4,9 @@ use std::borrow::Cow;
 
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
-use glam::{DVec3, Vec3};
+use cagework_core::field::{Field, bend_vertices};
+use cagework_core::splats::Splats;
+use glam::{DVec3, Quat, Vec3};
 
 use super::format::Kept;
 use super::{Document, Model, ModelFormat};
@@ -12,6 +14,8 @@ use crate::error::WriteError;
 use crate::gltf::{self, Pose, PoseTiming, Rest};
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
+use crate::splats::{self, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
+use crate::up::UpAxis;
 
 impl Model {
     /// Exports the model with new positions as `format`.
@@ -19,7 +23,79 @@ impl Model {
     /// # Errors
     /// Those of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        (format.facts().write)(self, positions)
+        match &self.capture {
+            Some(capture) if format.holds_splats() => {
+                self.check(positions)?;
+                self.write_splats(format, &Splats { positions: positions.to_vec(), ..capture.splats.clone() })
+            }
+            _ if format.holds_faces() => (format.facts().write)(self, positions),
+            _ => {
+                let others = ModelFormat::listed(Kept::Faces);
+                Err(WriteError::NoSplats { format: format.export_extension(), others })
+            }
+        }
+    }
+
+    /// Exports the model deformed by a field, whose space is that of [`Self::positions`]: splats with their shapes and
+    /// spherical harmonics, otherwise the vertices.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_in_field(&self, format: ModelFormat, field: &Field) -> Result<Vec<u8>, WriteError> {
+        match &self.capture {
+            Some(capture) if format.holds_splats() => {
+                self.write_splats(format, &capture.splats.deformed(field))
+            }
+            _ => {
+                let mut positions = self.positions.clone();
+                bend_vertices(field, &mut positions);
+                self.write(format, &positions)
+            }
+        }
+    }
+
+    /// Exports a capture with new positions, shapes and spherical harmonics. In the format of its file, splats that did
+    /// not change keep their bytes, and the others keep everything else.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the model is no capture, the format stores no splats, the number of splats differs, or a number is
+    /// not finite.
+    pub fn write_splats(&self, format: ModelFormat, splats: &Splats) -> Result<Vec<u8>, WriteError> {
+        let Some(capture) = self.capture.as_ref().filter(|_| format.holds_splats()) else {
+            let others = ModelFormat::listed(Kept::Faces);
+            return Err(WriteError::NoSplats { format: format.export_extension(), others });
+        };
+        self.check(&splats.positions)?;
+        let fits = |scale: &Vec3| scale.max_element() <= MAX_SCALE;
+        if let Some(splat) = splats.scales.iter().position(|scale| !fits(scale)) {
+            let (value, limit) = (splats.scales[splat].to_string(), "1e15");
+            return Err(WriteError::Splat { splat, what: "the scale", value, limit });
+        }
+        let is_same = format == self.format && !capture.file.is_empty();
+        let changed = is_same.then(|| changed(&capture.splats, splats));
+        // A .gltf is not a whole file.
+        let is_whole = format != ModelFormat::Gltf || capture.file.starts_with(b"glTF");
+        if changed.as_ref().is_some_and(|changed| is_whole && !changed.contains(&true)) {
+            return Ok(capture.file.clone());
+        }
+        let turned;
+        let splats = if self.up == UpAxis::Y {
+            splats
+        } else {
+            let positions = self.up.turned_back(&splats.positions).into_owned();
+            turned = Splats { positions, ..splats.rotated(Quat::from_mat4(&self.up.turn()).inverse()) };
+            &turned
+        };
+        let to_write = SplatsToWrite { splats, origin: self.origin, changed: changed.as_deref() };
+        Ok(match (format, &capture.records) {
+            (ModelFormat::Ply, Records::Ply(table)) => splats::ply::write(&to_write, Some(table)),
+            (ModelFormat::Ply, _) => splats::ply::write(&to_write, None),
+            (ModelFormat::Splat, Records::Splat) => records::write(&to_write, Some(&capture.file)),
+            (ModelFormat::Splat, _) => records::write(&to_write, None),
+            (ModelFormat::Spz, Records::Spz(body)) => spz::write(&to_write, Some(body))?,
+            (ModelFormat::Spz, _) => spz::write(&to_write, None)?,
+            _ => gltf::write_splats(&to_write)?,
+        })
     }
 
     /// A sentence that lists what an export to `format` loses; `None` if it loses nothing.
@@ -51,7 +127,11 @@ impl Model {
                 )
             }
         };
+        let is_mesh_of_splats = self.capture.is_some() && !format.holds_splats();
+        let has_harmonics = self.splats().is_some_and(|splats| splats.degree > 0) && format.holds_splats();
         let all = [
+            (is_mesh_of_splats, "everything but the centres of the splats"),
+            (has_harmonics && loses(Kept::Harmonics), "spherical harmonics of the splats"),
             (colors, "colours"),
             (texcoords, "texture coordinates"),
             (materials, "materials and textures"),

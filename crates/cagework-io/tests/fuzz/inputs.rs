@@ -1,9 +1,14 @@
 //! Numbered fuzz inputs: files of every readable kind, with random damage.
 
+use std::io::{Read as _, Write as _};
+
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
 use cagework_core::{Frames, PolygonMesh, Weights, subdivided_box};
 use cagework_io::{ModelFormat, encode_pose, write_cage_obj, write_project, write_weights_npz};
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -92,7 +97,29 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     samples.push(
         b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
     );
+    let capture = read("a.ply", &splats()).expect("the capture is valid");
+    for format in ModelFormat::ALL.into_iter().filter(|format| format.holds_splats()) {
+        samples.push(capture.write(format, &capture.positions).expect("the capture is valid"));
+    }
     samples
+}
+
+/// A text PLY of four splats with spherical harmonics of degree 1 and a property that is not read.
+fn splats() -> Vec<u8> {
+    let rest: String = (0..9).map(|k| format!("property float f_rest_{k}\n")).collect();
+    let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 label";
+    let others: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
+    let numbers: String = (0..4 * 24).map(|k| format!("{} ", ((7 * k % 13) as f32 - 6.0) / 4.0)).collect();
+    format!("ply\nformat ascii 1.0\nelement vertex 4\n{rest}{others}end_header\n{numbers}\n").into_bytes()
+}
+
+/// A file compressed by gzip, with damage to the uncompressed bytes.
+fn gzip_damaged(gzipped: &[u8], damage: &[Damage]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    GzDecoder::new(gzipped).read_to_end(&mut bytes).expect("the sample is valid");
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(&damaged(bytes, damage)).expect("a Vec takes all bytes");
+    encoder.finish().expect("a Vec takes all bytes")
 }
 
 /// A rig with shared data: a second mesh and clip with the same accessors, channels with one sampler, sparse positions.
@@ -138,7 +165,10 @@ pub(crate) fn cages() -> Vec<PolygonMesh> {
 
 fn files() -> BoxedStrategy<Vec<u8>> {
     let samples = samples();
-    let glbs = samples[..N_GLB].to_vec();
+    let mut glbs = samples[..N_GLB].to_vec();
+    glbs.extend(samples.iter().rev().find(|sample| sample.starts_with(b"glTF")).cloned());
+    let gzipped =
+        samples.iter().find(|sample| sample.starts_with(&[0x1f, 0x8b])).expect("one is an SPZ").clone();
     let texts: Vec<String> =
         cages().iter().map(|c| String::from_utf8(write_cage_obj(c, DVec3::ZERO)).expect("text")).collect();
     let magic: Vec<&[u8]> =
@@ -151,6 +181,7 @@ fn files() -> BoxedStrategy<Vec<u8>> {
         3 => (select(glbs), prop::collection::vec((any::<Index>(), odd_value()), 1..4), any::<bool>())
             .prop_map(|(glb, changes, as_text)| odd_json(&glb, changes, as_text)),
         5 => (select(texts), prop::collection::vec(line_damage(), 1..6)).prop_map(|(text, damage)| damaged_lines(&text, &damage)),
+        1 => prop::collection::vec(damage(), 1..6).prop_map(move |damage| gzip_damaged(&gzipped, &damage)),
         2 => soup(),
     ]
     .boxed()

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use cagework_cage::check::{Repair, check, repair};
 use cagework_cage::generate::{CageOptions, Shape, Symmetry, generate};
 use cagework_core::deform::deform_bound;
+use cagework_core::field::{Field, FieldWeights};
 use cagework_core::mesh::Bounds;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::Silent;
@@ -30,6 +31,8 @@ struct Rest {
     /// Points inside the cage.
     points: Vec<Vec3>,
     binding: Binding,
+    /// Field of a pose of the cube.
+    field: Field,
 }
 
 static REST: LazyLock<Rest> = LazyLock::new(|| {
@@ -39,7 +42,10 @@ static REST: LazyLock<Rest> = LazyLock::new(|| {
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
     let points = lattice(bounds);
     let binding = bind(&points, &closed, &options, &Silent).expect("points are inside");
-    Rest { samples: inputs::samples(), cage, closed, points, binding }
+    let posed: Vec<Vec3> = closed.positions().iter().map(|&p| twist(p)).collect();
+    let weights = FieldWeights::bind(&closed, GRID, &options, &Silent).expect("the cage is closed");
+    let field = weights.pose(closed.positions(), &posed);
+    Rest { samples: inputs::samples(), cage, closed, points, binding, field }
 });
 
 /// Memory limit of each reader, bytes.
@@ -77,10 +83,11 @@ pub(crate) fn survive(bytes: &[u8]) {
     if let Ok(Some(project)) = read_project("x", bytes, MEMORY_LIMIT) {
         as_cage(&project.cage, choice);
     }
-    let read =
-        Model::read_within("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok), MEMORY_LIMIT);
-    if let Ok(model) = read {
+    for name in ["x", "x.splat"] {
+        let beside = &mut |name: &str| inputs::beside(&REST.samples, name).map(Ok);
+        let Ok(model) = Model::read_within(name, bytes, beside, MEMORY_LIMIT) else { continue };
         as_file(&model);
+        as_splats(&model);
         as_rig(&model, choice);
         as_pose(&model);
         as_model(&model, choice);
@@ -115,6 +122,25 @@ fn as_file(model: &Model) {
     if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
         let again = Model::read("y.glb", &glb, &mut |_| None);
         assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+    }
+}
+
+/// Bends splats and points. Exports must be readable.
+fn as_splats(model: &Model) {
+    if model.n_faces() > 0 {
+        return;
+    }
+    for format in ModelFormat::ALL.into_iter().filter(|format| format.holds_splats()) {
+        let Ok(bytes) = model.write_in_field(format, &REST.field) else { continue };
+        let again = Model::read(&format!("y.{}", format.export_extension()), &bytes, &mut |_| None);
+        assert_eq!(again.map(|again| again.positions.len()), Ok(model.positions.len()), "{format:?}");
+    }
+    let Ok((positions, triangles)) = model.states(None) else { return };
+    assert!(triangles.iter().flatten().all(|&v| (v as usize) < positions.len()));
+    if let Some(splats) = model.splats() {
+        assert!(splats.scales.iter().all(|scale| scale.cmpge(Vec3::ZERO).all()));
+        assert!(splats.rotations.iter().all(|rotation| rotation.is_normalized()));
+        let _ = splats.n_inexact(&REST.field);
     }
 }
 

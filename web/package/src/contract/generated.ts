@@ -523,12 +523,12 @@ message: string, count: number, fix: Mend | null, };
 /**
  * File format of a model.
  */
-export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off";
+export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "splat" | "spz";
 /**
- * The up axis of a file. In memory Y is always up: files with Z up are rotated by 90 degrees about x when
- * read and back when written. Both rotations are exact.
+ * The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
+ * they are read, and back when they are written. The rotations are exact.
  */
-export type UpAxis = "y" | "z";
+export type UpAxis = "y" | "z" | "y_down";
 /**
  * Visibility of a model, and which of its parts the cage does not bend.
  */
@@ -1087,7 +1087,7 @@ export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
-export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off"] as const;
+export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off", "splat", "spz"] as const;
 /** MIME types of models. */
 export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json"] as const;
 /** Extensions of models that refer to other files. */

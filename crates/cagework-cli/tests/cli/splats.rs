@@ -1,0 +1,91 @@
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::support::{CORNERS, Sandbox, box_obj};
+
+/// A `.splat` file of splats on a sphere of radius 0.7, and one far outside the cage.
+fn capture() -> Vec<u8> {
+    const N: usize = 3000;
+    let mut bytes = Vec::new();
+    for k in 0..N {
+        let z = 1.0 - 2.0 * (k as f32 + 0.5) / N as f32;
+        let (radius, angle) = (0.7 * (1.0 - z * z).sqrt(), 2.4 * k as f32);
+        let far = if k == 7 { 30.0 } else { 0.0 };
+        let numbers = [radius * angle.cos() + far, radius * angle.sin(), 0.7 * z, 0.03, 0.02, 0.002];
+        bytes.extend(numbers.into_iter().flat_map(f32::to_le_bytes));
+        bytes.extend([200, 100, 50, 255, 255, 128, 128, 128]);
+    }
+    bytes
+}
+
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.splat", capture());
+    sandbox.write("box.obj", box_obj(&CORNERS));
+    sandbox.write("pose.obj", box_obj(&CORNERS.map(|[x, y, z]| [-y, x, z])));
+    sandbox
+}
+
+fn float(bytes: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+#[test]
+fn splats_turn_with_the_cage_and_stay_far_outside() {
+    let sandbox = sandbox();
+    let deform = "deform a.splat --cage box.obj --pose pose.obj -o turned.splat";
+    sandbox
+        .run(deform)
+        .success()
+        .stdout(contains("deformed 3,000 splats").and(contains("1 of 3,000 splats are outside the cage")));
+    let (given, turned) = (capture(), sandbox.read("turned.splat"));
+    for splat in 0..3000 {
+        let [x, y, z] = [0, 4, 8].map(|k| float(&given, 32 * splat + k));
+        let now = [0, 4, 8].map(|k| float(&turned, 32 * splat + k));
+        let expected = if splat == 7 { [x, y, z] } else { [-y, x, z] };
+        assert!(now.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{splat}: {now:?}");
+        // A quarter turn about z, as w, x, y, z: sqrt(1/2), 0, 0, sqrt(1/2), times 128 plus 128.
+        let bytes = if splat == 7 { [255, 128, 128, 128] } else { [219, 128, 128, 219] };
+        assert_eq!(turned[32 * splat + 28..32 * splat + 32], bytes);
+    }
+    sandbox.run("deform a.splat --cage box.obj --pose box.obj -o same.splat").success();
+    assert_eq!(sandbox.read("same.splat"), given);
+    for format in ["ply", "spz", "glb", "obj"] {
+        let done =
+            sandbox.json(&format!("{} --json", deform.replace("turned.splat", &format!("turned.{format}"))));
+        assert_eq!(done["outside_points"], 1);
+        sandbox.run(&format!("info turned.{format}")).success().stdout(contains("3000"));
+    }
+    let refused = |args: &str, message: &'static str| {
+        sandbox.run(args).failure().stderr(contains(message));
+    };
+    refused(&format!("{deform} --weights a.npz"), "is deformed without weights");
+    refused(&format!("{deform} --pose box.obj"), "take one pose, but 2 were given");
+    refused("map a.splat --cage box.obj --pose box.obj -o b.splat", "leave their shapes");
+    refused("bind a.splat --cage box.obj --weights a.npz", "no faces");
+}
+
+#[test]
+fn cages_of_captures_and_clouds_enclose_them() {
+    let sandbox = sandbox();
+    let cloud: String = (0..3000)
+        .map(|k| [0, 4, 8].map(|at| float(&capture(), 32 * k + at)))
+        .filter(|[x, ..]| *x < 1.0)
+        .map(|[x, y, z]| format!("{x} {y} {z} 5\n"))
+        .collect();
+    let header = "ply\nformat ascii 1.0\nelement vertex 2999\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar intensity\nend_header\n";
+    sandbox.write("cloud.ply", format!("{header}{cloud}"));
+    let info = sandbox.json("info a.splat --json");
+    assert_eq!((&info["splats"]["degree"], &info["vertices"]), (&0.into(), &3000.into()));
+    sandbox.run("info cloud.ply").success().stdout(contains("none: points"));
+    for (file, outside) in [("a.splat", 1), ("cloud.ply", 0)] {
+        let made = sandbox.json(&format!("cage {file} -o made.obj --json"));
+        assert!(made["vertices"].as_u64().unwrap() <= 80 || file == "a.splat", "{made}");
+        let done = sandbox.json(&format!("deform {file} --cage made.obj --pose made.obj -o out.ply --json"));
+        assert!(done["outside_points"].as_u64().unwrap() <= outside, "{done}");
+        sandbox.run("check made.obj").success();
+    }
+    sandbox.run("deform cloud.ply --cage box.obj --pose pose.obj -o turned.ply").success();
+    sandbox.run("info turned.ply").success().stdout(contains("2999"));
+}

@@ -1,0 +1,251 @@
+//! Captures: files of Gaussian splats. A capture keeps its file, and an export in the same format changes only the
+//! splats that moved. One submodule per format; `gltf/splats.rs` has the one of glTF.
+
+pub(crate) mod ply;
+pub(crate) mod records;
+pub(crate) mod spz;
+
+use cagework_core::splats::Splats;
+use cagework_core::words::counted;
+use glam::{DVec3, Quat, Vec3};
+use thiserror::Error;
+
+use crate::memory::MemoryError;
+use crate::polygons::Polygons;
+
+/// Factor between the coefficient of band 0 and a colour: 1 / (2 sqrt(pi)).
+const BAND_0: f32 = 0.282_094_8;
+/// Largest standard deviation of a splat, object units: its square is finite in f32.
+pub(crate) const MAX_SCALE: f32 = 1e15;
+/// Largest scale that is written as a logarithm: rounding must not lift it over the limit.
+const MAX_LOG_SCALE: f32 = 9.999e14;
+/// Smallest standard deviation that is written as a logarithm, object units.
+const MIN_SCALE: f32 = 1e-20;
+/// Opacities this close to 0 or 1 are written as this, because the logarithm of the odds is infinite at both.
+const MIN_ODDS: f32 = 1e-6;
+/// What to do about splats with invalid numbers.
+const FILTER: &str = "remove such splats with `splat-transform IN.ply --filter-nan OUT.ply`";
+
+/// Error of reading splats.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum SplatError {
+    /// The file cannot be parsed.
+    #[error("the file is damaged: {0}")]
+    Damaged(String),
+    /// The count of splats does not fit the size of the file.
+    #[error(
+        "its header counts {count} splats, which need {needed} bytes, but it has {found}: it is damaged or cut off"
+    )]
+    Count {
+        /// Declared number of splats.
+        count: u64,
+        /// Bytes that they need.
+        needed: u64,
+        /// Bytes in the file.
+        found: u64,
+    },
+    /// There are no splats.
+    #[error("it has no splats")]
+    Empty,
+    /// A property is missing.
+    #[error(
+        "its splats have no '{0}': a 3DGS file has x, y, z, f_dc_0 to f_dc_2, opacity, scale_0 to scale_2 and rot_0 to rot_3"
+    )]
+    Missing(&'static str),
+    /// A number of a splat is invalid.
+    #[error("splat {splat} has {what} {value}, but {limit}: {FILTER}")]
+    Value {
+        /// Index of the splat, from 0.
+        splat: usize,
+        /// Name of the number.
+        what: &'static str,
+        /// The number as read.
+        value: String,
+        /// The valid range.
+        limit: &'static str,
+    },
+    /// A version or variant that is not supported.
+    #[error("{0}")]
+    Unsupported(String),
+    /// The memory limit is exceeded.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+}
+
+/// Splats of a model, and the file that they were read from.
+#[derive(Clone, Debug)]
+pub(crate) struct Capture {
+    /// In the axes of the model.
+    pub(crate) splats: Splats,
+    /// The file as read; empty if the splats were not read from a file.
+    pub(crate) file: Vec<u8>,
+    /// Where the numbers of the splats are in the file, for the formats whose exports are patched.
+    pub(crate) records: Records,
+}
+
+/// Data of a file that exports in the same format keep.
+#[derive(Clone, Debug)]
+pub(crate) enum Records {
+    Ply(ply::Table),
+    Splat,
+    Spz(spz::Body),
+    /// Exports are new files.
+    New,
+}
+
+/// Splats as a reader returns them, in the axes of the file.
+pub(crate) struct ReadSplats {
+    pub(crate) splats: Splats,
+    pub(crate) origin: DVec3,
+    pub(crate) records: Records,
+    pub(crate) notices: Vec<String>,
+}
+
+/// Splats of a file while they are read.
+#[derive(Default)]
+pub(crate) struct RawSplats {
+    /// Without positions, and with rotations of any length.
+    pub(crate) splats: Splats,
+    /// Positions in the space of the file.
+    pub(crate) positions: Vec<DVec3>,
+}
+
+impl RawSplats {
+    /// Room for `count` splats.
+    ///
+    /// # Errors
+    /// [`MemoryError`] if splats and the `held` bytes need more than the limit.
+    pub(crate) fn new(count: u64, degree: u8, held: u64, limit: u64) -> Result<Self, SplatError> {
+        if count == 0 {
+            return Err(SplatError::Empty);
+        }
+        // The positions are in memory three times: as read, in the splats and in the model.
+        let each = Splats::bytes_per_splat(degree) + (size_of::<DVec3>() + size_of::<Vec3>()) as u64;
+        MemoryError::check(held.saturating_add(count.saturating_mul(each)), limit)?;
+        Ok(Self {
+            splats: Splats { degree, ..Splats::default() },
+            positions: Vec::with_capacity(count as usize),
+        })
+    }
+
+    /// Checks all numbers and normalises rotations. `near`: store positions relative to an origin near them.
+    ///
+    /// # Errors
+    /// [`SplatError::Value`] for the first number that is out of its range and cannot be repaired.
+    pub(crate) fn finish(self, near: bool, records: Records) -> Result<ReadSplats, SplatError> {
+        let Self { mut splats, positions } = self;
+        const FINITE: &str = "all numbers must be finite";
+        let n_harmonics = cagework_core::splats::n_harmonics(splats.degree);
+        let (mut n_negative, mut n_unrotated, mut n_opacities) = (0, 0, 0);
+        for (splat, position) in positions.iter().enumerate() {
+            let wrong = |what, value: String, limit| Err(SplatError::Value { splat, what, value, limit });
+            if !position.as_vec3().is_finite() {
+                return wrong("the position", position.to_string(), FINITE);
+            }
+            let scale = &mut splats.scales[splat];
+            if !scale.abs().cmple(Vec3::splat(MAX_SCALE)).all() {
+                return wrong("the scale", scale.to_string(), "the limit is 1e15");
+            }
+            if scale.is_negative_bitmask() & 7 != 0 && *scale != Vec3::ZERO {
+                n_negative += 1;
+            }
+            *scale = scale.abs();
+            let rotation = &mut splats.rotations[splat];
+            let largest = rotation.to_array().iter().fold(0.0_f32, |a, x| a.max(x.abs()));
+            if !rotation.is_finite() {
+                return wrong("the rotation", rotation.to_string(), FINITE);
+            }
+            if largest == 0.0 {
+                n_unrotated += 1;
+                *rotation = Quat::IDENTITY;
+            } else if !rotation.is_normalized() {
+                *rotation = (*rotation * largest.recip()).normalize();
+            }
+            let opacity = &mut splats.opacities[splat];
+            if opacity.is_nan() {
+                return wrong("the opacity", opacity.to_string(), FINITE);
+            }
+            if !(0.0..=1.0).contains(opacity) {
+                n_opacities += 1;
+                *opacity = opacity.clamp(0.0, 1.0);
+            }
+            let harmonics = &splats.harmonics[splat * n_harmonics..][..n_harmonics];
+            if let Some(color) = [splats.colors[splat]].iter().chain(harmonics).find(|c| !c.is_finite()) {
+                return wrong("the colour", color.to_string(), FINITE);
+            }
+        }
+        let mut notices = Vec::new();
+        let mut tell = |n: usize, what: &str| {
+            if n > 0 {
+                notices.push(format!("{} {what}", counted(n, "splat has", "splats have")));
+            }
+        };
+        tell(n_negative, "a negative scale: its absolute value is used");
+        tell(n_unrotated, "a rotation of length 0: none is used");
+        tell(n_opacities, "an opacity outside 0 to 1: it is clamped");
+        let mut placed = Polygons::default();
+        placed.place(&positions, near);
+        splats.positions = placed.positions;
+        Ok(ReadSplats { splats, origin: placed.origin, records, notices })
+    }
+}
+
+/// Which splats differ in position, scale or rotation.
+pub(crate) fn changed(before: &Splats, after: &Splats) -> Vec<bool> {
+    let differs = |s: usize| {
+        before.positions[s] != after.positions[s]
+            || before.scales[s] != after.scales[s]
+            || before.rotations[s] != after.rotations[s]
+    };
+    (0..after.len()).map(differs).collect()
+}
+
+/// Splats to write: those of a file and which of them changed, or all.
+pub(crate) struct SplatsToWrite<'a> {
+    /// In the axes of the file, relative to `origin`.
+    pub(crate) splats: &'a Splats,
+    pub(crate) origin: DVec3,
+    /// One flag per splat. `None` to write a new file.
+    pub(crate) changed: Option<&'a [bool]>,
+}
+
+impl SplatsToWrite<'_> {
+    /// Whether a splat has to be written.
+    pub(crate) fn writes(&self, splat: usize) -> bool {
+        self.changed.is_none_or(|changed| changed[splat])
+    }
+
+    /// Position in the space of the file.
+    pub(crate) fn position(&self, splat: usize) -> DVec3 {
+        self.origin + self.splats.positions[splat].as_dvec3()
+    }
+}
+
+/// Coefficients of band 0 of a colour.
+pub(crate) fn band_0(color: Vec3) -> Vec3 {
+    (color - 0.5) / BAND_0
+}
+
+/// Colour of the coefficients of band 0.
+pub(crate) fn color_of(band_0: Vec3) -> Vec3 {
+    BAND_0 * band_0 + 0.5
+}
+
+/// Opacity of the logarithm of its odds.
+pub(crate) fn sigmoid(log_odds: f32) -> f32 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+pub(crate) fn log_odds(opacity: f32) -> f32 {
+    let opacity = opacity.clamp(MIN_ODDS, 1.0 - MIN_ODDS);
+    (opacity / (1.0 - opacity)).ln()
+}
+
+pub(crate) fn log_scale(scale: Vec3) -> Vec3 {
+    scale.clamp(Vec3::splat(MIN_SCALE), Vec3::splat(MAX_LOG_SCALE)).map(f32::ln)
+}
+
+/// A number from 0 to 1 as a byte.
+pub(crate) fn unit_byte(x: f32) -> u8 {
+    (255.0 * x).round().clamp(0.0, 255.0) as u8
+}

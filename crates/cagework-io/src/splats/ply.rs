@@ -1,0 +1,406 @@
+//! 3DGS PLY files: logarithms of the scales, logarithm of the opacity's odds, rotation w, x, y, z, and spherical harmonics
+//! by channel. The table of vertices keeps properties that are not read.
+
+use glam::{DVec3, Quat, Vec3};
+
+use super::{
+    RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, band_0, color_of, log_odds, log_scale, sigmoid,
+};
+use crate::memory::MemoryError;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+
+/// Largest size of a header, bytes.
+const MAX_HEADER: usize = 1 << 20;
+const POSITION: [&str; 3] = ["x", "y", "z"];
+const COLOR: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
+const SCALE: [&str; 3] = ["scale_0", "scale_1", "scale_2"];
+/// w, x, y, z.
+const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
+const OPACITY: &str = "opacity";
+
+/// Type of a property.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn of(word: &str) -> Option<Self> {
+        Some(match word {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// Decodes a number from little-endian bytes.
+    fn get(self, bytes: [u8; 8]) -> f64 {
+        let [a, b, c, d, ..] = bytes;
+        match self {
+            Self::I8 => f64::from(a as i8),
+            Self::U8 => f64::from(a),
+            Self::I16 => f64::from(i16::from_le_bytes([a, b])),
+            Self::U16 => f64::from(u16::from_le_bytes([a, b])),
+            Self::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+            Self::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+            Self::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
+            Self::F64 => f64::from_le_bytes(bytes),
+        }
+    }
+
+    /// Encodes a number as little-endian bytes.
+    fn put(self, x: f64) -> [u8; 8] {
+        let mut bytes = [0; 8];
+        let mut set = |from: &[u8]| bytes[..from.len()].copy_from_slice(from);
+        match self {
+            Self::I8 => set(&(x as i8).to_le_bytes()),
+            Self::U8 => set(&(x as u8).to_le_bytes()),
+            Self::I16 => set(&(x as i16).to_le_bytes()),
+            Self::U16 => set(&(x as u16).to_le_bytes()),
+            Self::I32 => set(&(x as i32).to_le_bytes()),
+            Self::U32 => set(&(x as u32).to_le_bytes()),
+            Self::F32 => set(&(x as f32).to_le_bytes()),
+            Self::F64 => set(&x.to_le_bytes()),
+        }
+        bytes
+    }
+}
+
+/// A property of the vertices.
+#[derive(Clone, Debug)]
+struct Column {
+    name: String,
+    kind: Kind,
+    /// First byte in the record of a vertex.
+    start: usize,
+}
+
+/// The vertices of a PLY file, and everything around them.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    /// The file. A text file is stored as binary.
+    bytes: Vec<u8>,
+    /// First byte of the vertices.
+    start: usize,
+    count: usize,
+    /// Bytes per vertex.
+    stride: usize,
+    is_big_endian: bool,
+    columns: Vec<Column>,
+}
+
+/// A parsed header.
+struct PlyHeader<'a> {
+    format: &'a str,
+    /// Lines, without `ply` and `end_header`.
+    lines: Vec<&'a str>,
+    /// First byte after the header.
+    end: usize,
+    /// Names and counts of the elements, in order.
+    elements: Vec<(&'a str, u64)>,
+    columns: Vec<Column>,
+    stride: usize,
+    /// Bytes per item of the elements before the vertices; `None` after a list.
+    before: Option<u64>,
+}
+
+/// Whether the vertices of a PLY file are splats: it has one of their properties.
+pub(crate) fn is_splats(bytes: &[u8]) -> bool {
+    let lines = header_lines(bytes).map(|(lines, _)| lines).unwrap_or_default();
+    let mut names = lines.iter().filter_map(|line| line.strip_prefix("property ")?.split_whitespace().last());
+    names.any(|name| ["scale_0", "rot_0", "f_dc_0", "packed_position"].contains(&name))
+}
+
+fn header_lines(bytes: &[u8]) -> Option<(Vec<&str>, usize)> {
+    let mut lines = Vec::new();
+    let mut start = bytes.strip_prefix(b"\xef\xbb\xbf").map_or(0, |_| 3);
+    loop {
+        let rest = bytes.get(start..MAX_HEADER.min(bytes.len()))?;
+        let length = rest.iter().position(|&b| b == b'\n')?;
+        start += length + 1;
+        // Comments in another encoding are of no interest.
+        let line = std::str::from_utf8(&rest[..length]).unwrap_or("comment").trim();
+        match line {
+            "end_header" => return Some((lines, start)),
+            "ply" | "" => {}
+            _ => lines.push(line),
+        }
+    }
+}
+
+impl<'a> PlyHeader<'a> {
+    fn parse(bytes: &'a [u8]) -> Result<Self, SplatError> {
+        let wrong = |line: &str| {
+            SplatError::Damaged(format!(
+                "'{}' is not a line of a PLY header",
+                shown_start(line, MAX_NAME_CHARS)
+            ))
+        };
+        let (lines, end) = header_lines(bytes)
+            .ok_or_else(|| SplatError::Damaged("its header has no 'end_header' line".into()))?;
+        let mut header = Self {
+            format: "",
+            lines,
+            end,
+            elements: Vec::new(),
+            columns: Vec::new(),
+            stride: 0,
+            before: Some(0),
+        };
+        let (mut of_vertex, mut size) = (false, Some(0_u64));
+        for line in header.lines.clone() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words[..] {
+                ["format", format, _] => header.format = format,
+                ["element", name, count] => {
+                    header.close(of_vertex, size);
+                    let count: u64 = count.parse().map_err(|_| wrong(line))?;
+                    header.elements.push((name, count));
+                    (of_vertex, size) = (name == "vertex", Some(0));
+                }
+                ["property", "list", ..] => size = None,
+                ["property", kind, name] => {
+                    let kind = Kind::of(kind).ok_or_else(|| wrong(line))?;
+                    size = size.map(|size| size + kind.size() as u64);
+                    if of_vertex {
+                        let column = Column { name: name.to_owned(), kind, start: header.stride };
+                        header.columns.push(column);
+                        header.stride += kind.size();
+                    }
+                }
+                ["comment" | "obj_info", ..] => {}
+                _ => return Err(wrong(line)),
+            }
+            if of_vertex && size.is_none() {
+                return Err(SplatError::Unsupported(
+                    "its splats have a list property, which no 3DGS file has".into(),
+                ));
+            }
+        }
+        Ok(header)
+    }
+
+    /// Adds the size of an element before the vertices.
+    fn close(&mut self, of_vertex: bool, size: Option<u64>) {
+        let has_vertices = of_vertex || self.elements.iter().any(|(name, _)| *name == "vertex");
+        if let (false, Some((_, count))) = (has_vertices, self.elements.last()) {
+            let size = size.and_then(|size| size.checked_mul(*count));
+            self.before = self.before.zip(size).and_then(|(a, b)| a.checked_add(b));
+        }
+    }
+}
+
+impl Table {
+    /// Reads the header, and checks that the file contains all vertices.
+    fn of(bytes: &[u8], memory_limit: u64) -> Result<Self, SplatError> {
+        let header = PlyHeader::parse(bytes)?;
+        if header.columns.iter().any(|column| column.name.starts_with("packed_")) {
+            let hint = "it is a compressed PLY: convert it with `splat-transform IN.compressed.ply OUT.ply`";
+            return Err(SplatError::Unsupported(hint.into()));
+        }
+        if header.columns.is_empty() {
+            return Err(SplatError::Missing("x"));
+        }
+        let found = header.elements.iter().find(|(name, _)| *name == "vertex");
+        let count = found.map_or(0, |(_, count)| *count);
+        let is_text = header.format == "ascii";
+        if !is_text && !["binary_little_endian", "binary_big_endian"].contains(&header.format) {
+            let format = shown_start(header.format, MAX_NAME_CHARS);
+            return Err(SplatError::Damaged(format!("its format '{format}' is not a format of PLY files")));
+        }
+        let is_first = header.elements.first() == found;
+        let Some(before) = header.before.filter(|_| !is_text || is_first) else {
+            return Err(SplatError::Unsupported(
+                "its vertices follow another element: write them first".into(),
+            ));
+        };
+        // A number of a text takes at least two bytes, with its separator.
+        let each = if is_text { 2 * header.columns.len() as u64 } else { header.stride as u64 };
+        let needed = before.saturating_add(count.saturating_mul(each));
+        // The last number may end the file.
+        let found = (bytes.len() - header.end) as u64 + u64::from(is_text);
+        if needed > found || count > u64::from(u32::MAX) {
+            return Err(SplatError::Count { count, needed, found });
+        }
+        let in_memory = count.saturating_mul(header.stride as u64) + 2 * bytes.len() as u64;
+        MemoryError::check(in_memory, memory_limit)?;
+        let (count, stride) = (count as usize, header.stride);
+        let is_big_endian = header.format == "binary_big_endian";
+        let columns = header.columns;
+        if !is_text {
+            let start = header.end + before as usize;
+            return Ok(Self { bytes: bytes.to_vec(), start, count, stride, is_big_endian, columns });
+        }
+        let lines = header.lines.iter().filter(|line| !line.starts_with("format"));
+        let is_vertex = |line: &&&str| !line.starts_with("element") || line.starts_with("element vertex");
+        // Other elements of a text file are dropped.
+        let lines: Vec<&str> = lines.take_while(is_vertex).copied().collect();
+        let mut table = Self::empty(&lines.join("\n"), columns, count, stride);
+        let text = String::from_utf8_lossy(&bytes[header.end..]);
+        let mut words = text.split_ascii_whitespace();
+        for vertex in 0..count {
+            for column in 0..table.columns.len() {
+                let word = words.next().unwrap_or_default();
+                let number: f64 = word.parse().map_err(|_| {
+                    let word = shown_start(word, MAX_NAME_CHARS);
+                    SplatError::Damaged(format!("splat {vertex}: '{word}' is not a number such as 1.25"))
+                })?;
+                table.put(vertex, column, number);
+            }
+        }
+        Ok(table)
+    }
+
+    /// A table of zeros. `lines`: header lines after the format.
+    fn empty(lines: &str, columns: Vec<Column>, count: usize, stride: usize) -> Self {
+        let mut bytes = format!("ply\nformat binary_little_endian 1.0\n{lines}\nend_header\n").into_bytes();
+        let start = bytes.len();
+        bytes.resize(start + count * stride, 0);
+        Self { bytes, start, count, stride, is_big_endian: false, columns }
+    }
+
+    /// A table for new splats. `is_far`: positions need f64.
+    fn of_splats(count: usize, n_harmonics: usize, is_far: bool) -> Self {
+        let rest = (0..3 * n_harmonics).map(|k| format!("f_rest_{k}"));
+        let names = [&POSITION[..], &COLOR].concat().into_iter().map(str::to_owned).chain(rest);
+        let others = [&[OPACITY][..], &SCALE, &ROTATION].concat().into_iter().map(str::to_owned);
+        let (mut columns, mut stride) = (Vec::new(), 0);
+        let mut lines = format!("element vertex {count}");
+        for name in names.chain(others) {
+            let is_wide = is_far && POSITION.contains(&name.as_str());
+            let (kind, word) = if is_wide { (Kind::F64, "double") } else { (Kind::F32, "float") };
+            lines += &format!("\nproperty {word} {name}");
+            columns.push(Column { name, kind, start: stride });
+            stride += kind.size();
+        }
+        Self::empty(&lines, columns, count, stride)
+    }
+
+    fn column(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.name == name)
+    }
+
+    fn columns<const N: usize>(&self, names: [&'static str; N]) -> Result<[usize; N], SplatError> {
+        let mut found = [0; N];
+        for (place, name) in found.iter_mut().zip(names) {
+            *place = self.column(name).ok_or(SplatError::Missing(name))?;
+        }
+        Ok(found)
+    }
+
+    /// Columns of the spherical harmonics, `[n_harmonics][red, green, blue]`.
+    fn harmonics(&self) -> Result<Vec<[usize; 3]>, SplatError> {
+        let n = self.columns.iter().filter(|column| column.name.starts_with("f_rest_")).count();
+        if ![0, 9, 24, 45].contains(&n) {
+            return Err(SplatError::Damaged(format!(
+                "it has {n} properties f_rest_*, but spherical harmonics of degree 0 to 3 have 0, 9, 24 or 45"
+            )));
+        }
+        let at = |k: usize| {
+            let name = format!("f_rest_{k}");
+            self.column(&name)
+                .ok_or_else(|| SplatError::Damaged(format!("it has {n} properties f_rest_*, but no {name}")))
+        };
+        (0..n / 3).map(|k| Ok([at(k)?, at(k + n / 3)?, at(k + 2 * n / 3)?])).collect()
+    }
+
+    fn get(&self, vertex: usize, column: usize) -> f64 {
+        let Column { kind, start, .. } = self.columns[column];
+        let first = self.start + vertex * self.stride + start;
+        let from = &self.bytes[first..first + kind.size()];
+        let mut bytes = [0; 8];
+        bytes[..from.len()].copy_from_slice(from);
+        if self.is_big_endian {
+            bytes[..from.len()].reverse();
+        }
+        kind.get(bytes)
+    }
+
+    fn put(&mut self, vertex: usize, column: usize, x: f64) {
+        let Column { kind, start, .. } = self.columns[column];
+        let (first, mut bytes) = (self.start + vertex * self.stride + start, kind.put(x));
+        if self.is_big_endian {
+            bytes[..kind.size()].reverse();
+        }
+        self.bytes[first..first + kind.size()].copy_from_slice(&bytes[..kind.size()]);
+    }
+}
+
+/// Reads a file, using at most `memory_limit` bytes.
+pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSplats, SplatError> {
+    let table = Table::of(bytes, memory_limit)?;
+    let [x, y, z] = table.columns(POSITION)?;
+    let [red, green, blue] = table.columns(COLOR)?;
+    let [opacity] = table.columns([OPACITY])?;
+    let scale = table.columns(SCALE)?;
+    let rotation = table.columns(ROTATION)?;
+    let harmonics = table.harmonics()?;
+    let degree = [0, 3, 8, 15].iter().position(|&n| n == harmonics.len()).unwrap_or_default() as u8;
+    let held = 2 * bytes.len() as u64 + table.bytes.len() as u64;
+    let mut raw = RawSplats::new(table.count as u64, degree, held, memory_limit)?;
+    for vertex in 0..table.count {
+        let number = |column: usize| table.get(vertex, column) as f32;
+        let vector = |columns: [usize; 3]| Vec3::from_array(columns.map(number));
+        let [w, i, j, k] = rotation.map(number);
+        raw.positions.push(DVec3::from_array([x, y, z].map(|column| table.get(vertex, column))));
+        raw.splats.scales.push(vector(scale).map(f32::exp));
+        raw.splats.rotations.push(Quat::from_xyzw(i, j, k, w));
+        raw.splats.opacities.push(sigmoid(number(opacity)));
+        raw.splats.colors.push(color_of(vector([red, green, blue])));
+        raw.splats.harmonics.extend(harmonics.iter().map(|&columns| vector(columns)));
+    }
+    raw.finish(near, Records::Ply(table))
+}
+
+/// Writes splats over a table, or as a new file.
+pub(crate) fn write(to_write: &SplatsToWrite<'_>, table: Option<&Table>) -> Vec<u8> {
+    let splats = to_write.splats;
+    let n_harmonics = cagework_core::splats::n_harmonics(splats.degree);
+    let is_far = to_write.origin != DVec3::ZERO;
+    let mut table = table.cloned().unwrap_or_else(|| Table::of_splats(splats.len(), n_harmonics, is_far));
+    const KNOWN: &str = "the table has the columns of splats";
+    let all = (table.columns(POSITION), table.columns(COLOR), table.columns([OPACITY]));
+    let (position, color, opacity) = (all.0.expect(KNOWN), all.1.expect(KNOWN), all.2.expect(KNOWN));
+    let (scale, rotation) = (table.columns(SCALE).expect(KNOWN), table.columns(ROTATION).expect(KNOWN));
+    let harmonics = table.harmonics().expect(KNOWN);
+    for splat in (0..splats.len()).filter(|&splat| to_write.writes(splat)) {
+        let mut put = |columns: &[usize], numbers: &[f32]| {
+            columns.iter().zip(numbers).for_each(|(&column, &x)| table.put(splat, column, x.into()));
+        };
+        let [x, y, z, w] = splats.rotations[splat].to_array();
+        put(&scale, &log_scale(splats.scales[splat]).to_array());
+        put(&rotation, &[w, x, y, z]);
+        for (columns, coefficient) in harmonics.iter().zip(splats.harmonics_of(splat)) {
+            put(columns, &coefficient.to_array());
+        }
+        if to_write.changed.is_none() {
+            put(&color, &band_0(splats.colors[splat]).to_array());
+            put(&opacity, &[log_odds(splats.opacities[splat])]);
+        }
+        let at = to_write.position(splat).to_array();
+        position.iter().zip(at).for_each(|(&column, x)| table.put(splat, column, x));
+    }
+    table.bytes
+}

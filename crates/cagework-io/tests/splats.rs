@@ -1,0 +1,393 @@
+//! Files of Gaussian splats.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+
+use std::io::{Read as _, Write as _};
+
+use cagework_core::splats::{Splats, n_harmonics, splat_covariance};
+use cagework_io::{Model, ModelFormat, UpAxis};
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+use glam::{Quat, Vec3};
+
+const FORMATS: [ModelFormat; 4] = [ModelFormat::Ply, ModelFormat::Splat, ModelFormat::Spz, ModelFormat::Gltf];
+/// Properties of a 3DGS file with spherical harmonics of degree 1, and one that is not read.
+const NAMES: &str = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 f_rest_0 f_rest_1 f_rest_2 f_rest_3 f_rest_4 f_rest_5 f_rest_6 \
+    f_rest_7 f_rest_8 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 label";
+
+fn read(name: &str, bytes: &[u8]) -> Result<Model, String> {
+    Model::read_within(name, bytes, &mut |_| None, 1 << 28).map_err(|e| e.to_string())
+}
+
+/// Number `column` of splat `splat`, by formula.
+fn number(splat: usize, column: usize) -> f32 {
+    let wave = ((7 * splat + 3 * column) as f32).sin();
+    if (19..22).contains(&column) { wave - 3.0 } else { wave }
+}
+
+fn header(names: &str, count: usize, format: &str) -> String {
+    let lines: String = names.split_whitespace().map(|name| format!("property float {name}\n")).collect();
+    format!("ply\nformat {format} 1.0\ncomment a\nelement vertex {count}\n{lines}end_header\n")
+}
+
+/// A 3DGS file of six splats, whose numbers `change` may replace.
+fn ply(change: impl Fn(usize, usize) -> Option<f32>) -> Vec<u8> {
+    let mut bytes = header(NAMES, 6, "binary_little_endian").into_bytes();
+    for (splat, column) in (0..6).flat_map(|splat| (0..27).map(move |column| (splat, column))) {
+        let x = change(splat, column).unwrap_or_else(|| number(splat, column));
+        bytes.extend(x.to_le_bytes());
+    }
+    bytes
+}
+
+/// Position of the first splat in the space of the file.
+fn place(model: &Model) -> Vec3 {
+    (model.origin() + model.positions[0].as_dvec3()).as_vec3()
+}
+
+fn capture() -> Model {
+    read("a.ply", &ply(|_, _| None)).unwrap()
+}
+
+#[test]
+fn ply_stores_logarithms_and_harmonics_by_channel() {
+    let model = capture();
+    let splats = model.splats().unwrap();
+    assert_eq!((model.positions.len(), splats.degree, model.n_faces()), (6, 1, 0));
+    for s in 0..6 {
+        let vector = |columns: [usize; 3]| Vec3::from_array(columns.map(|column| number(s, column)));
+        assert_eq!(splats.positions[s], vector([0, 1, 2]));
+        assert!(splats.scales[s].abs_diff_eq(vector([19, 20, 21]).map(f32::exp), 1e-7));
+        let rotation = Quat::from_xyzw(number(s, 23), number(s, 24), number(s, 25), number(s, 22));
+        assert!(splats.rotations[s].dot(rotation.normalize()) > 0.999_999);
+        assert!((splats.opacities[s] - 1.0 / (1.0 + (-number(s, 18)).exp())).abs() <= 1e-6);
+        // The value of band 0 is 1 / (2 sqrt(pi)).
+        let color = 0.5 + vector([6, 7, 8]) * 0.5 / std::f32::consts::PI.sqrt();
+        assert!(splats.colors[s].abs_diff_eq(color, 1e-6));
+        for k in 0..3 {
+            assert_eq!(splats.harmonics_of(s)[k], vector([9 + k, 12 + k, 15 + k]));
+        }
+    }
+}
+
+#[test]
+fn text_and_big_endian_files_equal_the_binary_one() {
+    let expected = capture();
+    let mut text = header(NAMES, 6, "ascii");
+    let mut big = header(NAMES, 6, "binary_big_endian").into_bytes();
+    for (splat, column) in (0..6).flat_map(|splat| (0..27).map(move |column| (splat, column))) {
+        text += &format!("{} ", number(splat, column));
+        big.extend(number(splat, column).to_be_bytes());
+    }
+    for file in [text.into_bytes(), big] {
+        let model = read("a.ply", &file).unwrap();
+        assert_eq!(model.splats(), expected.splats());
+        assert_eq!(model.write(ModelFormat::Ply, &model.positions).unwrap(), file, "unchanged");
+        let mut moved = model.splats().unwrap().clone();
+        moved.positions[2].x += 0.5;
+        let again = read("a.ply", &model.write_splats(ModelFormat::Ply, &moved).unwrap()).unwrap();
+        assert_eq!(again.positions, moved.positions);
+    }
+}
+
+/// Position, scale and rotation of a record, by the layout of the format: 3 floats, 3 floats, 4 bytes, 4 bytes.
+#[test]
+fn splat_records_are_32_bytes() {
+    let mut record = Vec::new();
+    for x in [1.0_f32, -2.0, 3.0, 0.1, 0.2, 0.3] {
+        record.extend(x.to_le_bytes());
+    }
+    record.extend([255, 128, 0, 51, 128, 255, 128, 128]);
+    let model = read("a.splat", &record).unwrap();
+    let splats = model.splats().unwrap();
+    assert_eq!((place(&model), splats.scales[0]), (Vec3::new(1.0, -2.0, 3.0), Vec3::new(0.1, 0.2, 0.3)));
+    assert_eq!((splats.opacities[0], splats.colors[0].x), (0.2, 1.0));
+    assert_eq!(splats.rotations[0], Quat::from_xyzw(1.0, 0.0, 0.0, 0.0));
+    assert_eq!(model.write(ModelFormat::Splat, &model.positions).unwrap(), record);
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// An SPZ of one splat of degree 1 with the bytes that the format's documentation prescribes.
+fn spz(version: u32, position: &[u8], rotation: &[u8]) -> Vec<u8> {
+    let header = [&b"NGSP"[..], &version.to_le_bytes(), &1_u32.to_le_bytes(), &[1, 12, 0, 0]].concat();
+    gzip(
+        &[
+            &header[..],
+            position,
+            &[51],
+            &[128, 166, 128],
+            &[160, 144, 128],
+            rotation,
+            &[128, 192, 64].repeat(3),
+        ]
+        .concat(),
+    )
+}
+
+#[test]
+fn spz_versions_decode_by_their_documentation() {
+    // 1, -0.5 and 2 with 12 fractional bits.
+    let fixed = [[0, 16, 0], [0, 248, 255], [0, 32, 0]].concat();
+    let halves = [0x3c00_u16, 0xb800, 0x4000].map(u16::to_le_bytes).concat();
+    // Half a turn about x; then a quarter: its largest part is w, index 3, and x is sqrt(1/2), 511 steps.
+    let quarter = ((3_u32 << 30) | (511 << 20)).to_le_bytes();
+    for (version, position, rotation, expected) in [
+        (1, &halves, &[255, 127, 128][..], Quat::from_rotation_x(std::f32::consts::PI)),
+        (2, &fixed, &[255, 127, 128], Quat::from_rotation_x(std::f32::consts::PI)),
+        (3, &fixed, &quarter, Quat::from_rotation_x(std::f32::consts::FRAC_PI_2)),
+    ] {
+        let model = read("a.spz", &spz(version, position, rotation)).unwrap();
+        let splats = model.splats().unwrap();
+        assert_eq!(place(&model), Vec3::new(1.0, -0.5, 2.0), "version {version}");
+        assert!(splats.scales[0].abs_diff_eq(Vec3::new(1.0, (-1.0_f32).exp(), (-2.0_f32).exp()), 1e-6));
+        assert!(splats.rotations[0].angle_between(expected) < 0.02, "{}", splats.rotations[0]);
+        // Byte 166 is 0.15 f + 0.5, and f is (colour - 0.5) 2 sqrt(pi).
+        let green = 0.5 + (166.0 / 255.0 - 0.5) / 0.15 * 0.5 / std::f32::consts::PI.sqrt();
+        assert!((splats.colors[0].y - green).abs() < 1e-5 && (splats.opacities[0] - 0.2).abs() < 1e-6);
+        assert_eq!(splats.harmonics_of(0), [Vec3::new(0.0, 0.5, -0.5); 3]);
+    }
+}
+
+/// Largest errors by quantization: positions and scales relative, rotations in radians, colours, harmonics.
+fn tolerances(format: ModelFormat) -> [f32; 4] {
+    match format {
+        ModelFormat::Splat => [1e-6, 0.02, 0.003, f32::INFINITY],
+        // Scales have steps of 1/16 of a logarithm, rotations of 0.7/511, colours 1/255/0.15 * 0.28, harmonics 1/128.
+        ModelFormat::Spz => [0.032, 0.004, 0.004, 0.004],
+        _ => [1e-6, 1e-3, 1e-5, 1e-6],
+    }
+}
+
+#[test]
+fn every_format_returns_what_every_other_wrote() {
+    for from in FORMATS {
+        let model = read("a", &capture().write(from, &capture().positions).unwrap());
+        let model = if from == ModelFormat::Splat {
+            read("a.splat", &capture().write(from, &capture().positions).unwrap())
+        } else {
+            model
+        }
+        .unwrap();
+        assert_eq!(model.format(), from);
+        for to in FORMATS {
+            let bytes = model.write(to, &model.positions).unwrap();
+            let again = read(&format!("b.{}", to.export_extension()), &bytes).unwrap();
+            let (a, b) = (model.splats().unwrap(), again.splats().unwrap());
+            let [scale, angle, color, harmonic] = tolerances(to);
+            for s in 0..6 {
+                assert!(a.positions[s].distance(b.positions[s]) <= 1e-5, "{from:?} {to:?}");
+                assert!((b.scales[s] / a.scales[s] - 1.0).abs().max_element() <= scale, "{from:?} {to:?}");
+                assert!(a.rotations[s].angle_between(b.rotations[s]) <= angle, "{from:?} {to:?}");
+                let [a_color, b_color] = [a, b].map(|of| of.colors[s].extend(of.opacities[s]));
+                // Bytes hold 0 to 1.
+                let limit = if to == ModelFormat::Splat {
+                    a_color.clamp(Vec3::ZERO.extend(0.0), Vec3::ONE.extend(1.0))
+                } else {
+                    a_color
+                };
+                assert!(
+                    (limit - b_color).abs().max_element() <= color,
+                    "{from:?} {to:?} {a_color} {b_color}"
+                );
+                for (x, y) in a
+                    .harmonics_of(s)
+                    .iter()
+                    .zip(b.harmonics.chunks(n_harmonics(b.degree).max(1)).nth(s).unwrap_or_default())
+                {
+                    // SPZ stores harmonics from -1 to 1.
+                    assert!(
+                        (x.clamp(Vec3::NEG_ONE, Vec3::splat(0.992)) - *y).abs().max_element()
+                            <= harmonic.max(0.008),
+                        "{from:?} {to:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn unchanged_splats_keep_their_bytes_and_changed_ones_the_rest() {
+    let file = ply(|_, _| None);
+    let start = file.len() - 6 * 27 * 4;
+    for up in [UpAxis::Y, UpAxis::Z, UpAxis::YDown] {
+        let mut model = read("a.ply", &file).unwrap();
+        model.set_up(up);
+        assert_eq!(model.write(ModelFormat::Ply, &model.positions).unwrap(), file);
+        let mut moved: Splats = model.splats().unwrap().clone();
+        moved.positions[3] += up.vector_turned(glam::DVec3::X).as_vec3();
+        let bytes = model.write_splats(ModelFormat::Ply, &moved).unwrap();
+        for splat in 0..6 {
+            for column in 0..27 {
+                let at = start + 4 * (27 * splat + column);
+                let [was, now] =
+                    [&file, &bytes].map(|of| f32::from_le_bytes(of[at..at + 4].try_into().unwrap()));
+                match (splat, column) {
+                    (3, 0) => assert!((now - was - 1.0).abs() < 1e-6),
+                    (3, 1..=2 | 9..=17 | 19..=21) => {
+                        assert!((now - was).abs() < 1e-5, "{column}: {was} {now}")
+                    }
+                    // The rotation is normalised.
+                    (3, 22..=25) => {}
+                    _ => assert_eq!(now.to_bits(), was.to_bits(), "{splat} {column}"),
+                }
+            }
+        }
+    }
+    for format in FORMATS {
+        let written = capture().write(format, &capture().positions).unwrap();
+        let model = read(&format!("a.{}", format.export_extension()), &written).unwrap();
+        assert_eq!(model.write(format, &model.positions).unwrap(), written, "{format:?}");
+        let mut moved = model.splats().unwrap().clone();
+        moved.positions[3].x += 0.25;
+        let again =
+            read(&format!("a.{}", format.export_extension()), &model.write_splats(format, &moved).unwrap());
+        let again = again.unwrap();
+        for splat in 0..6 {
+            assert!(again.positions[splat].distance(moved.positions[splat]) < 1e-5);
+        }
+        assert_eq!(again.splats().unwrap().opacities, moved.opacities, "{format:?}");
+    }
+}
+
+#[test]
+fn up_axis_turns_shapes_and_harmonics() {
+    let mut model = capture();
+    let before = model.splats().unwrap().clone();
+    model.set_up(UpAxis::Z);
+    let after = model.splats().unwrap();
+    let turn = Quat::from_mat4(&UpAxis::Z.turn());
+    assert_eq!(after.positions, model.positions);
+    for s in 0..6 {
+        let axes = glam::Mat3::from_quat(turn) * before.axes(s);
+        let [a, b] = [splat_covariance(axes), splat_covariance(after.axes(s))];
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+    let value = |of: &Splats, d: Vec3| -> Vec3 {
+        let basis = cagework_core::splats::harmonic_basis(d);
+        basis.iter().zip(of.harmonics_of(0)).map(|(&y, &c)| y * c).sum()
+    };
+    assert!(value(after, turn * Vec3::X).abs_diff_eq(value(&before, Vec3::X), 1e-5));
+}
+
+#[test]
+fn nodes_of_a_glb_move_turn_and_scale_splats() {
+    let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json = String::from_utf8(glb[20..20 + length].to_vec()).unwrap();
+    // A quarter turn about y and twice the size.
+    let node = r#"{"mesh":0,"scale":[2,2,2],"rotation":[0,0.70710678,0,0.70710678],"translation":[1,0,0]}"#;
+    let mut json = json.replace(r#"{"mesh":0}"#, node).into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut turned = glb[..8].to_vec();
+    turned.extend((12 + 8 + json.len() as u32 + (glb.len() - 20 - length) as u32).to_le_bytes());
+    turned.extend((json.len() as u32).to_le_bytes());
+    turned.extend(b"JSON");
+    turned.extend(json);
+    turned.extend(&glb[20 + length..]);
+    let (before, after) = (capture(), read("a.glb", &turned).unwrap());
+    let quarter = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+    let (before, after) = (before.splats().unwrap(), after.splats().unwrap());
+    for s in 0..6 {
+        assert!((2.0 * (quarter * before.positions[s]) + Vec3::X).distance(after.positions[s]) < 1e-5);
+        let axes = glam::Mat3::from_quat(quarter) * before.axes(s) * 2.0;
+        let [a, b] = [splat_covariance(axes), splat_covariance(after.axes(s))];
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5 * a.abs().max(0.01)));
+    }
+}
+
+#[test]
+fn damaged_captures_are_refused_with_value_and_limit() {
+    let fault = |name: &str, bytes: &[u8]| read(name, bytes).unwrap_err();
+    let text =
+        |names: &str| format!("{}{}", header(names, 1, "ascii"), "0.5 ".repeat(names.split(' ').count()));
+    let without = |name: &str| fault("a.ply", text(&NAMES.replace(name, "other")).as_bytes());
+    assert!(without("scale_1").contains("its splats have no 'scale_1': a 3DGS file has x, y, z"));
+    assert!(without("f_rest_8").contains("it has 8 properties f_rest_*"));
+    assert!(without("opacity").contains("no 'opacity'"));
+    let with = |column: usize, x: f32| read("a.ply", &ply(|s, c| (s == 2 && c == column).then_some(x)));
+    assert!(with(0, f32::NAN).unwrap_err().contains("splat 2 has the position"));
+    let huge = with(20, 100.0).unwrap_err();
+    assert!(
+        huge.contains("splat 2 has the scale") && huge.contains("the limit is 1e15: remove such splats"),
+        "{huge}"
+    );
+    assert!(with(10, f32::INFINITY).unwrap_err().contains("splat 2 has the colour"));
+    assert!(with(18, f32::NAN).unwrap_err().contains("the opacity NaN"));
+    // Infinite odds are an opacity of 1, and a scale of exp(-200) is 0.
+    assert_eq!(with(18, f32::INFINITY).unwrap().splats().unwrap().opacities[2], 1.0);
+    assert_eq!(with(19, -200.0).unwrap().splats().unwrap().scales[2].x, 0.0);
+    let unrotated = read("a.ply", &ply(|s, c| (s == 2 && (22..26).contains(&c)).then_some(0.0))).unwrap();
+    assert_eq!(unrotated.splats().unwrap().rotations[2], Quat::IDENTITY);
+    assert_eq!(unrotated.notices, ["1 splat has a rotation of length 0: none is used"]);
+    let many = fault("a.ply", &ply(|_, _| None)[..900]);
+    assert!(many.contains("its header counts 6 splats, which need 648 bytes"), "{many}");
+    let claimed = String::from_utf8_lossy(&ply(|_, _| None)[..800]).replace("vertex 6", "vertex 50000000");
+    assert!(fault("a.ply", claimed.as_bytes()).contains("counts 50000000 splats"));
+    let packed = text("x y z packed_position packed_rotation packed_scale packed_color");
+    assert!(fault("a.ply", packed.as_bytes()).contains("compressed PLY: convert it with `splat-transform"));
+
+    assert!(fault("a.splat", &[0; 33]).contains("it has 33 bytes, which is not a multiple of the 32 bytes"));
+    assert!(fault("a.splat", b"").contains("the file has no bytes"));
+    let mut negative = [0; 32];
+    negative[12..16].copy_from_slice(&(-2.0_f32).to_le_bytes());
+    let negative = read("a.splat", &negative).unwrap();
+    assert_eq!(negative.splats().unwrap().scales[0].x, 2.0);
+    assert_eq!(negative.notices[0], "1 splat has a negative scale: its absolute value is used");
+    // The first bytes of a glTF, and of a UTF-16 text.
+    let braces = [&b"{\0\0\0"[..], &[0; 28]].concat();
+    assert_eq!(read("a.splat", &braces).unwrap().format(), ModelFormat::Splat);
+
+    let good = spz(3, &[0; 9], &[0; 4]);
+    let mut body = Vec::new();
+    GzDecoder::new(&good[..]).read_to_end(&mut body).unwrap();
+    let changed = |at: usize, to: &[u8]| {
+        let mut body = body.clone();
+        body[at..at + to.len()].copy_from_slice(to);
+        fault("a.spz", &gzip(&body))
+    };
+    assert!(changed(0, b"XXXX").contains("not an SPZ"));
+    assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 3 are read"));
+    assert!(changed(12, &[4]).contains("degree 4") && changed(13, &[60]).contains("60 fractional bits"));
+    assert!(changed(8, &2_u32.to_le_bytes()).contains("its header counts 2 splats, which need 58 bytes"));
+    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
+    assert!(changed(8, &[0; 4]).contains("it has no splats"));
+    assert!(fault("a.spz", b"NGSP\x04\0\0\0").contains("SPZ of version 4 (Zstandard)"));
+    assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));
+    // 20 MB of zeros in 20 kB: the limit is checked before they are decompressed.
+    let mut bomb = body[..16].to_vec();
+    bomb[8..12].copy_from_slice(&1_000_000_u32.to_le_bytes());
+    bomb.resize(16 + 29_000_000, 0);
+    let bomb = gzip(&bomb);
+    let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
+    assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");
+
+    assert!(fault("a.sog", b"PK\x03\x04").contains("convert it with `splat-transform IN.sog OUT.ply`"));
+    let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
+    let renamed = |from: &str, to: &str| {
+        let text: String = glb.iter().map(|&b| char::from(b)).collect();
+        let bytes: Vec<u8> = text.replace(from, to).chars().map(|c| c as u8).collect();
+        fault("a.glb", &bytes)
+    };
+    assert!(
+        renamed("splatting:SCALE", "splatting:SCALF").contains("no attribute KHR_gaussian_splatting:SCALE")
+    );
+    assert!(
+        renamed(
+            r#""kernel":"ellipse","colorSpace":"srgb_rec709_display""#,
+            r#""extensions":{"a":1},"colorSpace":"srgb_rec709_displ""#,
+        )
+        .contains("use a, which is not supported")
+    );
+    let cube = read("cube.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    assert_eq!(
+        cube.write(ModelFormat::Spz, &cube.positions).unwrap_err().to_string(),
+        "the model has no splats, but a SPZ stores nothing else: export GLB, OBJ, PLY, STL or OFF"
+    );
+}
