@@ -1,7 +1,7 @@
 /** Binds run in the background: they draw frames, report progress and can be cancelled. */
 
 import { BIND_DEFAULTS } from "../src/defaults";
-import { bound, expect, open, shoot, test } from "./support";
+import { bound, dropBox, expect, open, shoot, test } from "./support";
 import { longestTask } from "./tasks";
 
 /** Upper limit for the longest task of the main thread during a bind, ms of processor time. */
@@ -65,13 +65,15 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
     await bound(page);
   });
 
+  // Few vertices, whose binds are quick.
+  await dropBox(page, "small");
   for (const backend of ["gpu", "cpu"] as const) {
     await test.step(`${backend}: a bind reports progress and stops when cancelled`, async () => {
       const answer = await page.evaluate(async (backend) => {
         const session = globalThis.cagework;
         if (!session) throw new Error("no session");
         const options = {
-          grid: 192,
+          grid: 128,
           method: "embedded",
           solver: "multigrid",
           preconditioner: "none",

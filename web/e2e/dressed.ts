@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import type { Download, Page } from "@playwright/test";
 import { validationErrors } from "./models";
-import { bound, type Dropped, drop, expect, largestMove, modelPositions } from "./support";
+import { bound, type Dropped, expect, largestMove, modelPositions, openWith } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
 /** Tolerance for distances within a rigid model, relative to the model's size. */
@@ -22,7 +22,7 @@ export const undo = (page: Page) => page.keyboard.press("Control+z");
 /** Drops body, shirt and buckle, waits until they are bound and opens the list of models. */
 export async function dressed(page: Page): Promise<readonly Dropped[]> {
   const files = await wardrobe();
-  await drop(page, files);
+  await openWith(page, files);
   await expect(page).toHaveTitle(/body\.glb and 2 more/);
   await bound(page);
   await step(page, "Model");

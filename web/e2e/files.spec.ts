@@ -13,6 +13,7 @@ import {
   expect,
   modelPositions,
   open,
+  openWith,
   shoot,
   test,
 } from "./support";
@@ -128,8 +129,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
 });
 
 test("choosing Z as the up axis turns model, cage and pose, but not exported files", async ({ page }) => {
-  await open(page);
-  await drop(page, [
+  await openWith(page, [
     { name: "tower.obj", bytes: box([0.5, 0.7, 1.5]) },
     { name: "tower-cage.obj", bytes: box([0.8, 1, 2]) },
   ]);

@@ -3,7 +3,7 @@
 import type { Page } from "@playwright/test";
 import type { GizmoHandle } from "../src/contract";
 import { box } from "./models";
-import { bound, cagePositions, drawn, drop, expect, handle, open, reachable, shoot, test } from "./support";
+import { bound, cagePositions, drawn, expect, handle, openWith, reachable, shoot, test } from "./support";
 
 /** Tolerance for equal coordinates: rounding of `f32` in a model two units long. */
 const ALIKE = 1e-4;
@@ -74,9 +74,8 @@ function middle(list: readonly number[]): number[] {
 
 test("arrows, rings and boxes move along their own axis only", async ({ page }) => {
   await page.setViewportSize({ width: 820, height: 520 });
-  await open(page);
   // A small model keeps the test short: it draws many frames.
-  await drop(page, [
+  await openWith(page, [
     { name: "cube.obj", bytes: box(0.5) },
     { name: "cube-cage.obj", bytes: box(1) },
   ]);

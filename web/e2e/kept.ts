@@ -22,27 +22,3 @@ export const savedSince = (page: Page, moment: number, name = ""): Promise<boole
       }),
     { moment, name },
   );
-
-/** Truncates all saved files, as a disk failure would. */
-export const cutKept = (page: Page): Promise<void> =>
-  page.evaluate(
-    () =>
-      new Promise<void>((done) => {
-        const opened = indexedDB.open("cagework");
-        opened.onsuccess = () => {
-          const { result } = opened;
-          const transaction = result.transaction("projects", "readwrite");
-          const request = transaction.objectStore("projects").openCursor();
-          request.onsuccess = () => {
-            const cursor = request.result;
-            if (!cursor) return;
-            cursor.update(cursor.value.slice(0, 1000));
-            cursor.continue();
-          };
-          transaction.oncomplete = () => {
-            result.close();
-            done();
-          };
-        };
-      }),
-  );

@@ -2,8 +2,6 @@
 
 import {
   cagePositions,
-  download,
-  drop,
   expect,
   grip,
   largestMove,
@@ -93,14 +91,5 @@ test("points of the model are pulled and pinned", async ({ page }) => {
     await rested(page);
     expect(changed(await cagePositions(page))).toBeGreaterThan(3);
     await page.keyboard.press("Control+z");
-  });
-
-  await test.step("a project restores the pins", async () => {
-    const project = await download(page, "project");
-    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
-    await page.getByRole("button", { name: "Remove all pins" }).click();
-    await expect(page.getByText("1 pin on the model")).toHaveCount(0);
-    await drop(page, [project]);
-    await expect(page.getByText("1 pin on the model")).toBeVisible({ timeout: 60_000 });
   });
 });

@@ -6,12 +6,11 @@ import {
   bound,
   cagePositions,
   drag,
-  drop,
   expect,
   handle,
   largestMove,
   modelPositions,
-  open,
+  openWith,
   reachable,
   shoot,
   spot,
@@ -38,8 +37,7 @@ async function settled(page: Page, count: number): Promise<number[]> {
 
 test("the cage at rest is edited, checked during the drag and bound again", async ({ page }) => {
   await page.setViewportSize({ width: 900, height: 560 });
-  await open(page);
-  await drop(page, [
+  await openWith(page, [
     { name: "cube.obj", bytes: box(0.9) },
     { name: "cube-cage.obj", bytes: box(1) },
   ]);
@@ -163,8 +161,7 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
 
 test("an edited cage is bound completely, on the chosen back end", async ({ page }) => {
   await page.setViewportSize({ width: 900, height: 560 });
-  await open(page);
-  await drop(page, [
+  await openWith(page, [
     { name: "cube.obj", bytes: box(0.9) },
     { name: "cube-cage.obj", bytes: box(1) },
   ]);

@@ -13,6 +13,7 @@ import {
   handle,
   largestMove,
   open,
+  openWith,
   pull,
   reachable,
   rested,
@@ -44,11 +45,8 @@ async function played(page: Page, at: readonly number[] = TIMES): Promise<number
 }
 
 test("a clip is chosen, paused, bent by the cage and exported", async ({ page }) => {
-  await open(page);
-  await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  await page.getByRole("button", { name: /Legs close together/ }).click();
+  await open(page, "./#sample=humanoid");
   await expect(page).toHaveTitle(/Legs close together/);
-  await bound(page);
   const rest = await played(page);
   // Clips start by themselves unless the user prefers reduced motion, which is set for all other tests.
   await page.emulateMedia({ reducedMotion: "no-preference" });
@@ -119,10 +117,9 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
 test("a model with several meshes, morph targets and a clip is the same after pose, export and import", async ({
   page,
 }) => {
-  await open(page);
   const dropped = { name: "dancer.glb", bytes: await dancer() };
   expect(await validationErrors(dropped.bytes)).toEqual([]);
-  await drop(page, [dropped]);
+  await openWith(page, [dropped]);
   await expect(page).toHaveTitle(/dancer/);
   await bound(page);
   const before = await played(page, [0, 0.3, 0.5]);

@@ -2,7 +2,7 @@
 
 import { WITH_WEBGL } from "./browser";
 import { apart, BUCKLE, bend, dressed, exportsEach, paintable, press, RIGID, row, still } from "./dressed";
-import { expect, open, pull, shoot, test } from "./support";
+import { expect, pull, shoot, test } from "./support";
 import { distances } from "./wardrobe";
 
 test.use({ launchOptions: WITH_WEBGL });
@@ -11,7 +11,6 @@ test("models that follow, keep their shape or stay are exported as drawn", async
   await page.addInitScript(() => {
     Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
   });
-  await open(page);
   await dressed(page);
   await bend(page);
   const own = apart(

@@ -56,6 +56,13 @@ export async function open(page: Page, address = "./"): Promise<void> {
   await bound(page);
 }
 
+/** Opens the page and drops files on it without waiting for the sample. */
+export async function openWith(page: Page, files: readonly Dropped[]): Promise<void> {
+  await page.goto("./");
+  await page.waitForFunction(() => globalThis.cagework !== undefined);
+  await drop(page, files);
+}
+
 /** Waits until a model is bound and no job is running. */
 export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
@@ -172,19 +179,20 @@ export async function grip(
     const canvas = document.querySelector("canvas");
     if (!engine || !canvas) return null;
     const { left, top, width, height } = canvas.getBoundingClientRect();
-    let best: { x: number; y: number; point: SurfacePoint; off: number } | null = null;
+    const places: { x: number; y: number; off: number }[] = [];
     for (let x = 8; x < width; x += 8) {
-      for (let y = 8; y < height; y += 8) {
-        const off = Math.hypot(x - sx * width, y - sy * height);
-        if (best && off >= best.off) continue;
-        const element = document.elementFromPoint(left + x, top + y);
-        if (!element || !(element === canvas || element.contains(canvas))) continue;
-        if (engine.pick(x, y, 14).length > 0) continue;
-        const point = engine.surfaceAt(x, y);
-        if (point) best = { x: left + x, y: top + y, point, off };
-      }
+      for (let y = 8; y < height; y += 8)
+        places.push({ x, y, off: Math.hypot(x - sx * width, y - sy * height) });
     }
-    return best;
+    // Picking takes milliseconds: stop at the first hit.
+    for (const { x, y } of places.sort((a, b) => a.off - b.off)) {
+      const element = document.elementFromPoint(left + x, top + y);
+      if (!element || !(element === canvas || element.contains(canvas))) continue;
+      if (engine.pick(x, y, 14).length > 0) continue;
+      const point = engine.surfaceAt(x, y);
+      if (point) return { x: left + x, y: top + y, point };
+    }
+    return null;
   }, share);
   if (!found) throw new Error("no point of the model is within reach");
   return found;

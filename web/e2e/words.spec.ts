@@ -1,8 +1,9 @@
-/** Every panel in the pseudo-locale: all text comes from the catalogue, and none is cut off. */
+/** Every panel, in the pseudo-locale: all text comes from the catalogue, none is cut off, and axe finds no fault. */
 
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { build, type Rolldown } from "vite";
+import { complaintsOfAxe } from "./stories";
 import { expect, test } from "./support";
 
 const WEB = join(import.meta.dirname, "..");
@@ -39,7 +40,7 @@ for (const [name, device] of [
 ] as const) {
   test.describe(name, () => {
     test.use(device);
-    test(`on a ${name} all text is in the catalogue and fits`, async ({ page }) => {
+    test(`on a ${name} all text is in the catalogue and fits, and axe finds no fault`, async ({ page }) => {
       built ??= gallery();
       const files = await built;
       await page.route("**/gallery/**", async (route) => {
@@ -51,6 +52,12 @@ for (const [name, device] of [
       });
       await page.goto("./gallery/?lang=pseudo");
       await page.waitForFunction(() => globalThis.visitAll);
+      const names = await page.evaluate(() => [...(globalThis.visits?.keys() ?? [])]);
+      // The stops of the tour consist of the same parts.
+      for (const name of names.filter((name) => !name.startsWith("stop") || name === "stop error")) {
+        await page.evaluate((name) => globalThis.visits?.get(name)?.(), name);
+        expect.soft(await complaintsOfAxe(page), name).toEqual([]);
+      }
       expect(await page.evaluate(() => globalThis.visitAll?.())).toEqual([]);
     });
   });

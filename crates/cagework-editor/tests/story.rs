@@ -151,6 +151,7 @@ fn assert_survives_saving(editor: &Editor, k: usize) {
     let (document, reopened) = (editor.document(), saved_and_opened(editor));
     assert_eq!(reopened.models.settings(), document.models.settings(), "{k}");
     assert_eq!(reopened.cage.mesh.faces, document.cage.mesh.faces, "{k}");
+    assert_eq!(reopened.cage.controls, document.cage.controls, "{k}");
     assert_eq!((reopened.poses.len(), &reopened.pins), (document.poses.len(), &document.pins), "{k}");
     for (a, b) in reopened.poses.iter().zip(&*document.poses) {
         assert_eq!((&a.name, &a.positions), (&b.name, &b.positions), "{k}");

@@ -30,6 +30,8 @@ import { inspect } from "./inspect";
 declare global {
   /** Shows all states of the page, and returns the faults found in their texts. */
   var visitAll: (() => Promise<string[]>) | undefined;
+  /** Functions that show a step or dialog with as much as it can contain, by name. */
+  var visits: ReadonlyMap<string, () => Promise<void>> | undefined;
 }
 
 type Patch = Partial<AppState>;
@@ -118,7 +120,50 @@ const selected = (count: number, last: number | null): AppState["selected"] => (
 const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
   values.map((value) => ({ ...also, [key]: value }) as Patch);
 
-/** States of each step, as changes of `BOUND`. */
+/** Each step with as much as it can contain, upon `BOUND`. */
+const full = (): Record<AppState["step"], Patch> => ({
+  model: {
+    model: SEVERAL,
+    sample: "rat",
+    painting: { id: 0, radius: 0.1, erase: false },
+    works: [work("here")],
+    undoLabel: T.did.grab,
+    redoLabel: T.did.pull,
+  },
+  cage: {
+    check: checkOf(MENDS, "error", 2),
+    cage: { ...CONTROLLED, usable: false },
+    editingRest: true,
+    element: "face",
+    placing: "line",
+    cageProgress: 0.5,
+  },
+  bind: {
+    earlier: EARLIER,
+    appliedOptions: { ...INITIAL.bindOptions, grid: 32 },
+    bindOptions: { ...RUN, method: "classic", preconditioner: "v_cycle" },
+    lack: "NoAdapter",
+  },
+  pose: {
+    selected: selected(3, 1),
+    pins: [{ triangle: 0, bary: [1, 0, 0] }],
+    symmetry: true,
+    proportionalOn: true,
+    poses: [{ name: "01", fits: true }],
+    shares: [0.5],
+    clip: { ...INITIAL.clip, clip: 0 },
+    scene: { ...INITIAL.scene, slice: "value", colour: "weight" },
+    seeOpen: true,
+    legend: { low: 0, high: 1, logarithmic: false, map: "viridis", largest: null },
+  },
+  export: {
+    model: SEVERAL,
+    cage: CONTROLLED,
+    poses: [{ name: "01", fits: true }],
+  },
+});
+
+/** Other states of each step. */
 const states = (): Record<AppState["step"], readonly Patch[]> => ({
   model: [
     { model: null, cage: null, bound: false },
@@ -128,11 +173,12 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
       { id: 0, radius: 0.1, erase: false },
       { id: 0, radius: 0.1, erase: true },
     ]),
-    ...of("busy", [T.opening.fileOf("01", 0, 2)], {
+    {
+      busy: T.opening.fileOf("01", 0, 2),
       busyStep: T.opening.freezes(1_234_567, 12_345),
       goOn: () => {},
       cancelBusy: () => {},
-    }),
+    },
     ...of(
       "hovering",
       (["page", "cage", "list"] as const).map((to) => ({ files: 2, to })),
@@ -300,6 +346,29 @@ async function start(): Promise<void> {
     store.set({ ...INITIAL, ...BOUND, adapter: "1", samples, ...patch, legend });
   };
 
+  const whole = full();
+  const visits = new Map([
+    ...STEPS.map((step) => [step, async () => show({ step, ...whole[step] })] as const),
+    ...DIALOGS.map((patch, k) => [`dialog ${k}`, async () => show(patch)] as const),
+    ...STOPS.map((name, stop) => {
+      const { binds, step } = stopsOf(true)[name];
+      const tour = { stop, reports: binds.map(reportBy), doing: null };
+      return [
+        `stop ${name}`,
+        async () => {
+          await tourLoaded();
+          show({ step, tour });
+        },
+      ] as const;
+    }),
+  ]);
+  globalThis.visits = visits;
+  /** Loads the tour, which waits for its sample forever. */
+  const tourLoaded = async () => {
+    if (!app.tour.loaded()) void app.tour.start(0);
+    while (!app.tour.loaded()) await new Promise((done) => setTimeout(done));
+  };
+
   globalThis.visitAll = async () => {
     const faults = new Set<string>();
     const seen = new Set<string>();
@@ -314,9 +383,13 @@ async function start(): Promise<void> {
         show({ step, ...patch });
         await look(`${step} ${k}`);
       }
-    for (const [k, patch] of DIALOGS.entries()) {
-      show(patch);
-      await look(`dialog ${k}`);
+    for (const [name, visit] of visits) {
+      await visit();
+      await look(name);
+    }
+    for (const stop of STOPS.keys()) {
+      show({ tour: { stop, reports: [], doing: [2, 3] } });
+      await look(`stop ${stop}, binding`);
     }
     show({});
 
@@ -344,17 +417,6 @@ async function start(): Promise<void> {
     }
     offer(T.offline.ready, { label: T.offline.reload, run: () => {} });
     await look("offer");
-
-    await Promise.race([app.tour.start(0), new Promise((done) => setTimeout(done, 50))]);
-    while (!app.tour.loaded()) await new Promise((done) => setTimeout(done));
-    for (const [stop, name] of STOPS.entries()) {
-      const { binds, step } = stopsOf(true)[name];
-      for (const reports of [[], binds.map(reportBy)]) {
-        show({ step, tour: { stop, reports, doing: reports.length > 0 ? null : [2, 3] } });
-        await look(`stop ${name}`);
-      }
-    }
-    show({});
 
     // Sentences that no state shows appear as messages, whose lines are as long as those of any panel.
     for (const text of sentencesOf(T).filter((text) => !isSeen(seen, text))) {
