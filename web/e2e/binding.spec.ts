@@ -41,7 +41,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
 
   await test.step("the panel compares the paper's method with the default", async () => {
     await grid("32").check({ force: true });
-    await page.getByRole("button", { name: "The paper's" }).click();
+    await page.getByRole("button", { name: "Published" }).click();
     await page.keyboard.press("Control+Enter");
     await bound(page);
     const rows = page.getByRole("table", { name: "Binds of this cage" }).locator("tbody tr");

@@ -81,7 +81,7 @@ test("a gap between legs stays open by default and at a chosen width", async ({ 
   await shoot(page, "cage-gap");
 
   await test.step("a cage with fewer vertices than requested says which option would change it", async () => {
-    await page.getByLabel("Vertices, at most").fill("400");
+    await page.getByLabel("Number of vertices").fill("400");
     await gaps.fill("16");
     await primary.click();
     await bound(page);

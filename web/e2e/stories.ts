@@ -74,7 +74,7 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   const legend = page.locator(".legend");
   await expect(legend).toBeHidden();
   await page.keyboard.press("k");
-  await expect(legend).toContainText(`Weight of vertex ${vertex}`);
+  await expect(legend).toContainText(`Weight of handle ${vertex}`);
   const coloured = await pixels();
   expect(coloured.equals(plain), "the model has the colours of weights").toBe(false);
   await shoot(page, `${picture}-heat-map`);

@@ -32,7 +32,7 @@ describe("dropped files", () => {
   it("find the .gltf among its files", () => {
     const plan = planDrop(["scene/scene.bin", "scene/textures/a.png", "scene/scene.gltf"]);
     expect(plan.main).toBe(2);
-    expect(plan.sentence).toBe("Opens scene.gltf with 2 files and makes a cage for it.");
+    expect(plan.sentence).toBe("Opens scene.gltf with its 2 files and makes a cage for it.");
   });
 
   it("let several models share a cage, generated or given", () => {
@@ -40,14 +40,14 @@ describe("dropped files", () => {
       kind: "model",
       main: 0,
       more: [2, 3],
-      sentence: "Opens body.glb and 2 more with 1 file and makes a cage for all of them.",
+      sentence: "Opens body.glb and 2 more with their 1 file and makes a cage for all of them.",
     });
     expect(planDrop(["body-cage.obj", "shirt-cage.obj", "body.glb", "shirt.glb"])).toEqual({
       kind: "model",
       main: 2,
       more: [3],
       second: 0,
-      sentence: "Opens body.glb and 1 more with body-cage.obj as their cage.",
+      sentence: "Opens body.glb and 1 more and uses body-cage.obj as the cage.",
     });
     expect(planDrop(["body.glb", "body-controls.obj"]).more, "controls are not a model").toBeUndefined();
   });

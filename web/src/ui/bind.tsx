@@ -29,6 +29,7 @@ export function BindPanel({ app }: { app: App }) {
           <div class="stack tight">
             <h3 class="section-title">{T.bind.beside}</h3>
             <CompareTable reports={[report, ...earlier]} />
+            <p class="hint">{T.bind.besideSentence}</p>
           </div>
         )}
       </div>
@@ -98,14 +99,14 @@ function Ways({ app }: { app: App }) {
       <div class="row even">
         <Button label={T.bind.ours} onClick={() => preset(BIND_DEFAULTS)} kind="small" tip={T.bind.oursTip} />
         <Button
-          label={T.bind.papers}
+          label={T.bind.published}
           onClick={() => preset(PAPER_DEFAULTS)}
           kind="small"
-          tip={T.bind.papersTip}
+          tip={T.bind.publishedTip}
         />
       </div>
       <Segments
-        label={T.bind.grid}
+        label={options.method === "classic" && options.cell_shape === "box" ? T.bind.gridEach : T.bind.grid}
         choices={GRIDS.map((value) => ({ value, label: value }))}
         value={String(options.grid) as (typeof GRIDS)[number]}
         onChange={(value) => set({ grid: Number(value) })}
@@ -233,6 +234,7 @@ function Advanced({ app }: { app: App }) {
         choices={(["extend", "stay", "refuse"] as const).map((value) => ({
           value,
           label: T.bind.outsides[value],
+          tip: T.bind.outsideTips[value],
         }))}
         value={options.outside}
         onChange={(outside) => set({ outside })}
@@ -246,5 +248,5 @@ export function sayOptions({ method, solver, preconditioner }: BindOptions): str
   const say = T.bind.options;
   if (solver === "cg") return preconditioner === "v_cycle" ? say.cgPreconditioned : say.cg;
   if (method === "embedded") return solver === "multigrid" ? say.ours : say.oursJacobi;
-  return solver === "jacobi" ? say.papers : say.papersMultigrid;
+  return solver === "jacobi" ? say.published : say.publishedMultigrid;
 }

@@ -1,4 +1,4 @@
-/** Live plot of the change per iteration on a logarithmic scale, like figure 7 of the paper. */
+/** Live plot of the change per iteration on a logarithmic scale, like figure 7 of K. Smith. */
 
 import { count } from "../format";
 import { T } from "../words";

@@ -4,18 +4,18 @@ import { count, endings, plural } from "../../format";
 
 export const cage = {
   title: "Put a cage around it",
-  sentence: "A cage is a coarse closed mesh. Move its few vertices and the model follows smoothly.",
+  sentence: "A cage is a coarse closed mesh around the model. Move its few vertices, and the model follows.",
   how: "Kind of cage",
   sources: { auto: "Automatic", hull: "Hull", box: "Box", file: "File" },
   about: {
     auto: "Follows the limbs of the model and encloses every vertex. It is checked before you see it.",
     hull: "A rough hull of about 24 vertices: good for bodies without limbs, and quick to pose.",
-    box: "A box around the model, its sides divided into squares, as in free-form deformation.",
+    box: "A box around the model. Its sides are divided into quads, as in free-form deformation.",
     get file() {
       return `A closed mesh that you made around the model, as a ${endings("disjunction")} file.`;
     },
   },
-  wanted: "Vertices, at most",
+  wanted: "Number of vertices",
   closeness: "Closeness",
   within: (share: string) => `within ${share} of the model's size`,
   quads: "Quads",
@@ -33,7 +33,7 @@ export const cage = {
   aroundRest: "The model at rest and its morph targets",
   perPart: "A cage for each part",
   perPartSentence: "For models made of separate parts. Off: one cage around all of them.",
-  divisions: "Squares along the longest side",
+  divisions: "Quads along the longest edge",
   make: "Make this cage",
   load: "Open a cage file",
   making: "Making the cage",
@@ -49,8 +49,8 @@ export const cage = {
   kinds: { point: "Point", line: "Bone", face: "Sheet" },
   kindTips: {
     point: "A ball that moves the model around it. Click to place it.",
-    line: "A line that bends at its corners. Click each corner; end with Done, Enter or a second click on the last corner.",
-    face: "A wall: the model on one side does not follow the other side. Click to place its middle.",
+    line: "A line with corners, at which it bends. Click each corner; end with Done, Enter or a second click on the last corner.",
+    face: "A wall: the model on one side of it does not follow the model on the other side. Click to place its middle.",
   },
   radius: "Radius",
   count: (points: number, lines: number, faces: number) =>
@@ -92,7 +92,7 @@ export const cage = {
   vertices: (n: number) => plural(n, "vertex", "vertices"),
   edges: "Edges",
   faces: "Faces",
-  posesWait: "The pose and saved poses belong to the previous cage and are kept with it.",
+  posesWait: "The pose and the saved poses belong to the previous cage and return with it.",
   bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>
     `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices, move Closeness to the right.`,
@@ -109,5 +109,5 @@ export const cage = {
   },
   bindFiner: (cells: number) => `Bind with ${cells} cells`,
   more: (made: number, wanted: number) =>
-    `The model's holes and gaps need ${made} vertices instead of ${wanted}.`,
+    `The model's holes and gaps need more vertices: ${made} instead of ${wanted}.`,
 };

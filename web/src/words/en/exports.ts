@@ -6,11 +6,17 @@ export const exports = {
   title: "Export",
   sentence: "Files for Blender, Unity, Unreal, three.js, Python and this page.",
   items: {
-    glb: ["Posed model", "GLB as you see it, with the materials, textures and parts of your file."],
-    shape: ["Shape only", "Only the shape as you see it, for printing, measuring or other programs."],
+    glb: [
+      "Posed model",
+      "GLB of the model as you see it. Keeps its parts, materials, textures, skeleton and clips.",
+    ],
+    shape: [
+      "Shape only",
+      "The shape as you see it, without skeleton and clips, for printing, measuring or other programs.",
+    ],
     poses: [
       "Poses as morph targets",
-      "GLB with one morph target per pose and an animation through them. Every blend is exact.",
+      "GLB with one morph target per saved pose and an animation that plays them.",
     ],
     cage: ["Cage", "OBJ of the cage in this pose, for any modelling program."],
     controls: ["Controls inside", "OBJ of points (p), bones (l) and sheets (f) in this pose."],

@@ -5,9 +5,9 @@ import { count, endings, percent, plural } from "../../format";
 export const model = {
   title: "Choose a model",
   sentence:
-    "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or drop your own file on this page.",
+    "A cage is a coarse mesh around a model: move the cage, and the model follows. The sample has a cage already. Pull it anywhere, or drop your own file here.",
   sentenceTouch:
-    "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or open your own file.",
+    "A cage is a coarse mesh around a model: move the cage, and the model follows. The sample has a cage already. Pull it anywhere, or open your own file.",
   drop: "Drop models here",
   dropTouch: "Your own model",
   get kinds() {
@@ -37,7 +37,7 @@ export const samples: Readonly<Record<string, Sample>> = {
   rat: {
     name: "Rat",
     poses: ["Tail up, head turned", "Looking round"],
-    tip: "The paper's rat. Pull its nose to turn its head: the feet stay in place.",
+    tip: "Pull its nose to turn its head: the feet stay in place.",
   },
   humanoid: {
     name: "Legs close together",
@@ -90,9 +90,10 @@ export const opening = {
   companions: "These files belong to a .gltf or .obj file. Open that file together with them.",
   project: (name: string) => `Opens the project ${name}.`,
   plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
-    const what = companions > 0 ? `${models} with ${plural(companions, "file")}` : models;
+    const what =
+      companions > 0 ? `${models} with ${several ? "their" : "its"} ${plural(companions, "file")}` : models;
     return cage
-      ? `Opens ${what} with ${cage} as ${several ? "their" : "its"} cage.`
+      ? `Opens ${what} and uses ${cage} as the cage.`
       : `Opens ${what} and makes a cage for ${several ? "all of them" : "it"}.`;
   },
   dropTo: {

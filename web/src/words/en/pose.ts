@@ -60,7 +60,7 @@ export const pull = {
   title: "Pull the model",
   tool: "Pull the model",
   sentence: (pin: string) =>
-    `Drag any point of the model. Grey areas stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
+    `Drag any point of the model. Grey areas stay in place; the wheel sets how far the pull reaches. To pin a point, Shift-click it, press it long, or press ${pin} over it.`,
   sentenceTouch: "Drag any point of the model with a finger. Grey areas stay. A long press pins a point.",
   off: "Only handles can be dragged now. To pull the model, choose the tool Pull the model.",
   whole: "The whole model follows",

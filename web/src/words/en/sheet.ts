@@ -38,7 +38,7 @@ const commands: { readonly [command in Command]?: string } = {
   original: "Hold: show the model at rest",
   toggleCage: "Hide or show the cage",
   toggleWire: "The model at rest, as wireframe",
-  heatMap: "Weights of the selected vertex",
+  heatMap: "Weight of the selected handle",
   see: "The See panel",
   tour: "The tour, ten stops",
   nextStop: "Next or previous stop of the tour",

@@ -19,10 +19,10 @@ export const tourWords = {
   doing: (bind: number, all: number) => (all > 1 ? `Binding, ${bind} of ${all}…` : "Binding…"),
   cells: "Cells",
   ofCells: (grid: number) => `${grid} cells`,
-  tau: "Stop below (tau)",
+  tau: "Stop below this change (tau)",
   ofTau: (tau: number) => `tau = ${scientific(tau)}`,
   errorOf: (what: string) => `Rest error, mean, ${what}`,
-  meanError: "Mean rest error of the paper's method, relative to the cage's size",
+  meanError: "Mean rest error of the published method, relative to the cage's size",
   showError: (grid: number, tau: number, error: number) =>
     `${scientific(error)}: show ${grid} cells, tau = ${scientific(tau)}`,
   iterations: (name: string, n: number) => `${name}: ${count(n)}`,
@@ -50,15 +50,15 @@ export const tourWords = {
       task: "move the slice through the rat, then look at the cells themselves.",
     },
     paper: {
-      title: "The paper's method, with 16 cells",
+      title: "The published method, with 16 cells",
       claim: () =>
-        "The paper (Joshi et al. 2007) gives every point the weights of its grid cell. With 16 cells along each side, all points of a cell land on one spot (the wireframe shows where they should be).",
+        "The published method (Joshi et al. 2007, as K. Smith describes it) gives every point the weights of its grid cell. With 16 cells along each side, all points of a cell land on one spot. The wireframe shows where they should be.",
       task: "choose 32 cells. The steps get smaller but do not vanish.",
     },
     smoothing: {
       title: "Too little smoothing",
       claim: () =>
-        "A sweep carries heat one cell further. Stop at 1e-3 and the heat has not spread everywhere yet: the rat does not fill its wireframe.",
+        "A sweep replaces every cell inside by the mean of its neighbours, so heat gets one cell further. If the sweeps stop at a change of 1e-3 (tau), the heat has not spread everywhere yet, and the rat does not fill its wireframe.",
       task: "continue until a sweep changes less than 1e-5.",
     },
     delta: {
@@ -72,8 +72,8 @@ export const tourWords = {
       claim: (reports: Reports) => {
         const [paper, ours] = reports;
         return paper && ours
-          ? `With 32 cells, the paper's method just took ${duration(paper.timings_ms.total)} here and ours ${duration(ours.timings_ms.total)}.`
-          : "The paper's method and ours, timed on this computer.";
+          ? `With 32 cells, the published method just took ${duration(paper.timings_ms.total)} here and ours ${duration(ours.timings_ms.total)}.`
+          : "The published method and ours, timed on this computer.";
       },
       task: "close other programs and measure again.",
     },

@@ -36,7 +36,7 @@ export const status = {
   innerSelected: (last: number) => `Control ${last} inside selected`,
   placing: {
     point: "Click the model to put a point there",
-    line: "Click each joint, then Done",
+    line: "Click each corner of the bone, then Done",
     face: "Click the model to put a sheet there",
   },
   /** Handles are cage vertices and controls inside. */
@@ -50,7 +50,8 @@ export const hints = {
   clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose None.",
   clipTouch: "A clip is shown: one finger turns, two move and zoom. To pose the model, choose None.",
   noCage: "A model needs a cage around it before it can be posed.",
-  placing: "The control is placed under the pointer, in the middle of the model. Drag to turn the view.",
+  placing:
+    "The control is placed under the pointer, halfway between the model's front and back. Drag to turn the view.",
   restHidden: "The cage is hidden: show it in the See panel, then drag its handles.",
   restTouch: "Drag a handle to reshape the cage; the model stays still.",
   rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",

@@ -2,7 +2,7 @@
 
 export const without = {
   different:
-    "The page draws with WebGL2 and computes on the processor instead: everything works, binding takes longer.",
+    "The page draws with WebGL2 and computes on the processor instead. Everything works, but binding takes longer, and very large models follow with a delay.",
   short: {
     NoWebGPU: "No WebGPU here",
     NoAdapter: "WebGPU found no graphics card",
@@ -19,11 +19,10 @@ export const without = {
   title: "How to switch WebGPU on",
   steps: "Steps",
   closeNotice: "Close this notice",
-  needs: "Cagework needs WebGPU",
-  noWebGl: (why: string) =>
-    `${why} The alternative, WebGL2, is missing as well. These steps switch WebGPU on:`,
+  needs: "Cagework needs WebGPU or WebGL2",
+  noWebGl: (why: string) => `${why} WebGL2 is missing as well. These steps switch WebGPU on:`,
   command:
-    " If no browser works, use the cagework command, which does the same on the processor. See the project's README.",
+    " If no browser works, use the command line: it can make cages, bind and deform, without a view. See the project's README.",
   others: "Other browsers",
   thatWork: "Browsers that work",
   ways: {
@@ -53,7 +52,10 @@ export const without = {
     },
     firefox: {
       title: "Firefox on Windows or macOS",
-      steps: ["Update to version 147 or newer: menu, Help, About Firefox.", "Open this page again."],
+      steps: [
+        "Update to version 147 or newer: menu, Help, About Firefox.",
+        "Open this page again. On a Mac with an Intel processor, use Chrome.",
+      ],
     },
     firefoxLinux: {
       title: "Firefox on Linux",
