@@ -97,7 +97,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
       const file = new File(["glTF"], "huge.glb");
       Object.defineProperty(file, "size", { value: 5 * 2 ** 30 });
       const session = globalThis.cagework;
-      return session?.readFiles([{ name: file.name, path: file.name, file }]).done.catch((error) => {
+      return session?.readFiles([{ name: file.name, path: file.name, file }], 0).done.catch((error) => {
         document.body.dataset.refused = `${error.name}: ${error.message}`;
       });
     });

@@ -25,6 +25,8 @@ const LONGEST_EMPTY = 3000;
 const OWN = {
   siblings: new Map(),
   up: undefined,
+  used: 0,
+  pixels: 0,
   textures: [],
   notices: [],
   took: 0,
@@ -147,7 +149,7 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     adapter,
     lack,
     samples,
-    readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
+    readFiles: (files, used, hear) => reading("read", { files, up: undefined, used }, hear),
     shareReader: reading.share,
     open: (read: ReadFile) => openRead(read as ReadModel, null).finally(begin),
     add(reads: readonly ReadFile[], label, hear) {
@@ -180,12 +182,12 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
       const words = T.samples[id];
       const name = `${words?.name ?? id}.glb`;
       const named = poses.map((pose, k) => ({ ...pose, name: words?.poses[k] ?? pose.name }));
-      return openRead({ ...OWN, name, bytes: glb, cage }, id, named).finally(begin);
+      return openRead({ ...OWN, name, content: new Blob([glb as BlobPart]), cage }, id, named).finally(begin);
     },
     async turn(bytes, up) {
       const name = "turned.glb";
       const file = new Blob([new Uint8Array(bytes)]);
-      return openRead(await reading("read", { files: [{ name, path: name, file }], up }).done, null);
+      return openRead(await reading("read", { files: [{ name, path: name, file }], up, used: 0 }).done, null);
     },
     readSettings: (text, bind) =>
       pkg.readSettings(text, JSON.stringify({ bind, cage: CAGE_DEFAULTS, rig: RIG_DEFAULTS })),
@@ -223,7 +225,11 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     bindByFormula: (kind) =>
       chain(
         ofNow(client.run("formula", { kind, positions: engine.modelPositions(), cage: cage() })),
-        ({ indptr, indices, data }) => engine.adoptOther(kind, indptr, indices, data),
+        ({ indptr, indices, data }) =>
+          engine.adoptOther(kind, indptr, (start, end) => [
+            indices.subarray(start, end),
+            data.subarray(start, end),
+          ]),
       ),
     loadSlice(axis, fraction, grid) {
       const options = possible({ ...BIND_DEFAULTS, grid });

@@ -75,6 +75,17 @@ it("a stopped worker is restarted by the next job", async () => {
   expect(await said(second.done)).toBe("Worker");
 });
 
+it("an idle worker ends at rest and is restarted by the next job; a busy one stays", async () => {
+  const { all, answer, client, run } = workers();
+  const first = run("a");
+  client.rest();
+  answer(0, { kind: "done", id: 0, output: "a" as never });
+  expect([await said(first.done), all.length]).toEqual(["a", 1]);
+  client.rest();
+  run("b");
+  expect(all.length).toBe(2);
+});
+
 it("if the script of a worker cannot be loaded, its job fails with the error Unloaded", async () => {
   const { miss, run } = workers();
   const job = run("a");

@@ -289,6 +289,7 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
+    estimateUpdates: () => 0,
     gestureView: () => ({ kind: "grab", amounts: [0.25], axis: 0, plane: false }),
   };
   const engine = new Proxy({} as Engine, {

@@ -21,7 +21,7 @@ function workers() {
       worker.fail(named("Cancelled", "the page is closing"));
     };
     opened.push(worker);
-    return { run: () => ({ done, cancel: close }), isBusy: () => true, close };
+    return { run: () => ({ done, cancel: close }), isBusy: () => true, rest: () => {}, close };
   };
   return { opened, open };
 }
@@ -30,7 +30,7 @@ it("each file is read by a worker of its own", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   for (const k of [0, 1]) {
-    const job = apart("read", { files: [file("a.obj")], up: undefined });
+    const job = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
     opened[k]?.answer({ name: "a.obj" });
     expect(await job.done).toEqual({ name: "a.obj" });
     expect(opened[k]?.closed).toBeGreaterThan(0);
@@ -42,7 +42,7 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
   const { opened, open } = workers();
   const apart = createApart(open);
   const release = apart.share();
-  const read = () => apart("read", { files: [file("a.obj")], up: undefined });
+  const read = () => apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   const first = read();
   opened[0]?.answer({ name: "a.obj" });
   await first.done;
@@ -58,8 +58,8 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
 it("a cancellation or another file ends the current read", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
-  const first = apart("read", { files: [file("a.obj")], up: undefined });
-  const second = apart("read", { files: [file("b.obj")], up: undefined });
+  const first = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
+  const second = apart("read", { files: [file("b.obj")], up: undefined, used: 0 });
   await expect(first.done).rejects.toMatchObject({ name: "Cancelled" });
   expect(opened[1]?.closed).toBe(0);
   second.cancel();
@@ -69,10 +69,10 @@ it("a cancellation or another file ends the current read", async () => {
 it("a broken worker becomes a readable error; errors of the file are passed on", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
-  const broken = apart("read", { files: [file("a.obj")], up: undefined });
+  const broken = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   opened[0]?.fail(named("Worker", "unreachable"));
   await expect(broken.done).rejects.toThrow("reading this file failed unexpectedly");
-  const bad = apart("read", { files: [file("b.obj")], up: undefined });
+  const bad = apart("read", { files: [file("b.obj")], up: undefined, used: 0 });
   opened[1]?.fail(named("Format", "not a GLB"));
   await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });
 });
@@ -82,6 +82,7 @@ it("a file above the size limit starts no worker", async () => {
   const job = createApart(open)("read", {
     files: [file("a.glb"), file("huge.bin", 5 * 2 ** 30)],
     up: undefined,
+    used: 0,
   });
   await expect(job.done).rejects.toThrow("huge.bin has 5.0 GiB");
   expect(opened.length).toBe(0);

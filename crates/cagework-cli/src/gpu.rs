@@ -21,7 +21,7 @@ pub(crate) fn open() -> Result<GpuContext, GpuError> {
 /// Converts a model to the renderer's data. Also returns notices about textures that are scaled down or omitted.
 pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
-    let TexturePlan { side, admitted, mut notices } = TexturePlan::new(&[&look]);
+    let TexturePlan { side, admitted, mut notices } = TexturePlan::new(&[&look], 0);
     let mut textures = Vec::new();
     // Groups whose image cannot be decoded are drawn in their base colour.
     let numbers: Vec<Option<u32>> = look

@@ -148,17 +148,17 @@ impl Model {
     }
 
     /// Like [`Self::read`], using at most `memory_limit` bytes. The estimate covers `bytes`, the model and the table
-    /// for welding positions.
+    /// for welding positions. Owned bytes of an OBJ become part of the model; borrowed ones are copied.
     ///
     /// # Errors
     /// [`ReadError`]. The memory limit is checked before allocating.
-    pub fn read_within(
+    pub fn read_within<'a>(
         name: &str,
-        bytes: &[u8],
+        bytes: impl Into<Cow<'a, [u8]>>,
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        Self::read_from(name, bytes, resolve, memory_limit, true)
+        Self::read_from(name, bytes.into(), resolve, memory_limit, true)
     }
 
     /// A model from a generated mesh whose positions are relative to `origin`; same result as reading the
@@ -168,7 +168,7 @@ impl Model {
     /// [`ReadError`] if the mesh has no vertices.
     pub fn of_mesh(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Self, ReadError> {
         let text = obj::write_cage_obj(mesh, DVec3::ZERO);
-        let model = Self::read_from(name, &text, &mut |_| None, u64::MAX, false)?;
+        let model = Self::read_from(name, text.into(), &mut |_| None, u64::MAX, false)?;
         Ok(Self { origin, ..model })
     }
 
@@ -183,18 +183,18 @@ impl Model {
         if splats.is_empty() {
             return Err(ReadError::Splats { name: name.into(), source: SplatError::Empty });
         }
-        let source = Source { name, bytes: &[], resolve: &mut |_| None, memory_limit: u64::MAX, near: false };
+        let source = Source { name, bytes: Cow::default(), resolve: &mut |_| None, memory_limit: u64::MAX, near: false };
         source.new_capture(splats, origin)
     }
 
     fn read_from(
         name: &str,
-        bytes: &[u8],
+        bytes: Cow<'_, [u8]>,
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
         near: bool,
     ) -> Result<Self, ReadError> {
-        let format = ModelFormat::of_file(name, bytes)?;
+        let format = ModelFormat::of_file(name, &bytes)?;
         (format.facts().read)(Source { name, bytes, resolve, memory_limit, near })
     }
 

@@ -15,6 +15,9 @@ const MAX_TOTAL_PIXELS: u64 = 1 << 29;
 /// Limit on all drawn textures together, pixels: 256 MiB, and a third more on the GPU for mipmaps.
 const MAX_DRAWN_PIXELS: u64 = 1 << 26;
 
+/// Pixels that must be left for the textures of a further model.
+const MIN_DRAWN_PIXELS: u64 = 1 << 18;
+
 /// Why an image is not decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum TextureError {
@@ -26,6 +29,8 @@ enum TextureError {
     Total,
     #[error("the images of the file overlap: export the file again")]
     Overlap,
+    #[error("the textures of the models fill the limit of {MAX_DRAWN_PIXELS} pixels: make them smaller")]
+    Full,
 }
 
 /// Which images of some models are decoded, and the size at which they are drawn.
@@ -40,17 +45,22 @@ pub struct TexturePlan {
 }
 
 impl TexturePlan {
-    /// A plan for models that are drawn together.
+    /// A plan for models that are drawn together, beside others whose drawn textures have `used` pixels.
     #[must_use]
-    pub fn new(looks: &[&Look]) -> Self {
-        let mut left = MAX_TOTAL_PIXELS;
+    pub fn new(looks: &[&Look], used: u64) -> Self {
+        let budget = MAX_DRAWN_PIXELS.saturating_sub(used);
+        // Textures that would be scaled down beyond recognition are not decoded.
+        let mut left = if budget < MIN_DRAWN_PIXELS { 0 } else { MAX_TOTAL_PIXELS };
         let mut sizes = Vec::new();
         let mut refused: Vec<(&str, TextureError, usize)> = Vec::new();
         let mut admitted = Vec::new();
         for look in looks {
             let mut own = Vec::new();
             for image in &look.images {
-                let answer = image.admit(&mut left);
+                let answer = image.admit(&mut left).map_err(|error| match error {
+                    TextureError::Total if budget < MIN_DRAWN_PIXELS => TextureError::Full,
+                    other => other,
+                });
                 own.push(answer.is_ok());
                 match answer {
                     Ok(size) => sizes.push(size),
@@ -72,7 +82,7 @@ impl TexturePlan {
         let notices = refused.into_iter().map(notice).collect();
         let drawn = |side: u32| -> u64 { sizes.iter().map(|&size| pixels(scaled(size, side))).sum() };
         let mut side = MAX_SIDE;
-        while side > 1 && drawn(side) > MAX_DRAWN_PIXELS {
+        while side > 1 && drawn(side) > budget {
             side /= 2;
         }
         Self { side, admitted, notices }
@@ -201,7 +211,7 @@ mod tests {
     fn images_beyond_the_limits_are_refused() {
         let plan = |sizes: &[[u32; 2]]| {
             let images = sizes.iter().map(|&[width, height]| png(width, height)).collect();
-            TexturePlan::new(&[&Look { images, ..Look::default() }])
+            TexturePlan::new(&[&Look { images, ..Look::default() }], 0)
         };
         let found = plan(&[[8192, 8192], [8193, 8192], [u32::MAX, u32::MAX], [64, 64]]);
         assert_eq!((found.side, found.admitted), (2048, vec![vec![true, false, false, true]]));
@@ -212,5 +222,16 @@ mod tests {
         assert!(many.notices[0].contains("536870912 pixels in total"), "{:?}", many.notices);
         // 16 textures of 2048 x 2048 pixels reach the limit.
         assert_eq!([16, 17, 65].map(|n| plan(&vec![[2048, 2048]; n]).side), [2048, 1024, 512]);
+    }
+
+    #[test]
+    fn models_share_one_limit() {
+        let look = Look { images: vec![png(2048, 2048)], ..Look::default() };
+        let side = |used| TexturePlan::new(&[&look], used).side;
+        // 15 textures of 2048 x 2048 pixels leave room for one more, 15.5 for a quarter of one.
+        assert_eq!([15 << 22, 31 << 21, (1 << 26) - (1 << 18)].map(side), [2048, 1024, 512]);
+        let full = TexturePlan::new(&[&look], MAX_DRAWN_PIXELS);
+        assert_eq!(full.admitted, [[false]]);
+        assert!(full.notices[0].contains("the limit of 67108864 pixels"), "{:?}", full.notices);
     }
 }

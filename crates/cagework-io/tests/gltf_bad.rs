@@ -178,7 +178,7 @@ fn memory_is_checked_before_allocation() {
     let nodes = 100_000;
     b.json["nodes"] = vec![json!({ "mesh": 0 }); nodes].into();
     b.json["scenes"][0]["nodes"] = (0..nodes).collect::<Vec<_>>().into();
-    let within = |b: &Builder, limit| Model::read_within("x.glb", &b.glb(), &mut |_| None, limit);
+    let within = |b: &Builder, limit| Model::read_within("x.glb", b.glb(), &mut |_| None, limit);
     let message = within(&b, 128 << 20).unwrap_err().to_string();
     assert!(message.contains("MiB of memory, more than the limit of 128 MiB"), "{message}");
     // Decoding this base64 would give another error, because it is damaged.

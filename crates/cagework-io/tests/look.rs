@@ -82,7 +82,7 @@ fn overlapping_images_need_no_more_memory_than_the_file() {
     let found = look(&b);
     assert_eq!(found.images.len(), 10);
     assert!(found.images.iter().map(|image| image.bytes.len()).sum::<usize>() <= b.glb().len());
-    let plan = TexturePlan::new(&[&found]);
+    let plan = TexturePlan::new(&[&found], 0);
     assert!(plan.notices.iter().any(|notice| notice.contains("overlap")), "{:?}", plan.notices);
 }
 

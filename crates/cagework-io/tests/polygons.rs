@@ -258,7 +258,7 @@ fn damaged_ply_and_stl_files_are_errors() {
     stl[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(fault("x.stl", &stl).contains("vertex 0 has a coordinate that is not finite"));
     let tight =
-        Model::read_within("x.stl", &obj().write(ModelFormat::Stl, &cube()).unwrap(), &mut |_| None, 1000);
+        Model::read_within("x.stl", obj().write(ModelFormat::Stl, &cube()).unwrap(), &mut |_| None, 1000);
     assert!(tight.unwrap_err().to_string().contains("memory"));
 }
 

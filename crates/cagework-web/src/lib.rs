@@ -47,6 +47,10 @@ const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, Element, Gesture,
   GizmoHandle, Grip, Legend, ModelFormat, ModelInfo, OpenContents, Pivot, Problem, Progress, PullOptions, Repair, RigOptions,
   SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, UpAxis, View } from "../contract/generated";
+
+/** Column indices and weights from `start` to `end` of sparse rows. */
+export type WeightRows = (start: number, end: number) => Rows | Promise<Rows>;
+type Rows = readonly [Uint32Array, Float32Array];
 "#;
 
 #[wasm_bindgen]

@@ -17,6 +17,27 @@ use crate::binder::Polygons;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{READ_LIMIT, decode};
 
+/// The bytes of a file, copied into wasm memory in chunks, so that JavaScript never holds the whole file.
+#[wasm_bindgen]
+pub struct FileBytes(Vec<u8>);
+
+#[wasm_bindgen]
+impl FileBytes {
+    /// Reserves memory for a file of `size` bytes.
+    #[wasm_bindgen(constructor)]
+    #[must_use]
+    pub fn new(size: usize) -> Self {
+        Self(Vec::with_capacity(size))
+    }
+
+    /// Appends a chunk.
+    pub fn push(&mut self, chunk: &Uint8Array) {
+        let start = self.0.len();
+        self.0.resize(start + chunk.length() as usize, 0);
+        chunk.copy_to(&mut self.0[start..]);
+    }
+}
+
 /// A model with its materials, and the other contents of its file.
 #[wasm_bindgen]
 pub struct Loaded {
@@ -41,18 +62,19 @@ impl Loaded {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(name: &str, bytes: &[u8], sibling: &Function) -> Result<Loaded, JsValue> {
-        Ok(Self::from_bytes(name, bytes, sibling)?)
+    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Result<Loaded, JsValue> {
+        Ok(Self::from_bytes(name, bytes.0, sibling)?)
     }
 
     /// Reads materials and textures of all models of the file; call it before [`Self::take_next`]. It is separate from
-    /// [`Self::read`] so that the page can handle events in between.
-    pub fn prepare(&mut self) {
+    /// [`Self::read`] so that the page can handle events in between. `used`: pixels of the textures of the other models
+    /// that are drawn together with these.
+    pub fn prepare(&mut self, used: f64) {
         self.more.iter_mut().for_each(Self::read_look);
         self.read_look();
         let looks: Vec<&Look> =
             [&self.look].into_iter().chain(self.more.iter().map(|next| &next.look)).collect();
-        let TexturePlan { side, admitted, notices } = TexturePlan::new(&looks);
+        let TexturePlan { side, admitted, notices } = TexturePlan::new(&looks, used as u64);
         self.model.notices.extend(notices);
         self.keep_images(side, &admitted[0]);
         for (next, admitted) in self.more.iter_mut().zip(&admitted[1..]) {
@@ -178,8 +200,8 @@ impl Loaded {
 }
 
 impl Loaded {
-    fn from_bytes(name: &str, bytes: &[u8], sibling: &Function) -> Answer<Self> {
-        if let Some(project) = read_project(name, bytes, READ_LIMIT)? {
+    fn from_bytes(name: &str, bytes: Vec<u8>, sibling: &Function) -> Answer<Self> {
+        if let Some(project) = read_project(name, &bytes, READ_LIMIT)? {
             let mut models = project.models.into_iter().enumerate().map(|(number, model)| {
                 let settings = Some(project.settings.clone());
                 Self { number, settings, ..Self::new(model) }

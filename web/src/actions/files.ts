@@ -5,7 +5,6 @@ import { BIND_DEFAULTS } from "../defaults";
 import { cageKey } from "../derived";
 import type { DocumentMirror } from "../document";
 import { planDrop } from "../drop";
-import { stem } from "../format";
 import { type StepName, stateOfNextModel } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -43,6 +42,12 @@ export interface FileNeeds {
   overtaken(sample: string | null): void;
 }
 
+/**
+ * Largest work of a bind that starts by itself, updates of one value: 10 s on one processor core. A number in a project could
+ * otherwise ask for hours.
+ */
+const MOST_UPDATES = 1e10;
+
 /** What is opened together with a model: further models, a cage, and bind options. */
 interface Along {
   readonly others: readonly Named[];
@@ -60,7 +65,10 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
     store.set({
       ...stateOfNextModel(store.get()),
-      model: { ...opened.model, name: shownName(opened, sample) },
+      model: {
+        ...opened.model,
+        name: T.samples[sample ?? sampleOf(opened) ?? ""]?.name ?? opened.model.name,
+      },
       busy: others.length > 0 ? store.get().busy : null,
     });
     if (opened.check) needs.know(opened.check);
@@ -80,7 +88,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
-    void prepare(cageFiles, sample !== null || opened.settings !== null);
+    void prepare(cageFiles, sample !== null, opened.settings !== null);
   };
 
   const settingsOf = (opened: Opened): Settings => {
@@ -93,11 +101,25 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     if (from.includes(store.get().step)) store.set({ step });
   };
 
+  /** Replaces the bind options of a project by the defaults if a bind with them would take long. */
+  const limitWork = () => {
+    const { bindOptions, model } = store.get();
+    const updates = ctx.session().engine.estimateUpdates(bindOptions);
+    if (updates <= MOST_UPDATES) return;
+    store.set({ bindOptions: { ...BIND_DEFAULTS, memory_limit: bindOptions.memory_limit } });
+    ctx.tell.say(T.opening.longBind(model?.name ?? "", updates / (MOST_UPDATES / 10)));
+  };
+
   /**
-   * Makes the cage and binds, unless the user has to repair the cage first. Changes the step of the page unless the
-   * model is `familiar`, which samples and projects are.
+   * Makes the cage and binds, unless the user has to repair the cage first. Changes the step of the page, except for samples
+   * and projects.
    */
-  const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
+  const prepare = async (
+    cageFiles: readonly NamedFile[] | undefined,
+    isSample: boolean,
+    isProject: boolean,
+  ) => {
+    const familiar = isSample || isProject;
     if (cageFiles) {
       if (!(await needs.cage.load(cageFiles, true))) return;
     } else if (!store.get().cage) {
@@ -108,6 +130,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       goTo(["model", "bind", "pose", "export"], "cage");
       return;
     }
+    if (isProject) limitWork();
     if (!familiar) goTo(["model", "cage"], "bind");
     if ((await needs.bind.start(true)) && !familiar) goTo(["bind"], "pose");
   };
@@ -167,10 +190,12 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   };
 }
 
-/** Name shown for the model: a sample's label, the name of a project without its extension, or the name of the file. */
-function shownName(opened: Opened, sample: string | null): string {
-  const { name } = opened.model;
-  const own = T.samples[sample ?? ""]?.name;
-  // The name of several models, such as "fox.glb and 2 more", is kept.
-  return own ?? (opened.settings !== null && opened.model.members.length === 1 ? stem(name) : name);
+/** The sample that a project was made from. The name of its model is not that of a file. */
+function sampleOf({ settings }: Opened): string | undefined {
+  try {
+    const { sample } = JSON.parse(settings ?? "");
+    return typeof sample === "string" ? sample : undefined;
+  } catch {
+    return undefined;
+  }
 }

@@ -59,7 +59,8 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       const went = await attempt(ctx, T.models.notAdded, () => {
         ctx.tell.clear();
         return ctx.queue.replace("open", async (signal) => {
-          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add");
+          const { texturePixels } = ctx.session().engine;
+          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", texturePixels);
           settle();
           const n = members().length;
           await models.join(reads, signal, T.did.addModels);

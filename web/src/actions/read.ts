@@ -27,16 +27,17 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
 
 /**
  * Reads models in sequence. If none can be read, shows their errors and throws a cancellation. `another`: whether the
- * fixes of errors offer to open or to add another file.
+ * fixes of errors offer to open or to add another file. `used`: pixels of the textures of the open models, if these stay.
  */
 export async function readModels(
   ctx: Context,
   signal: AbortSignal,
   models: readonly (readonly NamedFile[])[],
   another: "file" | "add",
+  used = 0,
 ): Promise<Named[]> {
   const what = T.opening.fileOf(models[0]?.[0]?.name ?? "", 0, models.length);
-  const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another));
+  const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another, used));
   if (reads.length === 0) throw cancelled("there is nothing to open");
   ctx.store.set({ busy: what });
   return reads;
@@ -47,13 +48,15 @@ function readAll(
   models: readonly (readonly NamedFile[])[],
   hear: (progress: Reading) => void,
   another: "file" | "add",
+  before: number,
 ): Job<{ reads: Named[] } & ReadFile> {
   const release = ctx.session().shareReader();
   let isGivenUp = false;
   let cancelOne = () => {};
   const work = async () => {
     const reads: Named[] = [];
-    let longest: ReadFile = { took: 0, vertices: 0 };
+    let longest: ReadFile = { took: 0, vertices: 0, pixels: 0 };
+    let used = before;
     for (const [k, own] of models.entries()) {
       if (isGivenUp) throw cancelled("cancelled");
       const name = own[0]?.name ?? "";
@@ -64,9 +67,10 @@ function readAll(
         continue;
       }
       try {
-        const job = ctx.session().readFiles(own, hear);
+        const job = ctx.session().readFiles(own, used, hear);
         cancelOne = job.cancel;
         const read = await job.done;
+        used += read.pixels;
         if (read.took > longest.took) longest = read;
         reads.push({ name, read });
       } catch (error) {
@@ -74,7 +78,7 @@ function readAll(
         report(ctx, T.failed.open(name), error, another);
       }
     }
-    return { reads, took: longest.took, vertices: longest.vertices };
+    return { ...longest, reads };
   };
   return {
     done: work().finally(release),

@@ -38,9 +38,9 @@ export interface Session {
   /**
    * Reads one model with its companion files, or a project GLB, in a worker of its own. Files of a folder are found by
    * `path`. Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If reading fails or
-   * crashes, the open model is not affected.
+   * crashes, the open model is not affected. `used`: pixels of the textures of other models that are drawn together with this one.
    */
-  readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
+  readFiles(files: readonly NamedFile[], used: number, hear?: (progress: Reading) => void): Job<ReadFile>;
   /** Opens a file that was read; a project brings its cage and poses. Call it once for each file. */
   open(read: ReadFile): Promise<Opened>;
   /** Until the returned function is called, one worker reads all files. The worker is replaced only after a failure. */
@@ -146,6 +146,8 @@ export interface ReadFile {
   readonly vertices: number;
 }
 
+  /** Pixels of its textures. */
+  readonly pixels: number;
 export interface Opened {
   readonly model: ModelInfo;
   /** Check of the cage in the file; null without a cage. */

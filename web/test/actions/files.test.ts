@@ -1,6 +1,7 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createFiles } from "../../src/actions/files";
+import type { BindOptions } from "../../src/contract";
 import { BIND_DEFAULTS } from "../../src/defaults";
 import { MODEL_STATE, PERSON_STATE } from "../../src/state";
 import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED, settled } from "../fake";
@@ -167,6 +168,21 @@ it("a sample that cannot be built is named", async () => {
     "The sample could not be opened",
     null,
   ]);
+});
+
+it("a project that asks for a long bind gets the default options", async () => {
+  const { files, asked, store, said, teach } = page();
+  const estimateUpdates = ({ solver }: BindOptions) => (solver === "jacobi" ? 3e11 : 1e9);
+  teach({ estimateUpdates });
+  const opened = files.openFiles([file("slow.cagework.glb")]);
+  await settled();
+  asked[0]?.resolve({ took: 0 });
+  await settled();
+  const settings = JSON.stringify({ bind: { ...store.get().bindOptions, solver: "jacobi" } });
+  asked[1]?.resolve({ ...OPENED, settings });
+  await opened;
+  expect(store.get().bindOptions.solver).toBe("multigrid");
+  expect(said.at(-1)).toContain("a solve of about 5 min: the default settings are used instead");
 });
 
 it("a new model resets model settings; user settings, backend and memory limit stay", async () => {

@@ -4,6 +4,8 @@
 //! are proportional to these two or to the number of vertices. Compared with the peak memory of the command's process,
 //! the estimate is within 25 % on models with repeated positions, with many nodes, and on many threads.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::BindError;
@@ -11,7 +13,9 @@ use super::points::VertexCounts;
 use crate::cage::Cage;
 use crate::controls::{Controls, InnerControls};
 use crate::grid::Grid;
+
 use crate::levels::{BoundaryTerm, CutCell, Run};
+use crate::mesh::Bounds;
 use crate::options::{BindOptions, Method, Solver};
 use crate::solve::jacobi;
 use crate::solve::rows::{LANES, Row};
@@ -131,6 +135,24 @@ pub(super) fn estimate(
     MemoryEstimate { bytes: bytes as u64, of_points: of_points as u64 }
 }
 
+/// Estimated number of updates of one value.
+pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions) -> f64 {
+    /// Work of a multigrid solve, in sweeps of the finest level (benches/README.md).
+    const MULTIGRID_SWEEPS: f64 = 18.0;
+    let Bounds { min, max } = controls.surface().bounds();
+    let widths = ((max - min).as_dvec3() / grid.cell).max(DVec3::ONE).to_array();
+    // Jacobi sweeps of a box multiply the error by 1 - decay: its slowest mode is one half-wave along each axis.
+    let decay = widths.iter().map(|w| (PI / w).powi(2) / 6.0).sum::<f64>().min(1.0);
+    let digits = (1.0 / f64::from(options.tau)).max(1.0).ln();
+    let sweeps = match options.solver {
+        Solver::Multigrid => MULTIGRID_SWEEPS,
+        Solver::ConjugateGradient => digits / decay.sqrt(),
+        Solver::Jacobi => digits / decay,
+    };
+    let columns = controls.n_controls().div_ceil(LANES) * LANES;
+    unknowns(controls, grid).0 * columns as f64 * sweeps.min(options.max_iterations as f64)
+}
+
 pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
     let n_batches = controls.n_controls().div_ceil(LANES) as f64;
     (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
@@ -158,8 +180,8 @@ fn volume_and_area(cage: &Cage) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::bind::bind;
+    use crate::bind::voxels::Voxelization;
     use crate::cage::subdivided_box;
-    use crate::mesh::Bounds;
     use crate::progress::Silent;
     use glam::Vec3;
 
@@ -170,6 +192,22 @@ mod tests {
         let (volume, area) = volume_and_area(&cage);
         // 2 x 3 x 4
         assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
+    }
+
+    /// Measured by the solvers on the cube, whose slowest mode the estimate assumes. Most solves take fewer sweeps.
+    #[test]
+    fn sweeps_stay_below_their_estimate() {
+        let cage =
+            Cage::new(&subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1; 3])).unwrap();
+        for (solver, most) in [(Solver::Jacobi, 4.0), (Solver::ConjugateGradient, 12.0)] {
+            let options = BindOptions { grid: 32, solver, method: Method::Classic, ..BindOptions::default() };
+            let estimate = crate::bind::estimate_updates(&cage, &options).unwrap();
+            let report = bind(&[Vec3::splat(0.5)], &cage, &options, &Silent).unwrap().report;
+            let grid = Voxelization::grid(&cage, &options);
+            let sweeps = estimate / (8.0 * unknowns((&cage).into(), &grid).0);
+            let share = sweeps / f64::from(report.iterations);
+            assert!((1.0..most).contains(&share), "{solver:?}: {sweeps} for {}", report.iterations);
+        }
     }
 
     /// A threshold need not drop any weight, so the estimate must hold for all weights.

@@ -142,3 +142,18 @@ pub fn estimate_memory<'a>(
     let vertices = points::VertexCounts { rows: n_points, points: n_points };
     Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }
+
+/// Estimated work of a solve: updates of one value, which are cells times columns times sweeps. A thread does about
+/// 10^9 per second. Allocates nothing.
+///
+/// # Errors
+/// [`BindError::Option`] if an option is out of range.
+pub fn estimate_updates<'a>(
+    controls: impl Into<Controls<'a>>,
+    options: &BindOptions,
+) -> Result<f64, BindError> {
+    options.check()?;
+    let controls = controls.into();
+    let grid = voxels::Voxelization::grid(controls.surface(), options);
+    Ok(memory::updates(controls, &grid, options))
+}

@@ -1,5 +1,6 @@
 //! Reads models from the contents of files.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use cagework_core::splats::Splats;
@@ -17,7 +18,7 @@ use crate::{gltf, obj, ply};
 /// A file to read.
 pub(super) struct Source<'a, 'b> {
     pub(super) name: &'a str,
-    pub(super) bytes: &'a [u8],
+    pub(super) bytes: Cow<'a, [u8]>,
     pub(super) resolve: &'a mut Resolve<'b>,
     pub(super) memory_limit: u64,
     /// Whether to store positions relative to an origin near them.
@@ -27,7 +28,7 @@ pub(super) struct Source<'a, 'b> {
 impl Source<'_, '_> {
     pub(super) fn gltf(self) -> Result<Model, ReadError> {
         let origin = (!self.near).then_some(DVec3::ZERO);
-        let mut model = gltf::read(self.name, self.bytes, self.resolve, self.memory_limit, origin)
+        let mut model = gltf::read(self.name, &self.bytes, self.resolve, self.memory_limit, origin)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
         if let Some(raw) = model.splats.take() {
             let mut read = raw.finish(self.near, Records::New).map_err(|e| self.splat_fault(e))?;
@@ -86,7 +87,7 @@ impl Source<'_, '_> {
 
     /// Reads a PLY: splats, polygons or points.
     pub(super) fn ply(self) -> Result<Model, ReadError> {
-        if splats::ply::is_splats(self.bytes) {
+        if splats::ply::is_splats(&self.bytes) {
             return self.splats(ModelFormat::Ply, splats::ply::read);
         }
         self.polygons(ModelFormat::Ply, ply::read)
@@ -98,7 +99,7 @@ impl Source<'_, '_> {
         format: ModelFormat,
         read: fn(&[u8], u64, bool) -> Result<ReadSplats, SplatError>,
     ) -> Result<Model, ReadError> {
-        let read = read(self.bytes, self.memory_limit, self.near).map_err(|e| self.splat_fault(e))?;
+        let read = read(&self.bytes, self.memory_limit, self.near).map_err(|e| self.splat_fault(e))?;
         Ok(self.capture(format, read))
     }
 
@@ -106,8 +107,9 @@ impl Source<'_, '_> {
         ReadError::Splats { name: self.name.into(), source }
     }
 
-    fn capture(&self, format: ModelFormat, read: ReadSplats) -> Model {
+    fn capture(self, format: ModelFormat, read: ReadSplats) -> Model {
         let splats = read.splats;
+        let file = self.bytes.into_owned();
         let each = Splats::bytes_per_splat(splats.degree) + size_of::<Vec3>() as u64;
         Model {
             name: self.name.into(),
@@ -117,12 +119,12 @@ impl Source<'_, '_> {
             notices: read.notices,
             up: UpAxis::Y,
             origin: read.origin,
-            bytes: 2 * self.bytes.len() as u64 + each * splats.len() as u64,
+            bytes: 2 * file.len() as u64 + each * splats.len() as u64,
             format,
             encoding: Encoding::default(),
             has_normals: false,
             document: Document::Obj(Box::default()),
-            capture: Some(Arc::new(Capture { splats, file: self.bytes.to_vec(), records: read.records })),
+            capture: Some(Arc::new(Capture { splats, file, records: read.records })),
         }
     }
 
@@ -141,7 +143,7 @@ impl Source<'_, '_> {
         read: fn(&[u8], u64, bool) -> Result<Polygons, PolygonsError>,
     ) -> Result<Model, ReadError> {
         let fault = |source| ReadError::Polygons { name: self.name.into(), source };
-        let mut read = read(self.bytes, self.memory_limit, self.near).map_err(fault)?;
+        let mut read = read(&self.bytes, self.memory_limit, self.near).map_err(fault)?;
         let document = read.document().map_err(fault)?;
         let corner = |c: u32| document.corners[c as usize].v;
         let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);

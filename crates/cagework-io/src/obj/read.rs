@@ -1,6 +1,7 @@
 //! Reads an OBJ file: one vertex per `v` line, one polygon per `f` line, in file order.
 
 use cagework_core::words::counted;
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
@@ -148,6 +149,8 @@ pub(crate) struct ObjModel {
 
 struct Reader<'a> {
     bytes: &'a [u8],
+    /// Memory of the file: the caller's bytes and, unless the document takes these, the document's copy.
+    file_memory: u64,
     positions: Vec<Vec3>,
     document: ObjDocument,
     material_numbers: HashMap<&'a [u8], u32>,
@@ -181,9 +184,26 @@ pub(super) const MIN_CORNERS: usize = 3;
 const MEMORY_CHECK_INTERVAL: usize = 1 << 12;
 
 /// Reads an OBJ file using at most `memory_limit` bytes. `resolve` returns its material files and textures.
-pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Result<ObjModel, ObjError> {
+pub(crate) fn read(
+    bytes: Cow<'_, [u8]>,
+    resolve: &mut Resolve<'_>,
+    memory_limit: u64,
+) -> Result<ObjModel, ObjError> {
+    let copies = if matches!(bytes, Cow::Owned(_)) { 1 } else { 2 };
+    let mut model = read_bytes(&bytes, copies, resolve, memory_limit)?;
+    model.document.bytes = bytes.into_owned();
+    Ok(model)
+}
+
+fn read_bytes(
+    bytes: &[u8],
+    copies: u64,
+    resolve: &mut Resolve<'_>,
+    memory_limit: u64,
+) -> Result<ObjModel, ObjError> {
     let mut reader = Reader {
         bytes,
+        file_memory: copies * bytes.len() as u64,
         positions: Vec::new(),
         document: ObjDocument { face_starts: vec![0], ..ObjDocument::default() },
         material_numbers: HashMap::new(),
@@ -287,8 +307,7 @@ impl<'a> Reader<'a> {
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
-        // The file counts twice: the caller's bytes and the document's copy.
-        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + self.group_bytes + lists;
+        let needed = self.file_memory + self.siblings.bytes() + self.group_bytes + lists;
         MemoryError::check(needed, self.memory_limit).map(|()| needed)
     }
 
@@ -436,10 +455,9 @@ impl<'a> Reader<'a> {
             "lines, points, curves or faces with fewer than three corners",
             "not deformed: kept unchanged in OBJ exports",
         );
-        self.document.bytes = self.bytes.to_vec();
-        let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
-        // Subtract what the caller frees after reading: its bytes of the file, and the weld table.
-        let bytes = reading - bytes - welding;
+        // Subtract what is freed after reading: the caller's copy of the file, and the weld table.
+        let freed = self.file_memory - self.bytes.len() as u64;
+        let bytes = reading - freed - WELD_BYTES * vertices as u64;
         Ok(ObjModel {
             positions: self.positions,
             document: self.document,

@@ -3,6 +3,7 @@
 use cagework_core::deform::OutsideVertex;
 use cagework_core::{Frames, PolygonMesh, Weights};
 use glam::Vec3;
+use js_sys::{Array, Float32Array, Uint32Array};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -63,6 +64,22 @@ impl Bound {
     #[must_use]
     pub fn indptr(&self) -> Vec<u32> {
         self.weights.indptr().to_vec()
+    }
+
+    /// Number of weights.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.weights.data().len()
+    }
+
+    /// Column indices and weights from `start` to `end`.
+    #[wasm_bindgen(unchecked_return_type = "[Uint32Array, Float32Array]")]
+    #[must_use]
+    pub fn rows(&self, start: usize, end: usize) -> JsValue {
+        let (indices, data) = (self.weights.indices().get(start..end), self.weights.data().get(start..end));
+        let indices = Uint32Array::from(indices.unwrap_or_default());
+        Array::of2(&indices, &Float32Array::from(data.unwrap_or_default())).into()
     }
 
     /// Column indices: controls first, then frames. `[n_nonzeros]`

@@ -1,6 +1,6 @@
 //! Methods that create, read, reshape and pose the cage.
 
-use cagework_core::bind::estimate_memory;
+use cagework_core::bind::{estimate_memory, estimate_updates};
 use cagework_core::subdivided_box;
 use cagework_editor::Command;
 use cagework_io::{decode_pose, encode_pose};
@@ -191,6 +191,19 @@ impl Engine {
             Answer::Ok(estimate_memory(set, n, &request.options)?)
         })?;
         Ok(bytes as f64)
+    }
+
+    /// Estimated work of a bind: updates of one value. A second on one processor core is about 10^9.
+    ///
+    /// # Errors
+    /// Without a cage, or if an option is out of range.
+    #[wasm_bindgen(js_name = estimateUpdates)]
+    pub fn estimate_updates(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+    ) -> Result<f64, JsValue> {
+        let request: JsBindOptions = decode(options)?;
+        Ok(self.read(|state| Answer::Ok(estimate_updates(state.require_set()?, &request.options)?))?)
     }
 
     /// Compact encoding of the current pose, in the axes of the model's file.

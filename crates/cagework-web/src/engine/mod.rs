@@ -25,7 +25,7 @@ use async_lock::Mutex;
 use cagework_core::{Coordinates, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, check_layers};
-use js_sys::{Float32Array, Function, Uint32Array};
+use js_sys::Function;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
@@ -123,6 +123,7 @@ impl Engine {
                 check_layers(gpu.main.context(), &camera, &model.positions, &model.triangles, size)
                     .map_err(Fault::from)?;
             }
+            page_turn().await;
             let draw = joined(&draws.iter().collect::<Vec<_>>());
             gpu.others.clear();
             self.state.borrow_mut().forget_gpu();
@@ -145,8 +146,8 @@ impl Engine {
         Ok(notices)
     }
 
-    /// Uses the weights that `Binder.bind` computed: row pointers, column indices and values, the offsets, and the
-    /// report. Weights of a `final` pass are cached for undo.
+    /// Uses the weights that `Binder.bind` computed: row pointers, a function that returns a range of column indices and
+    /// values, the offsets, and the report. Weights of a `final` pass are cached for undo.
     ///
     /// # Errors
     /// If the arrays do not match models and cage, or the GPU runs out of memory. `Cancelled` if models or cage change
@@ -154,8 +155,7 @@ impl Engine {
     pub async fn adopt(
         &self,
         indptr: Vec<u32>,
-        indices: Uint32Array,
-        data: Float32Array,
+        #[wasm_bindgen(unchecked_param_type = "WeightRows")] rows: Function,
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
         #[wasm_bindgen(unchecked_param_type = "BindReport")] report: JsValue,
         is_final: bool,
@@ -165,7 +165,7 @@ impl Engine {
         let n_vertices = self.read(|state| state.models().positions().len());
         let Offsets { frames, outside } = decode(offsets)?;
         let n_columns = n_columns + frames.n_columns() as u32;
-        let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
+        let all = incoming::weights(n_columns, &indptr, &rows).await?;
         let (weights, rig) = split(all, n_vertices);
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
@@ -216,13 +216,12 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
         indptr: Vec<u32>,
-        indices: Uint32Array,
-        data: Float32Array,
+        #[wasm_bindgen(unchecked_param_type = "WeightRows")] rows: Function,
     ) -> Result<(), JsValue> {
         let kind: Coordinates = decode(kind)?;
         let (revision, n_columns) = self
             .read(|state| (state.revision, state.set().map_or(0, |set| kind.n_columns(set.cage())) as u32));
-        let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
+        let weights = incoming::weights(n_columns, &indptr, &rows).await?;
         self.read(|state| state.require(revision))?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;

@@ -78,6 +78,17 @@ impl Engine {
         Ok(())
     }
 
+    /// Pixels of the models' textures.
+    #[wasm_bindgen(getter, js_name = texturePixels)]
+    #[must_use]
+    pub fn texture_pixels(&self) -> f64 {
+        self.read(|state| {
+            let draws = state.models().iter().filter_map(|member| state.draws.get(&member.id));
+            let textures = draws.flat_map(|draw| &draw.textures);
+            textures.map(|texture| f64::from(texture.width) * f64::from(texture.height)).sum()
+        })
+    }
+
     /// Properties of the models, for panels.
     ///
     /// # Errors

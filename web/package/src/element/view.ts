@@ -86,7 +86,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
 
   async function openModel({ name, file, vertices, grid }: Wanted, hear: Hear): Promise<Ready> {
     hear("Opening", 0);
-    const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
+    const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined, used: 0 }));
     await engine.open(await load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
     engine.frameAll();
     let cage = read.cage;

@@ -12,10 +12,16 @@ import type {
 } from "../contract";
 import { createEta } from "../eta";
 import { type Client, named } from "./client";
-import type { BoundArrays } from "./messages";
+import type { KeptRows } from "./messages";
 
 /** Number of cells along the cage's longest side in the coarse pass. */
 const COARSE = 32;
+
+/** Largest number of weights with a coarse pass. Of more, assembling takes most of the time, and both passes take the same. */
+const MOST_COARSE = 1 << 23;
+
+/** Number of weights above which the worker ends after a bind, to free its memory: 64 MiB. */
+const MOST_KEPT = 1 << 23;
 
 /** Names of errors after which the bind is repeated on the CPU. */
 const GPU_ERRORS: readonly string[] = [
@@ -40,7 +46,7 @@ type Pass = "coarse" | "fine";
 export function startBind(start: BindStart): Job<BindReport> {
   const { client, engine, adapter, listener, cage } = start;
   let options = start.options;
-  let job: Job<BoundArrays> | undefined;
+  let job: Job<KeptRows> | undefined;
   let isCancelled = false;
   const { revision } = engine;
   const positions = engine.boundPoints();
@@ -56,12 +62,14 @@ export function startBind(start: BindStart): Job<BindReport> {
   };
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
-    job = client.run("bind", { positions, extra, cage, options: asked }, step(pass));
-    const { indptr, indices, data, offsets, report } = await job.done;
+    job = client.run("bindKept", { positions, extra, cage, options: asked }, step(pass));
+    const { key, indptr, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     engine.requireCurrent(revision);
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
-    await engine.adopt(indptr, indices, data, offsets, whole, pass === "fine");
+    const rows = (start: number, end: number) => client.run("rows", { key, start, end }).done;
+    await engine.adopt(indptr, rows, offsets, whole, pass === "fine");
+    if ((indptr.at(-1) ?? 0) > MOST_KEPT) client.rest();
     if (isCancelled) throw named("Cancelled", "cancelled");
     listener({ kind: "adopted", pass, report: whole });
     return whole;
@@ -82,7 +90,8 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    if (!engine.bound && options.grid > COARSE) await run("coarse");
+    const isLarge = (positions.length / 3) * (cage.positions.length / 3) > MOST_COARSE;
+    if (!engine.bound && !isLarge && options.grid > COARSE) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }

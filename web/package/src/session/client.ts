@@ -25,6 +25,8 @@ export interface Client {
   ): Job<Jobs[K]["output"]>;
   /** Whether a job is running or queued. */
   isBusy(): boolean;
+  /** Ends the worker if it is idle, which frees its memory. The next job starts another one. */
+  rest(): void;
   close(): void;
 }
 
@@ -142,6 +144,9 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       };
     },
     isBusy: () => waiting.size > 0,
+    rest() {
+      if (waiting.size === 0) lose(closing());
+    },
     close() {
       isClosed = true;
       lose(closing());

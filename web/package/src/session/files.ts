@@ -3,18 +3,24 @@
 import type { NamedFile } from "../contract";
 import { NAMING_ENDINGS } from "../contract/generated";
 import { extension, isModel } from "../names";
+import type { FileBytes } from "../pkg/cagework";
+import type { Package } from "./artifact";
 import { named } from "./client";
 
 /** Maximum size of a file, bytes. Opening a file takes several times its size in memory. */
 const LARGEST = 1 << 30;
 
+/** Bytes that are read at a time. */
+const CHUNK = 1 << 23;
+
 export interface Bytes {
   readonly name: string;
-  readonly bytes: Uint8Array;
+  /** The file, or its decompressed contents. Reading it into wasm memory twice takes less memory than passing a copy on. */
+  readonly content: Blob;
   /** The siblings, by name and by path relative to the model's folder. */
   readonly siblings: ReadonlyMap<string, Uint8Array>;
-  /** The compressed original, if `bytes` were decompressed. */
-  readonly packed?: Uint8Array;
+  /** The compressed original, if `content` was decompressed. */
+  readonly packed?: Blob;
 }
 
 /** Returns a function that finds a sibling by the path in the model's file, or else by the file name in that path. */
@@ -28,17 +34,16 @@ export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8A
 export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   const main = files.find(({ name }) => isModel(name)) ?? files[0];
   if (!main) throw named("Empty", "there is no file to open");
-  const bytes = await read(main);
   const siblings = new Map<string, Uint8Array>();
   if ((NAMING_ENDINGS as readonly string[]).includes(extension(main.name))) {
     const folder = main.path.slice(0, main.path.lastIndexOf("/") + 1);
     for (const file of files.filter((file) => file !== main)) {
-      const content = await read(file);
+      const content = await read(file.name, file.file);
       siblings.set(file.name, content);
       if (file.path.startsWith(folder)) siblings.set(file.path.slice(folder.length), content);
     }
   }
-  return { name: main.name, bytes, siblings };
+  return { name: main.name, content: main.file, siblings };
 }
 
 /** The error for the first file above the size limit; undefined if there is none. */
@@ -49,7 +54,22 @@ export function tooLarge(files: readonly NamedFile[]): Error | undefined {
   return large && named("TooLarge", message);
 }
 
-async function read({ name, file }: NamedFile): Promise<Uint8Array> {
+/** Copies a file into wasm memory, in chunks. `tell` is called with the fraction done. */
+export async function toWasm(
+  pkg: Package,
+  name: string,
+  file: Blob,
+  tell: (share: number) => void = () => {},
+): Promise<FileBytes> {
+  const bytes = new pkg.FileBytes(file.size);
+  for (let at = 0; at < file.size; at += CHUNK) {
+    tell(at / file.size);
+    bytes.push(await read(name, file.slice(at, at + CHUNK)));
+  }
+  return bytes;
+}
+
+export async function read(name: string, file: Blob): Promise<Uint8Array> {
   try {
     return new Uint8Array(await file.arrayBuffer());
   } catch {

@@ -32,6 +32,10 @@ export interface Texture {
 export interface ReadModel extends Bytes {
   /** The up axis that the user chose; undefined for the file's own. */
   readonly up: UpAxis | undefined;
+  /** Pixels of the textures of other models, which share a limit with this one. */
+  readonly used: number;
+  /** Pixels of the textures. */
+  readonly pixels: number;
   /** Textures of each model, by index; null for those that are missing or that this browser cannot decode. */
   readonly textures: readonly (readonly (Texture | null)[])[];
   /** The cage of a project. */
@@ -54,6 +58,12 @@ export interface BoundArrays {
   readonly report: BindReport | undefined;
 }
 
+/** Sparse rows whose columns and weights stay in the worker until the job `rows` has fetched the last of them. */
+export type KeptRows = Omit<BoundArrays, "indices" | "data"> & {
+  /** Number of this bind, for `rows`. */
+  readonly key: number;
+};
+
 export interface SampleArrays {
   readonly glb: Uint8Array;
   readonly cage: CheckedCage;
@@ -67,6 +77,14 @@ export interface Jobs {
     input: { positions: Float32Array; extra: number; cage: CageArrays; options: BindOptions };
     step: Progress;
     output: BoundArrays;
+  };
+  /** Like `bind`, but the worker keeps columns and weights for `rows`. */
+  bindKept: { input: Jobs["bind"]["input"]; step: Progress; output: KeptRows };
+  /** Columns and weights of the last `bindKept`, from `start` to `end`. */
+  rows: {
+    input: { key: number; start: number; end: number };
+    step: never;
+    output: [Uint32Array, Float32Array];
   };
   formula: {
     input: { kind: Coordinates; positions: Float32Array; cage: CageArrays };
@@ -113,7 +131,8 @@ export interface Jobs {
     output: CheckedCage;
   };
   read: {
-    input: { files: readonly NamedFile[]; up: UpAxis | undefined };
+    /** `used`: pixels of the textures of other models that are drawn together with this one. */
+    input: { files: readonly NamedFile[]; up: UpAxis | undefined; used: number };
     step: Reading;
     output: ReadModel;
   };

@@ -4,7 +4,7 @@ import type { Job, Reading } from "../contract";
 import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Client, named } from "./client";
-import { siblingOf, tooLarge } from "./files";
+import { read as readBytes, siblingOf, tooLarge, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
 import { furtherOf } from "./reading";
 
@@ -93,11 +93,12 @@ async function pause(): Promise<void> {
  * Reads on this thread a file that a worker has already read. Returns its model, then the other models of a project.
  */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
-  const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
-  if (read.packed) loaded.setPacked(read.packed);
+  const bytes = await toWasm(pkg, read.name, read.content);
+  const loaded = pkg.Loaded.read(read.name, bytes, siblingOf(read.siblings));
+  if (read.packed) loaded.setPacked(await readBytes(read.name, read.packed));
   if (read.up) loaded.setUp(read.up);
   await pause();
-  loaded.prepare();
+  loaded.prepare(read.used);
   const all: [Loaded, ...Loaded[]] = [loaded, ...furtherOf(loaded)];
   all.forEach((one, number) => {
     read.textures[number]?.forEach((texture, k) => {

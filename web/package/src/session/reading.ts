@@ -3,7 +3,7 @@
 import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
 import type { Loaded, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
-import { type Bytes, readFiles, siblingOf } from "./files";
+import { type Bytes, read as readBytes, readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
 import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
@@ -15,19 +15,20 @@ const say = (tell: Tell, stage: Reading["stage"], fraction = 0) => tell({ stage,
 /** Reads a model: decompresses it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
-  { files, up }: Jobs["read"]["input"],
+  { files, up, used }: Jobs["read"]["input"],
   tell: Tell,
 ): Promise<ReadModel> {
-  const { loaded, bytes } = await read(pkg, files, tell);
+  const { loaded, file } = await read(pkg, files, tell);
   const began = performance.now();
   if (up) loaded.setUp(up);
-  loaded.prepare();
+  loaded.prepare(used);
   const all = [loaded, ...furtherOf(loaded)];
-  const took = bytes.took + performance.now() - began;
+  const took = file.took + performance.now() - began;
   const decoded = [];
   for (const one of all) {
     decoded.push(await decodeTextures(one, (share) => say(tell, "textures", share)));
   }
+  const drawn = decoded.flatMap(({ textures }) => textures.map((one) => (one ? one.width * one.height : 0)));
   const failed = decoded.reduce((sum, one) => sum + one.failed, 0);
   const many = failed === 1 ? "a texture" : `${failed} textures`;
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
@@ -37,8 +38,10 @@ export async function readModel(
   const vertices = positions.reduce((sum, { length }) => sum + length / 3, 0);
   const cage = mesh && checked(pkg, mesh, flat(positions));
   return {
-    ...bytes,
+    ...file,
     up,
+    used,
+    pixels: drawn.reduce((sum, pixels) => sum + pixels, 0),
     textures: decoded.map(({ textures }) => textures),
     cage,
     notices: failed > 0 ? [notice] : [],
@@ -109,23 +112,26 @@ export async function read(
   pkg: Package,
   files: Jobs["read"]["input"]["files"],
   tell: Tell,
-): Promise<{ loaded: Loaded; bytes: Bytes & { took: number } }> {
+): Promise<{ loaded: Loaded; file: Bytes & { took: number } }> {
   say(tell, "bytes");
   const file = await readFiles(files);
   const sibling = siblingOf(file.siblings);
-  const timed = (bytes: Uint8Array) => {
+  const timed = async (content: Blob) => {
+    const bytes = await toWasm(pkg, file.name, content, (share) => say(tell, "bytes", share));
     say(tell, "geometry");
     const began = performance.now();
     const loaded = pkg.Loaded.read(file.name, bytes, sibling);
-    return { loaded, bytes: { ...file, bytes, took: performance.now() - began } };
+    return { loaded, file: { ...file, content, took: performance.now() - began } };
   };
   try {
-    return timed(file.bytes);
+    return await timed(file.content);
   } catch (error) {
     if (!(error instanceof Error) || error.name !== "Compressed") throw error;
     say(tell, "decompress");
     const { decompress } = await loadPart(import("../decode"));
-    const { loaded, bytes } = timed(await decompress(file.name, file.bytes, sibling));
-    return { loaded, bytes: { ...bytes, packed: file.bytes } };
+    const packed = await readBytes(file.name, file.content);
+    const plain = await decompress(file.name, packed, sibling);
+    const { loaded, file: decompressed } = await timed(new Blob([plain as BlobPart]));
+    return { loaded, file: { ...decompressed, packed: file.content } };
   }
 }

@@ -1,7 +1,9 @@
 /** Code of the worker, which runs long jobs in sequence. */
 
+import type { Progress } from "../contract";
 import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
+import { named } from "./client";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
 import { check, checked, read, readCage, readModel } from "./reading";
 
@@ -74,6 +76,9 @@ type Work = {
 
 function createWork(pkg: Package): Work {
   let shared: Binder | undefined;
+  /** Weights of the last bind that have not all been fetched. */
+  let kept: Bound | undefined;
+  let keptKey = 0;
   let puller: Puller | undefined;
   const opened = (): Puller => {
     if (!puller) throw new Error("no model is ready to be pulled: bind it again");
@@ -84,12 +89,32 @@ function createWork(pkg: Package): Work {
     if (needsGpu) await shared.openGpu();
     return shared;
   };
+  const bind = async (
+    { positions, extra, cage, options }: Jobs["bind"]["input"],
+    step: (step: Progress) => boolean,
+  ): Promise<Bound> => {
+    const by = await binder(options.backend === "gpu");
+    return by.bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step);
+  };
   return {
-    async bind({ positions, extra, cage, options }, step) {
-      const by = await binder(options.backend === "gpu");
-      return taken(
-        await by.bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step),
-      );
+    bind: async (input, step) => taken(await bind(input, step)),
+    async bindKept(input, step) {
+      kept?.free();
+      kept = undefined;
+      keptKey += 1;
+      kept = await bind(input, step);
+      const { indptr, offsets, report } = kept;
+      return { key: keptKey, indptr, offsets, report };
+    },
+    async rows({ key, start, end }) {
+      if (key < keptKey) throw named("Cancelled", "a newer bind has replaced these weights");
+      if (!kept || key > keptKey) throw new Error("the weights are gone: bind again");
+      const rows = kept.rows(start, end);
+      if (end === kept.count) {
+        kept.free();
+        kept = undefined;
+      }
+      return rows;
     },
     async formula({ kind, positions, cage }) {
       const by = await binder(false);

@@ -1,6 +1,6 @@
 /** Sentences of step Model, and about opening files. */
 
-import { count, endings, percent, plural } from "../../format";
+import { count, endings, inUnit, percent, plural } from "../../format";
 
 export const model = {
   title: "Choose a model",
@@ -78,6 +78,8 @@ export const opening = {
   },
   far: (stage: string, fraction: number) => (fraction > 0 ? `${stage}, ${percent(fraction)}` : stage),
   anyway: "Open anyway",
+  longBind: (name: string, seconds: number) =>
+    `The settings in ${name} ask for a solve of about ${inUnit(Math.round(seconds / 60) || 1, "minute")}: the default settings are used instead. Step Bind can change them.`,
   freezes: (vertices: number, ms: number) =>
     `Large model (${plural(vertices, "vertex", "vertices")}): the page will freeze for about ${plural(Math.round(ms / 1000), "second")}.`,
   nothing: "Nothing to open",
