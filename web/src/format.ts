@@ -110,3 +110,8 @@ export function stem(name: string): string {
   const dot = base.lastIndexOf(".");
   return dot > 0 ? base.slice(0, dot) : base;
 }
+
+/** The stem of exported files: without the endings of earlier exports, which would otherwise accumulate. */
+export function exportStem(name: string): string {
+  return stem(name).replace(/(?<=.)(-pose[ds])+$/i, "");
+}

@@ -257,6 +257,11 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
       ),
     pullGrab: (grab) => ofNow(pulling().run("pullGrab", grab)),
     pullFrame: (to) => ofNow(pulling().run("pullFrame", { to })),
+    zip: (files) =>
+      pkg.Engine.zipFiles(
+        files.map(({ name }) => name),
+        files.map(({ bytes }) => bytes),
+      ),
     draw: frames.ask,
     onFrame: frames.listen,
     async picture(width, height, alone = false) {

@@ -125,7 +125,7 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** The clip shown in place of the cage's pose. */
   clip: ClipState;
   /** Identifier of the only model to export; null to export all. */
-  exportOnly: number | null;
+  exportOnly: number | "zip" | null;
   /** How the model's skeleton follows the cage. */
   rigOptions: RigOptions;
   /** Name of the pose that the animation approaches; null for the rest pose. */

@@ -300,6 +300,7 @@ export function createFake(): Fake {
     engine,
     samples: ["rat"],
     readFiles: (files) => job("read", files),
+    zip: (files) => Uint8Array.of(files.length),
     open: (read) => job<Opened>("open", read).done,
     shareReader: () => () => {},
     add: (reads, label) => job("add", { reads, label }),

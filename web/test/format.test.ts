@@ -1,5 +1,15 @@
 import { describe, expect, it } from "vitest";
-import { bytes, coordinate, count, duration, percent, plural, scientific, stem } from "../src/format";
+import {
+  bytes,
+  coordinate,
+  count,
+  duration,
+  exportStem,
+  percent,
+  plural,
+  scientific,
+  stem,
+} from "../src/format";
 
 describe("formats", () => {
   it("group thousands", () => expect(count(1234567)).toBe("1,234,567"));
@@ -44,5 +54,9 @@ describe("formats", () => {
     expect(stem("models/horse.v2.glb")).toBe("horse.v2");
     expect(stem(".hidden")).toBe(".hidden");
     expect(stem("horse.cagework.glb")).toBe("horse");
+  });
+  it("of exports drop the endings of earlier exports", () => {
+    const stems = ["fox-posed.glb", "fox-poses-posed.obj", "posed.obj", "-posed.obj"].map(exportStem);
+    expect(stems).toEqual(["fox", "fox", "posed", "-posed"]);
   });
 });

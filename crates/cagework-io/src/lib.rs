@@ -46,7 +46,7 @@ pub use gltf::{
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{FormatError, FormatFacts, Model, ModelFormat, PoseState, ReadError};
-pub use npz::{NpzError, SavedWeights, read_weights_npz, write_field_npz, write_weights_npz};
+pub use npz::{NpzError, SavedWeights, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use origin::origin_near;
 pub use part_kind::PartKind;

@@ -183,7 +183,13 @@ impl Model {
         if splats.is_empty() {
             return Err(ReadError::Splats { name: name.into(), source: SplatError::Empty });
         }
-        let source = Source { name, bytes: Cow::default(), resolve: &mut |_| None, memory_limit: u64::MAX, near: false };
+        let source = Source {
+            name,
+            bytes: Cow::default(),
+            resolve: &mut |_| None,
+            memory_limit: u64::MAX,
+            near: false,
+        };
         source.new_capture(splats, origin)
     }
 

@@ -15,6 +15,8 @@
 
 mod arrays;
 
+pub use arrays::write_zip;
+
 use cagework_core::deform::OutsideVertex;
 use cagework_core::field::Field;
 use cagework_core::weights::WeightsError;

@@ -7,7 +7,7 @@ use std::io::{Cursor, Read as _, Write as _};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::field::{Field, Lattice};
 use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
-use cagework_io::{SavedWeights, read_weights_npz, write_field_npz, write_weights_npz};
+use cagework_io::{SavedWeights, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
 use glam::{DVec3, Vec3};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -28,6 +28,18 @@ fn sample() -> (Weights, Frames, Vec<OutsideVertex>) {
 
 fn saved((weights, frames, outside): (Weights, Frames, Vec<OutsideVertex>)) -> SavedWeights {
     SavedWeights { weights, frames, outside, extra_points: vec![], inner_controls: vec![] }
+}
+
+#[test]
+fn an_archive_holds_files_with_distinct_names() {
+    let files = [("a.glb".to_owned(), vec![1, 2, 3]), ("é b.obj".to_owned(), Vec::new())];
+    let mut archive = ZipArchive::new(Cursor::new(write_zip(&files).unwrap())).unwrap();
+    for (name, bytes) in &files {
+        let mut found = Vec::new();
+        archive.by_name(name).unwrap().read_to_end(&mut found).unwrap();
+        assert_eq!(&found, bytes);
+    }
+    assert_eq!(write_zip(&[files[0].clone(), files[0].clone()]), None);
 }
 
 #[test]

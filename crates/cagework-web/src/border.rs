@@ -169,6 +169,12 @@ fn generated_types_are_up_to_date() {
     ] {
         writeln!(text, "/** {about} */\nexport const {name} = {values:?} as const;").unwrap();
     }
+    text += "/** MIME types of exported models, by extension. */\nexport const EXPORT_TYPES: Readonly<Record<string, string>> = {";
+    for facts in ModelFormat::ALL.map(ModelFormat::facts) {
+        let Some(mime_type) = facts.mime_types.first() else { continue };
+        facts.endings.iter().for_each(|ending| write!(text, " {ending}: {mime_type:?},").unwrap());
+    }
+    text += " };\n";
     text += "/** Sliders of options, by name. */\nexport const SLIDERS = {";
     for (name, number) in NUMBERS {
         let Some(slider) = number.slider else { continue };

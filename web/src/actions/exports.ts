@@ -1,9 +1,10 @@
 /** Exports files, pictures and links. */
 
+import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
-import { SHAPE_FORMATS } from "../defaults";
+import { EXPORT_TYPES, SHAPE_FORMATS } from "../defaults";
 import { rigOf } from "../derived";
-import { stem } from "../format";
+import { exportStem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { loadLattice } from "./clips";
@@ -20,12 +21,15 @@ export interface Exports {
   share(): Promise<void>;
   /** Sets the pixels of a picture per CSS pixel of the view, and whether the picture shows only the model. */
   pictureOf(scale: number, alone: boolean): void;
-  /** Sets the format of exported shapes. */
-  shapeIn(format: ShapeFormatName): void;
+  /** Sets the format of exported shapes, and whether they are the shown frame of a clip. */
+  shapeIn(format: ShapeFormatName, frame: boolean): void;
 }
 
 /** Pause between two downloads, ms. Browsers drop downloads that start at the same time. */
 const BETWEEN_MS = 250;
+
+/** Media type of formats without a registered one. */
+const OCTETS = "application/octet-stream";
 
 /** Largest side of a picture, pixels. */
 const LONGEST_SIDE = 8192;
@@ -34,6 +38,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   let scale = 2;
   let alone = false;
   let format: ShapeFormatName = SHAPE_FORMATS[0];
+  let frame = true;
 
   const engine = () => ctx.session().engine;
   const rig = () => rigOf(ctx.store.get());
@@ -41,7 +46,7 @@ export function createExports(ctx: Context, project: Project): Exports {
   /** Exports that write one file for each model. */
   const own = {
     glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
-    shape: (id: number) => engine().exportShape(id, format),
+    shape: (id: number) => engine().exportShape(id, format, frame),
     poses: (id: number) => engine().exportPoses(id, rig()),
     weights: (id: number) => engine().exportWeights(id),
   };
@@ -55,30 +60,43 @@ export function createExports(ctx: Context, project: Project): Exports {
   const suffix = (kind: Exclude<ExportKind, "project">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
-  /** Downloads one file for each model to export. */
+  /** Downloads one file for each model to export, or all of them in a zip archive. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
     if (kind === "glb") await loadLattice(ctx);
     const { members } = model;
     const { exportOnly } = ctx.store.get();
     const chosen = members.filter(({ id }) => id === exportOnly);
     const notices = new Set<string>();
-    const files: string[] = [];
-    let size = 0;
-    for (const { id, name } of chosen.length > 0 ? chosen : members) {
+    const files: { name: string; bytes: Uint8Array<ArrayBuffer> }[] = [];
+    for (const member of chosen.length > 0 ? chosen : members) {
       // A single model may be shown under the name of its sample or project.
-      const source = members.length === 1 ? model.name : name;
-      const full = `${stem(source)}${suffix(kind)}`;
+      const source = members.length === 1 ? model.name : member.name;
+      const full = `${exportStem(source)}${suffix(kind)}`;
       // A VRM is a GLB with its own extension.
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
-      const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
-      const blob = new Blob([new Uint8Array(own[kind](id))]);
+      const name = other(
+        isVrm ? full.replace(/glb$/, "vrm") : full,
+        files.map((file) => file.name),
+      );
+      files.push({ name, bytes: own[kind](member.id) as Uint8Array<ArrayBuffer> });
       if (kind === "glb" || kind === "shape") for (const notice of engine().rigNotices()) notices.add(notice);
-      if (files.length > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
-      download(blob, file);
-      files.push(file);
-      size += blob.size;
     }
-    ctx.tell.say(T.exports.saved(files, size));
+    const [first] = files;
+    if (exportOnly === "zip" && first && files.length > 1) {
+      const name = first.name.replace(/\.\w+$/, ".zip");
+      files.splice(0, files.length, { name, bytes: ctx.session().zip(files) as Uint8Array<ArrayBuffer> });
+    }
+    for (const [k, { name, bytes }] of files.entries()) {
+      if (k > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
+      download(blobOf(name, bytes), name);
+    }
+    const size = files.reduce((sum, { bytes }) => sum + bytes.length, 0);
+    ctx.tell.say(
+      T.exports.saved(
+        files.map(({ name }) => name),
+        size,
+      ),
+    );
     for (const notice of notices) ctx.tell.say(sentence(notice));
   };
 
@@ -95,9 +113,10 @@ export function createExports(ctx: Context, project: Project): Exports {
         // Right after a bind, its weights may still be uploading to the GPU.
         await engine().ready();
         if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
-        const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(shared[kind]())]);
-        const name = stem(model?.name ?? "model");
+        const name = exportStem(model?.name ?? "model");
         const file = kind === "project" ? project.fileName() : `${name}${suffix(kind)}`;
+        const blob =
+          kind === "picture" ? await picture() : blobOf(file, shared[kind]() as Uint8Array<ArrayBuffer>);
         download(blob, file);
         ctx.tell.say(T.exports.saved([file], blob.size));
       });
@@ -117,8 +136,8 @@ export function createExports(ctx: Context, project: Project): Exports {
     pictureOf(size, isAlone) {
       [scale, alone] = [size, isAlone];
     },
-    shapeIn(chosen) {
-      format = chosen;
+    shapeIn(chosen, isFrame) {
+      [format, frame] = [chosen, isFrame];
     },
   };
   return exports;
@@ -144,6 +163,12 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   weights: "-weights.npz",
   picture: ".png",
 };
+
+/** A file in memory, with the media type of its format. */
+function blobOf(name: string, bytes: Uint8Array<ArrayBuffer>): Blob {
+  const type = EXPORT_TYPES[extension(name)] ?? (name.endsWith(".zip") ? "application/zip" : OCTETS);
+  return new Blob([bytes], { type });
+}
 
 /** Appends a number to a file name that is in `taken`: models from different folders may have the same name. */
 function other(name: string, taken: readonly string[]): string {

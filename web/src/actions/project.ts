@@ -2,7 +2,7 @@
 
 import type { MemberInfo, SceneOptions } from "../contract";
 import { optionsInUse } from "../derived";
-import { stem } from "../format";
+import { exportStem } from "../format";
 import { encodeShare } from "../share";
 import type { Context } from "./context";
 import type { ControlActions } from "./controls";
@@ -22,12 +22,13 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     const state = store.get();
     const { cageOptions: cage, symmetry, rigOptions: rig, model } = state;
     const settings = { bind: optionsInUse(state), cage, symmetry, ...(model?.rigged ? { rig } : {}) };
-    return new Uint8Array(ctx.session().engine.writeProject(JSON.stringify(settings)));
+    // A copy out of the wasm memory, so its buffer is not shared.
+    return ctx.session().engine.writeProject(JSON.stringify(settings)) as Uint8Array<ArrayBuffer>;
   };
 
   return {
     write,
-    fileName: () => `${stem(store.get().model?.name ?? "model")}.cagework.glb`,
+    fileName: () => `${exportStem(store.get().model?.name ?? "model")}.cagework.glb`,
     async link() {
       const { sample, sampleCage, posed, scene, model } = store.get();
       const { engine } = ctx.session();

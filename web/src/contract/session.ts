@@ -113,6 +113,8 @@ export interface Session {
   /** Solves one frame of the pull, in the worker for pulls. `to`: targets of the grabbed points, `[n_grabs, 3]`. */
   pullFrame(to: Float32Array): Job<PullFrame>;
 
+  /** A zip archive of files with distinct names. */
+  zip(files: readonly { readonly name: string; readonly bytes: Uint8Array }[]): Uint8Array;
   /** Requests a frame; repeated calls are merged. Changes through `engine` request a frame themselves. */
   draw(): void;
   /**
@@ -144,10 +146,10 @@ export interface ReadFile {
   /** Approximate time for which opening the file blocks the page, ms. */
   readonly took: number;
   readonly vertices: number;
-}
-
   /** Pixels of its textures. */
   readonly pixels: number;
+}
+
 export interface Opened {
   readonly model: ModelInfo;
   /** Check of the cage in the file; null without a cage. */

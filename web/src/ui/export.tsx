@@ -83,13 +83,17 @@ function Which({ app }: { app: App }) {
   const { model, exportOnly } = app.store.get();
   const members = model?.members ?? [];
   if (members.length < 2) return null;
-  const which = members.find(({ id }) => id === exportOnly)?.id ?? "";
-  const choose = (id: string) => app.store.set({ exportOnly: id === "" ? null : Number(id) });
+  const which = exportOnly === "zip" ? "zip" : (members.find(({ id }) => id === exportOnly)?.id ?? "");
+  const choose = (chosen: string) => {
+    const exportOnly = chosen === "zip" ? "zip" : chosen === "" ? null : Number(chosen);
+    app.store.set({ exportOnly });
+  };
   return (
     <label class="stack tight">
       <span class="legend-text">{T.exports.which}</span>
       <select value={which} onChange={({ currentTarget: { value } }) => choose(value)}>
         <option value="">{T.exports.all(members.length)}</option>
+        <option value="zip">{T.exports.zip(members.length)}</option>
         {members.map(({ id, name }) => (
           <option key={id} value={id}>
             {name}
@@ -121,9 +125,22 @@ function RigExport({ app }: { app: App }) {
 
 function ShapeFormat({ app }: { app: App }) {
   const [format, setFormat] = useState<ShapeFormatName>(SHAPE_FORMATS[0]);
-  useEffect(() => app.exports.shapeIn(format), [app, format]);
+  const [moment, setMoment] = useState<"frame" | "rest">("frame");
+  useEffect(() => app.exports.shapeIn(format, moment === "frame"), [app, format, moment]);
+  const isClipShown = app.store.get().clip.clip !== null;
   return (
-    <div class="export-option">
+    <div class="export-option stack tight">
+      {isClipShown && (
+        <Segments
+          label={T.exports.moment}
+          choices={[
+            { value: "frame", label: T.exports.frame },
+            { value: "rest", label: T.exports.restShape },
+          ]}
+          value={moment}
+          onChange={setMoment}
+        />
+      )}
       <Segments
         label={T.exports.format}
         choices={SHAPE_FORMATS.map((value) => ({ value, label: value.toUpperCase() }))}

@@ -5,10 +5,16 @@ import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
 /** File names of downloads since the start of the test. */
 let downloads: string[] = [];
+let types: string[] = [];
 let copied: string[] = [];
 
 beforeEach(() => {
   downloads = [];
+  types = [];
+  vi.spyOn(URL, "createObjectURL").mockImplementation((blob) => {
+    types.push((blob as Blob).type);
+    return "";
+  });
   copied = [];
   const link = {
     href: "",
@@ -23,6 +29,7 @@ beforeEach(() => {
 });
 afterEach(() => {
   vi.unstubAllGlobals();
+  vi.restoreAllMocks();
 });
 
 function page() {
@@ -40,7 +47,8 @@ it("files are named after the model and their size is shown", async () => {
     exportGlb: () => new Uint8Array(2000),
     rigNotices: () => ["3 of 4 joints moved"],
     exportCage: () => Uint8Array.of(1),
-    exportShape: (_id: number, format: string) => new TextEncoder().encode(format),
+    exportShape: (_id: number, format: string, frame: boolean) =>
+      new TextEncoder().encode(format + (frame ? "!" : "")),
   });
   await exports.save("glb");
   await exports.save("cage");
@@ -49,10 +57,15 @@ it("files are named after the model and their size is shown", async () => {
   store.set({ model: { ...MODEL, name: "someone.vrm" } });
   await exports.save("glb");
   expect(downloads.at(-1), "a VRM keeps its extension").toBe("someone-posed.vrm");
-  exports.shapeIn("stl");
+  exports.shapeIn("stl", false);
   await exports.save("shape");
   expect(downloads.at(-1), "a shape has its own format").toBe("someone-posed.stl");
   expect(said.at(-2)).toContain("(3 byte)");
+  exports.shapeIn("ply", true);
+  await exports.save("shape");
+  expect(said.at(-2), "the shown frame of a clip").toContain("(4 byte)");
+  const glb = "model/gltf-binary";
+  expect(types).toEqual([glb, "model/obj", glb, "model/stl", "application/octet-stream"]);
 });
 
 it("each of several models is exported to its own file; one of them can be exported alone", async () => {
@@ -85,6 +98,10 @@ it("each of several models is exported to its own file; one of them can be expor
   store.set({ exportOnly: 6 });
   await exports.save("weights");
   expect(downloads.length, "a removed model cannot be chosen").toBe(8);
+  store.set({ exportOnly: "zip" });
+  await exports.save("glb");
+  expect([downloads.slice(8), types.at(-1)]).toEqual([["body-posed.zip"], "application/zip"]);
+  expect(said.at(-2)).toBe("body-posed.zip is in your downloads (1 byte).");
 });
 
 it("a failed export is reported and saves nothing", async () => {

@@ -19,7 +19,8 @@ pub struct FormatFacts {
     pub endings: &'static [&'static str],
     /// Extensions among `endings` that files can be read with, but not written with.
     read_only: &'static [&'static str],
-    /// MIME types, for file choosers that support MIME types better than extensions.
+    /// MIME types, for file choosers that support MIME types better than extensions; the first one is that of exported
+    /// files.
     pub mime_types: &'static [&'static str],
     /// Extensions of files that refer to other files: buffers, textures, materials.
     pub naming: &'static [&'static str],
@@ -151,6 +152,7 @@ formats! {
     /// Wavefront OBJ.
     Obj = "obj": FormatFacts {
         endings: &["obj"],
+        mime_types: &["model/obj"],
         naming: &["obj"],
         companions: &["mtl"],
         named_files: obj::named_files,
@@ -179,6 +181,7 @@ formats! {
     /// STL, text or binary.
     Stl = "stl": FormatFacts {
         endings: &["stl"],
+        mime_types: &["model/stl"],
         is: stl::is_stl,
         read: |source| source.polygons(ModelFormat::Stl, stl::read),
         write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),

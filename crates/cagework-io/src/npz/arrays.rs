@@ -77,6 +77,18 @@ impl NpzWriter {
     }
 }
 
+/// Writes files into a zip archive, uncompressed, with a fixed time. `None` if two names are equal.
+#[must_use]
+pub fn write_zip(files: &[(String, Vec<u8>)]) -> Option<Vec<u8>> {
+    let sizes = || files.iter().map(|(_, bytes)| bytes.len());
+    let mut writer = NpzWriter::new(sizes().sum(), sizes().max().unwrap_or(0));
+    for (name, bytes) in files {
+        writer.zip.start_file(name.as_str(), writer.options).ok()?;
+        writer.zip.write_all(bytes).expect("writing to memory does not fail");
+    }
+    Some(writer.finish())
+}
+
 pub(super) fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     let shape = match shape {
         [n] => format!("({n},)"),

@@ -7,10 +7,10 @@ use cagework_core::field::bend_vertices;
 use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
-    Clip, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_weights_npz,
+    Clip, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_weights_npz, write_zip,
 };
 use glam::{DVec3, Vec3};
-use js_sys::{Array, Float32Array, Uint32Array};
+use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -18,12 +18,24 @@ use super::Engine;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{JsRigOptions, decode};
-use crate::playing::SharedClip;
+use crate::playing::{Playback, SharedClip};
 use crate::state::State;
 use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
+    /// A zip archive of files, uncompressed. The names must be distinct.
+    ///
+    /// # Errors
+    /// If two names are equal.
+    #[wasm_bindgen(js_name = zipFiles)]
+    pub fn zip_files(names: Vec<String>, files: Vec<Uint8Array>) -> Result<Vec<u8>, JsValue> {
+        let files: Vec<(String, Vec<u8>)> =
+            names.into_iter().zip(files.iter().map(Uint8Array::to_vec)).collect();
+        let equal = || Fault::new(ErrorName::Error, "two files of an archive have the same name");
+        Ok(write_zip(&files).ok_or_else(equal)?)
+    }
+
     /// The posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With `options.dynamic`, and
     /// if the model has this clip, the frames of `clip` are exported as morph targets instead.
     ///
@@ -46,7 +58,8 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// The posed model in a format that stores only its shape, without rig or animation.
+    /// The posed model in a format that stores only its shape, without rig or animation. `frame`: the shown frame of a
+    /// clip, if one is shown.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -55,10 +68,17 @@ impl Engine {
         &self,
         id: u32,
         #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
+        frame: bool,
     ) -> Result<Vec<u8>, JsValue> {
         let format: ModelFormat = decode(format)?;
-        let pose = self.read(|state| state.pose().to_vec());
-        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
+        let shown = self.read(|state| state.playing.as_ref().filter(|_| frame).map(Playback::positions));
+        let posed = match shown {
+            Some(positions) => positions,
+            None => {
+                let pose = self.read(|state| state.pose().to_vec());
+                self.deformed(&[pose])?.pop().unwrap_or_default()
+            }
+        };
         let (bytes, lost) = self.read(|state| {
             let model = &state.models().get(id)?.model;
             Answer::Ok((model.write(format, state.models().get(id)?.share(&posed))?, model.lost_in(format)))

@@ -1089,12 +1089,14 @@ export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","gre
 /** File extensions of models, preferred first. */
 export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off", "splat", "spz"] as const;
 /** MIME types of models. */
-export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json"] as const;
+export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json", "model/obj", "model/stl"] as const;
 /** Extensions of models that refer to other files. */
 export const NAMING_ENDINGS = ["gltf", "obj"] as const;
 /** Extensions of these other files. */
 export const COMPANION_ENDINGS = ["bin", "png", "jpg", "jpeg", "webp", "ktx2", "mtl"] as const;
 /** Formats that store only a shape. */
 export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
+/** MIME types of exported models, by extension. */
+export const EXPORT_TYPES: Readonly<Record<string, string>> = { glb: "model/gltf-binary", vrm: "model/gltf-binary", gltf: "model/gltf-binary", obj: "model/obj", stl: "model/stl", };
 /** Sliders of options, by name. */
 export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, vertices: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, margin: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, } as const;

@@ -8,11 +8,11 @@ export const exports = {
   items: {
     glb: [
       "Posed model",
-      "GLB of the model as you see it. Keeps its parts, materials, textures, skeleton and clips.",
+      "GLB of the model in this pose. Keeps its parts, materials, textures, skeleton and clips.",
     ],
     shape: [
       "Shape only",
-      "The shape as you see it, without skeleton and clips, for printing, measuring or other programs.",
+      "The shape alone, without skeleton and clips, for printing, measuring or other programs.",
     ],
     poses: [
       "Poses as morph targets",
@@ -36,6 +36,10 @@ export const exports = {
   aloneSentence: "Without cage and floor, on a transparent background.",
   which: "Which model",
   all: (n: number) => `All ${n}, one file each`,
+  zip: (n: number) => `All ${n}, in one .zip file`,
+  moment: "Shape to export",
+  frame: "This frame",
+  restShape: "The rest shape",
   saved: (files: readonly string[], size: number) =>
     `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
   noLink: "Links work for samples only. Save a project to share your own model.",
