@@ -27,6 +27,10 @@ const MIN_SHELL_OPACITY: f32 = 0.1;
 /// Share of the splats, the largest ones, that do not belong to the captured object.
 const LARGEST_SHARE: f64 = 0.01;
 
+/// Cells along the longest side of a capture, of whose small splats one each gets an octahedron. They are a third of the
+/// voxels of a cage of 80 vertices.
+const SHELL_CELLS: f32 = 128.0;
+
 /// Gaussian splats. All arrays have one entry per splat, unless stated otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Splats {
@@ -185,12 +189,32 @@ impl Splats {
         if kept.is_empty() {
             kept = (0..self.len()).collect();
         }
+        self.thin_out(&mut kept);
         let corners = |&splat: &usize| octahedron(self.positions[splat], SHELL_SIGMAS * self.axes(splat));
         (kept.iter().flat_map(corners).collect(), octahedra(kept.len()))
     }
 }
 
-/// Octahedra around the corners' mean of every cell of a grid that contains points: the shells of a point cloud. The grid
+impl Splats {
+    /// Drops splats whose octahedron is smaller than a cell of a grid, except the largest one in each cell: the time to
+    /// generate a cage is proportional to the number of triangles.
+    fn thin_out(&self, kept: &mut Vec<usize>) {
+        let centers: Vec<Vec3> = kept.iter().map(|&s| self.positions[s]).collect();
+        let longest = Bounds::of(&centers).map_or(0.0, |bounds| bounds.extent().max_element());
+        let size = longest / SHELL_CELLS;
+        let cell = |s: usize| (self.positions[s] / size).floor().as_ivec3().to_array();
+        let extent = |s: usize| SHELL_SIGMAS * self.scales[s].max_element();
+        kept.sort_by_cached_key(|&s| (cell(s), std::cmp::Reverse(extent(s).to_bits())));
+        let mut last = None;
+        kept.retain(|&s| {
+            let is_first = last.replace(cell(s)) != Some(cell(s));
+            is_first || extent(s) > size
+        });
+        kept.sort_unstable();
+    }
+}
+
+/// Octahedra around the centres of all cells of a grid that contain points: the shells of a point cloud. The grid
 /// is the finest one of a cascade whose cells have six occupied neighbours or more on average, as those of a sampled
 /// surface do.
 #[must_use]

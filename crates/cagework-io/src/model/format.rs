@@ -10,6 +10,7 @@ use crate::polygons::Shape;
 use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::splats::{records, spz};
+use crate::up::UpAxis;
 use crate::{gltf, obj, off, ply, stl};
 
 /// Facts about a format, and its functions.
@@ -242,6 +243,12 @@ impl ModelFormat {
     #[must_use]
     pub fn holds_poses(self) -> bool {
         self.keeps(Kept::Poses)
+    }
+
+    /// Up axis that captures in this format have by convention.
+    #[must_use]
+    pub fn up_of_captures(self) -> UpAxis {
+        if matches!(self, Self::Ply | Self::Splat) { UpAxis::YDown } else { UpAxis::Y }
     }
 
     pub(crate) fn keeps(self, what: Kept) -> bool {

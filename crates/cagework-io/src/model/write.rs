@@ -55,7 +55,8 @@ impl Model {
     }
 
     /// Exports a capture with new positions, shapes and spherical harmonics. In the format of its file, splats that did
-    /// not change keep their bytes, and the others keep everything else.
+    /// not change keep their bytes, and the others keep everything else. Between formats with y up and with y down, the
+    /// capture makes half a turn about x.
     ///
     /// # Errors
     /// [`WriteError`] if the model is no capture, the format stores no splats, the number of splats differs, or a number is
@@ -78,15 +79,23 @@ impl Model {
         if changed.as_ref().is_some_and(|changed| is_whole && !changed.contains(&true)) {
             return Ok(capture.file.clone());
         }
-        let turned;
-        let splats = if self.up == UpAxis::Y {
-            splats
-        } else {
-            let positions = self.up.turned_back(&splats.positions).into_owned();
-            turned = Splats { positions, ..splats.rotated(Quat::from_mat4(&self.up.turn()).inverse()) };
-            &turned
+        let mut turned = Cow::Borrowed(splats);
+        let mut turn = |turn: Quat, positions: &dyn Fn(&[Vec3]) -> Vec<Vec3>| {
+            turned = Cow::Owned(Splats { positions: positions(&turned.positions), ..turned.rotated(turn) });
         };
-        let to_write = SplatsToWrite { splats, origin: self.origin, changed: changed.as_deref() };
+        if self.up != UpAxis::Y {
+            let to_file = Quat::from_mat4(&self.up.turn()).inverse();
+            turn(to_file, &|positions| self.up.turned_back(positions).into_owned());
+        }
+        let mut origin = self.origin;
+        let [from, to] = [self.format, format].map(ModelFormat::up_of_captures);
+        if from != to {
+            // Half a turn about x, in either direction.
+            let half = UpAxis::YDown;
+            turn(Quat::from_mat4(&half.turn()), &|positions| half.turned(positions).into_owned());
+            origin = half.vector_turned(origin);
+        }
+        let to_write = SplatsToWrite { splats: &turned, origin, changed: changed.as_deref() };
         Ok(match (format, &capture.records) {
             (ModelFormat::Ply, Records::Ply(table)) => splats::ply::write(&to_write, Some(table)),
             (ModelFormat::Ply, _) => splats::ply::write(&to_write, None),
