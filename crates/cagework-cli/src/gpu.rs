@@ -72,7 +72,8 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let positions = model.positions.clone();
     let (copies, triangles) = (look.copies, look.triangles);
     let textures = textures.into_iter().map(Arc::new).collect();
-    (DrawModel { positions, copies, vertices, triangles, groups, textures, splats: None }, notices)
+    let splats = model.splats().cloned().map(Arc::new);
+    (DrawModel { positions, copies, vertices, triangles, groups, textures, splats }, notices)
 }
 
 fn wrap(wrap: LookWrap) -> Wrap {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cagework_core::bind::Binding;
+use cagework_core::field::{CELLS, FieldWeights};
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Controls, Coordinates, Weights};
 use cagework_gpu::Session;
@@ -20,7 +21,7 @@ use crate::deform::load_weights;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
 use crate::gpu;
-use crate::load::{LoadedCage, load_cage, load_model};
+use crate::load::{LoadedCage, load_any, load_cage};
 use crate::progress::Bar;
 
 /// Output of `--json`.
@@ -53,7 +54,8 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&[&args.output], &inputs)?;
     check_compare(args)?;
-    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
+    let model = load_any(&args.model, args.read.axis(), args.read.memory)?;
+    check_capture(args, &model)?;
     let cage = args
         .cage
         .as_ref()
@@ -65,7 +67,9 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     pollster::block_on(session.set_model(drawn))?;
     let mut scene = scene_of(args);
     let mut other = None;
-    let mut points = model.positions.clone();
+    // Floaters of a capture can be far away: frame its cage.
+    let is_framed_by_cage = model.splats().is_some() && cage.is_some();
+    let mut points = if is_framed_by_cage { Vec::new() } else { model.positions.clone() };
     if let Some(cage) = &cage {
         pollster::block_on(session.set_cage(cage.controls()))?;
         points.extend(prepare(args, &model, cage, &mut session, &mut scene)?);
@@ -135,6 +139,19 @@ fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
+/// Rejects files without faces and splats, and displays that a capture of splats does not have.
+fn check_capture(args: &RenderArgs, model: &Model) -> Result<(), CliError> {
+    let is_drawn = matches!(args.show, ShowArg::Solid | ShowArg::Cells | ShowArg::Slice);
+    if model.splats().is_none() {
+        return Ok(model.require_faces()?);
+    }
+    if is_drawn && args.compare.is_none() && args.weights.is_none() {
+        return Ok(());
+    }
+    let message = "a capture of splats is drawn as it is, and follows the cage by a field".to_owned();
+    Err(CliError::Mismatch { message, hint: "leave out --compare, --weights and other values of --show" })
+}
+
 /// Minimum width of a picture that consists of two parts, pixels: one column for each part, and the divider.
 const MIN_PAIR_WIDTH: u32 = 2 + DIVIDER_WIDTH;
 
@@ -202,7 +219,8 @@ fn prepare(
     let needs_weights = args.compare.is_some()
         || args.pose.is_some()
         || matches!(args.show, ShowArg::Wireframe | ShowArg::Weights | ShowArg::Error);
-    if needs_weights {
+    let is_capture = model.splats().is_some();
+    if needs_weights && !is_capture {
         let (weights, frames) = match &args.weights {
             Some(path) => {
                 let saved = load_weights(path, model, &cage.cage, args.read.memory)?.of_vertices();
@@ -231,6 +249,11 @@ fn prepare(
         )?;
         let pose = poses.into_iter().flatten().collect::<Vec<_>>();
         session.pose(&pose);
+        if is_capture {
+            let options = args.solve.options(args.grid, args.read.memory);
+            let field = FieldWeights::bind(controls, CELLS, &options, &Bar::start())?;
+            session.set_field(Some(field.pose(controls.rest(), &pose)), &pose);
+        }
         places.extend(pose);
     }
     if matches!(args.show, ShowArg::Cells | ShowArg::Slice) {

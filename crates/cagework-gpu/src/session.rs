@@ -240,9 +240,9 @@ impl Session {
         self.renderer.set_floaters(&self.context, floaters);
     }
 
-    /// Sets the field that deforms the splats in the current pose; `None` for splats at rest.
-    pub fn set_field(&mut self, field: Option<Field>) {
-        let posed = Bounds::of(&self.pose).or_else(|| self.bounds());
+    /// Sets the field that deforms the splats; `None` for splats at rest. `pose`: positions of the controls.
+    pub fn set_field(&mut self, field: Option<Field>, pose: &[Vec3]) {
+        let posed = Bounds::of(pose).or_else(|| self.bounds());
         self.renderer.set_field(&self.context, field.zip(posed));
     }
 

@@ -212,9 +212,8 @@ impl SplatMover {
         match &mut self.way {
             Way::Kernels(kernels) => kernels.set_field(context, field.as_ref()),
             Way::Processor(processor) => {
-                let before = &processor.field;
-                let lattice = |field: &Option<Field>| field.as_ref().map(|field| field.lattice.clone());
-                if lattice(before) != lattice(&field) {
+                let lattices = [&processor.field, &field].map(|of| of.as_ref().map(|of| &of.lattice));
+                if lattices[0] != lattices[1] {
                     processor.sorted = None;
                 }
                 processor.field = field;

@@ -149,13 +149,13 @@ fn bent_splats_look_like_their_export() {
     session.set_scene(SceneOptions { cage_lines: false, handles: false, ..session.scene().clone() });
     let at_rest = picture(&mut session);
     session.pose(&pose);
-    session.set_field(Some(field));
+    session.set_field(Some(field), &pose);
     let bent = picture(&mut session);
     assert!(difference(&bent, &exported) < 2e-3, "{}", difference(&bent, &exported));
     assert!(difference(&bent, &at_rest) > 0.3, "the pose is visible");
     // The same frame again, and the rest pose.
     assert_eq!(picture(&mut session), bent);
-    session.set_field(None);
+    session.set_field(None, &pose);
     assert!(difference(&picture(&mut session), &at_rest) < 1e-3);
 }
 
@@ -170,7 +170,7 @@ fn splats_look_the_same_without_kernels() {
         pollster::block_on(session.set_cage(&cage)).unwrap();
         session.set_scene(SceneOptions { cage_lines: false, handles: false, ..session.scene().clone() });
         session.pose(&pose);
-        session.set_field(Some(field.clone()));
+        session.set_field(Some(field.clone()), &pose);
         picture(&mut session)
     });
     let [with, without] = &pictures;

@@ -82,6 +82,11 @@ pub fn write_project(
     // A model in another format is stored beside a GLB built from it, which viewers can show.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
+        Document::Obj(_) if model.splats().is_some() => {
+            let glb = model.write(ModelFormat::Gltf, &model.positions)?;
+            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(model.origin))?.document;
+            (&built, Some(file_of(model)?))
+        }
         Document::Obj(document) => {
             let (glb, _) =
                 gltf::build_from_obj(&model.name, document, &model.positions_in_file(), model.origin)?;

@@ -195,3 +195,22 @@ fn damaged_and_newer_projects_are_errors() {
     assert!(matches!(damaged, Err(ProjectError::Damaged { .. })), "{damaged:?}");
     assert!(read_project("x.glb", &bytes[..bytes.len() - 9], u64::MAX).is_err());
 }
+
+/// A project of a capture keeps its splats and its up axis.
+#[test]
+fn captures_survive_in_projects() {
+    let mut file = Vec::new();
+    for k in 0..5_u8 {
+        let numbers = [f32::from(k), 1.0, 2.0, 0.1, 0.2, 0.3];
+        file.extend(numbers.into_iter().flat_map(f32::to_le_bytes));
+        file.extend([10 * k, 20, 30, 200, 255, 128, 128, 128]);
+    }
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let mut model = read("a.splat", &file).unwrap();
+        model.set_up(up);
+        let project = reopened(&written(&model));
+        let again = &project.models[0];
+        assert_eq!((again.format(), again.up(), &*again.name), (ModelFormat::Splat, up, "a.splat"));
+        assert_eq!(again.splats(), model.splats());
+    }
+}
