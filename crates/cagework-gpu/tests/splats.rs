@@ -1,5 +1,7 @@
 //! Pictures of splats: shape and order, deformed by a field, and without storage buffers.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+
 mod support;
 
 use std::sync::Arc;
@@ -107,7 +109,7 @@ fn bent_bar() -> (Splats, Cage, Vec<Vec3>, Field) {
     let mut rng = Rng(31);
     let dot = |k: u32, rng: &mut Rng| {
         let y = k as f32 / 300.0 - 1.0;
-        let side = if k % 2 == 0 { Vec3::X } else { Vec3::Y };
+        let side = if k.is_multiple_of(2) { Vec3::X } else { Vec3::Y };
         one(
             Vec3::new(0.4 * rng.unit() - 0.2, y, 0.4 * rng.unit() - 0.2),
             Vec3::new(0.05, 0.02, 0.01),

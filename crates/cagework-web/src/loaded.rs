@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cagework_core::PolygonMesh;
 use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
-use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan, UpAxis, read_project};
+use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan, UpAxis, read_project, shown};
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -220,6 +220,11 @@ impl Loaded {
             Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
         let model = Model::read_within(name, bytes, &mut resolve, READ_LIMIT)?;
+        if model.splats().is_some() {
+            let how = "cagework deform CAPTURE --cage CAGE.obj --pose POSED.obj -o BENT.ply";
+            let message = format!("{} is a capture of Gaussian splats: bend it by `{how}`", shown(name));
+            return Err(Fault::new(ErrorName::Format, message));
+        }
         model.require_faces()?;
         Ok(Self::new(model))
     }
