@@ -17,7 +17,7 @@ use std::str::FromStr;
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
 use cagework_core::field as field_options;
 use cagework_core::options::{self, BindOptions, Choice, Number};
-use cagework_io::{ModelFormat, UpAxis};
+use cagework_io::{Interpolation, MAX_SECONDS, ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -161,11 +161,14 @@ pub(crate) enum LatticeFormat {
 #[derive(Args, Debug)]
 #[command(
     after_help = "One pose gives the deformed model. Several give a GLB with one morph target per pose and an \
-    animation that plays them. Gaussian splats and point clouds take one pose and no weights.\n\n\
+    animation that plays them: without --times, one pose per second, starting and ending at rest; poses of one file with \
+    keyframes keep their times. Gaussian splats and point clouds take one pose and no weights.\n\n\
     Examples:\n  \
     cagework deform plant.ply --cage cage.obj --pose bent.obj -o bent.ply\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
-    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb"
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb\n  \
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj --times 0.4,1.2 \
+    --interpolation cubic -o poses.glb"
 )]
 pub(crate) struct DeformArgs {
     /// Mesh that was bound.
@@ -190,6 +193,15 @@ pub(crate) struct DeformArgs {
     /// File to write; the extension selects the format.
     #[arg(short, long, value_name = "FILE", required_unless_present = "lattice")]
     pub(crate) output: Option<ModelOutput>,
+    /// Times of the poses in the animation, in seconds, ascending: one per pose, separated by commas. The animation starts
+    /// at 0 with the shape at rest, or with the first pose if its time is 0, and ends with the last pose. To return to
+    /// rest, give the cage as the last pose.
+    #[arg(long, value_name = "SECONDS", value_delimiter = ',', allow_negative_numbers = true, requires = "output", conflicts_with = "dynamic", value_parser = seconds)]
+    pub(crate) times: Vec<f32>,
+    /// What the animation shows between two poses: step keeps the earlier one, linear goes straight to the next one, cubic
+    /// is a smooth curve, which may swing past a pose [default: linear].
+    #[arg(long, value_name = "KIND", requires = "output", conflicts_with = "dynamic", value_parser = words::<Interpolation>())]
+    pub(crate) interpolation: Option<Interpolation>,
     /// Write the deformation of the space around the cage (.npz): displacements `u` and gradients `F` at the nodes of a
     /// lattice. Takes one pose.
     #[arg(long, value_name = "FILE", value_parser = lattice_output, conflicts_with = "dynamic")]
@@ -326,6 +338,13 @@ fn positive(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("not a positive number".into()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(value) if (0.0..=MAX_SECONDS).contains(&value) => Ok(value),
+        _ => Err(format!("not a number of seconds from 0 to {MAX_SECONDS}")),
     }
 }
 

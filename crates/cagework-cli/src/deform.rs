@@ -5,8 +5,10 @@ use std::time::Instant;
 
 use cagework_core::Cage;
 use cagework_core::deform::{displacements, outside_in_words};
+use cagework_core::words::counted;
 use cagework_io::{
-    MemoryError, Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown,
+    MemoryError, Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Timeline, read_weights_npz,
+    shown,
 };
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -31,6 +33,9 @@ struct DeformSummary {
     /// Number of vertices outside the cage that do not follow it at all.
     staying_vertices: usize,
     poses: Vec<String>,
+    /// Length of the animation; `None` without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    animation_seconds: Option<f32>,
     /// Changes of skeleton, morph targets and clips; `None` if the model has no rig or `--static` drops it.
     #[serde(flatten)]
     rig: Option<ReshapeReport>,
@@ -68,7 +73,11 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     }
     let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;
     match (&args.output, &args.weights, &lattice) {
-        (Some(output), _, _) if is_capture => capture::deform(args, &model, output, lattice, as_json),
+        (Some(output), _, _) if is_capture => {
+            // Refuses --times and --interpolation.
+            timeline(args, &[], 1)?;
+            capture::deform(args, &model, output, lattice, as_json)
+        }
         (Some(output), Some(weights), _) => deform(args, &model, weights, output, lattice, as_json),
         (None, _, Some(lattice)) => print(&if as_json { json(lattice) } else { lattice.text() }),
         _ => Err(CliError::Mismatch {
@@ -126,15 +135,13 @@ fn deform(
         (model.up(), model.origin()),
         args.read.memory,
     )?;
+    let timeline = timeline(args, &seconds, poses.len())?;
     let rest = rest_of(&cage.cage, &saved);
-    let mut options = args.rig.options(model, &args.mesh)?;
+    let animation_seconds = timeline.as_ref().map(Timeline::seconds);
+    let options = ReshapeOptions { timeline, ..args.rig.options(model, &args.mesh)? };
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
-    // Keep the keyframe times of a single pose file; times of several files are unrelated.
-    if args.pose.len() == 1 && seconds.len() == poses.len() {
-        options.pose_seconds = seconds;
-    }
     let mut notices = model.notices.clone();
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
     let poses = Poses { names, rest, positions: poses };
@@ -154,12 +161,46 @@ fn deform(
         outside_vertices,
         staying_vertices,
         poses: poses.names,
+        animation_seconds,
         rig,
         deform_ms,
         lattice,
         notices,
     };
     print(&if as_json { json(&summary) } else { text(&summary) })
+}
+
+/// When the animation shows each pose; `None` for a single pose, which has none. `seconds`: key times of the poses that
+/// are keyframes.
+fn timeline(args: &DeformArgs, seconds: &[f32], n_poses: usize) -> Result<Option<Timeline>, CliError> {
+    let DeformArgs { times, interpolation, .. } = args;
+    if n_poses < 2 {
+        return if times.is_empty() && interpolation.is_none() {
+            Ok(None)
+        } else {
+            Err(CliError::Mismatch {
+                message:
+                    "--times and --interpolation need an animation, but one pose gives the deformed model"
+                        .into(),
+                hint: "leave them out, or give the cage at rest as another pose",
+            })
+        };
+    }
+    let timeline = if times.is_empty() {
+        // Times of several files are unrelated.
+        let is_clip = args.pose.len() == 1 && seconds.len() == n_poses;
+        if is_clip { Timeline::at_keys(seconds) } else { Timeline::every_second(n_poses) }
+    } else if times.len() == n_poses {
+        let hint = "give the poses in the order of their times";
+        Timeline::new(times, None)
+            .map_err(|e| CliError::Mismatch { message: format!("--times: {e}"), hint })?
+    } else {
+        return Err(CliError::Mismatch {
+            message: format!("--times: {} for {n_poses} poses", counted(times.len(), "time", "times")),
+            hint: "give one time per pose; each keyframe of a clip and each shape key in a file is a pose",
+        });
+    };
+    Ok(Some(timeline.with(interpolation.unwrap_or_default())))
 }
 
 /// Poses of the cage and its inner controls.
@@ -222,10 +263,9 @@ impl Deformation {
                     export(model, only, output)?
                 } else {
                     let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(posed).collect();
-                    let glb = if options.pose_seconds.is_empty() {
-                        model.write_glb_poses(&model.positions, &named)
-                    } else {
-                        model.write_glb_poses_at(&model.positions, &named, &options.pose_seconds)
+                    let glb = match &options.timeline {
+                        None => model.write_glb_poses(&model.positions, &named),
+                        Some(timeline) => model.write_glb_poses_at(&model.positions, &named, timeline),
                     };
                     glb.map_err(|e| CliError::file(&output.path, e))?
                 };
@@ -274,9 +314,10 @@ fn text(summary: &DeformSummary) -> String {
         format!("pose {}", shown(only))
     } else {
         format!(
-            "{} poses as morph targets ({}) and an animation",
+            "{} poses as morph targets ({}) and an animation of {} s",
             summary.poses.len(),
-            shown(&summary.poses.join(", "))
+            shown(&summary.poses.join(", ")),
+            summary.animation_seconds.unwrap_or_default()
         )
     };
     let mut out = format!(

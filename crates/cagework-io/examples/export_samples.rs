@@ -6,8 +6,9 @@ mod common;
 use std::error::Error;
 use std::path::PathBuf;
 
+use cagework_core::options::Choice;
 use cagework_core::skin::skin_vertices;
-use cagework_io::Model;
+use cagework_io::{Interpolation, Model, Timeline};
 use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::Vec3;
 use serde_json::json;
@@ -62,6 +63,28 @@ fn main() -> Result<(), Box<dyn Error>> {
             directory.join(format!("{stem}-poses.glb")),
             model.write_glb_poses(&model.positions, &poses)?,
         )?;
+        if name == "plain.glb" {
+            for (word, interpolation) in Interpolation::ALL {
+                let timeline = Timeline::new(&[0.4, 1.2], Some(0.5))?.with(*interpolation);
+                let glb = model.write_glb_poses_at(&model.positions, &poses, &timeline)?;
+                std::fs::write(directory.join(format!("{stem}-{word}.glb")), glb)?;
+                let frames: Vec<_> = (0..17)
+                    .map(|k| {
+                        let seconds = 0.099 * k as f32;
+                        let mut positions = model.positions.clone();
+                        for ((_, pose), share) in poses.iter().zip(timeline.shares(seconds)) {
+                            for ((at, pose), rest) in positions.iter_mut().zip(pose).zip(&model.positions) {
+                                *at += share * (pose - rest);
+                            }
+                        }
+                        let positions: Vec<f32> = positions.iter().flat_map(Vec3::to_array).collect();
+                        json!({ "seconds": seconds, "positions": positions, "origin": model.origin().to_array() })
+                    })
+                    .collect();
+                let name = format!("{stem}-{word}.played.json");
+                std::fs::write(directory.join(name), serde_json::to_vec(&frames)?)?;
+            }
+        }
         if model.is_rigged() {
             let extra = model.extra_points()?;
             let by = model.positions.iter().chain(&extra).map(|&p| twist(p).as_dvec3() - p.as_dvec3());

@@ -47,6 +47,14 @@ pub enum WriteError {
         /// Formats that store faces.
         others: String,
     },
+    /// The timeline is that of another number of poses.
+    #[error("the timeline has {expected} poses, but {given} were given: make one for these poses")]
+    Poses {
+        /// Number of poses given.
+        given: usize,
+        /// Number of poses of the timeline.
+        expected: usize,
+    },
     /// The operation needs a rig, but the model is not a glTF.
     #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,

@@ -34,6 +34,7 @@ mod siblings;
 mod splats;
 mod stl;
 mod textures;
+mod timeline;
 mod up;
 
 pub use blender::write_field_blender;
@@ -60,6 +61,9 @@ pub use shown::{escaped, json_fault, shown, value_fault};
 pub use siblings::Resolve;
 pub use splats::SplatError;
 pub use textures::TexturePlan;
+pub use timeline::{
+    Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline, TimelineError, check_times,
+};
 pub use up::UpAxis;
 
 /// The example of the README.

@@ -7,11 +7,12 @@ use thiserror::Error;
 
 use crate::error::WriteError;
 use crate::gltf::{
-    self, Clip, JointPoint, Player, PoseDisplacements, PoseTiming, ReshapeOptions, ReshapeReport, Rig,
+    self, Clip, JointPoint, Player, PoseClip, PoseDisplacements, ReshapeOptions, ReshapeReport, Rig,
 };
 use crate::model::{Document, Model};
 use crate::origin::relative;
 use crate::shown::shown;
+use crate::timeline::Timeline;
 
 // Limits on the frames of a clip that a generated cage encloses: on their number, and on the vertices of all frames.
 const MAX_CLIP_FRAMES: usize = 32;
@@ -261,8 +262,10 @@ impl Model {
         let Clip { name, seconds, .. } = clips.get(clip).ok_or(WriteError::NoClip(clip))?;
         let clip = name.as_deref().unwrap_or("clip");
         let step = seconds / (frames.len().max(2) - 1) as f32;
-        let named = |(k, at)| (format!("{:.3} s", k as f32 * step), at);
-        let frames: Vec<(String, Vec<Vec3>)> = frames.into_iter().enumerate().map(named).collect();
-        self.glb(rest, &frames, PoseTiming::Frames { clip, seconds: *seconds })
+        let times: Vec<f32> = (0..frames.len()).map(|k| k as f32 * step).collect();
+        let named = |(at, shape): (&f32, _)| (format!("{at:.3} s"), shape);
+        let frames: Vec<(String, Vec<Vec3>)> = times.iter().zip(frames).map(named).collect();
+        let timeline = &Timeline::at_keys(&times);
+        self.glb(rest, &frames, PoseClip { name: clip, timeline, is_alone: true })
     }
 }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use cagework_io::{Model, ModelFormat};
+use cagework_io::{Model, ModelFormat, Timeline};
 use common::{
     Builder, CUBE_OBJ, PNG, cube, instanced, json_of, plain_cube, quantized, read, relative_error, skinned,
     textured_square, twist, volume,
@@ -246,7 +246,7 @@ fn morph_target_at_weight_one_is_the_pose() {
 fn states_of_a_pose_are_the_keys_of_its_clip_or_its_morph_targets() {
     let cage = read("cage.glb", &plain_cube().glb()).unwrap();
     let poses = poses(&cage);
-    let glb = cage.write_glb_poses_at(&cage.positions, &poses, &[0.25, 1.5]).unwrap();
+    let glb = cage.write_glb_poses_at(&cage.positions, &poses, &Timeline::at_keys(&[0.25, 1.5])).unwrap();
     let states = cage.pose_states(&read("pose.glb", &glb).unwrap()).unwrap();
     let names: Vec<_> = states.iter().map(|state| (state.name.as_str(), state.seconds)).collect();
     assert_eq!(names, [("0.250 s", Some(0.25)), ("1.500 s", Some(1.5))]);

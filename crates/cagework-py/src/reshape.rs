@@ -57,7 +57,7 @@ pub(crate) fn reshape<'py>(
         let props = if r#static { Vec::new() } else { model.props().map_err(error::model)? };
         let (rigid, others): (Vec<_>, Vec<_>) = rigid.into_iter().partition(|name| props.contains(name));
         let parts = model.parts(&mask, &others).map_err(error::model)?;
-        let of_rig = ReshapeOptions { joints, keep_travel, rigid, parts, pose_seconds: Vec::new() };
+        let of_rig = ReshapeOptions { joints, keep_travel, rigid, parts, timeline: None };
         let keeps_rig = model.is_rigged() && !r#static;
         let extra = if keeps_rig { model.extra_points().map_err(error::model)? } else { Vec::new() };
         let points = [model.positions.as_slice(), &extra].concat();

@@ -97,6 +97,6 @@ impl RigArgs {
             parts.rigid.iter().cloned().partition(|name| props.contains(name));
         let parts = model.parts(&parts.mask, &others).map_err(|e| CliError::file(path, e))?;
         let (joints, keep_travel) = (self.joints, self.keep_travel);
-        Ok(ReshapeOptions { joints, keep_travel, rigid, parts, pose_seconds: Vec::new() })
+        Ok(ReshapeOptions { joints, keep_travel, rigid, parts, timeline: None })
     }
 }

@@ -62,6 +62,41 @@ fn several_poses_become_morph_targets_and_an_animation() {
 }
 
 #[test]
+fn times_and_interpolation_of_the_animation_are_as_given() {
+    let sandbox = bound();
+    let command = "deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj";
+    let animation = |options: &str| {
+        let done = sandbox.json(&format!("{command} {options} -o out.glb --json"));
+        let glb = glb_json(&sandbox.read("out.glb"));
+        let sampler = &glb["animations"][0]["samplers"][0];
+        let accessor = |key: &str| &glb["accessors"][sampler[key].as_u64().unwrap() as usize];
+        let [times, weights] = ["input", "output"].map(|key| accessor(key)["count"].as_u64().unwrap());
+        (done["animation_seconds"].as_f64().unwrap(), times, weights, sampler["interpolation"].clone())
+    };
+    // A key at rest at 0 s, unless the first pose is there. Each key has two weights; cubic splines add two tangents.
+    assert_eq!(animation("--times 0.5,1.25"), (1.25, 3, 6, "LINEAR".into()));
+    assert_eq!(animation("--times 0,1.25 --interpolation step"), (1.25, 2, 4, "STEP".into()));
+    assert_eq!(animation("--interpolation cubic"), (3.0, 4, 24, "CUBICSPLINE".into()));
+    for (options, message) in [
+        ("--times 1", "--times: 1 time for 2 poses"),
+        ("--times 1,2,3", "give one time per pose"),
+        ("--times 2,1", "the time of pose 2 is 1 s, but the previous pose is at 2 s"),
+        ("--times 1,1", "give the poses in the order of their times"),
+        ("--times 0,-1", "not a number of seconds from 0 to 3600"),
+        ("--times 0,nan", "not a number of seconds from 0 to 3600"),
+        ("--times 0,1e9", "not a number of seconds from 0 to 3600"),
+        ("--times 0,", "not a number of seconds from 0 to 3600"),
+        ("--interpolation smooth", "possible values: step, linear, cubic"),
+    ] {
+        sandbox.run(&format!("{command} {options} -o out.glb")).failure().stderr(contains(message));
+    }
+    sandbox
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --times 1 -o out.glb")
+        .failure()
+        .stderr(contains("one pose gives the deformed model").and(contains("another pose")));
+}
+
+#[test]
 fn poses_above_the_memory_limit_are_rejected_before_they_are_computed() {
     let many = " --pose lifted.obj".repeat(300);
     bound()

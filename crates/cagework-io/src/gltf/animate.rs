@@ -6,9 +6,7 @@ use glam::{DMat4, Vec3};
 use serde_json::{Value, json};
 
 use super::pack::{Pack, push};
-
-/// Time between poses in the animation, seconds.
-pub(super) const SECONDS_PER_POSE: f32 = 1.0;
+use crate::timeline::Timeline;
 
 /// A pose of the model: its name and vertex positions.
 #[derive(Clone, Copy)]
@@ -61,15 +59,20 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
     }
 }
 
-/// When the animation of an export shows its poses.
+/// The animation of an export's poses.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum PoseTiming<'a> {
-    /// One pose per second, starting and ending at rest. Keeps the document's animations.
-    EverySecond,
-    /// Ascending times in seconds. Keeps the document's animations.
-    At(&'a [f32]),
-    /// Equally spaced frames of a clip of this duration. Replaces the document's animations.
-    Frames { clip: &'a str, seconds: f32 },
+pub(crate) struct PoseClip<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) timeline: &'a Timeline,
+    /// Whether the document's own animations are dropped.
+    pub(crate) is_alone: bool,
+}
+
+impl<'a> PoseClip<'a> {
+    /// A clip beside those of the document.
+    pub(crate) fn of(timeline: &'a Timeline) -> Self {
+        Self { name: "poses", timeline, is_alone: false }
+    }
 }
 
 /// Names the morph targets after the poses, and adds an animation that plays them.
@@ -78,7 +81,7 @@ pub(crate) fn play_poses(
     pack: &mut Pack<'_>,
     places: &[MeshPlacement],
     poses: &[Pose<'_>],
-    timing: PoseTiming<'_>,
+    PoseClip { name, timeline, is_alone }: PoseClip<'_>,
 ) {
     let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
     for place in places {
@@ -89,25 +92,16 @@ pub(crate) fn play_poses(
         }
         mesh["extras"]["targetNames"] = json!(names);
     }
-    let every = |n: usize, step: f32| (0..n).map(|k| k as f32 * step).collect::<Vec<f32>>();
-    // Key times, and the number of keys before that of the first pose.
-    let (name, times, before) = match timing {
-        PoseTiming::EverySecond => ("poses", every(poses.len() + 2, SECONDS_PER_POSE), 1),
-        PoseTiming::At(times) => ("poses", times.to_vec(), 0),
-        PoseTiming::Frames { clip, seconds } => {
-            json["animations"] = json!([]);
-            (clip, every(poses.len(), seconds / (poses.len().max(2) - 1) as f32), 0)
-        }
-    };
-    let weights: Vec<f32> = (0..times.len())
-        .flat_map(|key| (0..poses.len()).map(move |pose| if key == pose + before { 1.0 } else { 0.0 }))
-        .collect();
-    let input = pack.push_floats(json, &times, 1, false, true);
-    let output = pack.push_floats(json, &weights, 1, false, false);
+    if is_alone {
+        json["animations"] = json!([]);
+    }
+    let input = pack.push_floats(json, &timeline.times(), 1, false, true);
+    let output = pack.push_floats(json, &timeline.weights(&[]), 1, false, false);
     let channels: Vec<Value> = places
         .iter()
         .map(|place| json!({ "sampler": 0, "target": { "node": place.node, "path": "weights" } }))
         .collect();
-    let sampler = json!({ "input": input, "output": output, "interpolation": "LINEAR" });
+    let sampler =
+        json!({ "input": input, "output": output, "interpolation": timeline.interpolation.in_gltf() });
     push(json, "animations", json!({ "name": name, "samplers": [sampler], "channels": channels }));
 }

@@ -40,7 +40,7 @@ use crate::siblings::{Image, Resolve};
 use crate::splats::{RawSplats, SplatError};
 use scene::{Instance, Worlds};
 
-pub(crate) use animate::{Pose, PoseTiming};
+pub(crate) use animate::{Pose, PoseClip};
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts, named_files};

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
-use super::animate::{self, MeshPlacement, Pose, PoseTiming};
+use super::animate::{self, MeshPlacement, Pose, PoseClip};
 use super::geometry::{Frame, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
@@ -48,7 +48,7 @@ pub(crate) fn patch(
     rest: Rest<'_>,
     base: &[Vec3],
     poses: &[Pose<'_>],
-    timing: PoseTiming<'_>,
+    clip: PoseClip<'_>,
 ) -> Result<Vec<u8>, WriteError> {
     let is_at_rest = base == rest.positions && poses.is_empty() && !Rig::has_skin_or_targets(document);
     if let Some(file) = document.as_read().filter(|_| is_at_rest) {
@@ -95,7 +95,7 @@ pub(crate) fn patch(
     }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
-        animate::play_poses(&mut json, &mut pack, &places, poses, timing);
+        animate::play_poses(&mut json, &mut pack, &places, poses, clip);
     }
     pack.finish(json)
 }

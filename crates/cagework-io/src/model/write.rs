@@ -11,10 +11,11 @@ use glam::{DVec3, Quat, Vec3};
 use super::format::Kept;
 use super::{Document, Model, ModelFormat};
 use crate::error::WriteError;
-use crate::gltf::{self, Pose, PoseTiming, Rest};
+use crate::gltf::{self, Pose, PoseClip, Rest};
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
 use crate::splats::{self, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
+use crate::timeline::Timeline;
 use crate::up::UpAxis;
 
 impl Model {
@@ -212,7 +213,7 @@ impl Model {
     /// # Errors
     /// [`WriteError`] unless there is one finite position per vertex, there are triangles and the file fits into 4 GiB.
     pub fn write_glb(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        self.glb(positions, &[], PoseTiming::EverySecond)
+        self.glb(positions, &[], PoseClip::of(&Timeline::default()))
     }
 
     /// Exports `rest` with one morph target per pose and an animation from rest through all poses and back, with one
@@ -225,31 +226,28 @@ impl Model {
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
-        self.glb(rest, poses, PoseTiming::EverySecond)
+        self.write_glb_poses_at(rest, poses, &Timeline::every_second(poses.len()))
     }
 
-    /// Like [`Self::write_glb_poses`], with each pose at a given time. `seconds`: ascending, one per pose.
+    /// Like [`Self::write_glb_poses`], with a timeline of these poses.
     ///
     /// # Errors
-    /// As [`Self::write_glb`].
+    /// As [`Self::write_glb`], and [`WriteError::Poses`] if the timeline has another number of poses.
     pub fn write_glb_poses_at(
         &self,
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
-        seconds: &[f32],
+        timeline: &Timeline,
     ) -> Result<Vec<u8>, WriteError> {
-        let n = poses.len();
-        if seconds.len() != n {
-            return Err(WriteError::Count { given: seconds.len(), expected: n });
-        }
-        self.glb(rest, poses, PoseTiming::At(seconds))
+        timeline.require(poses.len())?;
+        self.glb(rest, poses, PoseClip::of(timeline))
     }
 
     pub(crate) fn glb(
         &self,
         base: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
-        timing: PoseTiming<'_>,
+        clip: PoseClip<'_>,
     ) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
         poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
@@ -262,7 +260,7 @@ impl Model {
         let document = match &self.document {
             Document::Gltf(document) => {
                 let rest = Rest { positions: &at_rest, origin: self.origin, triangles: &self.triangles };
-                return gltf::patch(document, rest, &base, &named(poses, &turned), timing);
+                return gltf::patch(document, rest, &base, &named(poses, &turned), clip);
             }
             Document::Obj(document) => document,
         };
@@ -273,7 +271,7 @@ impl Model {
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, origin: self.origin, triangles: &built.triangles };
-        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), timing)
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), clip)
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {

@@ -1,6 +1,6 @@
 //! Rigid props, several sets of joints, instancing, meshes outside the scene, singular skins.
 
-use cagework_io::{Joints, Model, ReshapeOptions};
+use cagework_io::{Interpolation, Joints, Model, ReshapeOptions, Timeline, WriteError};
 use glam::{DVec3, Mat4, Vec3, vec3};
 use serde_json::json;
 
@@ -373,9 +373,23 @@ fn poses_are_played_at_their_times() {
     let by = by(&model);
     let still = vec![DVec3::ZERO; by.len()];
     let poses = [("rest".to_owned(), still.clone()), ("bent".to_owned(), by)];
-    let options = ReshapeOptions { pose_seconds: vec![0.25, 0.75], ..ReshapeOptions::default() };
-    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &options).unwrap();
-    let written = read(&bytes);
+    let timed = |timeline| {
+        let options = ReshapeOptions { timeline: Some(timeline), ..ReshapeOptions::default() };
+        model.write_reshaped(&still, &[], &poses, &options)
+    };
+    let cubic = timed(Timeline::new(&[0.5, 2.0], None).unwrap().with(Interpolation::Cubic)).unwrap().0;
+    let written = read(&cubic);
+    let clip = written.clips().iter().position(|clip| clip.name.as_deref() == Some("poses")).unwrap();
+    // A quarter of the way to a key after which the clip ends: 3 u^2 - 2 u^3, and the slope of 1/2 at 0.5 s.
+    let (u, gap) = (0.25_f32, 1.5);
+    let share = 3.0 * u * u - 2.0 * u.powi(3) + gap * (u.powi(3) - 2.0 * u * u + u) / 2.0;
+    let at = shown(&player(&written), Some(clip), 0.875, &[]);
+    let [from, to] = [0.0, 2.0].map(|seconds| shown(&player(&written), Some(clip), seconds, &[]));
+    let expected: Vec<Vec3> = from.iter().zip(&to).map(|(a, b)| a.lerp(*b, share)).collect();
+    assert_near(&at, &expected, 4.0 * ROUNDED, "cubic");
+    let wrong = timed(Timeline::every_second(3)).unwrap_err();
+    assert_eq!(wrong, WriteError::Poses { given: 2, expected: 3 });
+    let written = read(&timed(Timeline::at_keys(&[0.25, 0.75])).unwrap().0);
     let clip = written.clips().iter().position(|clip| clip.name.as_deref() == Some("poses")).unwrap();
     assert_eq!(written.clips()[clip].seconds, 0.75);
     let player = player(&written);

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::tracks::{ChannelTarget, channel_target};
 use crate::gltf::{GltfDocument, GltfError};
+use crate::timeline::{Interpolation, hermite};
 
 /// An animation clip.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -32,13 +33,6 @@ struct Track {
     values: Numbers,
     width: usize,
     interpolation: Interpolation,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Interpolation {
-    Linear,
-    Step,
-    Cubic,
 }
 
 /// Numbers of an accessor. Tracks that use the same accessor share them.
@@ -137,13 +131,7 @@ impl Track {
         match self.interpolation {
             Interpolation::Step => of(if share >= 1.0 { next } else { last }).collect(),
             Interpolation::Cubic => {
-                let u = share;
-                let [a, b, c, d] = [
-                    2.0 * u.powi(3) - 3.0 * u * u + 1.0,
-                    gap * (u.powi(3) - 2.0 * u * u + u),
-                    3.0 * u * u - 2.0 * u.powi(3),
-                    gap * (u.powi(3) - u * u),
-                ];
+                let [a, b, c, d] = hermite(share, gap);
                 let (p, m) = (of(3 * last + 1), of(3 * last + 2));
                 let (q, n) = (of(3 * next + 1), of(3 * next));
                 p.zip(m).zip(q.zip(n)).map(|((p, m), (q, n))| a * p + b * m + c * q + d * n).collect()

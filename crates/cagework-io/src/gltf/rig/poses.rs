@@ -10,8 +10,8 @@ use super::shape::SurfaceGradients;
 use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
-use crate::gltf::animate::SECONDS_PER_POSE;
 use crate::gltf::pack::push;
+use crate::timeline::Timeline;
 
 /// Displacements of all points in a pose, world space as in the file. `[n_points]`
 pub(crate) struct PoseDisplacements<'a> {
@@ -19,14 +19,13 @@ pub(crate) struct PoseDisplacements<'a> {
     pub(crate) by: &'a [DVec3],
 }
 
-/// Appends one morph target per pose to every mesh, and an animation that plays them. `seconds`: as
-/// [`super::ReshapeOptions::pose_seconds`]. `rigid`: nodes whose meshes stay rigid, and whether each point is
-/// outside the cage.
+/// Appends one morph target per pose to every mesh, and an animation that plays them. `rigid`: nodes whose meshes stay
+/// rigid, and whether each point is outside the cage.
 pub(super) fn append(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,
     triangles: &[[u32; 3]],
-    (poses, seconds): (&[PoseDisplacements<'_>], &[f32]),
+    (poses, timeline): (&[PoseDisplacements<'_>], &Timeline),
     rigid: (&[u32], &[bool]),
 ) -> Result<(), WriteError> {
     if poses.is_empty() {
@@ -125,7 +124,7 @@ pub(super) fn append(
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
         }
     }
-    play(rig, edit, &meshes, poses.len(), seconds);
+    play(rig, edit, &meshes, timeline);
     Ok(())
 }
 
@@ -157,19 +156,9 @@ fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
     *weights = all.into();
 }
 
-/// Adds an animation of the poses: at their times, or one per second starting and ending at rest. Existing
-/// targets stay at their defaults.
-fn play(
-    rig: &Rig<'_>,
-    edit: &mut Edit<'_>,
-    meshes: &BTreeMap<usize, usize>,
-    n_poses: usize,
-    seconds: &[f32],
-) {
-    let is_timed = seconds.len() == n_poses;
-    let (n_keys, before) = if is_timed { (n_poses, 0) } else { (n_poses + 2, 1) };
-    let time = |k: usize| if is_timed { seconds[k] } else { k as f32 * SECONDS_PER_POSE };
-    let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [time(k)]).collect();
+/// Adds an animation of the poses. Existing targets stay at their defaults.
+fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, timeline: &Timeline) {
+    let times: Vec<[f32; 1]> = timeline.times().into_iter().map(|time| [time]).collect();
     let input = edit.write(None, &times, false, true);
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
     let shapes: HashSet<_> = rig.parts.iter().map(|part| key_of(&part.instance)).collect();
@@ -178,15 +167,12 @@ fn play(
         let Some(node) = instance.node.filter(|_| shapes.contains(&key_of(instance))) else { continue };
         let defaults = rig.document.default_weights(instance);
         let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);
-        let values: Vec<[f32; 1]> = (0..n_keys)
-            .flat_map(|key| {
-                let of_poses = (0..n_poses).map(move |pose| if key == pose + before { 1.0 } else { 0.0 });
-                (0..n_before).map(default).chain(of_poses).map(|w| [w])
-            })
-            .collect();
-        let output = edit.write(None, &values, false, false);
+        let before: Vec<f32> = (0..n_before).map(default).collect();
+        let weights: Vec<[f32; 1]> = timeline.weights(&before).into_iter().map(|weight| [weight]).collect();
+        let output = edit.write(None, &weights, false, false);
         channels.push(json!({ "sampler": samplers.len(), "target": { "node": node, "path": "weights" } }));
-        samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
+        let interpolation = timeline.interpolation.in_gltf();
+        samplers.push(json!({ "input": input, "output": output, "interpolation": interpolation }));
     }
     push(
         &mut edit.json,

@@ -17,6 +17,7 @@ use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
 use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
+use crate::timeline::Timeline;
 
 /// Options for reshaping a rigged document.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,9 +30,8 @@ pub struct ReshapeOptions {
     pub rigid: Vec<String>,
     /// Vertices that stay in place or keep their shape.
     pub parts: Parts,
-    /// Times of the poses in seconds, ascending. If empty, poses are played one per second, starting and
-    /// ending at rest.
-    pub pose_seconds: Vec<f32>,
+    /// When the clip of the poses shows each of them; `None` for one per second, starting and ending at rest.
+    pub timeline: Option<Timeline>,
 }
 
 /// Writes the document with points displaced by `by`; with `poses`, at rest with one more morph target per pose.
@@ -110,7 +110,10 @@ pub(crate) fn reshape(
         tracks::rescale(document, &mut edit, &moved.changes, &mut report);
         vrm::write(rig, &given, &moved.world, &mut edit.json);
     }
-    poses::append(rig, &mut edit, triangles, (poses, &options.pose_seconds), (&rigid, is_outside))?;
+    let every_second = Timeline::every_second(poses.len());
+    let timeline = options.timeline.as_ref().filter(|_| !poses.is_empty()).unwrap_or(&every_second);
+    timeline.require(poses.len())?;
+    poses::append(rig, &mut edit, triangles, (poses, timeline), (&rigid, is_outside))?;
     Ok((edit.finish()?, report))
 }
 

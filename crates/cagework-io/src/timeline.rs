@@ -1,0 +1,297 @@
+//! Timelines: when a clip shows each pose of a model, and what it shows in between. The page plays what exports
+//! contain: both follow the same timeline.
+
+use cagework_core::choice;
+use thiserror::Error;
+
+use crate::error::WriteError;
+
+/// Latest time of a pose, seconds.
+pub const MAX_SECONDS: f32 = 3600.0;
+/// Shortest time between two poses, seconds.
+pub const MIN_GAP: f32 = 1e-3;
+/// Time between two poses that have no times of their own, seconds.
+pub const SECONDS_PER_POSE: f32 = 1.0;
+
+choice! {
+    /// What a clip shows between two keys, as in glTF 2.0, appendix C.
+    Interpolation {
+        /// The earlier shape.
+        Step = "step",
+        /// The straight line between both shapes.
+        #[default]
+        Linear = "linear",
+        /// A cubic spline. Its slope at a key is that of the line between the neighbouring keys, and zero at the first
+        /// and the last key.
+        Cubic = "cubic",
+    }
+}
+
+impl Interpolation {
+    /// Value of `interpolation` in a glTF sampler.
+    pub(crate) fn in_gltf(self) -> &'static str {
+        match self {
+            Self::Step => "STEP",
+            Self::Linear => "LINEAR",
+            Self::Cubic => "CUBICSPLINE",
+        }
+    }
+}
+
+/// Factors of value and out-tangent at the earlier key, and of value and in-tangent at the later key. `u`: share of the
+/// time between the keys, `gap`: that time.
+pub(crate) fn hermite(u: f64, gap: f64) -> [f64; 4] {
+    let (u2, u3) = (u * u, u * u * u);
+    [2.0 * u3 - 3.0 * u2 + 1.0, gap * (u3 - 2.0 * u2 + u), 3.0 * u2 - 2.0 * u3, gap * (u3 - u2)]
+}
+
+/// Error of the times of poses.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum TimelineError {
+    /// A time is not a number of seconds within the limits.
+    #[error("the time of pose {number} is {seconds} s: times are from 0 to {MAX_SECONDS} s")]
+    OutOfRange {
+        /// Number of the pose, from 1.
+        number: usize,
+        /// Its time.
+        seconds: f32,
+    },
+    /// A pose does not follow the previous one.
+    #[error(
+        "the time of pose {number} is {seconds} s, but the previous pose is at {previous} s: each pose is at least {MIN_GAP} s later than the previous one"
+    )]
+    Order {
+        /// Number of the pose, from 1.
+        number: usize,
+        /// Its time.
+        seconds: f32,
+        /// Time of the previous pose.
+        previous: f32,
+    },
+}
+
+/// When a clip shows each pose, and what it shows in between.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timeline {
+    /// Interpolation between two keys.
+    pub interpolation: Interpolation,
+    /// Time of each key in seconds, and the pose that it shows; `None` is the shape at rest. Ascending
+    keys: Vec<(f32, Option<usize>)>,
+    n_poses: usize,
+}
+
+impl Timeline {
+    /// One pose per second, starting and ending at rest.
+    #[must_use]
+    pub fn every_second(n_poses: usize) -> Self {
+        let pose = |k: usize| k.checked_sub(1).filter(|&pose| pose < n_poses);
+        let keys = (0..n_poses + 2).map(|k| (k as f32 * SECONDS_PER_POSE, pose(k))).collect();
+        Self { interpolation: Interpolation::Linear, keys, n_poses }
+    }
+
+    /// Each pose at its time. The clip starts at 0 s, at rest unless the first pose is there, and ends with the last pose,
+    /// or `seconds_back` after it with the shape at its start.
+    ///
+    /// # Errors
+    /// If a time is outside of the limits, or not later than the previous one.
+    pub fn new(seconds: &[f32], seconds_back: Option<f32>) -> Result<Self, TimelineError> {
+        check_times(seconds)?;
+        let mut keys: Vec<_> = seconds.iter().enumerate().map(|(k, &at)| (at + 0.0, Some(k))).collect();
+        if seconds.first().is_none_or(|&first| first >= 0.5 * MIN_GAP) {
+            keys.insert(0, (0.0, None));
+        }
+        if let (Some(back), Some(&(last, _))) = (seconds_back, keys.last()) {
+            keys.push((last + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].1));
+        }
+        Ok(Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() })
+    }
+
+    /// One pose at each key time of a clip. `seconds`: ascending, not checked.
+    #[must_use]
+    pub fn at_keys(seconds: &[f32]) -> Self {
+        let keys = seconds.iter().enumerate().map(|(k, &at)| (at, Some(k))).collect();
+        Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() }
+    }
+
+    /// The timeline with another interpolation.
+    #[must_use]
+    pub fn with(self, interpolation: Interpolation) -> Self {
+        Self { interpolation, ..self }
+    }
+
+    /// Checks the number of poses.
+    pub(crate) fn require(&self, given: usize) -> Result<(), WriteError> {
+        let expected = self.n_poses;
+        if given == expected { Ok(()) } else { Err(WriteError::Poses { given, expected }) }
+    }
+
+    /// Number of poses.
+    #[must_use]
+    pub fn n_poses(&self) -> usize {
+        self.n_poses
+    }
+
+    /// Time of the last key.
+    #[must_use]
+    pub fn seconds(&self) -> f32 {
+        self.keys.last().map_or(0.0, |key| key.0)
+    }
+
+    /// Share of each pose in the shape at a time: `rest + sum_k share_k (pose_k - rest)`. `[n_poses]`
+    #[must_use]
+    pub fn shares(&self, seconds: f32) -> Vec<f32> {
+        let Some(last) = self.keys.len().checked_sub(1) else { return vec![0.0; self.n_poses] };
+        let next = self.keys.partition_point(|key| key.0 <= seconds);
+        if next == 0 || next > last {
+            return (0..self.n_poses).map(|pose| self.share(next.min(last), pose) as f32).collect();
+        }
+        let before = next - 1;
+        let start = f64::from(self.keys[before].0);
+        let gap = f64::from(self.keys[next].0) - start;
+        let u = (f64::from(seconds) - start) / gap;
+        let [a, b, c, d] = match self.interpolation {
+            Interpolation::Step => [1.0, 0.0, 0.0, 0.0],
+            Interpolation::Linear => [1.0 - u, 0.0, u, 0.0],
+            Interpolation::Cubic => hermite(u, gap),
+        };
+        let at = |pose| {
+            a * self.share(before, pose)
+                + b * self.slope(before, pose)
+                + c * self.share(next, pose)
+                + d * self.slope(next, pose)
+        };
+        (0..self.n_poses).map(|pose| at(pose) as f32).collect()
+    }
+
+    /// Key times: input of the clip's samplers.
+    pub(crate) fn times(&self) -> Vec<f32> {
+        self.keys.iter().map(|key| key.0).collect()
+    }
+
+    /// Output of a sampler of morph weights. `before`: constant weights of the targets that precede the poses.
+    pub(crate) fn weights(&self, before: &[f32]) -> Vec<f32> {
+        let mut weights = Vec::new();
+        for key in 0..self.keys.len() {
+            let slopes = || {
+                let of_poses = (0..self.n_poses).map(|pose| self.slope(key, pose) as f32);
+                std::iter::repeat_n(0.0, before.len()).chain(of_poses)
+            };
+            let is_cubic = self.interpolation == Interpolation::Cubic;
+            weights.extend(slopes().filter(|_| is_cubic));
+            weights.extend(before);
+            weights.extend((0..self.n_poses).map(|pose| self.share(key, pose) as f32));
+            weights.extend(slopes().filter(|_| is_cubic));
+        }
+        weights
+    }
+
+    fn share(&self, key: usize, pose: usize) -> f64 {
+        f64::from(u8::from(self.keys[key].1 == Some(pose)))
+    }
+
+    fn slope(&self, key: usize, pose: usize) -> f64 {
+        if key == 0 || key + 1 == self.keys.len() {
+            return 0.0;
+        }
+        let time = f64::from(self.keys[key + 1].0) - f64::from(self.keys[key - 1].0);
+        // Keys of a clip may coincide.
+        (self.share(key + 1, pose) - self.share(key - 1, pose)) / time.max(f64::from(MIN_GAP))
+    }
+}
+
+/// Checks that times of poses are within the limits and ascending.
+///
+/// # Errors
+/// [`TimelineError`] for the first pose whose time is wrong.
+pub fn check_times(seconds: &[f32]) -> Result<(), TimelineError> {
+    let mut previous: Option<f32> = None;
+    for (number, &seconds) in (1..).zip(seconds) {
+        if !(0.0..=MAX_SECONDS).contains(&seconds) {
+            return Err(TimelineError::OutOfRange { number, seconds });
+        }
+        // Half of the gap, because times near the limit are rounded to 0.0002 s.
+        if let Some(previous) = previous.filter(|previous| seconds - previous < 0.5 * MIN_GAP) {
+            return Err(TimelineError::Order { number, seconds, previous });
+        }
+        previous = Some(seconds);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(shares: &[f32], expected: &[f32]) {
+        assert!(shares.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{shares:?} {expected:?}");
+    }
+
+    #[test]
+    fn one_pose_per_second_from_rest_to_rest() {
+        let timeline = Timeline::every_second(2);
+        assert_eq!((timeline.seconds(), timeline.times()), (3.0, vec![0.0, 1.0, 2.0, 3.0]));
+        for (seconds, expected) in [
+            (0.0, [0.0, 0.0]),
+            (0.25, [0.25, 0.0]),
+            (1.0, [1.0, 0.0]),
+            (1.5, [0.5, 0.5]),
+            (2.0, [0.0, 1.0]),
+            (2.75, [0.0, 0.25]),
+            (3.0, [0.0, 0.0]),
+        ] {
+            near(&timeline.shares(seconds), &expected);
+        }
+        assert_eq!(Timeline::every_second(0).shares(0.7), [0.0; 0]);
+    }
+
+    #[test]
+    fn poses_are_shown_at_their_times() {
+        let timeline = Timeline::new(&[0.0, 0.4, 1.2], None).unwrap();
+        assert_eq!((timeline.seconds(), timeline.times()), (1.2, vec![0.0, 0.4, 1.2]));
+        near(&timeline.shares(0.1), &[0.75, 0.25, 0.0]);
+        near(&timeline.shares(1.0), &[0.0, 0.25, 0.75]);
+        near(&timeline.shares(9.0), &[0.0, 0.0, 1.0]);
+        let step = timeline.clone().with(Interpolation::Step);
+        near(&step.shares(0.39), &[1.0, 0.0, 0.0]);
+        near(&step.shares(0.4), &[0.0, 1.0, 0.0]);
+        near(&step.shares(1.2), &[0.0, 0.0, 1.0]);
+        // Without a pose at 0 s, the clip starts at rest, and a clip with a way back ends there.
+        let back = Timeline::new(&[0.5], Some(1.5)).unwrap();
+        assert_eq!((back.times(), back.weights(&[])), (vec![0.0, 0.5, 2.0], vec![0.0, 1.0, 0.0]));
+        // It ends with the pose at its start, if there is one.
+        near(&Timeline::new(&[0.0, 1.0], Some(1.0)).unwrap().shares(2.0), &[1.0, 0.0]);
+    }
+
+    /// The formula of glTF 2.0, appendix C, "Cubic spline interpolation", with slopes at the inner keys of
+    /// (v_(k+1) - v_(k-1)) / (t_(k+1) - t_(k-1)), the Catmull-Rom spline for uneven times.
+    #[test]
+    fn cubic_is_the_spline_of_gltf() {
+        let timeline = Timeline::new(&[0.0, 0.4, 1.2], None).unwrap().with(Interpolation::Cubic);
+        let (t, td) = (0.25_f64, f64::from(0.4_f32));
+        let (h00, h01) = (2.0 * t.powi(3) - 3.0 * t.powi(2) + 1.0, -2.0 * t.powi(3) + 3.0 * t.powi(2));
+        let h11 = t.powi(3) - t.powi(2);
+        // In-tangents at 0.4 s: -1/1.2, 0 and 1/1.2.
+        let expected = [h00 - td * h11 / 1.2, h01, td * h11 / 1.2].map(|x| x as f32);
+        near(&timeline.shares(0.1), &expected);
+        let m = (1.0 / f64::from(1.2_f32)) as f32;
+        let outer = |values: [f32; 3]| [[0.0; 3], values, [0.0; 3]].concat();
+        let inner = [[-m, 0.0, m], [0.0, 1.0, 0.0], [-m, 0.0, m]].concat();
+        assert_eq!(timeline.weights(&[]), [outer([1.0, 0.0, 0.0]), inner, outer([0.0, 0.0, 1.0])].concat());
+        // Targets before the poses keep their weights, with slopes of zero.
+        assert_eq!(timeline.weights(&[0.5])[..8], [0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn wrong_times_are_named() {
+        let error = |seconds: &[f32]| Timeline::new(seconds, None).unwrap_err().to_string();
+        assert_eq!(error(&[0.0, -1.0]), "the time of pose 2 is -1 s: times are from 0 to 3600 s");
+        assert!(error(&[f32::NAN]).contains("is NaN s"));
+        assert!(error(&[f32::INFINITY]).contains("is inf s"));
+        assert!(error(&[4000.0]).contains("is 4000 s"));
+        assert_eq!(
+            error(&[0.4, 0.4]),
+            "the time of pose 2 is 0.4 s, but the previous pose is at 0.4 s: each pose is at least 0.001 s later than the previous one"
+        );
+        assert!(Timeline::new(&[0.001, 0.002, 3599.999, 3600.0], None).is_ok());
+    }
+}
