@@ -89,6 +89,7 @@ export function followDocument(ctx: Context): DocumentMirror {
         ...same,
         poses: unchanged(old.poses, view.poses),
         shares: unchanged(old.shares, view.shares),
+        transition: unchanged(old.transition, view.transition),
         pins: unchanged(old.pins, view.pins),
         // Edges and faces can be selected only while the cage is reshaped.
         ...(old.editingRest && !view.editingRest ? { element: "vertex" } : {}),

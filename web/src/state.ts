@@ -175,6 +175,8 @@ export const DOCUMENT_STATE = {
   pins: [],
   poses: [],
   shares: [],
+  transition: { interpolation: "linear", loops: true, back: 1 },
+  animationSeconds: 0,
   steps: 0,
   undoLabel: null,
   redoLabel: null,

@@ -209,6 +209,8 @@ export function createFake(): Fake {
     cage: 0,
     poses: [],
     shares: [],
+    transition: { interpolation: "linear", loops: true, back: 1 },
+    animationSeconds: 0,
     pins: [],
     posed: false,
     editingRest: false,

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use cagework_core::{InnerElement, PolygonMesh};
+use cagework_io::{SECONDS_PER_POSE, check_times};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::controls::{CageControls, InnerKind, RestCage};
-use crate::document::NamedPose;
-use crate::edit::{SelectMode, reblend};
+use crate::document::{NamedPose, Transition};
+use crate::edit::{PoseError, SelectMode, reblend};
 use crate::editor::Editor;
 use crate::error::EditError;
 use crate::models::PartOptions;
@@ -67,10 +68,41 @@ pub enum Command {
         /// New name of the pose.
         name: String,
     },
-    /// Deletes a saved pose.
+    /// Deletes a saved pose. Later poses move forward by its lead.
     RemovePose {
         /// Index of the pose.
         index: usize,
+    },
+    /// Replaces a saved pose, with its pins, by the current pose.
+    UpdatePose {
+        /// Index of the pose.
+        index: usize,
+    },
+    /// Inserts a copy of a saved pose after it. Later poses move back by a second.
+    DuplicatePose {
+        /// Index of the pose.
+        index: usize,
+        /// Name of the copy.
+        name: String,
+    },
+    /// Moves a saved pose to another place in the list. The first pose has the first time afterwards, and so on.
+    MovePose {
+        /// Index of the pose.
+        index: usize,
+        /// Its new index.
+        to: usize,
+    },
+    /// Sets when the animation shows a saved pose. Other poses keep their times; the list is sorted by time.
+    SetPoseTime {
+        /// Index of the pose.
+        index: usize,
+        /// Seconds since the start of the animation.
+        seconds: f32,
+    },
+    /// Sets how the animation of the saved poses goes from one to the next, and how it ends.
+    SetTransition {
+        /// The new settings.
+        transition: Transition,
     },
     /// Changes the share of a saved pose in the blend, and keeps other changes of the pose since the last step.
     Blend {
@@ -188,14 +220,14 @@ impl Editor {
                     name: name.into(),
                     positions: pose,
                     pins,
+                    lead: SECONDS_PER_POSE,
                 });
             }
             Command::ApplyPose { index } => {
                 let NamedPose { positions, pins, .. } = self.pose(index)?.clone();
                 self.set_pose(positions.to_vec())?;
                 let document = self.document_mut();
-                document.shares =
-                    (0..document.poses.len()).map(|k| f32::from(u8::from(k == index))).collect();
+                document.shares = only(index, document.poses.len());
                 if let Some(pins) = pins {
                     document.pins = pins;
                 }
@@ -210,6 +242,39 @@ impl Editor {
                 Arc::make_mut(&mut document.poses).remove(index);
                 let shares = document.shares.iter().enumerate().filter(|(k, _)| *k != index);
                 document.shares = shares.map(|(_, share)| *share).collect();
+            }
+            Command::UpdatePose { index } => {
+                self.pose(index)?;
+                let document = self.document_mut();
+                let (positions, pins) = (document.pose.clone(), Some(document.pins.clone()));
+                let pose = &mut Arc::make_mut(&mut document.poses)[index];
+                (pose.positions, pose.pins) = (positions, pins);
+                document.shares = only(index, document.poses.len());
+            }
+            Command::DuplicatePose { index, name } => {
+                let copy =
+                    NamedPose { name: name.into(), lead: SECONDS_PER_POSE, ..self.pose(index)?.clone() };
+                let document = self.document_mut();
+                Arc::make_mut(&mut document.poses).insert(index + 1, copy);
+                let mut shares = document.shares.to_vec();
+                shares.insert(index + 1, 0.0);
+                document.shares = shares.into();
+            }
+            Command::MovePose { index, to } => {
+                self.pose(index)?;
+                self.pose(to)?;
+                let mut order: Vec<usize> = (0..self.document().poses.len()).collect();
+                let moved = order.remove(index);
+                order.insert(to, moved);
+                let leads: Vec<f32> = self.document().poses.iter().map(|pose| pose.lead).collect();
+                self.arrange(&order, &leads);
+            }
+            Command::SetPoseTime { index, seconds } => self.set_pose_time(index, seconds)?,
+            Command::SetTransition { transition } => {
+                if !transition.back.is_finite() {
+                    return Err(EditError::NotFinite { what: "seconds" });
+                }
+                self.document_mut().transition = transition.within_limits();
             }
             Command::Blend { index, share } => self.blend(index, share)?,
             Command::CarryPoses { from, positions, shares } => {
@@ -286,6 +351,40 @@ impl Editor {
         let poses = &self.document().poses;
         let missing = EditError::NoSuchPose { number: index + 1, count: poses.len() };
         poses.get(index).ok_or(missing)
+    }
+
+    /// Reorders the saved poses. `order`: old indices, `leads`: in the new order. `[n_poses]` each
+    fn arrange(&mut self, order: &[usize], leads: &[f32]) {
+        let document = self.document_mut();
+        let of = |(&k, &lead): (&usize, &f32)| NamedPose { lead, ..document.poses[k].clone() };
+        let poses = order.iter().zip(leads).map(of).collect();
+        document.shares = order.iter().map(|&k| document.shares[k]).collect();
+        document.poses = Arc::new(poses);
+    }
+
+    fn set_pose_time(&mut self, index: usize, seconds: f32) -> Result<(), EditError> {
+        self.pose(index)?;
+        let document = self.document();
+        let places: Vec<usize> =
+            (0..document.poses.len()).filter(|&k| document.fits(&document.poses[k])).collect();
+        let mut timed: Vec<(f32, usize)> =
+            document.pose_seconds().into_iter().zip(places.iter().copied()).collect();
+        let Some(own) = timed.iter_mut().find(|(_, k)| *k == index) else {
+            let given = document.poses[index].positions.len();
+            return Err(PoseError { given, expected: document.pose.len() }.into());
+        };
+        own.0 = seconds;
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        check_times(&timed.iter().map(|(at, _)| *at).collect::<Vec<_>>())?;
+        let mut order: Vec<usize> = (0..document.poses.len()).collect();
+        let mut leads: Vec<f32> = document.poses.iter().map(|pose| pose.lead).collect();
+        let mut before = 0.0;
+        for (&place, (at, k)) in places.iter().zip(timed) {
+            (order[place], leads[place]) = (k, at - before);
+            before = at;
+        }
+        self.arrange(&order, &leads);
+        Ok(())
     }
 
     fn require_cage(&self) -> Result<(), EditError> {
@@ -405,6 +504,11 @@ impl Editor {
             }
         })
     }
+}
+
+/// Shares of a pose that is one of the saved poses. `[n_poses]`
+fn only(index: usize, n_poses: usize) -> Arc<[f32]> {
+    (0..n_poses).map(|k| f32::from(u8::from(k == index))).collect()
 }
 
 /// Applies an edit to one item after another; `None` if there are none. The edit must keep the indices of later items.

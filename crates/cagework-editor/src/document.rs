@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::controls::RestCage;
 use crate::models::Models;
@@ -17,6 +19,33 @@ pub struct NamedPose {
     pub positions: Arc<[Vec3]>,
     /// Surface points that pulls keep in place; `None` if unknown.
     pub pins: Option<Arc<[SurfacePoint]>>,
+    /// Time from the previous pose, or from the start of the animation, to this pose, seconds.
+    pub lead: f32,
+}
+
+/// How the animation of the saved poses goes from one to the next, and how it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Transition {
+    /// Interpolation between two poses.
+    pub interpolation: Interpolation,
+    /// Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
+    pub loops: bool,
+    /// Time that this return takes, seconds.
+    pub back: f32,
+}
+
+impl Default for Transition {
+    fn default() -> Self {
+        Self { interpolation: Interpolation::Linear, loops: true, back: SECONDS_PER_POSE }
+    }
+}
+
+impl Transition {
+    /// These settings with `back` inside its limits.
+    pub(crate) fn within_limits(self) -> Self {
+        Self { back: self.back.clamp(MIN_GAP, MAX_SECONDS), ..self }
+    }
 }
 
 /// All data that can be edited, undone and saved. Clones share their contents.
@@ -32,6 +61,8 @@ pub struct Document {
     pub poses: Arc<Vec<NamedPose>>,
     /// Share of each saved pose in `pose`. `[n_poses]`
     pub shares: Arc<[f32]>,
+    /// How the animation of the saved poses goes from one to the next, and how it ends.
+    pub transition: Transition,
     /// Surface points that pulls keep in place.
     pub pins: Arc<[SurfacePoint]>,
     /// Identifier of the built-in sample that is open.
@@ -54,6 +85,7 @@ impl PartialEq for Document {
             && self.pose == other.pose
             && self.poses == other.poses
             && self.shares == other.shares
+            && self.transition == other.transition
             && self.pins == other.pins
             && self.sample == other.sample
             && self.has_sample_cage == other.has_sample_cage
@@ -84,6 +116,32 @@ impl Document {
         self.poses.iter().filter(|pose| self.fits(pose))
     }
 
+    /// Times of the poses that belong to the cage, seconds. Ascending
+    #[must_use]
+    pub fn pose_seconds(&self) -> Vec<f32> {
+        let mut at = 0.0;
+        let time = |(k, pose): (usize, &NamedPose)| {
+            at += f64::from(if k == 0 { pose.lead } else { pose.lead.max(MIN_GAP) });
+            at as f32
+        };
+        let seconds: Vec<f32> = self.fitting_poses().enumerate().map(time).collect();
+        if seconds.last().is_some_and(|&last| last > MAX_SECONDS) {
+            // The animation of a project, or one with many new poses, may be too long.
+            return (1..=seconds.len()).map(|k| k as f32 * SECONDS_PER_POSE).collect();
+        }
+        seconds
+    }
+
+    /// When the animation shows the poses that belong to the cage. The page plays it, and exports contain it.
+    #[must_use]
+    pub fn timeline(&self) -> Timeline {
+        let Transition { interpolation, loops, back } = self.transition;
+        let seconds = self.pose_seconds();
+        // More than an hour of poses, one per second, exceeds the limit on times.
+        let timeline = Timeline::new(&seconds, loops.then_some(back));
+        timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation)
+    }
+
     /// Whether a document and a later or earlier clone of it are equal. Compares meshes, cages and models by their
     /// keys.
     #[must_use]
@@ -93,6 +151,7 @@ impl Document {
             && self.models_key == other.models_key
             && (Arc::ptr_eq(&self.poses, &other.poses) || self.poses == other.poses)
             && self.shares == other.shares
+            && self.transition == other.transition
             && self.pins == other.pins
             && self.sample == other.sample
             && self.has_sample_cage == other.has_sample_cage

@@ -9,9 +9,9 @@ use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
 use crate::controls::RestCage;
-use crate::document::{Document, Key, NamedPose};
+use crate::document::{Document, Key, NamedPose, Transition};
 use crate::edit::{
-    Constraint, Element, Gesture, GestureKind, Pivot, Pull, Selection, SharedPull, Topology, moment,
+    Constraint, Element, Gesture, GestureKind, Pivot, Pull, Selection, SharedPull, Topology, blend,
 };
 use crate::error::EditError;
 use crate::history::History;
@@ -62,6 +62,8 @@ pub struct Contents {
     pub poses: Vec<NamedPose>,
     /// Share of each saved pose in the pose. `[n_poses]`, or shorter: missing shares are 0
     pub shares: Vec<f32>,
+    /// How the animation of the saved poses goes from one to the next, and how it ends.
+    pub transition: Transition,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
     /// Identifier of the built-in sample that the contents belong to, if any.
@@ -92,7 +94,7 @@ impl Editor {
 
     /// Replaces models and contents, and clears the history.
     pub fn open(&mut self, models: impl IntoIterator<Item = NewModel>, contents: Contents) {
-        let Contents { cage, poses, mut shares, pins, sample } = contents;
+        let Contents { cage, poses, mut shares, transition, pins, sample } = contents;
         let (pivot, radius, keys, steps) = (self.pivot, self.radius, self.keys, self.steps + 1);
         let limit = self.history.limit();
         shares.resize(poses.len(), 0.0);
@@ -104,6 +106,7 @@ impl Editor {
             models: all,
             poses: Arc::new(poses),
             shares: shares.into(),
+            transition: transition.within_limits(),
             pins: pins.into(),
             sample: sample.map(Into::into),
             ..Document::default()
@@ -353,12 +356,13 @@ impl Editor {
         Ok(())
     }
 
-    /// Moves the cage to a time of the animation through all saved poses, one second each.
+    /// Moves the cage to a time of the animation of the saved poses.
     pub fn play_at(&mut self, seconds: f32) {
         let poses: Vec<Vec<Vec3>> =
             self.document.fitting_poses().map(|pose| pose.positions.to_vec()).collect();
-        if let Ok(positions) = moment(&self.document.cage.mesh.positions, &poses, seconds) {
-            // `moment` returns one position per control, so this cannot fail.
+        let shares = self.document.timeline().shares(seconds);
+        if let Ok(positions) = blend(&self.document.cage.mesh.positions, &poses, &shares) {
+            // `blend` returns one position per control, so this cannot fail.
             let _ = self.set_pose(positions);
         }
     }
@@ -448,10 +452,24 @@ impl Editor {
     /// The view that panels show.
     #[must_use]
     pub fn view(&self) -> DocumentView {
-        let Document { poses, shares, pins, sample, has_sample_cage, models_key, cage_key, mesh_key, .. } =
-            &self.document;
-        let pose_view =
-            |pose: &NamedPose| PoseView { name: pose.name.to_string(), fits: self.document.fits(pose) };
+        let Document {
+            poses,
+            shares,
+            transition,
+            pins,
+            sample,
+            has_sample_cage,
+            models_key,
+            cage_key,
+            mesh_key,
+            ..
+        } = &self.document;
+        let mut seconds = self.document.pose_seconds().into_iter();
+        let pose_view = |pose: &NamedPose| {
+            let fits = self.document.fits(pose);
+            let seconds = if fits { seconds.next().unwrap_or_default() } else { 0.0 };
+            PoseView { name: pose.name.to_string(), fits, seconds }
+        };
         let center = || self.selection.center(&self.document.pose).map(|c| c.to_array());
         DocumentView {
             models: *models_key,
@@ -459,6 +477,8 @@ impl Editor {
             cage: *cage_key,
             poses: poses.iter().map(pose_view).collect(),
             shares: shares.to_vec(),
+            transition: *transition,
+            animation_seconds: self.document.timeline().seconds(),
             pins: pins.to_vec(),
             posed: !self.editing_rest && self.document.is_posed(),
             editing_rest: self.editing_rest,

@@ -1,7 +1,7 @@
 //! Errors of commands. The document is unchanged after an error.
 
 use cagework_core::{CageError, ControlError};
-use cagework_io::{SelectError, WriteError};
+use cagework_io::{SelectError, TimelineError, WriteError};
 use thiserror::Error;
 
 use crate::edit::PoseError;
@@ -59,6 +59,9 @@ pub enum EditError {
     /// The pose belongs to another cage.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// A pose cannot be at this time.
+    #[error(transparent)]
+    Time(#[from] TimelineError),
     /// A name selects no part of the model.
     #[error(transparent)]
     Part(#[from] SelectError),

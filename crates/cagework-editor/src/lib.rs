@@ -20,7 +20,7 @@ mod view;
 pub use cache::Cache;
 pub use command::{Command, RestEdit};
 pub use controls::{CageControls, InnerKind, RestCage};
-pub use document::{Document, Key, NamedPose};
+pub use document::{Document, Key, NamedPose, Transition};
 pub use editor::{Contents, Editor};
 pub use error::EditError;
 pub use history::HISTORY_BYTES;

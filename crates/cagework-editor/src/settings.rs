@@ -5,14 +5,14 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
-use cagework_io::{decode_pose, encode_pose};
+use cagework_io::{MAX_SECONDS, SECONDS_PER_POSE, decode_pose, encode_pose};
 use glam::Vec3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::controls::{CageControls, RestCage};
-use crate::document::{Document, NamedPose};
+use crate::document::{Document, NamedPose, Transition};
 use crate::models::MemberSettings;
 use crate::surface::SurfacePoint;
 
@@ -38,6 +38,12 @@ pub struct DocumentSettings {
     /// Share of each saved pose in the pose, 0 to 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pose_shares: Vec<f32>,
+    /// Time from the previous pose to each saved pose, seconds. If empty, one second each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pose_leads: Vec<f32>,
+    /// How the animation of the saved poses goes from one to the next, and how it ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transition: Option<Transition>,
     /// Visibility, parts and painted amounts of each model.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<MemberSettings>,
@@ -47,7 +53,8 @@ impl DocumentSettings {
     /// Settings of a document.
     #[must_use]
     pub fn of(document: &Document) -> Self {
-        let Document { cage, poses, shares, pins, sample, has_sample_cage, models, .. } = document;
+        let Document { cage, poses, shares, transition, pins, sample, has_sample_cage, models, .. } =
+            document;
         let up = models.up();
         let in_file = |positions| up.turned_back(positions);
         let pose = document.is_posed().then(|| {
@@ -55,6 +62,7 @@ impl DocumentSettings {
         });
         let has_pins = poses.iter().any(|pose| pose.pins.as_ref().is_some_and(|pins| !pins.is_empty()));
         let pins_of = |pose: &NamedPose| pose.pins.as_ref().map_or_else(Vec::new, |pins| pins.to_vec());
+        let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
         let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
         Self {
             sample: sample.as_deref().filter(|_| *has_sample_cage).map(str::to_owned),
@@ -63,6 +71,8 @@ impl DocumentSettings {
             pins: pins.to_vec(),
             pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
             pose_shares: if is_blended { shares.to_vec() } else { Vec::new() },
+            pose_leads: if is_timed { poses.iter().map(|pose| pose.lead).collect() } else { Vec::new() },
+            transition: (*transition != Transition::default()).then_some(*transition),
             models: models.settings(),
         }
     }
@@ -82,6 +92,12 @@ impl DocumentSettings {
                 .into_iter()
                 .map(|share| share.clamp(0.0, 1.0))
                 .collect(),
+            pose_leads: field::<Vec<f32>>(&given, "pose_leads")
+                .unwrap_or_default()
+                .into_iter()
+                .map(|lead| lead.clamp(0.0, MAX_SECONDS))
+                .collect(),
+            transition: field::<Transition>(&given, "transition").map(Transition::within_limits),
             models: field(&given, "models").unwrap_or_default(),
         }
     }
@@ -114,7 +130,7 @@ impl DocumentSettings {
         }
     }
 
-    /// Saved poses with their pins.
+    /// Saved poses with their pins and times.
     #[must_use]
     pub fn poses(&self, poses: impl IntoIterator<Item = (String, Vec<Vec3>)>) -> Vec<NamedPose> {
         let pins = |k: usize| {
@@ -126,6 +142,7 @@ impl DocumentSettings {
             name: name.into(),
             positions: Arc::from(positions),
             pins: pins(k),
+            lead: self.pose_leads.get(k).copied().unwrap_or(SECONDS_PER_POSE),
         };
         poses.into_iter().enumerate().map(named).collect()
     }

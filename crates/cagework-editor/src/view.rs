@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::document::Transition;
 use crate::surface::SurfacePoint;
 
 /// The part of a document that panels show. Meshes are read separately when their keys change.
@@ -19,6 +20,10 @@ pub struct DocumentView {
     pub poses: Vec<PoseView>,
     /// Share of each saved pose in the pose.
     pub shares: Vec<f32>,
+    /// How the animation of the saved poses goes from one to the next, and how it ends.
+    pub transition: Transition,
+    /// Length of this animation, seconds.
+    pub animation_seconds: f32,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
     /// Whether the pose differs from the cage at rest.
@@ -42,13 +47,15 @@ pub struct DocumentView {
 }
 
 /// A saved pose.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct PoseView {
     /// Name of the pose.
     pub name: String,
     /// Whether the pose belongs to the current cage rather than a replaced one.
     pub fits: bool,
+    /// Time in the animation, seconds; 0 if the pose belongs to a replaced cage.
+    pub seconds: f32,
 }
 
 /// The selection.

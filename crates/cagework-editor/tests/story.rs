@@ -1,14 +1,16 @@
 //! A whole session: open, make a cage, bind, pull, pose, blend, reshape, undo, redo, save, reopen.
 
 use cagework_cage::generate::{CageOptions, generate};
+use cagework_core::deform::deform_vertices;
 use cagework_core::progress::Silent;
+use cagework_core::skin::skin_vertices;
 use cagework_core::{BindOptions, Bounds, TriMesh, Weights, bind, subdivided_box};
 use cagework_editor::edit::{GestureKind, SelectMode};
 use cagework_editor::{
     Cache, Command, Contents, Document, DocumentSettings, Editor, InnerKind, Key, NewModel, PartOptions,
-    RestEdit, SurfacePoint,
+    RestEdit, SurfacePoint, Transition,
 };
-use cagework_io::{Model, read_project};
+use cagework_io::{Interpolation, Model, read_project};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use glam::{DVec3, Vec3};
 
@@ -108,6 +110,25 @@ fn session_can_be_undone_redone_saved_and_reopened() {
         let expected = rest[k] + 0.5 * (left[k] - rest[k]) + 0.25 * (up[k] - rest[k]);
         assert!(p.distance(expected) < 1e-5, "{p} {expected}");
     }
+    step(&mut editor, &mut documents, Command::SetPoseTime { index: 1, seconds: 0.25 });
+    // The second pose now comes first, with its share of the blend.
+    assert_eq!(
+        (times(&editor), editor.view().shares),
+        (vec![("up".into(), 0.25), ("left".into(), 1.0)], vec![0.25, 0.5])
+    );
+    step(&mut editor, &mut documents, Command::MovePose { index: 1, to: 0 });
+    assert_eq!(times(&editor), [("left".into(), 0.25), ("up".into(), 1.0)]);
+    step(&mut editor, &mut documents, Command::DuplicatePose { index: 0, name: "again".to_owned() });
+    assert_eq!(times(&editor), [("left".into(), 0.25), ("again".into(), 1.25), ("up".into(), 2.0)]);
+    step(&mut editor, &mut documents, Command::UpdatePose { index: 1 });
+    let document = editor.document();
+    assert_eq!((&document.poses[1].positions, editor.view().shares), (&document.pose, vec![0.0, 1.0, 0.0]));
+    let transition = Transition { interpolation: Interpolation::Cubic, loops: true, back: 0.5 };
+    step(&mut editor, &mut documents, Command::SetTransition { transition });
+    assert_eq!(editor.view().animation_seconds, 2.5);
+    assert!(editor.apply(Command::SetPoseTime { index: 2, seconds: 1.25 }).is_err(), "two poses at one time");
+    step(&mut editor, &mut documents, Command::RemovePose { index: 1 });
+    assert_eq!(times(&editor), [("left".into(), 0.25), ("up".into(), 1.0)]);
     step(&mut editor, &mut documents, Command::RenamePose { index: 0, name: "to the left".to_owned() });
     let hat = editor.document().models.iter().nth(1).unwrap().id;
     let options = PartOptions { rigid: vec!["all".to_owned()], ..PartOptions::default() };
@@ -146,6 +167,56 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     assert!(!editor.redo());
 }
 
+/// Names and times of the saved poses.
+fn times(editor: &Editor) -> Vec<(String, f32)> {
+    editor.view().poses.into_iter().map(|pose| (pose.name, pose.seconds)).collect()
+}
+
+/// What plays is what is exported: the vertices of the exported clip are those of the model under the played cage.
+#[test]
+fn exported_animation_is_the_one_that_plays() {
+    let mut editor = Editor::default();
+    let [body, _] = two_blocks();
+    editor.open([body], Contents::default());
+    let bounds = editor.bounds().unwrap();
+    let mesh = subdivided_box(bounds, 0.1, [1; 3]);
+    editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+    let weights = bound(editor.document(), 16);
+    for by in [Vec3::X, Vec3::new(0.0, 0.5, 0.25)] {
+        let rest = editor.document().cage.mesh.positions.clone();
+        let positions = rest.iter().enumerate().map(|(k, p)| *p + k as f32 * by).collect();
+        editor.apply(Command::SetPose { positions }).unwrap();
+        editor.apply(Command::SavePose { name: "pose".to_owned() }).unwrap();
+    }
+    editor.apply(Command::SetPoseTime { index: 0, seconds: 0.3 }).unwrap();
+    let model = editor.document().models.first().unwrap().model.clone();
+    let deformed = |pose: &[Vec3]| -> Vec<Vec3> { deform_vertices(&weights, pose) };
+    let poses: Vec<_> = editor
+        .document()
+        .fitting_poses()
+        .map(|pose| (pose.name.to_string(), deformed(&pose.positions)))
+        .collect();
+    for interpolation in [Interpolation::Step, Interpolation::Linear, Interpolation::Cubic] {
+        let transition = Transition { interpolation, ..Transition::default() };
+        editor.apply(Command::SetTransition { transition }).unwrap();
+        let timeline = editor.document().timeline();
+        let glb = model.write_glb_poses_at(&model.positions, &poses, &timeline).unwrap();
+        let written = Model::read("poses.glb", &glb, &mut |_| None).unwrap();
+        let player = written.player().unwrap().unwrap();
+        for seconds in [0.1, 0.3, 0.7, 1.9, 2.6] {
+            editor.play_at(seconds);
+            let posed = player.at(Some(0), seconds, &[]);
+            let exported = skin_vertices(&player.skin, &posed.palette, &posed.targets);
+            let played = deformed(&editor.document().pose);
+            // The GLB may repeat vertices of the OBJ.
+            for a in &exported {
+                let is_there = played.iter().any(|b| a.distance(*b) < 1e-3);
+                assert!(is_there, "{interpolation} at {seconds} s: {a}");
+            }
+        }
+    }
+}
+
 /// A document is the same after it was saved as a project and opened again.
 fn assert_survives_saving(editor: &Editor, k: usize) {
     let (document, reopened) = (editor.document(), saved_and_opened(editor));
@@ -154,8 +225,9 @@ fn assert_survives_saving(editor: &Editor, k: usize) {
     assert_eq!(reopened.cage.controls, document.cage.controls, "{k}");
     assert_eq!((reopened.poses.len(), &reopened.pins), (document.poses.len(), &document.pins), "{k}");
     for (a, b) in reopened.poses.iter().zip(&*document.poses) {
-        assert_eq!((&a.name, &a.positions), (&b.name, &b.positions), "{k}");
+        assert_eq!((&a.name, &a.positions, a.lead), (&b.name, &b.positions, b.lead), "{k}");
     }
+    assert_eq!(reopened.transition, document.transition, "{k}");
     // Projects store each coordinate of a pose in 16 bits, relative to the pose's largest movement.
     let movements = document.pose.iter().zip(&document.cage.mesh.positions).map(|(p, r)| p.distance(*r));
     let largest = movements.fold(0.0, f32::max);
@@ -180,6 +252,7 @@ fn saved_and_opened(saved: &Editor) -> Document {
         cage,
         poses: settings.poses(project.poses),
         shares: settings.pose_shares.clone(),
+        transition: settings.transition.unwrap_or_default(),
         pins: settings.pins.clone(),
         sample: settings.sample.clone(),
     };

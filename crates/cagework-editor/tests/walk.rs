@@ -6,9 +6,9 @@
 use cagework_core::{Bounds, subdivided_box};
 use cagework_editor::edit::SelectMode;
 use cagework_editor::{
-    Command, Contents, DocumentSettings, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint,
+    Command, Contents, DocumentSettings, Editor, InnerKind, PartOptions, RestEdit, SurfacePoint, Transition,
 };
-use cagework_io::{Model, read_project};
+use cagework_io::{Interpolation, Model, read_project};
 use glam::Vec3;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
@@ -34,6 +34,9 @@ fn vector() -> impl Strategy<Value = Vec3> {
 fn command() -> impl Strategy<Value = Command> {
     let index = || 0..4_usize;
     let share = prop_oneof![9 => 0.0..1.0_f32, 1 => Just(f32::NAN)];
+    let time = || prop_oneof![8 => 0.0..5.0_f32, 1 => Just(0.0), 1 => Just(f32::NAN), 1 => Just(3600.0)];
+    let interpolation =
+        prop::sample::select(vec![Interpolation::Step, Interpolation::Linear, Interpolation::Cubic]);
     let pin = (0..40_u32, 0.0..1.0_f32)
         .prop_map(|(triangle, a)| SurfacePoint { triangle, bary: [a, 1.0 - a, 0.0] });
     let edit = prop::sample::select(vec![
@@ -52,6 +55,13 @@ fn command() -> impl Strategy<Value = Command> {
         index().prop_map(|index| Command::ApplyPose { index }),
         index().prop_map(|index| Command::RenamePose { index, name: "another".to_owned() }),
         index().prop_map(|index| Command::RemovePose { index }),
+        index().prop_map(|index| Command::UpdatePose { index }),
+        index().prop_map(|index| Command::DuplicatePose { index, name: "copy".to_owned() }),
+        (index(), index()).prop_map(|(index, to)| Command::MovePose { index, to }),
+        (index(), time()).prop_map(|(index, seconds)| Command::SetPoseTime { index, seconds }),
+        (interpolation, any::<bool>(), time()).prop_map(|(interpolation, loops, back)| {
+            Command::SetTransition { transition: Transition { interpolation, loops, back } }
+        }),
         (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
         (6..10_usize, prop::collection::vec(vector(), 0..30))
             .prop_map(|(from, positions)| Command::CarryPoses { from, positions, shares: vec![0.5] }),
@@ -131,7 +141,11 @@ fn is_valid(editor: &Editor) -> Result<(), TestCaseError> {
     prop_assert_eq!(document.shares.len(), document.poses.len());
     prop_assert!(document.pose.iter().all(|p| p.is_finite()));
     prop_assert!(editor.selection.vertices().iter().all(|&v| (v as usize) < document.pose.len()));
-    let _ = editor.view();
+    let (view, timeline) = (editor.view(), document.timeline());
+    let times: Vec<f32> = view.poses.iter().filter(|pose| pose.fits).map(|pose| pose.seconds).collect();
+    prop_assert_eq!(timeline.n_poses(), times.len());
+    prop_assert!(times.is_sorted_by(|a, b| a < b), "{:?}", times);
+    prop_assert!(timeline.shares(0.5 * view.animation_seconds).iter().all(|share| share.is_finite()));
     Ok(())
 }
 
@@ -291,10 +305,15 @@ fn damaged_projects_open_as_valid_documents() {
     let moved = editor.document().pose.iter().map(|p| 1.1 * *p).collect();
     editor.apply(Command::SetPose { positions: moved }).expect("valid input");
     editor.apply(Command::SavePose { name: "two".to_owned() }).expect("valid input");
+    editor.apply(Command::SetPoseTime { index: 1, seconds: 1.5 }).expect("valid input");
+    let transition = Transition { loops: false, ..Transition::default() };
+    editor.apply(Command::SetTransition { transition }).expect("valid input");
     let bytes = editor.write_project("{}").expect("valid input");
     let project = || read_project("saved.glb", &bytes, 1 << 28).expect("valid input").expect("valid input");
     let settings: Value = serde_json::from_str(&project().settings).expect("valid input");
-    for field in ["controls", "pose", "pins", "pose_pins", "pose_shares", "models"] {
+    for field in
+        ["controls", "pose", "pins", "pose_pins", "pose_shares", "pose_leads", "transition", "models"]
+    {
         assert!(settings.get(field).is_some(), "{field} is not damaged");
     }
     runner(300)
@@ -310,6 +329,7 @@ fn damaged_projects_open_as_valid_documents() {
                 cage: settings.cage(&project.cage).0,
                 poses: settings.poses(project.poses),
                 shares: settings.pose_shares.clone(),
+                transition: settings.transition.unwrap_or_default(),
                 pins: settings.pins.clone(),
                 sample: settings.sample.clone(),
             };

@@ -17,10 +17,10 @@ use cagework_core::{BindOptions, Coordinates, Frames, InnerElement, Stage};
 use cagework_editor::edit::{Element, GestureKind, GestureView, Pivot, SelectMode};
 use cagework_editor::{
     CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
-    SelectionView, SurfacePoint,
+    SelectionView, SurfacePoint, Transition,
 };
 use cagework_gpu::render::Theme;
-use cagework_io::{FormatFacts, Joints, ModelFormat, UpAxis};
+use cagework_io::{FormatFacts, Interpolation, Joints, ModelFormat, UpAxis};
 use serde::Serialize;
 use ts_rs::{Config, TS};
 
@@ -113,6 +113,8 @@ fn generated_types_are_up_to_date() {
         MemberInfo,
         MemberSettings,
         ModelInfo,
+        Interpolation,
+        Transition,
         DocumentSettings,
         Command,
         PoseView,

@@ -69,6 +69,7 @@ impl OpenContents {
             cage,
             poses: settings.poses(given),
             shares: settings.pose_shares.clone(),
+            transition: settings.transition.unwrap_or_default(),
             pins: settings.pins.clone(),
             sample: settings.sample.clone().or(self.sample).filter(is_known),
         };

@@ -149,7 +149,7 @@ const full = (): Record<AppState["step"], Patch> => ({
     pins: [{ triangle: 0, bary: [1, 0, 0] }],
     symmetry: true,
     proportionalOn: true,
-    poses: [{ name: "01", fits: true }],
+    poses: [{ name: "01", fits: true, seconds: 1 }],
     shares: [0.5],
     clip: { ...INITIAL.clip, clip: 0 },
     scene: { ...INITIAL.scene, slice: "value", colour: "weight" },
@@ -159,7 +159,7 @@ const full = (): Record<AppState["step"], Patch> => ({
   export: {
     model: SEVERAL,
     cage: CONTROLLED,
-    poses: [{ name: "01", fits: true }],
+    poses: [{ name: "01", fits: true, seconds: 1 }],
   },
 });
 
@@ -244,7 +244,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { boxArmed: true, ortho: true },
     { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
     {
-      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3 })),
+      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k })),
       shares: [0.5, 1, 0],
       playing: true,
       playingPose: null,
@@ -293,7 +293,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { model: null, cage: null, bound: false },
     { bound: false, report: null },
     { cage: CONTROLLED },
-    { model: SEVERAL, poses: [{ name: "01", fits: true }] },
+    { model: SEVERAL, poses: [{ name: "01", fits: true, seconds: 1 }] },
     { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
   ],
 });

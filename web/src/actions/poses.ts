@@ -75,10 +75,16 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   };
 
   const step = (start: number) => (now: number) => {
-    const fitting = fittingPoses(store.get());
-    const seconds = ((now - start) / 1000) % (fitting.length + 1);
+    const { animationSeconds, transition } = store.get();
+    const played = (now - start) / 1000;
+    if (played > animationSeconds && !transition.loops) {
+      stop();
+      return;
+    }
+    const seconds = played % Math.max(animationSeconds, 0.001);
     engine().playAt(seconds);
-    store.set({ playingPose: fitting[Math.floor(seconds)]?.name ?? null });
+    const next = fittingPoses(store.get()).find((pose) => pose.seconds >= seconds);
+    store.set({ playingPose: next?.name ?? null });
     frame = requestAnimationFrame(step(start));
   };
 

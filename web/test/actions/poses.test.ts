@@ -20,7 +20,7 @@ function page() {
   fake.showCage(cageOf(2));
   fake.engine.setCagePositions(new Float32Array(6).fill(1));
   fake.engine.commit("Move");
-  fake.show({ poses: [{ name: "Pose 1", fits: true }], shares: [1], posed: true });
+  fake.show({ poses: [{ name: "Pose 1", fits: true, seconds: 1 }], shares: [1], posed: true });
   return { ...fake, poses };
 }
 
@@ -106,7 +106,7 @@ it("saving while poses are playing saves the pose on screen", () => {
 it("reset returns to rest; playing without poses is reported", () => {
   const { poses, commands, said, show, store } = page();
   poses.reset();
-  show({ posed: false, poses: [{ name: "of another cage", fits: false }] });
+  show({ posed: false, poses: [{ name: "of another cage", fits: false, seconds: 1 }] });
   poses.reset();
   expect(commands).toEqual([{ do: "reset_pose" }]);
   poses.togglePlay();

@@ -1,4 +1,4 @@
-//! Blending of poses, and their playback as an animation.
+//! Blending of poses.
 
 use glam::Vec3;
 use thiserror::Error;
@@ -50,26 +50,6 @@ pub fn reblend(
     Ok(from.iter().zip(&moved).zip(rest).map(|((&from, &moved), &rest)| from + (moved - rest)).collect())
 }
 
-/// Positions at a time of the looping animation from rest through all poses back to rest, one second each. Exports
-/// contain the same animation. `[n_cage]`
-///
-/// # Errors
-/// [`PoseError`] if a pose and the cage differ in their number of vertices.
-pub fn moment(rest: &[Vec3], poses: &[Vec<Vec3>], seconds: f32) -> Result<Vec<Vec3>, PoseError> {
-    let stops = poses.len() + 1;
-    let time = seconds.rem_euclid(stops as f32);
-    let (from, part) = ((time as usize).min(stops - 1), time.fract());
-    let mut shares = vec![0.0; poses.len()];
-    // Stop 0 is rest, stop k is pose k - 1.
-    if from > 0 {
-        shares[from - 1] = 1.0 - part;
-    }
-    if from < poses.len() {
-        shares[from] = part;
-    }
-    blend(rest, poses, &shares)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,25 +73,5 @@ mod tests {
         let now = reblend(&rest, &poses, &from, &[0.5, 1.0], &[0.25, 0.5]);
         assert_eq!(now, Ok(vec![blend(&rest, &poses, &[0.25, 0.5]).unwrap()[0] + by_hand]));
         assert_eq!(reblend(&rest, &poses, &from, &[], &[0.0, 0.0]), Ok(from.to_vec()));
-    }
-
-    #[test]
-    fn animation_passes_every_pose_and_returns_to_rest() {
-        let rest = [Vec3::ZERO];
-        let poses = [vec![Vec3::X], vec![Vec3::Y]];
-        let at = |seconds| moment(&rest, &poses, seconds).unwrap()[0];
-        for (seconds, expected) in [
-            (0.0, Vec3::ZERO),
-            (0.25, 0.25 * Vec3::X),
-            (1.0, Vec3::X),
-            (1.5, 0.5 * Vec3::X + 0.5 * Vec3::Y),
-            (2.0, Vec3::Y),
-            (2.75, 0.25 * Vec3::Y),
-            (3.0, Vec3::ZERO),
-            (7.0, Vec3::X),
-        ] {
-            assert!(at(seconds).abs_diff_eq(expected, 1e-6), "at {seconds} s");
-        }
-        assert_eq!(moment(&rest, &[], 0.7), Ok(rest.to_vec()));
     }
 }

@@ -7,7 +7,8 @@ use cagework_core::field::bend_vertices;
 use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
-    Clip, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_weights_npz, write_zip,
+    Clip, ModelFormat, ReshapeReport, Timeline, write_cage_obj, write_inner_controls, write_weights_npz,
+    write_zip,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
@@ -94,7 +95,7 @@ impl Engine {
         std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
 
-    /// A model as GLB with a morph target for each saved pose of the cage and an animation through all of them.
+    /// A model as GLB with a morph target for each saved pose of the cage and the animation that `playAt` shows.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -104,10 +105,11 @@ impl Engine {
         id: u32,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
-        let (rest, named): (Vec<Vec3>, Vec<(String, Vec<Vec3>)>) = self.read(|state| {
-            let poses = state.editor.document().fitting_poses();
+        let (rest, timeline, named): (Vec<Vec3>, Timeline, Vec<(String, Vec<Vec3>)>) = self.read(|state| {
+            let document = state.editor.document();
+            let poses = document.fitting_poses();
             let named = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec()));
-            (state.rest().positions.clone(), named.collect())
+            (state.rest().positions.clone(), document.timeline(), named.collect())
         });
         if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &decode(options)?)? {
             return Ok(bytes);
@@ -118,7 +120,7 @@ impl Engine {
             let member = state.models().get(id)?;
             let own = posed.iter().map(|posed| member.share(posed).to_vec());
             let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(own).collect();
-            Answer::Ok(member.model.write_glb_poses(&member.model.positions, &named)?)
+            Answer::Ok(member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?)
         })?)
     }
 
@@ -320,6 +322,7 @@ impl Engine {
                 let props = model.props()?;
                 options.rigid.retain(|name| props.contains(name));
                 options.parts = member.parts()?;
+                options.timeline = Some(state.editor.document().timeline());
                 Ok(Some(model.write_reshaped(&by(pose)?, &outside, &by_poses, &options)?))
             })
         })

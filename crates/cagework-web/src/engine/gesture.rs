@@ -170,7 +170,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Moves the cage to its pose at a time, in seconds, of the animation through all saved poses.
+    /// Moves the cage to its pose at a time, in seconds, of the animation of the saved poses.
     #[wasm_bindgen(js_name = playAt)]
     pub fn play_at(&self, seconds: f32) {
         self.change(|state| state.editor.play_at(seconds));

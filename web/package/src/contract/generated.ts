@@ -598,6 +598,26 @@ rigged: boolean, bounds: Bounds, notices: Array<string>,
  */
 members: Array<MemberInfo>, };
 /**
+ * What a clip shows between two keys, as in glTF 2.0, appendix C.
+ */
+export type Interpolation = "step" | "linear" | "cubic";
+/**
+ * How the animation of the saved poses goes from one to the next, and how it ends.
+ */
+export type Transition = {
+/**
+ * Interpolation between two poses.
+ */
+interpolation: Interpolation,
+/**
+ * Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
+ */
+loops: boolean,
+/**
+ * Time that this return takes, seconds.
+ */
+back: number, };
+/**
  * Settings of a document in a project.
  */
 export type DocumentSettings = {
@@ -625,6 +645,14 @@ pose_pins?: Array<Array<SurfacePoint>>,
  * Share of each saved pose in the pose, 0 to 1.
  */
 pose_shares?: Array<number>,
+/**
+ * Time from the previous pose to each saved pose, seconds. If empty, one second each.
+ */
+pose_leads?: Array<number>,
+/**
+ * How the animation of the saved poses goes from one to the next, and how it ends.
+ */
+transition?: Transition | null,
 /**
  * Visibility, parts and painted amounts of each model.
  */
@@ -656,7 +684,39 @@ name: string, } | { "do": "remove_pose",
 /**
  * Index of the pose.
  */
-index: number, } | { "do": "blend",
+index: number, } | { "do": "update_pose",
+/**
+ * Index of the pose.
+ */
+index: number, } | { "do": "duplicate_pose",
+/**
+ * Index of the pose.
+ */
+index: number,
+/**
+ * Name of the copy.
+ */
+name: string, } | { "do": "move_pose",
+/**
+ * Index of the pose.
+ */
+index: number,
+/**
+ * Its new index.
+ */
+to: number, } | { "do": "set_pose_time",
+/**
+ * Index of the pose.
+ */
+index: number,
+/**
+ * Seconds since the start of the animation.
+ */
+seconds: number, } | { "do": "set_transition",
+/**
+ * The new settings.
+ */
+transition: Transition, } | { "do": "blend",
 /**
  * Index of the pose.
  */
@@ -760,7 +820,11 @@ name: string,
 /**
  * Whether the pose belongs to the current cage rather than a replaced one.
  */
-fits: boolean, };
+fits: boolean,
+/**
+ * Time in the animation, seconds; 0 if the pose belongs to a replaced cage.
+ */
+seconds: number, };
 /**
  * The selection.
  */
@@ -805,6 +869,14 @@ poses: Array<PoseView>,
  * Share of each saved pose in the pose.
  */
 shares: Array<number>,
+/**
+ * How the animation of the saved poses goes from one to the next, and how it ends.
+ */
+transition: Transition,
+/**
+ * Length of this animation, seconds.
+ */
+animationSeconds: number,
 /**
  * Surface points that pulls keep in place.
  */
