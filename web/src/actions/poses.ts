@@ -1,6 +1,6 @@
 /** Saves, renames, blends and plays poses. */
 
-import type { CageArrays, PoseView } from "../contract";
+import type { CageArrays, PoseView, Transition } from "../contract";
 import { fittingPoses } from "../derived";
 import { triples } from "../points";
 import { follow } from "../queue";
@@ -14,6 +14,14 @@ export interface PoseActions {
   apply(index: number): void;
   rename(index: number, name: string): void;
   remove(index: number): void;
+  /** Replaces a pose by the current one. */
+  update(index: number): void;
+  /** Inserts a copy after the pose. */
+  duplicate(index: number): void;
+  move(index: number, to: number): void;
+  /** Sets the time of a pose in the animation. Returns whether that is possible. */
+  time(index: number, seconds: number): boolean;
+  transition(transition: Transition): void;
   /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */
   blend(index: number, share: number, done: boolean): void;
   /**
@@ -108,6 +116,14 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       edit.apply({ do: "rename_pose", index, name }, T.did.rename);
     },
     remove: (index) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
+    update: (index) => void edit.apply({ do: "update_pose", index }, T.did.update),
+    duplicate(index) {
+      const name = T.did.copyName(store.get().poses[index]?.name ?? "");
+      edit.apply({ do: "duplicate_pose", index, name }, T.did.duplicate);
+    },
+    move: (index, to) => void edit.apply({ do: "move_pose", index, to }, T.did.movePose),
+    time: (index, seconds) => edit.apply({ do: "set_pose_time", index, seconds }, T.did.time),
+    transition: (transition) => void edit.apply({ do: "set_transition", transition }, T.did.transition),
     blend(index, share, done) {
       edit.setEditingRest(false);
       engine().apply({ do: "blend", index, share });

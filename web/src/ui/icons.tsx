@@ -10,6 +10,7 @@ import {
   Check,
   CircleDot,
   CircleQuestionMark,
+  Copy,
   Download,
   Eye,
   EyeOff,
@@ -18,6 +19,7 @@ import {
   FolderOpen,
   Gem,
   Grid2x2,
+  GripVertical,
   Hand,
   Hexagon,
   type IconNode,
@@ -121,6 +123,8 @@ const ICONS = {
   rigid: Gem,
   stays: Anchor,
   brush: Brush,
+  copy: Copy,
+  grip: GripVertical,
 } satisfies Record<string, IconNode>;
 
 export type IconName = keyof typeof ICONS;

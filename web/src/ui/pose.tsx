@@ -1,15 +1,27 @@
 /** Step 4: position of the selection, move options, and saved poses. */
 
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
-import type { Pivot } from "../contract";
+import type { Interpolation, Pivot } from "../contract";
 import { fittingPoses } from "../derived";
 import { coordinate, percent } from "../format";
 import { T } from "../words";
 import { Clips } from "./clips";
-import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";
+import {
+  Button,
+  Head,
+  IconButton,
+  NumberField,
+  NumberInput,
+  Section,
+  Segments,
+  Slider,
+  Toggle,
+} from "./controls";
 import { Icon } from "./icons";
 import { useTouch } from "./touch";
 
+const INTERPOLATIONS = ["step", "linear", "cubic"] as const satisfies readonly Interpolation[];
 const PIVOTS = ["middle", "border", "last"] as const satisfies readonly Pivot[];
 
 export function PosePanel({ app }: { app: App }) {
@@ -17,6 +29,9 @@ export function PosePanel({ app }: { app: App }) {
   return (
     <div class="stack loose">
       <Head title={T.pose.title} sentence={T.pose.sentence} />
+      <Section title={T.pose.poses}>
+        <Poses app={app} />
+      </Section>
       {model && (model.clips.length > 0 || model.rigged) && (
         <Section title={T.clips.title}>
           <Clips app={app} />
@@ -30,9 +45,6 @@ export function PosePanel({ app }: { app: App }) {
       </Section>
       <Section title={T.pose.help}>
         <Help app={app} />
-      </Section>
-      <Section title={T.pose.poses}>
-        <Poses app={app} />
       </Section>
     </div>
   );
@@ -146,31 +158,38 @@ function Help({ app }: { app: App }) {
 function Poses({ app }: { app: App }) {
   const state = app.store.get();
   const { poses, shares, playing, posed } = state;
-  const fitting = fittingPoses(state);
-  const others = poses.length - fitting.length;
+  const places = poses.flatMap(({ fits }, index) => (fits ? [index] : []));
+  const others = poses.length - places.length;
+  const list = useRef<HTMLUListElement>(null);
+  /** Place in `places` to which a card is being dragged. */
+  const [over, setOver] = useState<number | null>(null);
+  const count = useRef(poses.length);
+  useLayoutEffect(() => {
+    // A saved pose is the last one, with the whole share of the blend.
+    const isSaved = poses.length === count.current + 1 && shares.at(-1) === 1;
+    count.current = poses.length;
+    if (isSaved) list.current?.lastElementChild?.scrollIntoView({ block: "nearest" });
+  });
+  const move = (from: number, to: number) => {
+    const [index, target] = [places[from], places[to]];
+    if (index === undefined || target === undefined || index === target) return;
+    app.poses.move(index, target);
+    list.current?.children[to]?.querySelector<HTMLElement>(".grip")?.focus();
+  };
+  /** Place of the card under the pointer. */
+  const placeAt = (y: number) => {
+    const middles = [...(list.current?.children ?? [])].map((card) => card.getBoundingClientRect());
+    return Math.max(0, middles.filter(({ top }) => top <= y).length - 1);
+  };
   return (
     <>
-      {poses.length === 0 && (
-        <div class="empty-state">
-          <Icon name="pose" />
-          <p>{T.pose.empty}</p>
-          <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" kind="small" />
-        </div>
-      )}
-      <ul class="poses">
-        {poses.map(
-          ({ name, fits }, index) =>
-            fits && <PoseRow key={index} app={app} index={index} name={name} share={shares[index] ?? 0} />,
-        )}
-      </ul>
-      {others > 0 && <p class="hint">{T.pose.waiting(others)}</p>}
       <div class="row">
         <Button
           label={playing ? T.pose.stop : T.pose.play}
           onClick={() => app.run("play")}
           icon={playing ? "stop" : "play"}
           kind="small"
-          disabled={fitting.length === 0}
+          disabled={places.length === 0}
         />
         <Button
           label={T.pose.reset}
@@ -181,16 +200,113 @@ function Poses({ app }: { app: App }) {
           disabled={!posed}
         />
       </div>
+      {poses.length === 0 && (
+        <div class="empty-state">
+          <Icon name="pose" />
+          <p>{T.pose.empty}</p>
+          <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" kind="small" />
+        </div>
+      )}
+      <ul class="poses" ref={list}>
+        {places.map((index, place) => (
+          <PoseRow
+            key={index}
+            app={app}
+            index={index}
+            isOver={over === place}
+            share={shares[index] ?? 0}
+            onDrag={(y) => setOver(placeAt(y))}
+            onDrop={(y) => {
+              setOver(null);
+              if (y !== null) move(place, placeAt(y));
+            }}
+            onStep={(by) => move(place, place + by)}
+          />
+        ))}
+      </ul>
+      {others > 0 && <p class="hint">{T.pose.waiting(others)}</p>}
+      {places.length > 0 && <Timing app={app} />}
     </>
   );
 }
 
-function PoseRow(props: { app: App; index: number; name: string; share: number }) {
-  const { app, index, name, share } = props;
-  const isOn = app.store.get().playingPose === name;
+/** How the animation of the poses goes from one to the next, and how it ends. */
+function Timing({ app }: { app: App }) {
+  const state = app.store.get();
+  const { transition, animationSeconds } = state;
+  const last = fittingPoses(state).at(-1)?.seconds ?? 0;
   return (
-    <li class="card pose" aria-current={isOn ? "true" : undefined}>
+    <>
+      <Segments<Interpolation>
+        label={T.pose.between}
+        choices={INTERPOLATIONS.map((value) => ({
+          value,
+          label: T.pose.interpolations[value],
+          tip: T.pose.interpolationTips[value],
+        }))}
+        value={transition.interpolation}
+        onChange={(interpolation) => app.poses.transition({ ...transition, interpolation })}
+      />
+      <Toggle
+        label={T.pose.loop}
+        sentence={T.pose.loopSentence}
+        on={transition.loops}
+        onChange={(loops) => app.poses.transition({ ...transition, loops })}
+      />
+      {transition.loops && (
+        <NumberField
+          label={T.pose.length}
+          value={thousandths(animationSeconds)}
+          min={last}
+          onCommit={(seconds) => app.poses.transition({ ...transition, back: seconds - last })}
+        />
+      )}
+    </>
+  );
+}
+
+interface PoseRowProps {
+  app: App;
+  index: number;
+  /** Whether another card would be dropped here. */
+  isOver: boolean;
+  share: number;
+  /** `y`: position of the pointer in the window; null if the drag was cancelled. */
+  onDrag: (y: number) => void;
+  onDrop: (y: number | null) => void;
+  onStep: (by: 1 | -1) => void;
+}
+
+function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowProps) {
+  const { poses, playingPose } = app.store.get();
+  const { name, seconds } = poses[index] ?? { name: "", seconds: 0 };
+  /** Counts refused times. A new key makes the field show the time of the pose again. */
+  const [refused, setRefused] = useState(0);
+  return (
+    <li
+      class={isOver ? "card pose over" : "card pose"}
+      aria-current={playingPose === name ? "true" : undefined}
+      onKeyDown={(event) => {
+        if (!event.altKey || (event.key !== "ArrowUp" && event.key !== "ArrowDown")) return;
+        event.preventDefault();
+        onStep(event.key === "ArrowUp" ? -1 : 1);
+      }}
+    >
       <div class="row">
+        <button
+          type="button"
+          class="icon-button small grip"
+          aria-label={T.pose.move(name)}
+          data-tip={T.pose.moveTip}
+          onPointerDown={(event) => event.currentTarget.setPointerCapture(event.pointerId)}
+          onPointerMove={(event) => {
+            if (event.currentTarget.hasPointerCapture(event.pointerId)) onDrag(event.clientY);
+          }}
+          onPointerUp={(event) => onDrop(event.clientY)}
+          onPointerCancel={() => onDrop(null)}
+        >
+          <Icon name="grip" />
+        </button>
         <input
           class="pose-name"
           type="text"
@@ -212,6 +328,32 @@ function PoseRow(props: { app: App; index: number; name: string; share: number }
           kind="small"
         />
       </div>
+      <div class="row">
+        <div class="pose-time">
+          <NumberInput
+            key={refused}
+            name={T.pose.timeOf(name)}
+            value={thousandths(seconds)}
+            min={0}
+            onCommit={(value) => {
+              if (!app.poses.time(index, value)) setRefused(refused + 1);
+            }}
+          />
+          <span aria-hidden="true">s</span>
+        </div>
+        <Button
+          label={T.pose.update}
+          name={T.pose.updateOf(name)}
+          onClick={() => app.poses.update(index)}
+          kind="small"
+        />
+        <IconButton
+          icon="copy"
+          label={T.pose.duplicate(name)}
+          onClick={() => app.poses.duplicate(index)}
+          kind="small"
+        />
+      </div>
       <Slider
         label={T.pose.blend}
         name={T.pose.blendOf(name)}
@@ -225,4 +367,9 @@ function PoseRow(props: { app: App; index: number; name: string; share: number }
       />
     </li>
   );
+}
+
+/** Seconds without the digits that their storage as 32-bit numbers adds. */
+function thousandths(seconds: number): number {
+  return Number(seconds.toFixed(3));
 }

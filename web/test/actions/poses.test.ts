@@ -31,13 +31,40 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   poses.rename(0, " Wave ");
   poses.rename(0, "  ");
   poses.remove(0);
+  poses.update(0);
+  poses.duplicate(0);
+  poses.move(1, 0);
+  expect(poses.time(0, 0.4)).toBe(true);
+  const transition = { interpolation: "cubic", loops: false, back: 1 } as const;
+  poses.transition(transition);
   expect(commands).toEqual([
     { do: "save_pose", name: "Pose 2" },
     { do: "apply_pose", index: 0 },
     { do: "rename_pose", index: 0, name: "Wave" },
     { do: "remove_pose", index: 0 },
+    { do: "update_pose", index: 0 },
+    { do: "duplicate_pose", index: 0, name: "Pose 1 copy" },
+    { do: "move_pose", index: 1, to: 0 },
+    { do: "set_pose_time", index: 0, seconds: 0.4 },
+    { do: "set_transition", transition },
   ]);
-  expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 5]);
+  expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 10]);
+});
+
+it("an animation that does not loop ends with the pose before it", () => {
+  const { poses, calls, show, store } = page();
+  let frame: (now: number) => void = () => undefined;
+  vi.stubGlobal("requestAnimationFrame", (step: typeof frame) => {
+    frame = step;
+    return 1;
+  });
+  const shown = { interpolation: "linear", back: 1 } as const;
+  show({ animationSeconds: 1, transition: { ...shown, loops: false } });
+  poses.togglePlay();
+  frame(performance.now() + 500);
+  expect([store.get().playing, store.get().playingPose]).toEqual([true, "Pose 1"]);
+  frame(performance.now() + 2000);
+  expect([store.get().playing, calls.at(-1)]).toEqual([false, "revert"]);
 });
 
 it("poses of a previous cage are carried over as one step", async () => {
