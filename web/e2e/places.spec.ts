@@ -14,6 +14,23 @@ type Box = Awaited<ReturnType<typeof boxOf>>;
 const overlap = (a: Box, b: Box) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
+/** Number of cage vertices that are outside the view or under panels and toolbars. */
+const hiddenHandles = (page: Page) =>
+  page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const { left = 0, top = 0 } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
+    const positions = engine?.cagePositions() ?? new Float32Array();
+    let hidden = 0;
+    for (let k = 0; k < positions.length; k += 3) {
+      const [x = 0, y = 0, z = 0] = positions.subarray(k, k + 3);
+      const [right = 0, down = 0] = engine?.project(x, y, z) ?? [];
+      const there = document.elementsFromPoint(left + right, top + down);
+      const isClear = !there.some((element) => element.matches(".floating, .see, .panel"));
+      if (!isClear || !there.some(({ id }) => id === "viewport")) hidden += 1;
+    }
+    return hidden;
+  });
+
 /**
  * Checks that names, messages, tips and tools fit into windows of several sizes, and that a toolbar is one tab stop.
  */
@@ -47,6 +64,11 @@ async function fits(page: Page): Promise<void> {
     if (await tool.isVisible()) expect(overlap(await boxOf(tip), await boxOf(tool))).toBe(false);
   }
 
+  await page.keyboard.press("Alt+a");
+  await page.keyboard.press("n");
+  expect(await hiddenHandles(page), "See narrows the view").toBe(0);
+  await page.keyboard.press("n");
+
   const before = await cagePositions(page);
   await tools.first().focus();
   await page.keyboard.press("ArrowDown");
@@ -64,6 +86,7 @@ async function fits(page: Page): Promise<void> {
   expect(bar.x + bar.width - view.x, "the toolbar is beside the model").toBeLessThan(0.15 * view.width);
   expect(bar.y + bar.height).toBeLessThanOrEqual(view.y + view.height);
   await shoot(page, "landscape");
+  expect(await hiddenHandles(page), "the view frames the cage again").toBe(0);
   await page.setViewportSize({ width: 1024, height: 640 });
 }
 

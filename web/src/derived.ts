@@ -56,6 +56,13 @@ export function isCageSparse(state: AppState): boolean {
   return isGenerated && cage.info.vertices < FEW * cageOptions.vertices;
 }
 
+/** Whether the page asks to pull the sample, because nothing has been changed yet. */
+export function asksToPull(state: AppState): boolean {
+  const { grip, bound, posed, undoLabel, gesture, playing, clip, tour, scene } = state;
+  const isUntouched = grip !== null && bound && !posed && undoLabel === null;
+  return isUntouched && scene.pull && !gesture && !playing && clip.clip === null && tour === null;
+}
+
 /** Saved poses that fit the current cage. */
 export function fittingPoses(state: AppState): readonly PoseView[] {
   return state.poses.filter((pose) => pose.fits);

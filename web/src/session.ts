@@ -178,11 +178,13 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
       };
     },
     async openSample(id) {
-      const { glb, cage, poses } = await buildSample(id);
+      const { glb, cage, poses, grip } = await buildSample(id);
       const words = T.samples[id];
       const name = `${words?.name ?? id}.glb`;
       const named = poses.map((pose, k) => ({ ...pose, name: words?.poses[k] ?? pose.name }));
-      return openRead({ ...OWN, name, content: new Blob([glb as BlobPart]), cage }, id, named).finally(begin);
+      const content = new Blob([glb as BlobPart]);
+      const opened = await openRead({ ...OWN, name, content, cage }, id, named).finally(begin);
+      return { ...opened, grip };
     },
     async turn(bytes, up) {
       const name = "turned.glb";

@@ -11,6 +11,7 @@ import type { Offline } from "./offline/keep";
 import { decodeShare } from "./share";
 import { loadTheme } from "./store";
 import { PageError } from "./strings";
+import { coveredIn } from "./ui/covered";
 import { showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
 import { T } from "./words";
@@ -36,6 +37,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
     const { clientWidth, clientHeight } = stage.viewport;
     if (clientWidth === 0 || clientHeight === 0) return;
     session.engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
+    session.engine.cover(...coveredIn(stage.viewport));
   };
   new ResizeObserver(resize).observe(stage.viewport);
   resize();

@@ -69,6 +69,8 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */
   goOn: (() => void) | null;
   model: ModelInfo | null;
+  /** Point of the sample to pull first, until the model has been pulled. */
+  grip: Float32Array | null;
   cage: CageState | null;
   /** Result of the cage's check; null until it is known. */
   check: Check | null;
@@ -192,6 +194,7 @@ const CAGE_SETTINGS = {
 /** Initial values of the keys that belong to the open model, see docs/page.md. */
 export const MODEL_STATE = {
   ...CAGE_SETTINGS,
+  grip: null,
   cageMade: cageKey(CAGE_SETTINGS),
   cageProgress: null,
   bindOptions: BIND_DEFAULTS,

@@ -277,7 +277,8 @@ impl Binder {
             cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours, sample.rig.as_ref())
                 .map_err(Fault::from)?;
         let positions = sample.mesh.positions;
-        Ok(BuiltSample { glb, positions, cage: sample.cage, poses: sample.poses })
+        let grip = positions[sample.grip as usize];
+        Ok(BuiltSample { glb, positions, cage: sample.cage, poses: sample.poses, grip })
     }
 }
 

@@ -11,7 +11,7 @@ use cagework_core::slice::Slice;
 use cagework_core::{Bounds, ControlSet, Coordinates, Frames, PolygonMesh, Weights};
 use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
-use cagework_gpu::render::{Camera, DrawModel, GizmoPart};
+use cagework_gpu::render::{Camera, CameraPlace, DrawModel, GizmoPart};
 use cagework_io::UpAxis;
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
@@ -57,8 +57,12 @@ pub(crate) struct State {
     pub(crate) held: GrabState,
     pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
+    /// Place of the camera after it framed everything. If it is still there, it frames everything in a resized view.
+    framed: Option<CameraPlace>,
     /// Size of the viewport, CSS pixels.
     pub(crate) size: Vec2,
+    /// Widths of the viewport's margins under overlays: left, top, right, bottom, CSS pixels.
+    pub(crate) covered: [f32; 4],
     /// Device pixels per CSS pixel.
     pub(crate) scale: f32,
     /// Number of changes of mesh and cage so far. A job's result is valid only if the revision is still that of its
@@ -144,7 +148,9 @@ impl Default for State {
             held: GrabState::default(),
             view: JsSceneOptions::default(),
             camera: Camera::default(),
+            framed: None,
             size: Vec2::default(),
+            covered: [0.0; 4],
             scale: 0.0,
             revision: 0,
             derived: DerivedKeys::default(),
@@ -252,7 +258,11 @@ impl State {
 
     /// Sets the camera's viewport: the whole view, or one of several pictures that are shown side by side.
     pub(crate) fn place_viewport(&mut self) {
-        self.camera.set_viewport(Vec2::new(self.part_width(), self.size.y));
+        let is_framed = self.framed == Some(self.camera.place());
+        let is_other = self.camera.set_free_part(Vec2::new(self.part_width(), self.size.y), self.covered);
+        if is_framed && is_other {
+            self.frame_all();
+        }
     }
 
     /// Kinds of coordinates that are shown side by side; harmonic coordinates alone if none of the chosen kinds is
@@ -289,10 +299,13 @@ impl State {
         (camera, size.as_uvec2().to_array())
     }
 
+    /// Fits the posed cage into the view; without a cage, the models.
     pub(crate) fn frame_all(&mut self) {
-        if let Some(bounds) = self.editor.bounds() {
-            self.camera.frame(bounds);
-        }
+        let pose = self.pose();
+        let mut camera = self.camera;
+        camera.frame_points(if pose.is_empty() { self.models().positions() } else { pose });
+        self.camera = camera;
+        self.framed = Some(camera.place());
     }
 
     /// Recomputes the grey shading of the model in paint mode.

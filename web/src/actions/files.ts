@@ -69,6 +69,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
         ...opened.model,
         name: T.samples[sample ?? sampleOf(opened) ?? ""]?.name ?? opened.model.name,
       },
+      grip: opened.grip ?? null,
       busy: others.length > 0 ? store.get().busy : null,
     });
     if (opened.check) needs.know(opened.check);

@@ -178,7 +178,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       by: { right: 0, up: 0 },
     };
     current = drag;
-    store.set({ gesture: T.pull.pulling });
+    store.set({ gesture: T.pull.pulling, grip: null });
     void attempt(ctx, T.failed.pull, () => run(drag)).then((went) => {
       if (!went && current === drag) pulling.end(false);
     });
@@ -247,8 +247,9 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     },
     nudge(right, up) {
       if (!current || current.letGo) {
-        const middle = { x: ctx.viewport().width / 2, y: ctx.viewport().height / 2 };
-        const at = (held && pins.inView(held)) ?? middle;
+        const [x = 0, y = 0, z = 0] = engine().camera().target;
+        const [right = 0, down = 0] = engine().project(x, y, z);
+        const at = (held && pins.inView(held)) ?? { x: right, y: down };
         if (!pulling.begin(at.x, at.y)) {
           ctx.tell.say(T.pull.nothingThere);
           return;

@@ -34,7 +34,7 @@ export interface View {
   original(on: boolean): void;
   /** Updates the scene after the cage has changed. */
   refresh(): void;
-  /** Passes the view's size to the session. Set at startup. */
+  /** Passes the size of the view and of what covers it to the session. Set at startup. */
   resized: () => void;
 }
 
@@ -48,9 +48,6 @@ const SLICE_PAUSE_MS = 90;
 export function isComparison(kinds: readonly Coordinates[]): boolean {
   return kinds.length > 1;
 }
-
-/** Zoom relative to a single view at which the model fits into each of several views side by side. */
-const partZoom = (parts: number) => (parts > 2 ? 0.45 : parts > 1 ? 0.6 : 1);
 
 export function createView(
   ctx: Context,
@@ -122,12 +119,7 @@ export function createView(
     },
     async compare(kinds) {
       const next = isComparison(kinds) && (await prepareCompare(kinds)) ? kinds : SCENE_DEFAULTS.compare;
-      const { compare } = store.get().scene;
-      if (String(compare) === String(next)) return;
-      scene({ compare: [...next] });
-      const { width, height } = ctx.viewport();
-      const zoom = partZoom(next.length) / partZoom(compare.length);
-      engine().zoomAt(width / next.length / 2, height / 2, zoom);
+      if (String(store.get().scene.compare) !== String(next)) scene({ compare: [...next] });
     },
     frameAll: () => engine().frameAll(),
     frameSelection: () => engine().frameSelection(),

@@ -156,6 +156,8 @@ export interface Opened {
   readonly check: Check | null;
   /** Settings text of a project; null for other files. */
   readonly settings: string | null;
+  /** Point of a sample to pull first. */
+  readonly grip?: Float32Array;
   /** Sentences about parts of a project that could not be restored. */
   readonly notices: readonly string[];
 }

@@ -139,16 +139,6 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     if (stop.slice) view.slice(stop.slice, stop.scene?.slice);
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
-    if (stop.pose === undefined) return;
-    // Frame the cage in this pose; `frameAll` frames its rest pose.
-    engine.selectAll();
-    engine.frameSelection();
-    if (stop.compare) {
-      // Zoom out, so that the toolbar does not cover the leftmost of the views.
-      const { width, height } = ctx.viewport();
-      engine.zoomAt(width / stop.compare.length / 2, height / 2, 0.8);
-    }
-    engine.select(new Uint32Array(), "replace");
   };
 
   const guide: Guide = {

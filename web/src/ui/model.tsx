@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import type { App } from "../app";
 import type { ModelInfo, UpAxis } from "../contract";
+import { asksToPull } from "../derived";
 import { count, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -17,6 +18,7 @@ const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp:
 export function ModelPanel({ app }: { app: App }) {
   const { model, sample, samples, works } = app.store.get();
   const isTouch = useTouch();
+  const task = asksToPull(app.store.get()) ? T.samples[sample ?? ""]?.task : undefined;
   const open = model && (
     <>
       {model.members.length === 1 ? <ModelCard app={app} model={model} /> : <Up app={app} model={model} />}
@@ -28,7 +30,7 @@ export function ModelPanel({ app }: { app: App }) {
   );
   return (
     <div class="stack loose">
-      <Head title={T.model.title} sentence={isTouch ? T.model.sentenceTouch : T.model.sentence} />
+      <Head title={task ?? T.model.title} sentence={isTouch ? T.model.sentenceTouch : T.model.sentence} />
       <div class="dropzone">
         <Icon name="upload" />
         <div class="grow">
@@ -36,7 +38,7 @@ export function ModelPanel({ app }: { app: App }) {
           <p class="hint">{T.model.kinds}</p>
         </div>
         <div class="row wrap">
-          <Button label={T.panel.open} onClick={app.chooseModel} icon="file" kind="small" />
+          {model && <Button label={T.panel.open} onClick={app.chooseModel} icon="file" kind="small" />}
           <Button label={T.model.openFolder} onClick={app.chooseFolder} icon="open" kind="small" />
         </div>
       </div>

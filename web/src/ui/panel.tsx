@@ -31,7 +31,6 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
       if (!state.model) return { primary: open };
       return {
         primary: state.bound ? pose : { label: T.panel.next, run: () => app.go("cage") },
-        second: open,
       };
     case "cage": {
       const needed = cageAction(state, app);

@@ -7,7 +7,7 @@ import { COORDINATES } from "../defaults";
 import { percent } from "../format";
 import type { Slice } from "../state";
 import { T } from "../words";
-import { Button, IconButton, Section, Segments, Slider, Toggle } from "./controls";
+import { IconButton, Section, Segments, Slider, Toggle } from "./controls";
 
 const COLOURS = ["material", "clay", "weight", "error"] as const satisfies SceneOptions["colour"][];
 const SLICES = ["off", "kinds", "value"] as const satisfies SceneOptions["slice"][];
@@ -20,13 +20,7 @@ const PARTS = [
 ] as const satisfies (keyof SceneOptions)[];
 
 export function See({ app }: { app: App }) {
-  const { seeOpen, ortho } = app.store.get();
-  if (!seeOpen) return null;
-  const views = [
-    [2, "viewFront"],
-    [0, "viewRight"],
-    [1, "viewTop"],
-  ] as const;
+  if (!app.store.get().seeOpen) return null;
   return (
     <aside class="see" id="see" aria-label={T.see.title}>
       <div class="row see-head">
@@ -46,26 +40,6 @@ export function See({ app }: { app: App }) {
         </Section>
         <Section title={T.see.show}>
           <Parts app={app} />
-        </Section>
-        <Section title={T.see.fromWhere}>
-          <div class="row even">
-            {views.map(([axis, command], k) => (
-              <Button
-                key={axis}
-                label={T.see.views[k] ?? ""}
-                onClick={() => app.view.axis(axis, false)}
-                kind="small"
-                tip={app.key(command)}
-              />
-            ))}
-          </div>
-          <Button
-            label={T.see.parallel}
-            onClick={() => app.view.ortho()}
-            kind="small"
-            tip={T.see.parallelTip(app.key("ortho"))}
-            pressed={ortho}
-          />
         </Section>
       </div>
     </aside>

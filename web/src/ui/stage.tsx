@@ -1,14 +1,16 @@
 /** Overlays of the view: tools, legend, status line. */
 
-import { useLayoutEffect } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
 import type { Element as CageElement, CageState, SceneOptions } from "../contract";
-import { elementInUse } from "../derived";
+import { asksToPull, elementInUse } from "../derived";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
+import { Axes } from "./axes";
 import { Button, IconButton, Say, Segments } from "./controls";
+import { useFrames } from "./frame";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
 import { hintOf, statusOf, underWay } from "./status";
@@ -17,11 +19,14 @@ import { useTouch } from "./touch";
 
 /** All overlays of the view. Sets `data-rest` and `data-painting` on `stage` for the style sheet. */
 export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
-  const { cage, scene, editingRest, painting } = app.store.get();
+  const { model, cage, scene, editingRest, painting } = app.store.get();
   useLayoutEffect(() => {
     stage.toggleAttribute("data-rest", editingRest);
     stage.toggleAttribute("data-painting", painting !== null);
   }, [stage, editingRest, painting]);
+  const hasCage = cage !== null;
+  // The tools appear with the cage.
+  useLayoutEffect(() => app.view.resized(), [app, hasCage]);
   return (
     <>
       <div class="top-line">
@@ -31,6 +36,8 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
       </div>
       <Placing app={app} />
       {cage && <Tools app={app} />}
+      {model && <Axes app={app} />}
+      {asksToPull(app.store.get()) && <Cue app={app} />}
       <LegendOfColours app={app} />
       {isComparison(scene.compare) && (
         <div class="compare-labels" aria-hidden="true">
@@ -206,6 +213,24 @@ function BottomLine({ app }: { app: App }) {
       <p class="hint-line" hidden={isQuiet}>
         {hintOf(state, isTouch)}
       </p>
+    </div>
+  );
+}
+
+/** Marks the point of the sample to pull first. The Model panel says it in words. */
+function Cue({ app }: { app: App }) {
+  const element = useRef<HTMLDivElement>(null);
+  const { grip } = app.store.get();
+  useFrames(app, (engine) => {
+    const [x = 0, y = 0, z = 0] = grip ?? [];
+    const [right = 0, down = 0, isThere = 0] = engine.project(x, y, z);
+    if (!element.current) return;
+    element.current.hidden = isThere === 0;
+    element.current.style.transform = `translate(${right}px, ${down}px)`;
+  });
+  return (
+    <div class="cue" aria-hidden="true" ref={element}>
+      <span>{T.view.cue}</span>
     </div>
   );
 }

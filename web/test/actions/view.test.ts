@@ -15,16 +15,14 @@ function page(canCompare = true) {
   const fake = createFake();
   const dark = Object.assign(new EventTarget(), { matches: true }) as MediaQueryList;
   const scenes: SceneOptions[] = [];
-  const zooms: number[] = [];
   const elements: string[] = [];
   fake.teach({
     setScene: (scene) => scenes.push(scene),
-    zoomAt: (_x, _y, factor) => zooms.push(factor),
     setElement: (element) => elements.push(element),
   });
   const view = createView(fake.ctx, async () => canCompare, dark);
   fake.showCage(cageOf(8));
-  return { ...fake, view, scenes, zooms, elements };
+  return { ...fake, view, scenes, elements };
 }
 
 it("the theme follows the system unless one is chosen", () => {
@@ -61,15 +59,12 @@ it("a failed slice is reported and ends the busy state", async () => {
   expect([store.get().slice.busy, problems[0]?.title]).toEqual([false, "The slice could not be computed"]);
 });
 
-it("side-by-side views shrink the model and end with the comparison", async () => {
-  const { view, store, zooms } = page();
+it("a single kind of coordinates, or weights that are missing, end the comparison", async () => {
+  const { view, store } = page();
   await view.compare(["harmonic", "green"]);
-  await view.compare(["harmonic", "green"]);
-  expect([store.get().scene.compare, zooms]).toEqual([["harmonic", "green"], [0.6]]);
   await view.compare(["harmonic", "mean_value", "green"]);
   await view.compare(["green"]);
   expect(store.get().scene.compare, "a single kind ends the comparison").toEqual(["harmonic"]);
-  expect(zooms.reduce((all, zoom) => all * zoom)).toBeCloseTo(1);
   const other = page(false);
   await other.view.compare(["harmonic", "green"]);
   expect(other.store.get().scene.compare).toEqual(["harmonic"]);

@@ -45,6 +45,8 @@ pub struct Sample {
     pub poses: Vec<(String, Vec<Vec3>)>,
     /// Skeleton with an animation clip, if the sample has one.
     pub rig: Option<Rig>,
+    /// Vertex of the model to pull first: its last pose was made by pulling it.
+    pub grip: u32,
 }
 
 const SAMPLES: [SampleInfo; 4] = [rat::INFO, humanoid::INFO, clamp::INFO, strider::INFO];
@@ -78,7 +80,9 @@ pub fn build(id: &str) -> Option<Sample> {
     let mut poses: Vec<_> = recipe.poses.iter().map(posed).collect();
     poses.push((recipe.pulled.name.to_owned(), recipe.pulled.pose(&cage.positions)));
     let rig = recipe.rig.map(|rig| rig(&mesh.positions));
-    Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses, rig })
+    let away = |v: &u32| mesh.positions[*v as usize].distance(recipe.pulled.at);
+    let grip = (0..mesh.positions.len() as u32).min_by(|a, b| away(a).total_cmp(&away(b)))?;
+    Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses, rig, grip })
 }
 
 enum CageRecipe {
@@ -102,7 +106,6 @@ struct Recipe {
 struct PulledPose {
     name: &'static str,
     /// Point whose nearest vertex of the model is grabbed, object units.
-    #[cfg_attr(not(test), expect(dead_code, reason = "only the test that makes the bytes pulls"))]
     at: Vec3,
     /// Displacement of the grab, object units.
     #[cfg_attr(not(test), expect(dead_code, reason = "only the test that makes the bytes pulls"))]

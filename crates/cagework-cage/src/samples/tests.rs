@@ -57,7 +57,7 @@ fn poses_move_part_of_the_cage_and_keep_its_vertex_count() {
 #[test]
 fn the_last_pose_of_each_sample_is_that_of_its_pull() {
     for (info, recipe) in all().iter().zip(recipes()) {
-        let Sample { mesh, cage, poses, .. } = build(info.id).unwrap();
+        let Sample { mesh, cage, poses, grip: held, .. } = build(info.id).unwrap();
         let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
         let cage = Cage::new(&cage).unwrap();
         let weights = |points: &[Vec3]| {
@@ -67,8 +67,6 @@ fn the_last_pose_of_each_sample_is_that_of_its_pull() {
         let probes = Probes::new(&mesh, &cage).unwrap();
         let of_probes = weights(probes.points());
         let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
-        let nearest = |v: &u32| mesh.positions[*v as usize].distance(pulled.at);
-        let held = (0..mesh.positions.len() as u32).min_by(|a, b| nearest(a).total_cmp(&nearest(b))).unwrap();
         let grip =
             Grip::new(Handle::Vertex(held), &pull, &mesh.triangles, &weights(&mesh.positions)).unwrap();
         let start: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();

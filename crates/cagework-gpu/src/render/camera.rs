@@ -17,6 +17,9 @@ const FRAME_MARGIN: f32 = 1.12;
 /// Distance factor of [`Camera::fit`], for a margin around the points.
 const FIT_MARGIN: f32 = 1.06;
 
+/// Steps of the iteration that centres points.
+const CENTERING_STEPS: usize = 4;
+
 /// Range of the distance from the eye to the target, as multiples of the scene's radius.
 const DISTANCE_RANGE: [f32; 2] = [1e-3, 1e3];
 
@@ -73,10 +76,19 @@ pub struct ImagePoint {
     pub depth: f32,
 }
 
+/// Position and direction of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPlace {
+    target: Vec3,
+    yaw: f32,
+    pitch: f32,
+    distance: f32,
+}
+
 /// An orbit camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Centre of the orbit, world space.
+    /// Centre of the orbit, world space; drawn in the middle of the free part of the picture.
     pub target: Vec3,
     /// Angle about y, radians; 0 looks along -z.
     pub yaw: f32,
@@ -89,6 +101,10 @@ pub struct Camera {
     /// Kind of projection.
     pub projection: Projection,
     viewport: Vec2,
+    /// Widths of the picture's margins under overlays: left, top, right, bottom, pixels.
+    covered: [f32; 4],
+    /// Width and height at the target that stay visible when the size of the picture changes, object units.
+    kept: Vec2,
     scene_center: Vec3,
     scene_radius: f32,
 }
@@ -104,6 +120,8 @@ impl Default for Camera {
             fov_y: FOV_Y,
             projection: Projection::Perspective,
             viewport: Vec2::new(4.0, 3.0),
+            covered: [0.0; 4],
+            kept: Vec2::ZERO,
             scene_center: Vec3::ZERO,
             scene_radius: 1.0,
         }
@@ -122,12 +140,59 @@ impl Camera {
         self.viewport = size.max(Vec2::ONE);
     }
 
+    /// Sets the size of the picture and the widths of its margins under overlays (left, top, right, bottom), pixels.
+    /// Changes the distance so that the free part shows what it showed after the last framing or movement. Returns
+    /// whether size or margins have changed.
+    pub fn set_free_part(&mut self, size: Vec2, covered: [f32; 4]) -> bool {
+        if (self.viewport, self.covered) == (size.max(Vec2::ONE), covered) {
+            return false;
+        }
+        self.set_viewport(size);
+        self.covered = covered;
+        let factor = (self.kept / self.visible()).max_element();
+        if factor.is_finite() && factor > 0.0 {
+            self.distance *= factor;
+        }
+        true
+    }
+
+    /// Makes what is visible now stay visible when the size of the picture changes.
+    pub fn keep_visible(&mut self) {
+        self.kept = self.visible();
+    }
+
+    /// Middle and size of the part of the picture that overlays leave free, pixels: at least half of each side.
+    fn free_part(&self) -> [Vec2; 2] {
+        let [left, top, right, bottom] = self.covered.map(|width| width.max(0.0));
+        let [start, end] = [Vec2::new(left, top), Vec2::new(right, bottom)];
+        let scale = (0.5 * self.viewport / (start + end).max(Vec2::splat(f32::MIN_POSITIVE))).min(Vec2::ONE);
+        let [start, end] = [scale * start, scale * end];
+        [0.5 * (self.viewport + start - end), self.viewport - start - end]
+    }
+
+    /// Width and height of the free part at the target, object units.
+    fn visible(&self) -> Vec2 {
+        self.units_per_pixel(self.target) * self.free_part()[1]
+    }
+
+    /// Half the width and height of the free part at distance 1, object units.
+    fn tangents(&self) -> Vec2 {
+        (0.5 * self.fov_y).tan() * self.free_part()[1] / self.viewport.y
+    }
+
     /// Sets the bounds of the scene, which determine the near and far planes and limit zooming.
     pub fn set_scene(&mut self, bounds: Bounds) {
         self.scene_center = bounds.center();
         let radius = 0.5 * bounds.diagonal();
         // The bounds of a single point have radius 0; use 1.
         self.scene_radius = if radius > 0.0 { radius } else { 1.0 };
+    }
+
+    /// Position and direction.
+    #[must_use]
+    pub fn place(&self) -> CameraPlace {
+        let &Self { target, yaw, pitch, distance, .. } = self;
+        CameraPlace { target, yaw, pitch, distance }
     }
 
     /// Unit vector from the target to the eye.
@@ -172,7 +237,10 @@ impl Camera {
     pub fn clip_from_view(&self) -> Mat4 {
         let aspect = self.viewport.x / self.viewport.y;
         let [near, far] = self.depths();
-        match self.projection {
+        // Shifts the picture, so that the target is in the middle of the free part.
+        let shift = 2.0 * self.free_part()[0] / self.viewport - 1.0;
+        let shift = Mat4::from_translation(Vec3::new(shift.x, -shift.y, 0.0));
+        let centered = match self.projection {
             Projection::Perspective => {
                 glam::camera::rh::proj::directx::perspective(self.fov_y, aspect, near, far)
             }
@@ -187,7 +255,8 @@ impl Camera {
                     far,
                 )
             }
-        }
+        };
+        shift * centered
     }
 
     /// Transform from world space to clip space.
@@ -238,12 +307,14 @@ impl Camera {
     pub fn orbit(&mut self, delta: Vec2) {
         self.yaw = (self.yaw - delta.x).rem_euclid(TAU);
         self.pitch = (self.pitch + delta.y).clamp(-FRAC_PI_2, FRAC_PI_2);
+        self.keep_visible();
     }
 
     /// Moves the target so that points at the target's depth follow the pointer. `delta`: pixels.
     pub fn pan(&mut self, delta: Vec2) {
         let size = self.units_per_pixel(self.target);
         self.target += size * (delta.y * self.up() - delta.x * self.right());
+        self.keep_visible();
     }
 
     /// Multiplies the distance by `factor`. The point at the target's depth under `cursor` stays in place.
@@ -254,22 +325,22 @@ impl Camera {
         let factor = distance / self.distance;
         self.target = fixed + factor * (self.target - fixed);
         self.distance = distance;
+        self.keep_visible();
     }
 
     /// Intersection of the ray through a pixel with the plane through the target that faces the eye.
     #[must_use]
     pub fn on_target_plane(&self, cursor: Vec2) -> Vec3 {
-        let from_center = cursor - 0.5 * self.viewport;
+        let from_center = cursor - self.free_part()[0];
         let size = self.units_per_pixel(self.target);
         self.target + size * (from_center.x * self.right() - from_center.y * self.up())
     }
 
-    /// Fits a box into the picture, keeping the view direction.
+    /// Fits a box into the free part of the picture, keeping the view direction.
     pub fn frame(&mut self, bounds: Bounds) {
         self.target = bounds.center();
         let half = 0.5 * bounds.extent();
-        let tan_y = (0.5 * self.fov_y).tan();
-        let tan_x = tan_y * self.viewport.x / self.viewport.y;
+        let tangents = self.tangents();
         let (right, up, backward) = (self.right(), self.up(), self.backward());
         let needed = (0..8)
             .map(|k| {
@@ -279,29 +350,58 @@ impl Camera {
                     if k & 4 == 0 { -1.0 } else { 1.0 },
                 );
                 let corner = sign * half;
-                let across = (corner.dot(right).abs() / tan_x).max(corner.dot(up).abs() / tan_y);
+                let across = Vec2::new(corner.dot(right), corner.dot(up)).abs() / tangents;
                 match self.projection {
                     Projection::Perspective => across + corner.dot(backward),
                     Projection::Orthographic => across,
                 }
             })
-            .fold(0.0, f32::max);
-        // A single vertex has no size: limit the distance to a twentieth of the scene's radius.
-        self.distance = (FRAME_MARGIN * needed).max(0.05 * self.scene_radius);
+            .fold(Vec2::ZERO, Vec2::max);
+        self.step_back(FRAME_MARGIN * needed);
     }
 
-    /// Fits points into the picture as tightly as possible, keeping the view direction. The target can be
-    /// anywhere, so use [`Self::frame`] for interactive views.
+    /// Fits points into the free part of the picture, with the target at the depth of the centre of their bounds.
+    pub fn frame_points(&mut self, points: &[Vec3]) {
+        let Some(bounds) = Bounds::of(points) else { return };
+        self.target = bounds.center();
+        self.fit(points);
+        self.step_back(FRAME_MARGIN / FIT_MARGIN * self.kept / (2.0 * self.tangents()));
+        if self.projection == Projection::Orthographic {
+            return;
+        }
+        // Nearer points move faster as the eye steps back: centre the points as they are seen from there.
+        let (eye, backward) = (self.eye(), self.backward());
+        for across in [self.right(), self.up()] {
+            let mut shift = 0.0;
+            for _ in 0..CENTERING_STEPS {
+                let seen = points.iter().map(|p| ((*p - eye).dot(across) - shift) / (eye - *p).dot(backward));
+                let (low, high) =
+                    seen.fold((f32::MAX, f32::MIN), |(low, high), s| (low.min(s), high.max(s)));
+                shift += 0.5 * self.distance * (low + high);
+            }
+            self.target += shift * across;
+        }
+    }
+
+    /// Sets the distance. `needed`: smallest distances at which everything fits horizontally and vertically.
+    fn step_back(&mut self, needed: Vec2) {
+        // A single vertex has no size: limit the distance to a twentieth of the scene's radius.
+        let needed = needed.max(Vec2::splat(0.05 * self.scene_radius));
+        self.distance = needed.max_element();
+        self.kept = 2.0 * self.tangents() * needed;
+    }
+
+    /// Fits points into the free part of the picture as tightly as possible, keeping the view direction. The target can
+    /// be at any depth, so use [`Self::frame_points`] for interactive views.
     pub fn fit(&mut self, points: &[Vec3]) {
-        let tan_y = (0.5 * self.fov_y).tan();
-        let tans = [tan_y * self.viewport.x / self.viewport.y, tan_y];
+        let tangents = self.tangents();
         let across = [self.right(), self.up()];
         let depth = match self.projection {
             Projection::Perspective => self.backward(),
             Projection::Orthographic => Vec3::ZERO,
         };
-        let mut needed = 0.0_f32;
-        for (tan, across) in tans.into_iter().zip(across) {
+        let mut needed = [0.0_f32; 2];
+        for ((tan, across), needed) in tangents.to_array().into_iter().zip(across).zip(&mut needed) {
             // Distance from which this side of the picture touches the outermost point. Shifting the target sideways
             // makes the distances of both sides equal.
             let from_side = |sign: f32| {
@@ -311,11 +411,18 @@ impl Camera {
             };
             let sides = [from_side(1.0), from_side(-1.0)];
             if sides.iter().all(|side| side.is_finite()) {
-                needed = needed.max(0.5 * (sides[0] + sides[1]));
+                *needed = 0.5 * (sides[0] + sides[1]);
                 self.target += 0.5 * tan * (sides[0] - sides[1]) * across;
             }
         }
-        self.distance = (FIT_MARGIN * needed).max(0.05 * self.scene_radius);
+        self.step_back(FIT_MARGIN * Vec2::from(needed));
+    }
+
+    /// Directions of the axes x, y, z in the picture: right, up, and towards the eye.
+    #[must_use]
+    pub fn axes(&self) -> [Vec3; 3] {
+        let (right, up, backward) = (self.right(), self.up(), self.backward());
+        [0, 1, 2].map(|k| Vec3::new(right[k], up[k], backward[k]))
     }
 
     /// Looks along an axis, keeping the target.
@@ -328,6 +435,7 @@ impl Camera {
             AxisView::Top => (0.0, FRAC_PI_2),
             AxisView::Bottom => (0.0, -FRAC_PI_2),
         };
+        self.keep_visible();
     }
 
     /// Projects a point into the picture. `None` if the point is nearer to the eye than the near plane.

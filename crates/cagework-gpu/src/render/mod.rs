@@ -35,7 +35,7 @@ mod splats;
 mod texture;
 mod theme;
 
-pub use camera::{AxisView, Camera, ImagePoint, Projection, Ray};
+pub use camera::{AxisView, Camera, CameraPlace, ImagePoint, Projection, Ray};
 pub use frame::{Renderer, Target};
 pub use gizmo::{GIZMO_PX, pick_gizmo};
 pub use layers::check_layers;

@@ -49,7 +49,8 @@ impl Session {
         let readback = allocator.readback("picture, read back", bytes)?;
         allocator.settle().await?;
         let mut camera = self.camera;
-        camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
+        // No overlay covers an exported picture.
+        camera.set_free_part(Vec2::from(size.map(|s| s as f32)) / scale, [0.0; 4]);
         let mut encoder = self.encoder();
         self.encode(&mut encoder, Target { view: &view, format: PICTURE_FORMAT, size, scale }, &camera);
         encoder.copy_texture_to_buffer(

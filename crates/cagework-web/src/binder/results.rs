@@ -55,6 +55,7 @@ pub struct BuiltSample {
     pub(super) positions: Vec<Vec3>,
     pub(super) cage: PolygonMesh,
     pub(super) poses: Vec<(String, Vec<Vec3>)>,
+    pub(super) grip: Vec3,
 }
 
 #[wasm_bindgen]
@@ -176,6 +177,13 @@ impl BuiltSample {
     #[must_use]
     pub fn cage(&self) -> Polygons {
         self.cage.clone().into()
+    }
+
+    /// Point of the model to pull first. `[3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn grip(&self) -> Vec<f32> {
+        self.grip.to_array().to_vec()
     }
 
     /// Names of the sample's poses.

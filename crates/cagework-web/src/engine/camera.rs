@@ -56,6 +56,7 @@ impl Engine {
             (camera.yaw, camera.pitch, camera.distance) = (view.yaw, view.pitch, view.distance);
             camera.projection =
                 if view.parallel { Projection::Orthographic } else { Projection::Perspective };
+            camera.keep_visible();
         });
         Ok(())
     }
@@ -98,6 +99,12 @@ impl Engine {
                 None => state.frame_all(),
             }
         });
+    }
+
+    /// Directions of the axes x, y, z in the view: right, up, and towards the eye. `[3, 3]`
+    #[must_use]
+    pub fn axes(&self) -> Vec<f32> {
+        self.read(|state| state.camera.axes()).iter().flat_map(|axis| axis.to_array()).collect()
     }
 
     /// Looks along an axis, 0 to 2, from its positive end, or from its negative end if `negative` is set.

@@ -24,6 +24,16 @@ impl Engine {
         });
     }
 
+    /// Sets the widths of the viewport's margins under overlays, CSS pixels. The camera's target is drawn in the middle of
+    /// the rest; of several pictures side by side, each has these margins.
+    pub fn cover(&self, left: f32, top: f32, right: f32, bottom: f32) {
+        self.change(|state| {
+            state.covered =
+                [left, top, right, bottom].map(|width| if width.is_finite() { width } else { 0.0 });
+            state.place_viewport();
+        });
+    }
+
     /// Draws a frame. A slow GPU draws at reduced resolution unless `sharp` is set. Returns whether the frame has full
     /// resolution; undefined if the GPU is busy and nothing was drawn, in which case the page has to draw again.
     ///

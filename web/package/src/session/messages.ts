@@ -68,6 +68,8 @@ export interface SampleArrays {
   readonly glb: Uint8Array;
   readonly cage: CheckedCage;
   readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
+  /** Point of the model to pull first. */
+  readonly grip: Float32Array;
 }
 
 /** Input, progress and output of each job. */

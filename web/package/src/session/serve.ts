@@ -187,7 +187,8 @@ function createWork(pkg: Package): Work {
     async sample({ id }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
-      const output = { glb: sample.glb, cage: checked(pkg, sample.cage, sample.positions), poses };
+      const { glb, grip } = sample;
+      const output = { glb, cage: checked(pkg, sample.cage, sample.positions), poses, grip };
       sample.free();
       return output;
     },

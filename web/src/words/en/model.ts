@@ -5,9 +5,9 @@ import { count, endings, inUnit, percent, plural } from "../../format";
 export const model = {
   title: "Choose a model",
   sentence:
-    "A cage is a coarse mesh around a model: move the cage, and the model follows. The sample has a cage already. Pull it anywhere, or drop your own file here.",
+    "The model follows its cage, a coarse mesh around it. Pull it anywhere, or drop your own file here.",
   sentenceTouch:
-    "A cage is a coarse mesh around a model: move the cage, and the model follows. The sample has a cage already. Pull it anywhere, or open your own file.",
+    "The model follows its cage, a coarse mesh around it. Pull it anywhere, or open your own file.",
   drop: "Drop models here",
   dropTouch: "Your own model",
   get kinds() {
@@ -37,21 +37,25 @@ export const samples: Readonly<Record<string, Sample>> = {
   rat: {
     name: "Rat",
     poses: ["Tail up, head turned", "Looking round"],
-    tip: "Pull its nose to turn its head: the feet stay in place.",
+    task: "Drag the rat's nose.",
+    tip: "Its head turns, its feet stay in place.",
   },
   humanoid: {
     name: "Legs close together",
     poses: ["A step", "Knee up"],
+    task: "Drag the knee up.",
     tip: "Lift a knee: the other leg, a hand's breadth away, stays in place.",
   },
   clamp: {
     name: "Clamp",
     poses: ["Lower jaw open", "Lower jaw pulled down"],
+    task: "Drag the lower jaw down.",
     tip: "Pull the lower jaw open, then compare with mean value and Green coordinates.",
   },
   strider: {
     name: "Strider",
     poses: ["Front legs raised", "One leg up"],
+    task: "Drag a front foot.",
     tip: "Legs as thin as a grid cell. Pull one foot: the other legs stay in place.",
   },
 };
@@ -59,6 +63,8 @@ export const samples: Readonly<Record<string, Sample>> = {
 interface Sample {
   readonly name: string;
   readonly poses: readonly string[];
+  /** What to do first. */
+  readonly task: string;
   readonly tip: string;
 }
 

@@ -35,10 +35,7 @@ export const see = {
     floor: ["Floor", ""],
     problems: ["Faults of the cage", ""],
   },
-  fromWhere: "View from",
-  views: ["Front", "Right", "Top"],
   parallel: "Parallel projection",
-  parallelTip: (key: string) => `Perspective or parallel (${key})`,
 };
 
 export const legend = {

@@ -7,6 +7,17 @@ export const view = {
   help: "Square brackets select the previous and next cage vertex, arrow keys move it, the question mark lists all keys. Tab leaves the view.",
   tools: "Tools",
   looks: "View",
+  axes: "Axes",
+  cue: "Drag here",
+  /** Positive and negative end of each axis. */
+  from: [
+    "From the right (+X)",
+    "From the left (−X)",
+    "From above (+Y)",
+    "From below (−Y)",
+    "From the front (+Z)",
+    "From the back (−Z)",
+  ],
   mode: "What dragging changes",
   modes: { pose: "Pose", rest: "Reshape" },
   modeTip: (key: string) => `Pose the model, or reshape its cage (${key})`,

@@ -180,6 +180,73 @@ fn framed_box_fills_the_picture() {
     }
 }
 
+/// A picture of 800 x 600 pixels, of which overlays cover 100 on the left, 40 at the top, 60 on the right and 80 at the
+/// bottom, leaves the middle at (100 + 740) / 2, (40 + 520) / 2.
+#[test]
+fn target_is_in_the_middle_of_what_overlays_leave_free() {
+    for mut camera in both() {
+        camera.set_free_part(Vec2::new(800.0, 600.0), [100.0, 40.0, 60.0, 80.0]);
+        let middle = Vec2::new(420.0, 280.0);
+        assert!(camera.project(camera.target).unwrap().position.abs_diff_eq(middle, PIXELS));
+        assert!(camera.on_target_plane(middle).abs_diff_eq(camera.target, UNITS));
+        let point = Vec3::new(1.0, 0.5, -0.7);
+        let ray = camera.ray(camera.project(point).unwrap().position);
+        let along = (point - ray.origin).dot(ray.direction);
+        assert!((ray.origin + along * ray.direction).abs_diff_eq(point, UNITS), "{camera:?}");
+        let corners = [[0.0, 0.0, 0.0], [3.0, 0.2, 0.0], [0.5, 1.0, 0.4], [-0.3, 0.1, -2.0]].map(Vec3::from);
+        camera.frame_points(&corners);
+        let places = corners.map(|corner| camera.project(corner).unwrap().position);
+        let low = places.into_iter().fold(Vec2::MAX, Vec2::min);
+        let high = places.into_iter().fold(Vec2::MIN, Vec2::max);
+        assert!(low.x > 100.0 && low.y > 40.0 && high.x < 740.0 && high.y < 520.0, "{low} to {high}");
+        assert!((0.5 * (low + high)).abs_diff_eq(middle, 3.0), "centred: {low} to {high}");
+    }
+}
+
+/// Of overlays that cover more than half of the picture, only half counts.
+#[test]
+fn free_part_is_at_least_half_of_the_picture() {
+    let mut camera = Camera::default();
+    camera.set_free_part(Vec2::new(100.0, 100.0), [300.0, 0.0, 100.0, -5.0]);
+    assert_eq!(camera.free_part(), [Vec2::new(62.5, 50.0), Vec2::new(50.0, 100.0)]);
+}
+
+/// A resized picture shows what the previous one showed, and returns to the same distance with its size.
+#[test]
+fn resizing_keeps_what_is_visible() {
+    let bounds = Bounds { min: Vec3::new(-3.0, 0.0, 1.0), max: Vec3::new(1.0, 1.0, 2.0) };
+    for mut camera in both() {
+        camera.frame(bounds);
+        let framed = camera.distance;
+        for [width, height] in [[300.0, 600.0], [800.0, 100.0], [400.0, 380.0]] {
+            camera.set_free_part(Vec2::new(width, height), [0.0; 4]);
+            for p in [bounds.min, bounds.max] {
+                let Vec2 { x, y } = camera.project(p).unwrap().position;
+                assert!(
+                    (0.0..width).contains(&x) && (0.0..height).contains(&y),
+                    "{width} x {height}: {x}, {y}"
+                );
+            }
+        }
+        camera.set_free_part(Vec2::new(800.0, 600.0), [0.0; 4]);
+        assert!((camera.distance / framed - 1.0).abs() < 1e-5, "{} instead of {framed}", camera.distance);
+        // The horizontal field of view stays when the picture gets narrower: half the width, twice the distance.
+        camera.zoom_at(0.5, Vec2::new(10.0, 20.0));
+        let zoomed = camera.distance;
+        camera.set_free_part(Vec2::new(400.0, 600.0), [0.0; 4]);
+        assert!((camera.distance / zoomed - 2.0).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn axes_are_seen_from_the_eye() {
+    let mut camera = Camera::default();
+    camera.look_along(AxisView::Right);
+    // From +x, z is to the left and y up.
+    let seen = [Vec3::Z, Vec3::Y, -Vec3::X];
+    assert!(camera.axes().iter().zip(seen).all(|(a, b)| a.abs_diff_eq(b, 1e-6)), "{:?}", camera.axes());
+}
+
 #[test]
 fn switching_the_projection_keeps_the_size_at_the_target() {
     let [perspective, orthographic] = both();
