@@ -1,9 +1,15 @@
-// Draws the floor grid as one quad. The grid fades out with the distance from its centre. Every tenth line is stronger,
-// and the x and z axes are coloured.
+// Draws the floor as one quad: the model's shadow, and a grid over it. Both fade out with the distance from the centre.
+// Every tenth line of the grid is stronger, and the x and z axes are coloured.
 
 /// Colours of the x and z axes, linear.
 const X_COLOR = vec3f(0.55, 0.07, 0.09);
 const Z_COLOR = vec3f(0.06, 0.20, 0.62);
+
+/// How much of the floor's light the shadow takes away at most.
+const SHADOW_STRENGTH = 0.55;
+
+@group(1) @binding(0) var shadow_map: texture_2d<f32>;
+@group(1) @binding(1) var shadow_sampler: sampler;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -29,6 +35,29 @@ fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
     return cover * clamp(1.4 - 4.0 * slope, vec2f(0.0), vec2f(1.0));
 }
 
+/// The map interpolated by cubic B-splines, as four linear samples. `at`: 0 to 1 across the map.
+fn shadow_at(at: vec2f) -> f32 {
+    let size = vec2f(textureDimensions(shadow_map));
+    let place = at * size - 0.5;
+    let f = fract(place);
+    let g = 1.0 - f;
+    // Weights of the four pixels along each axis, and positions between the first two and the last two.
+    let w0 = g * g * g / 6.0;
+    let w1 = (4.0 - 6.0 * f * f + 3.0 * f * f * f) / 6.0;
+    let w3 = f * f * f / 6.0;
+    let first = w0 + w1;
+    let last = 1.0 - first;
+    let low = (floor(place) - 0.5 + w1 / first) / size;
+    let high = (floor(place) + 1.5 + w3 / last) / size;
+    let top = mix(sample_at(vec2f(high.x, low.y)), sample_at(low), first.x);
+    let bottom = mix(sample_at(high), sample_at(vec2f(low.x, high.y)), first.x);
+    return mix(bottom, top, first.y);
+}
+
+fn sample_at(at: vec2f) -> f32 {
+    return textureSampleLevel(shadow_map, shadow_sampler, at, 0.0).x;
+}
+
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4f {
     let at = in.world.xz / camera.floor_spacing;
@@ -46,6 +75,15 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let fade = 1.0 - smoothstep(0.15, 1.0, distance);
     let steep = clamp(6.0 * abs(dot(to_eye(in.world), vec3f(0.0, 1.0, 0.0))), 0.0, 1.0);
     alpha *= fade * steep;
-    if alpha <= 0.002 { discard; }
-    return to_target(color, alpha);
+    let across = (in.world - camera.floor_center).xz / (SHADOW_REACH * camera.floor_radius);
+    let from_center = max(abs(across.x), abs(across.y));
+    var shadow = 0.0;
+    // From below, the floor is transparent.
+    if from_center < 1.0 && to_eye(in.world).y > 0.0 {
+        let border = 1.0 - smoothstep(0.8, 1.0, from_center);
+        shadow = SHADOW_STRENGTH * border * shadow_at(0.5 + 0.5 * across);
+    }
+    if max(alpha, shadow) <= 0.002 { discard; }
+    // The grid over a black shadow.
+    return to_target(color, alpha) + vec4f(0.0, 0.0, 0.0, (1.0 - alpha) * shadow);
 }

@@ -8,9 +8,10 @@ struct Surface {
     mode: u32,
     /// Fragments with an alpha below this are discarded.
     alpha_cutoff: f32,
-    /// WEIGHTS: weight of the colour map's first colour. ERRORS: its error, as a base-10 logarithm.
+    /// WEIGHTS: weight of the colour map's first colour. ERRORS: its error, as a base-10 logarithm. Other modes: 1 to
+    /// paint each vertex by its value instead of greying it.
     low: f32,
-    /// WEIGHTS and ERRORS: the same for the last colour. Other modes: 1 to grey each vertex by its value, otherwise 0.
+    /// WEIGHTS and ERRORS: the same for the last colour. Other modes: 1 to grey or paint each vertex, otherwise 0.
     high: f32,
 }
 
@@ -24,6 +25,10 @@ const BLENDED = 4u;
 /// colour's luminance.
 const GREY_BRIGHTNESS = 0.7;
 const GREY_DESATURATION = 0.8;
+
+/// Colour of paint, linear, and how much of it covers the material.
+const PAINT_COLOR = vec3f(0.04, 0.19, 0.86);
+const PAINT_COVER = 0.72;
 
 @group(2) @binding(0) var<uniform> surface: Surface;
 @group(2) @binding(1) var base_texture: texture_2d<f32>;
@@ -69,8 +74,10 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
     if surface.mode == MATERIAL { base.a = 1.0; }
     if !is_value {
         let grey = dot(base.rgb, vec3f(0.2126, 0.7152, 0.0722));
-        let strength = GREY_DESATURATION * surface.high * clamp(in.value, 0.0, 1.0);
-        base = vec4f(mix(base.rgb, vec3f(GREY_BRIGHTNESS * grey), strength), base.a);
+        let greyed = vec4f(vec3f(GREY_BRIGHTNESS * grey), GREY_DESATURATION);
+        let over = select(greyed, vec4f(PAINT_COLOR, PAINT_COVER), surface.low == 1.0);
+        let strength = over.a * surface.high * clamp(in.value, 0.0, 1.0);
+        base = vec4f(mix(base.rgb, over.rgb, strength), base.a);
     }
     var normal = in.normal;
     // Light both sides of a triangle. The vertex normal is zero if all triangles of a vertex have no area: use the

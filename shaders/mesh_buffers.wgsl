@@ -2,7 +2,7 @@
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(1) var<storage, read> normals: array<vec4f>;
-/// For each vertex, the weight, the error, or how much it is greyed (0 to 1).
+/// For each vertex, the weight, the error, or how much it is greyed or painted (0 to 1).
 @group(1) @binding(2) var<storage, read> values: array<f32>;
 
 fn point_at(index: u32) -> vec3f { return positions[index].xyz; }

@@ -408,6 +408,7 @@ impl Session {
                 }
             }
             self.moved = false;
+            self.renderer.touch_shadow();
         }
     }
 

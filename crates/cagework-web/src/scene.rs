@@ -48,6 +48,7 @@ impl State {
             marks: self.marks(),
             hidden: self.models().hidden(),
             floaters_hidden: false,
+            painted: self.painting.is_some(),
             greyed: self
                 .painting
                 .as_ref()

@@ -375,8 +375,7 @@ impl Camera {
             let mut shift = 0.0;
             for _ in 0..CENTERING_STEPS {
                 let seen = points.iter().map(|p| ((*p - eye).dot(across) - shift) / (eye - *p).dot(backward));
-                let (low, high) =
-                    seen.fold((f32::MAX, f32::MIN), |(low, high), s| (low.min(s), high.max(s)));
+                let (low, high) = seen.fold((f32::MAX, f32::MIN), |(low, high), s| (low.min(s), high.max(s)));
                 shift += 0.5 * self.distance * (low + high);
             }
             self.target += shift * across;

@@ -15,6 +15,7 @@ use super::mesh::Mesh;
 use super::model::DrawModel;
 use super::pipelines::{DEPTH_FORMAT, Kind, Layouts, Pipelines, SAMPLES};
 use super::scene::{MeshStyle, SceneOptions};
+use super::shadow::ShadowMap;
 use super::slice::SlicePlane;
 use super::splats::SplatLayer;
 use super::theme::linear;
@@ -74,6 +75,7 @@ pub struct Renderer {
     /// Marks of problems, grabbed points and joints, topmost last.
     marks: Vec<MarksView>,
     gizmo: GizmoShape,
+    shadow: ShadowMap,
     scene: SceneOptions,
     floor: Bounds,
     /// Values of the first and last colour of the heat map.
@@ -96,6 +98,7 @@ impl Renderer {
         });
         Self {
             gizmo: GizmoShape::new(context, &layouts),
+            shadow: ShadowMap::new(context, &layouts),
             layouts,
             pipelines: Vec::new(),
             camera,
@@ -126,6 +129,7 @@ impl Renderer {
             Some(splats) => Some(SplatLayer::new(context, &self.layouts, splats).await?),
             None => None,
         };
+        self.touch_shadow();
         self.mesh = Some(Mesh::new(context, &self.layouts, model, &padded).await?);
         self.apply(context, Some(model), None);
         Ok(())
@@ -144,6 +148,7 @@ impl Renderer {
 
     /// Sets the tables of positions and normals; `None` for the rest pose.
     pub(crate) fn set_vertices(&mut self, context: &GpuContext, tables: Option<[&Table; 2]>) {
+        self.shadow.is_stale = true;
         let Some(mesh) = &mut self.mesh else { return };
         match tables {
             Some([positions, normals]) => mesh.set_vertices(context, &self.layouts, positions, normals),
@@ -184,11 +189,17 @@ impl Renderer {
         debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
         mesh.values.write(context, bytemuck::cast_slice(values));
         self.range = range;
-        mesh.set_style(context, self.scene.mesh, range, self.scene.greyed.is_some());
+        mesh.set_style(context, self.scene.mesh, range, self.scene.overlay());
+    }
+
+    /// Draws the shadow again with the next frame, because the model has moved.
+    pub(crate) fn touch_shadow(&mut self) {
+        self.shadow.is_stale = true;
     }
 
     /// Sets the bounds of the model at rest, which determine the position and size of the floor.
     pub(crate) fn set_bounds(&mut self, bounds: Bounds) {
+        self.touch_shadow();
         self.floor = bounds;
     }
 
@@ -212,11 +223,13 @@ impl Renderer {
             }
         }
         if let Some(mesh) = &self.mesh {
-            if before.is_none_or(|b| b.mesh != scene.mesh || b.greyed.is_some() != scene.greyed.is_some()) {
-                mesh.set_style(context, scene.mesh, self.range, scene.greyed.is_some());
+            if before.is_none_or(|b| b.mesh != scene.mesh || b.overlay() != scene.overlay()) {
+                mesh.set_style(context, scene.mesh, self.range, scene.overlay());
+                self.shadow.is_stale = true;
             }
             if before.is_none_or(|b| b.hidden != scene.hidden) {
                 self.wires = None;
+                self.shadow.is_stale = true;
             }
             if (scene.base_wireframe || scene.mesh_edges)
                 && self.wires.is_none()
@@ -277,6 +290,15 @@ impl Renderer {
             let hides = self.scene.floaters_hidden;
             splats.encode(context, &self.layouts, encoder, pipeline, &self.camera_group, &uniform, hides);
         }
+        if self.shadow.is_stale && self.scene.floor {
+            let mut pass = self.shadow.pass(encoder);
+            if let Some(mesh) = self.mesh.as_ref().filter(|_| self.scene.mesh != MeshStyle::Hidden) {
+                pass.set_bind_group(0, &self.camera_group, &[]);
+                pass.set_pipeline(pipelines.get(Kind::Shadow));
+                mesh.draw_plain(&mut pass, &self.scene.hidden);
+            }
+            self.shadow.is_stale = false;
+        }
         let [color, depth] = [&targets.color, &targets.depth]
             .map(|texture| texture.create_view(&wgpu::TextureViewDescriptor::default()));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -321,6 +343,7 @@ impl Renderer {
         let floor = |pass: &mut wgpu::RenderPass<'_>| {
             if scene.floor {
                 pass.set_pipeline(pipelines.get(Kind::Floor));
+                pass.set_bind_group(1, &self.shadow.group, &[]);
                 pass.draw(0..6, 0..1);
             }
         };

@@ -48,9 +48,10 @@ pub struct Surface {
     pub mode: u32,
     /// Fragments with less alpha are discarded.
     pub alpha_cutoff: f32,
-    /// Value of the first colour of the colour map.
+    /// Value of the first colour of the colour map. With materials: 1 to paint by the vertices' values instead of
+    /// greying.
     pub low: f32,
-    /// Value of the last colour. With materials: strength of greying by the vertices' values, 0 or 1.
+    /// Value of the last colour. With materials: strength of greying or paint, 0 or 1.
     pub high: f32,
 }
 

@@ -77,7 +77,7 @@ impl Mesh {
             textures.push(texture::upload(context, &mut allocator, texture));
         }
         let mut groups = Vec::new();
-        for group in model.whole_groups() {
+        for group in model.whole_groups(CLAY) {
             let (view, wrap) = match group.texture {
                 Some(t) => (&textures[t as usize], model.textures[t as usize].wrap),
                 None => (&white, [Wrap::Repeat; 2]),
@@ -109,32 +109,43 @@ impl Mesh {
         self.set_vertices(context, layouts, &rest, &normals);
     }
 
-    /// Sets the source of colours, and the values of the first and last colour. With `is_greyed`, materials
-    /// are greyed by the vertices' values.
+    /// Sets the source of colours, and the values of the first and last colour. `overlay`: [`Surface::low`] and
+    /// [`Surface::high`] with materials.
     pub(super) fn set_style(
         &self,
         context: &GpuContext,
         style: MeshStyle,
         [low, high]: [f32; 2],
-        is_greyed: bool,
+        overlay: [f32; 2],
     ) {
-        let grey = f32::from(u8::from(is_greyed));
+        let with_overlay = |surface| Surface { low: overlay[0], high: overlay[1], ..surface };
         for group in &self.groups {
             let surface = match style {
-                MeshStyle::Hidden | MeshStyle::Solid => Surface { high: grey, ..group.surface },
-                MeshStyle::Clay => Surface {
-                    mode: surface_mode::CLAY,
-                    base_color: CLAY,
-                    alpha_cutoff: 0.0,
-                    high: grey,
-                    ..Surface::default()
-                },
+                MeshStyle::Hidden | MeshStyle::Solid => with_overlay(group.surface),
+                MeshStyle::Clay => {
+                    with_overlay(Surface { mode: surface_mode::CLAY, base_color: CLAY, ..Surface::default() })
+                }
                 MeshStyle::Weights { .. } => {
                     Surface { mode: surface_mode::WEIGHTS, low, high, ..Surface::default() }
                 }
                 MeshStyle::Errors => Surface { mode: surface_mode::ERRORS, low, high, ..Surface::default() },
             };
             context.queue.write_buffer(&group.uniform, 0, bytemuck::bytes_of(&surface));
+        }
+    }
+
+    /// Binds vertices and indices.
+    fn begin(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(1, &self.vertices, &[]);
+        pass.set_vertex_buffer(0, self.corners.slice(..));
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+    }
+
+    /// Draws all groups without materials, except groups of `hidden` triangles.
+    pub(super) fn draw_plain(&self, pass: &mut wgpu::RenderPass<'_>, hidden: &[Range<u32>]) {
+        self.begin(pass);
+        for group in self.groups.iter().filter(|group| !group.is_among(hidden)) {
+            pass.draw_indexed(group.indices.clone(), 0, 0..1);
         }
     }
 
@@ -147,12 +158,9 @@ impl Mesh {
         blended: bool,
         hidden: &[Range<u32>],
     ) {
-        pass.set_bind_group(1, &self.vertices, &[]);
-        pass.set_vertex_buffer(0, self.corners.slice(..));
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        self.begin(pass);
         for group in &self.groups {
-            let is_hidden = hidden.iter().any(|range| range.contains(&(group.indices.start / 3)));
-            if (group.blended && style == MeshStyle::Solid) == blended && !is_hidden {
+            if (group.blended && style == MeshStyle::Solid) == blended && !group.is_among(hidden) {
                 pass.set_bind_group(2, &group.bind_group, &[]);
                 pass.draw_indexed(group.indices.clone(), 0, 0..1);
             }
@@ -179,6 +187,11 @@ fn bind_vertices(
 }
 
 impl Group {
+    /// Whether its triangles are in one of these ranges.
+    fn is_among(&self, hidden: &[Range<u32>]) -> bool {
+        hidden.iter().any(|range| range.contains(&(self.indices.start / 3)))
+    }
+
     fn new(
         context: &GpuContext,
         layouts: &Layouts,

@@ -30,6 +30,7 @@ mod part;
 mod pipelines;
 pub mod scene;
 pub mod shaders;
+mod shadow;
 mod slice;
 mod splats;
 mod texture;

@@ -10,6 +10,17 @@ use glam::Vec3;
 /// Default base colour, linear: light, slightly warm grey.
 pub const CLAY: [f32; 4] = [0.52, 0.505, 0.485, 1.0];
 
+/// Base colours of models without materials that are drawn together, linear: of the same lightness, the first is
+/// [`CLAY`].
+const TINTS: [[f32; 4]; 6] = [
+    CLAY,
+    [0.337, 0.456, 0.604, 1.0],
+    [0.610, 0.456, 0.262, 1.0],
+    [0.367, 0.515, 0.328, 1.0],
+    [0.584, 0.367, 0.392, 1.0],
+    [0.434, 0.381, 0.584, 1.0],
+];
+
 /// A drawable model.
 ///
 /// Vertices (`positions`) are bound and deformed, corners (`vertices`) are drawn. Vertices and corners differ because
@@ -120,12 +131,13 @@ impl DrawModel {
         Self { positions, vertices, triangles, ..Self::default() }
     }
 
-    /// Concatenates models: vertices, copies, corners and triangles in order. Textures are not duplicated.
+    /// Concatenates models: vertices, copies, corners and triangles in order. Textures are not duplicated. Triangles
+    /// without a material get a colour per model.
     #[must_use]
     pub fn joined(models: &[&Self]) -> Self {
         let n_vertices: usize = models.iter().map(|m| m.positions.len()).sum();
         let mut all = Self::default();
-        for model in models {
+        for (model, tint) in models.iter().zip(TINTS.iter().cycle()) {
             let first = all.positions.len() as u32;
             let own = model.positions.len() as u32;
             // Copies are numbered after the vertices of all models.
@@ -140,7 +152,7 @@ impl DrawModel {
             all.textures.extend(model.textures.iter().cloned());
             all.splats = all.splats.or_else(|| model.splats.clone());
             // Triangles without a group get one, so that no group spans two models.
-            all.groups.extend(model.whole_groups().into_iter().map(|group| DrawGroup {
+            all.groups.extend(model.whole_groups(*tint).into_iter().map(|group| DrawGroup {
                 triangles: triangle + group.triangles.start..triangle + group.triangles.end,
                 texture: group.texture.map(|t| texture + t),
                 ..group
@@ -149,8 +161,9 @@ impl DrawModel {
         all
     }
 
-    /// The groups, and groups of default material for the other triangles.
-    pub(super) fn whole_groups(&self) -> Vec<DrawGroup> {
+    /// The groups, and groups of this base colour for the other triangles.
+    pub(super) fn whole_groups(&self, base_color: [f32; 4]) -> Vec<DrawGroup> {
+        let gap = |triangles| DrawGroup { triangles, base_color, ..DrawGroup::default() };
         // Sorts number pairs, as other code does: another instance of sort would enlarge the page's module.
         let mut order: Vec<[u32; 2]> =
             (0u32..).zip(&self.groups).map(|(k, g)| [g.triangles.start, k]).collect();
@@ -161,13 +174,13 @@ impl DrawModel {
         let mut covered = 0;
         for group in &groups {
             if group.triangles.start > covered {
-                gaps.push(DrawGroup { triangles: covered..group.triangles.start, ..DrawGroup::default() });
+                gaps.push(gap(covered..group.triangles.start));
             }
             covered = covered.max(group.triangles.end);
         }
         let n = self.triangles.len() as u32;
         if covered < n {
-            gaps.push(DrawGroup { triangles: covered..n, ..DrawGroup::default() });
+            gaps.push(gap(covered..n));
         }
         groups.extend(gaps);
         groups
@@ -273,7 +286,7 @@ mod tests {
         let mut model = DrawModel::plain(vec![Vec3::ZERO; 3], vec![[0, 1, 2]; 10]);
         let group = |range| DrawGroup { triangles: range, base_color: [1.0; 4], ..DrawGroup::default() };
         model.groups = vec![group(6..8), group(1..4)];
-        let mut all = model.whole_groups();
+        let mut all = model.whole_groups(CLAY);
         all.sort_by_key(|g| g.triangles.start);
         let ranges: Vec<_> = all.iter().map(|g| (g.triangles.clone(), g.base_color == CLAY)).collect();
         assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
@@ -301,6 +314,19 @@ mod tests {
         assert_eq!(all.triangles[2..], [[5, 6, 7], [9, 10, 11]]);
         let groups: Vec<_> = all.groups.iter().map(|g| (g.triangles.clone(), g.texture)).collect();
         assert_eq!(groups, [(0..2, None), (2..3, Some(0)), (3..4, Some(1))]);
+    }
+
+    #[test]
+    fn models_without_materials_get_different_colours_together() {
+        let plain = triangle();
+        let with_material = DrawModel {
+            groups: vec![DrawGroup { triangles: 0..1, base_color: [1.0; 4], ..DrawGroup::default() }],
+            ..triangle()
+        };
+        let all = DrawModel::joined(&[&plain, &plain, &with_material, &plain]);
+        let colors: Vec<_> = all.groups.iter().map(|g| g.base_color).collect();
+        assert_eq!(colors, [TINTS[0], TINTS[1], [1.0; 4], TINTS[3]]);
+        assert!((1..TINTS.len()).all(|k| !TINTS[..k].contains(&TINTS[k])));
     }
 
     #[test]

@@ -16,6 +16,15 @@ pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth3
 
 /// Format of the layer of splats: sRGB values that are blended as they are.
 pub(super) const LAYER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Format of the map of the shadow.
+pub(super) const SHADOW_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+
+/// Keeps the larger of two values.
+const MAXIMUM: wgpu::BlendComponent = wgpu::BlendComponent {
+    src_factor: wgpu::BlendFactor::One,
+    dst_factor: wgpu::BlendFactor::One,
+    operation: wgpu::BlendOperation::Max,
+};
 
 /// Bind group layouts, which do not depend on the target's format.
 #[derive(Debug)]
@@ -28,6 +37,7 @@ pub(super) struct Layouts {
     pub(super) gizmo: wgpu::BindGroupLayout,
     pub(super) splats: wgpu::BindGroupLayout,
     pub(super) layer: wgpu::BindGroupLayout,
+    pub(super) floor: wgpu::BindGroupLayout,
 }
 
 /// Kinds of primitives, each with its pipeline.
@@ -48,6 +58,7 @@ pub(super) enum Kind {
     Floor,
     Slice,
     Gizmo,
+    Shadow,
 }
 
 impl Kind {
@@ -67,6 +78,7 @@ impl Kind {
             Self::Floor => (&shaders::FLOOR, DEPTH_VISIBLE, true),
             Self::Slice => (&shaders::SLICE, DEPTH_NEAREST, true),
             Self::Gizmo => (&shaders::GIZMO, DEPTH_NEAREST, true),
+            Self::Shadow => (&shaders::SHADOW, DEPTH_IGNORED, true),
         }
     }
 }
@@ -77,7 +89,7 @@ pub(super) struct Pipelines {
     context: GpuContext,
     layouts: Arc<Layouts>,
     pub(super) format: wgpu::TextureFormat,
-    made: [OnceLock<wgpu::RenderPipeline>; 14],
+    made: [OnceLock<wgpu::RenderPipeline>; 15],
 }
 
 /// Bytes of a gizmo vertex: position, normal, colour.
@@ -143,6 +155,7 @@ impl Layouts {
             gizmo: layout_of(context, "gizmo", shaders::GIZMO.groups[0]),
             splats: layout_of(context, "splats", shaders::SPLATS.groups[0]),
             layer: layout_of(context, "layer", shaders::LAYER.groups[0]),
+            floor: layout_of(context, "floor", shaders::FLOOR.groups[0]),
         }
     }
 
@@ -150,6 +163,8 @@ impl Layouts {
     fn of(&self, shader: &DrawShader) -> Vec<&wgpu::BindGroupLayout> {
         match shader.name {
             "draw_mesh" => vec![&self.vertices, &self.material],
+            "draw_shadow" => vec![&self.vertices],
+            "draw_floor" => vec![&self.floor],
             "draw_slice" => vec![&self.slice],
             "draw_gizmo" => vec![&self.gizmo],
             "draw_splats" => vec![&self.splats],
@@ -190,6 +205,14 @@ impl Pipelines {
         };
         let mesh_vertices = vertices(size_of::<DrawVertex>() as u64, &MESH_ATTRIBUTES);
         let gizmo_vertices = vertices(GIZMO_STRIDE, &GIZMO_ATTRIBUTES);
+        let is_shadow = shader.name == "draw_shadow";
+        let depth_stencil = wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(depth.write),
+            depth_compare: Some(depth.compare),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(shader.name),
             layout: Some(&layout),
@@ -198,7 +221,7 @@ impl Pipelines {
                 entry_point: Some("vertex"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 buffers: match shader.name {
-                    "draw_mesh" => &mesh_vertices,
+                    "draw_mesh" | "draw_shadow" => &mesh_vertices,
                     "draw_gizmo" => &gizmo_vertices,
                     _ => &[],
                 },
@@ -207,15 +230,9 @@ impl Pipelines {
                 topology: PrimitiveTopology::TriangleList,
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: (!is_layer).then(|| wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(depth.write),
-                depth_compare: Some(depth.compare),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
+            depth_stencil: (!is_layer && !is_shadow).then_some(depth_stencil),
             multisample: wgpu::MultisampleState {
-                count: if is_layer { 1 } else { SAMPLES },
+                count: if is_layer || is_shadow { 1 } else { SAMPLES },
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {
@@ -223,8 +240,16 @@ impl Pipelines {
                 entry_point: Some("fragment"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: if is_layer { LAYER_FORMAT } else { self.format },
-                    blend: blend.then_some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                    format: match shader.name {
+                        "draw_shadow" => SHADOW_FORMAT,
+                        _ if is_layer => LAYER_FORMAT,
+                        _ => self.format,
+                    },
+                    blend: blend.then_some(if is_shadow {
+                        BlendState { color: MAXIMUM, alpha: MAXIMUM }
+                    } else {
+                        BlendState::PREMULTIPLIED_ALPHA_BLENDING
+                    }),
                     write_mask: if is_depth { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL },
                 })],
             }),

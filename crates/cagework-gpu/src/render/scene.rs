@@ -49,9 +49,11 @@ pub struct SceneOptions {
     pub mesh: MeshStyle,
     /// Whether colours of weights span 0 to 1 instead of 0 to the maximum.
     pub weights_to_one: bool,
-    /// How grey each vertex is in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], from 0 to 1; shows which vertices stay
-    /// in place. `[n_vertices]`
+    /// How grey or painted each vertex is in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], from 0 to 1; shows which
+    /// vertices stay in place. `[n_vertices]`
     pub greyed: Option<Arc<Vec<f32>>>,
+    /// Whether `greyed` is shown as paint.
+    pub painted: bool,
     /// Whether the mesh's edges are drawn.
     pub mesh_edges: bool,
     /// Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of the paper.
@@ -90,6 +92,7 @@ impl Default for SceneOptions {
             mesh: MeshStyle::Solid,
             weights_to_one: false,
             greyed: None,
+            painted: false,
             mesh_edges: false,
             base_wireframe: false,
             cage_lines: true,
@@ -105,6 +108,13 @@ impl Default for SceneOptions {
             held: Marks::default(),
             joints: Marks::default(),
         }
+    }
+}
+
+impl SceneOptions {
+    /// Whether the mesh is painted instead of greyed, and the strength of either, 0 or 1.
+    pub(super) fn overlay(&self) -> [f32; 2] {
+        [self.painted, self.greyed.is_some()].map(|on| f32::from(u8::from(on)))
     }
 }
 

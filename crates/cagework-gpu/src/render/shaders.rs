@@ -35,6 +35,9 @@ pub struct DrawShader {
 /// Bindings of overlays: style, positions, items.
 const OVERLAY_GROUP: &[DrawBinding] = &[Uniform, Table(Entry::Point), Table(Entry::Pair)];
 
+/// Bindings of the mesh: positions, normals, values.
+const MESH_GROUP: &[DrawBinding] = &[Table(Entry::Point), Table(Entry::Point), Table(Entry::Value)];
+
 /// Concatenates shader files.
 macro_rules! text {
     ($($file:expr),+) => {
@@ -69,15 +72,17 @@ shaders! {
     BACKGROUND = "draw_background" + ["camera"], &[];
     /// Draws the mesh.
     MESH = "draw_mesh" + ["camera", "colormap", "light"] + ("mesh_buffers", "mesh_textures"),
-        &[&[Table(Entry::Point), Table(Entry::Point), Table(Entry::Value)], &[Uniform, Texture, Sampler]];
+        &[MESH_GROUP, &[Uniform, Texture, Sampler]];
     /// Draws edges of cage and mesh, and segments of marks.
     LINES = "draw_lines" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
     /// Draws handles and marks.
     POINTS = "draw_points" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
     /// Draws selected faces.
     FACES = "draw_faces" + ["camera", "overlay"] + ("overlay_buffers", "overlay_textures"), &[OVERLAY_GROUP];
-    /// Draws the floor grid.
-    FLOOR = "draw_floor" + ["camera"], &[];
+    /// Draws the map of the model's shadow on the floor.
+    SHADOW = "draw_shadow" + ["camera", "shadow"] + ("mesh_buffers", "mesh_textures"), &[MESH_GROUP];
+    /// Draws the floor: shadow and grid.
+    FLOOR = "draw_floor" + ["camera", "shadow"], &[&[Texture, Sampler]];
     /// Draws a slice of the grid.
     SLICE = "draw_slice" + ["camera", "colormap"] + ("slice_buffers", "slice_textures"),
         &[&[Uniform, Table(Entry::Pair)]];

@@ -107,7 +107,7 @@ impl Engine {
         Ok(self.read(|state| Answer::Ok(state.models().get(id)?.painted.to_vec()))?)
     }
 
-    /// Shows the painted amounts of a model in grey, and selects this model for `paint`; undefined hides them.
+    /// Shows the painted amounts of a model in colour, and selects this model for `paint`; undefined hides them.
     #[wasm_bindgen(js_name = showPainting)]
     pub fn show_painting(&self, id: Option<u32>) {
         self.change(|state| {
