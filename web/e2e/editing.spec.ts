@@ -1,7 +1,34 @@
 /** Posing by keyboard and pointer. */
 
+import type { Page } from "@playwright/test";
+import { box } from "./models";
 import { showsColours } from "./stories";
-import { cagePositions, drag, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
+import {
+  bound,
+  cagePositions,
+  drag,
+  expect,
+  handle,
+  largestMove,
+  open,
+  reachable,
+  rested,
+  shoot,
+  test,
+} from "./support";
+
+/** Presses a key until an element with this name has the focus. */
+async function moveTo(page: Page, name: RegExp, key = "Tab"): Promise<void> {
+  for (let k = 0; k < 80; k++) {
+    const found = await page.evaluate(() => {
+      const element = document.activeElement;
+      return (element?.ariaLabel || element?.textContent || "").trim();
+    });
+    if (name.test(found)) return;
+    await page.keyboard.press(key);
+  }
+  throw new Error(`${key} does not reach ${name}`);
+}
 
 test("poses are edited by keyboard and pointer", async ({ page }) => {
   await open(page);
@@ -84,5 +111,30 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
   await test.step("colours, slice and comparison are shown", async () => {
     await page.keyboard.press("m");
     await showsColours(page, "see");
+  });
+
+  await test.step("a file is opened, pulled and exported by keyboard alone", async () => {
+    const chooser = page.waitForEvent("filechooser");
+    await page.keyboard.press("Control+o");
+    const buffer = Buffer.from(box(0.5));
+    await (await chooser).setFiles({ name: "cube.obj", mimeType: "model/obj", buffer });
+    await expect(page).toHaveTitle(/cube/);
+    await bound(page);
+    const before = await cagePositions(page);
+    await moveTo(page, /^3-D view$/);
+    await page.keyboard.press("Shift+ArrowUp");
+    await rested(page);
+    expect(largestMove(before, await cagePositions(page))).toBeGreaterThan(0);
+    await moveTo(page, /^From the right/);
+    await moveTo(page, /^From above/, "ArrowRight");
+    await page.keyboard.press("Enter");
+    const above = await page.evaluate(() => globalThis.cagework?.engine.camera().pitch);
+    expect(above).toBeCloseTo(Math.PI / 2);
+    await moveTo(page, /Export/);
+    await page.keyboard.press("Enter");
+    const download = page.waitForEvent("download");
+    await moveTo(page, /^Download/);
+    await page.keyboard.press("Enter");
+    expect((await download).suggestedFilename()).toBe("cube-posed.glb");
   });
 });

@@ -8,7 +8,7 @@ import { type ControlActions, createControls } from "./actions/controls";
 import { createEdit, type Edit } from "./actions/edit";
 import { createExports, type Exports } from "./actions/exports";
 import { createFiles, type Files } from "./actions/files";
-import { followCage } from "./actions/follow";
+import { followCage, followSettings } from "./actions/follow";
 import { createModels, type Models } from "./actions/models";
 import { createPainting, type PaintActions } from "./actions/painting";
 import { createPoses, type PoseActions } from "./actions/poses";
@@ -73,6 +73,9 @@ export interface App {
 const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
 const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
 
+/** Windows in which See covers the panel, as in stage.css. */
+const NARROW = "(max-width: 1279.98px)";
+
 export interface Needs {
   store: Store;
   /** Returns the session. Throws until it is open. */
@@ -86,14 +89,15 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
   const ctx: Context = { session, store, queue: createQueue(), tell, fixFor, viewport };
   const bind = createBind(ctx);
-  const { take, know, checked } = followDocument(ctx);
+  const { take, know, made, checked } = followDocument(ctx);
   const edit = createEdit(ctx);
   const poses = createPoses(ctx, edit);
-  const cage = createCage(ctx, { bind, edit, know, poses });
+  const cage = createCage(ctx, { bind, edit, know, made, poses });
   const controls = createControls(ctx, cage.change, edit.setEditingRest);
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
   const pull = createPulling(ctx, edit);
   followCage(ctx, { bind, edit, view, pull });
+  followSettings(ctx, cage);
   const clips = createClips(ctx, () => edit.setEditingRest(false));
   const settle = () => {
     clips.stop();
@@ -110,6 +114,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const works = createWorks(ctx, { write: project.write, openFiles, startFresh });
   const files = createFiles(ctx, {
     know,
+    made,
     bind,
     cage,
     controls,
@@ -145,6 +150,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     location.reload();
   };
   const mac = isMac(navigator.platform);
+  const narrow = matchMedia(NARROW);
   const app: App = {
     ctx,
     store,
@@ -169,7 +175,8 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       if (step !== "cage" && store.get().placing) controls.arm(null);
       if (step !== "model") painting.on(null);
       if (step === "pose" || step === "export") edit.setEditingRest(false);
-      store.set({ step });
+      // In a narrow window, See covers the panel of the step.
+      store.set({ step, seeOpen: store.get().seeOpen && !narrow.matches });
     },
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),

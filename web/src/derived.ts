@@ -36,7 +36,12 @@ export function cageKey({ cageSource, cageOptions, cageClip, boxDivisions }: Cag
   return cageSource === "box" ? `box ${boxDivisions}` : cageSource;
 }
 
-type CageSettings = Pick<AppState, "cageSource" | "cageOptions" | "cageClip" | "boxDivisions">;
+export type CageSettings = Pick<AppState, "cageSource" | "cageOptions" | "cageClip" | "boxDivisions">;
+
+/** The settings of the Cage panel. */
+export function cageSettings({ cageSource, cageOptions, cageClip, boxDivisions }: AppState): CageSettings {
+  return { cageSource, cageOptions, cageClip, boxDivisions };
+}
 
 /** Whether the settings of the Cage panel differ from those with which the current cage was made. */
 export function hasUnmadeCage(state: AppState): boolean {
@@ -58,8 +63,8 @@ export function isCageSparse(state: AppState): boolean {
 
 /** Whether the page asks to pull the sample, because nothing has been changed yet. */
 export function asksToPull(state: AppState): boolean {
-  const { grip, bound, posed, undoLabel, gesture, playing, clip, tour, scene } = state;
-  const isUntouched = grip !== null && bound && !posed && undoLabel === null;
+  const { step, grip, bound, posed, undoLabel, gesture, playing, clip, tour, scene } = state;
+  const isUntouched = grip !== null && bound && !posed && undoLabel === null && step !== "cage";
   return isUntouched && scene.pull && !gesture && !playing && clip.clip === null && tour === null;
 }
 

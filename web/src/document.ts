@@ -3,6 +3,7 @@
 import { attempt, type Context } from "./actions/context";
 import type { Check, View } from "./contract";
 import { SCENE_DEFAULTS } from "./defaults";
+import { type CageSettings, cageKey, cageSettings } from "./derived";
 import { follow } from "./queue";
 import type { AppState } from "./state";
 import { T } from "./words";
@@ -15,6 +16,8 @@ export interface DocumentMirror {
   take(view: View): void;
   /** Stores and shows the result of a check. Cancels a check in progress. */
   know(check: Check): void;
+  /** Keeps the settings of the current cage, by default those of the panel; undo of a later cage shows them again. */
+  made(settings?: CageSettings): void;
   /** Resolves when the current cage has been checked. */
   checked(): Promise<unknown>;
 }
@@ -24,6 +27,8 @@ export function followDocument(ctx: Context): DocumentMirror {
   const engine = () => ctx.session().engine;
   /** Finished checks, by the `keyOf` of models and cage. */
   const checks = new Map<string, Check>();
+  /** Settings of generated cages, by the key of the cage. */
+  const settings = new Map<number, CageSettings>();
   let shown: View | undefined;
   let checking: Promise<unknown> = Promise.resolve();
 
@@ -61,6 +66,12 @@ export function followDocument(ctx: Context): DocumentMirror {
     };
   };
 
+  /** The settings of the cage, if it was made before. */
+  const settingsPatch = ({ cage }: View): Partial<AppState> => {
+    const of = settings.get(cage);
+    return of ? { ...of, cageMade: cageKey(of) } : {};
+  };
+
   /** Values of state keys for another cage, or for the same cage around other models. */
   const cagePatch = (view: View): Partial<AppState> => ({
     cage: engine().cageState() ?? null,
@@ -73,6 +84,10 @@ export function followDocument(ctx: Context): DocumentMirror {
 
   return {
     know,
+    made(of = cageSettings(store.get())) {
+      if (shown) settings.set(shown.cage, of);
+      store.set({ cageMade: cageKey(of) });
+    },
     checked: () => checking,
     take(view) {
       const before = shown;
@@ -98,6 +113,7 @@ export function followDocument(ctx: Context): DocumentMirror {
         redoLabel: redo,
         ...(models === (before?.models ?? 0) ? {} : modelPatch()),
         ...(isOther ? cagePatch(view) : {}),
+        ...(view.cage === before?.cage ? {} : settingsPatch(view)),
         ...(isNewlyBound ? { report: engine().boundReport() ?? null } : {}),
         ...(hasOtherColours ? { legend: engine().legend() ?? null } : {}),
       });

@@ -2,7 +2,17 @@
 
 import type { Job } from "./contract";
 
-export type Kind = "open" | "cage" | "check" | "bind" | "carry" | "compare" | "pull" | "slice" | "lattice";
+export type Kind =
+  | "open"
+  | "cage"
+  | "preview"
+  | "check"
+  | "bind"
+  | "carry"
+  | "compare"
+  | "pull"
+  | "slice"
+  | "lattice";
 
 export interface Queue {
   /** Runs `work` after all earlier work of its kind. */

@@ -81,6 +81,8 @@ export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo"
   /** Name of a clip whose frames generated cages also enclose; null for none. */
   cageClip: string | null;
   boxDivisions: number;
+  /** Number of vertices of the previewed cage; null without a preview. */
+  cagePreview: number | null;
   /** Finished fraction of the cage generation, 0 to 1; null if no generation runs. */
   cageProgress: number | null;
   /** Bind options chosen in the Bind panel. */
@@ -196,6 +198,7 @@ export const MODEL_STATE = {
   ...CAGE_SETTINGS,
   grip: null,
   cageMade: cageKey(CAGE_SETTINGS),
+  cagePreview: null,
   cageProgress: null,
   bindOptions: BIND_DEFAULTS,
   appliedOptions: null,

@@ -92,6 +92,7 @@ export const MODEL: ModelInfo = {
   props: [],
   rigged: false,
   bounds: BOUNDS,
+  lies: false,
   notices: [],
   members: [memberOf(0, "cube.obj")],
 };

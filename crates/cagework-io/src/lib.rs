@@ -64,7 +64,7 @@ pub use textures::TexturePlan;
 pub use timeline::{
     Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline, TimelineError, check_times,
 };
-pub use up::UpAxis;
+pub use up::{UpAxis, lies_on_back};
 
 /// The example of the README.
 #[cfg(doctest)]

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use cagework_core::{PolygonMesh, choice};
+use cagework_core::{Bounds, PolygonMesh, choice};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
 choice! {
@@ -74,5 +74,60 @@ impl UpAxis {
     #[must_use]
     pub fn mesh_turned_back(self, mesh: &PolygonMesh) -> PolygonMesh {
         PolygonMesh { positions: self.turned_back(&mesh.positions).into_owned(), faces: mesh.faces.clone() }
+    }
+}
+
+/// Height over depth above which a model can lie on its back.
+const LYING: f32 = 1.2;
+/// Distance from the lowest coordinate within which vertices are on a flat side, as a fraction of the extent along z.
+const FLAT: f32 = 0.01;
+/// Smallest fraction of the vertices on a flat side, and factor by which they outnumber those at the lowest y.
+const FEET: f32 = 0.005;
+const MORE_FEET: usize = 3;
+
+/// Whether a model with y up seems to lie on its back: it is longer along z than y, and stands on a flat side at the
+/// lowest z rather than at the lowest y. A hint, not a proof.
+#[must_use]
+pub fn lies_on_back(positions: &[Vec3]) -> bool {
+    let Some(bounds) = Bounds::of(positions) else { return false };
+    let extent = bounds.extent();
+    let at = |axis: usize| positions.iter().filter(|p| p[axis] - bounds.min[axis] <= FLAT * extent.z).count();
+    let [y, z] = [at(1), at(2)];
+    extent.z > LYING * extent.y && z as f32 >= FEET * positions.len() as f32 && z >= MORE_FEET * y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cone of height 1 on the ground z = 0, with a base of radius 0.25.
+    fn cone() -> Vec<Vec3> {
+        let ring = |k: u16| {
+            let (height, n) = (f32::from(k) / 20.0, 40_u16);
+            (0..n).map(move |j| {
+                let angle = std::f32::consts::TAU * f32::from(j) / f32::from(n);
+                (0.25 * (1.0 - height) * Vec3::new(angle.cos(), angle.sin(), 0.0)).with_z(height)
+            })
+        };
+        (0..=20).flat_map(ring).collect()
+    }
+
+    #[test]
+    fn model_with_z_up_lies_on_its_back_until_it_is_turned() {
+        assert!(lies_on_back(&cone()));
+        assert!(!lies_on_back(&UpAxis::Z.turned(&cone())));
+        assert!(!lies_on_back(&[]) && !lies_on_back(&[Vec3::ONE]));
+    }
+
+    /// A cone along z on feet stands, although it is longer than high.
+    #[test]
+    fn animal_on_feet_stands() {
+        let mut animal = cone();
+        let feet = (0..40_u16).map(|k| {
+            let along = if k < 20 { 0.2 } else { 0.6 };
+            Vec3::new(0.1 * f32::from(k % 20) / 20.0, -0.6, along)
+        });
+        animal.extend(feet);
+        assert!(!lies_on_back(&animal));
     }
 }

@@ -30,7 +30,7 @@ impl State {
 
     /// The scene that the view shows. `weights`: those on the GPU.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
-        let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view();
+        let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
             theme: self.view.theme,
             backdrop: true,
@@ -56,6 +56,7 @@ impl State {
                 .or_else(|| self.held.stays.clone()),
             held: self.held_marks(weights),
             joints: self.joint_marks(),
+            draft: Marks { segments: self.draft.clone(), ..Marks::default() },
         }
     }
 

@@ -55,6 +55,8 @@ pub(crate) struct State {
     pub(crate) active_part: Option<GizmoPart>,
     pub(crate) slice: Option<Arc<Slice>>,
     pub(crate) held: GrabState,
+    /// Edges of the previewed cage.
+    pub(crate) draft: Vec<[Vec3; 2]>,
     pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
     /// Place of the camera after it framed everything. If it is still there, it frames everything in a resized view.
@@ -146,6 +148,7 @@ impl Default for State {
             active_part: None,
             slice: None,
             held: GrabState::default(),
+            draft: Vec::new(),
             view: JsSceneOptions::default(),
             camera: Camera::default(),
             framed: None,
@@ -211,6 +214,7 @@ impl State {
             self.held = GrabState::default();
             self.others.clear();
             self.faults = Faults::default();
+            self.draft.clear();
             self.bound = None;
             if key.mesh != before.mesh {
                 self.n_rig = None;

@@ -5,7 +5,7 @@ use cagework_core::cage::CageNotice;
 use cagework_core::{Bounds, ControlSet};
 use cagework_editor::edit::Topology;
 use cagework_editor::{CageControls, DocumentView, Member, Models, PartOptions, RestCage};
-use cagework_io::{Model, ModelFormat, UpAxis};
+use cagework_io::{Model, ModelFormat, UpAxis, lies_on_back};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
@@ -88,6 +88,8 @@ pub(crate) struct ModelInfo {
     /// Whether a model has a rig that an export keeps.
     rigged: bool,
     bounds: BoundsView,
+    /// Whether the models seem to lie on their back, because the file's up axis is z.
+    lies: bool,
     notices: Vec<String>,
     /// Properties of each model.
     members: Vec<MemberInfo>,
@@ -119,6 +121,7 @@ impl ModelInfo {
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
             bounds: BoundsView::of(Bounds::of(models.positions())),
+            lies: lies_on_back(models.positions()),
             notices: all().flat_map(|model| model.notices.clone()).chain(models.origin_notice()).collect(),
             members: models.iter().map(MemberInfo::of).collect(),
         })

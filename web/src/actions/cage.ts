@@ -1,10 +1,9 @@
 /** Makes cages (generated, as a box, or from a file) and repairs them. */
 
 import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
-import { cageKey } from "../derived";
+import { type CageSettings, cageKey, cageSettings, hasUnmadeCage } from "../derived";
 import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
-import type { CageSource } from "../state";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import { attempt, type Context, waitFor } from "./context";
@@ -25,6 +24,8 @@ export interface CageActions {
    */
   make(unasked?: boolean): Promise<boolean>;
   cancel(): void;
+  /** Draws the cage of the panel's settings as lines, unless it is the current one. */
+  preview(): Promise<void>;
   load(files: readonly NamedFile[], unasked?: boolean): Promise<boolean>;
   repair(kind: Repair): Promise<boolean>;
   /** Selects generated cages in the panel and generates one. */
@@ -33,17 +34,20 @@ export interface CageActions {
   mend(fix: Mend): void;
 }
 
+/** Largest model whose cages are previewed, vertices: each preview generates a cage. */
+const MAX_PREVIEWED = 200_000;
 /** Maximum number of vertices of a hull cage. It is small, because a hull does not follow limbs. */
 const HULL_VERTICES = 24;
 
 export interface CageNeeds {
   readonly edit: Pick<Edit, "settle" | "step">;
   readonly know: DocumentMirror["know"];
+  readonly made: DocumentMirror["made"];
   readonly bind: Pick<BindActions, "again">;
   readonly poses: Pick<PoseActions, "carry">;
 }
 
-export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds): CageActions {
+export function createCage(ctx: Context, { bind, edit, know, made, poses }: CageNeeds): CageActions {
   const engine = () => ctx.session().engine;
 
   const change: CageActions["change"] = (label, change, failed = T.failed.controls) => {
@@ -71,14 +75,43 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
     ctx.tell.say(T.cage.posesWait, carry, back);
   };
 
-  const generate = async (source: CageSource, signal: AbortSignal) => {
-    const { cageOptions, cageClip } = ctx.store.get();
+  /** The last preview, which `make` takes if nothing has changed since. */
+  let previewed: { readonly key: string; readonly revision: number; readonly cage: CheckedCage } | undefined;
+  let isPreviewing = false;
+
+  const optionsOf = ({ cageSource, cageOptions }: CageSettings): CageOptions => {
     const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
-    const options: CageOptions = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
+    return cageSource === "hull" ? { ...cageOptions, ...hull } : cageOptions;
+  };
+  const isCurrent = (settings: CageSettings) =>
+    previewed?.key === cageKey(settings) && previewed.revision === engine().revision;
+  const box = (divisions: number): CheckedCage => ({ ...ctx.session().boxCage(divisions), check: null });
+
+  const showPreview = (cage: CheckedCage | undefined) => {
+    engine().showDraft(cage?.positions ?? new Float32Array(), cage?.corners ?? new Uint32Array());
+    ctx.store.set({ cagePreview: cage ? cage.positions.length / 3 : null });
+  };
+
+  /** The settings to preview; undefined if they are those of the cage, or cannot be previewed. */
+  const toPreview = (): CageSettings | undefined => {
+    const state = ctx.store.get();
+    const { step, model, cageSource, cageProgress, editingRest } = state;
+    const isSmall = (model?.vertices ?? 0) <= MAX_PREVIEWED;
+    const isShown = step === "cage" && !editingRest && cageProgress === null && cageSource !== "file";
+    return isShown && isSmall && hasUnmadeCage(state) ? cageSettings(state) : undefined;
+  };
+
+  const generate = async (settings: CageSettings, signal: AbortSignal) => {
+    const options = optionsOf(settings);
+    const { cageClip } = settings;
+    ctx.queue.cancel("preview");
     ctx.store.set({ cageProgress: 0 });
     try {
       const hear = (cageProgress: number) => ctx.store.set({ cageProgress });
-      const made = await follow(signal, ctx.session().generateCage(options, hear, cageClip ?? undefined));
+      const made =
+        previewed && isCurrent(settings)
+          ? previewed.cage
+          : await follow(signal, ctx.session().generateCage(options, hear, cageClip ?? undefined));
       const vertices = made.positions.length / 3;
       if (vertices > options.vertices) {
         ctx.tell.say(T.cage.more(vertices, options.vertices));
@@ -106,15 +139,43 @@ export function createCage(ctx: Context, { bind, edit, know, poses }: CageNeeds)
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
-          const { cageSource, boxDivisions } = ctx.store.get();
-          const cageMade = cageKey(ctx.store.get());
-          const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
-          take(T.did.makeCage, cageSource === "box" ? box() : await generate(cageSource, signal));
-          ctx.store.set({ cageMade });
+          const settings = cageSettings(ctx.store.get());
+          const isBox = settings.cageSource === "box";
+          take(T.did.makeCage, isBox ? box(settings.boxDivisions) : await generate(settings, signal));
+          made(settings);
         }),
       );
     },
     cancel: () => ctx.queue.cancel("cage"),
+    async preview() {
+      if (!toPreview()) {
+        ctx.queue.cancel("preview");
+        if (ctx.store.get().cagePreview !== null) showPreview(undefined);
+      }
+      if (isPreviewing) return;
+      isPreviewing = true;
+      try {
+        // Finish each preview before the next one: a slider that moves would cancel all of them.
+        for (let settings = toPreview(); settings && !isCurrent(settings); settings = toPreview()) {
+          const { cageSource, boxDivisions, cageClip } = settings;
+          const options = optionsOf(settings);
+          const { revision } = engine();
+          const job = () => ctx.session().generateCage(options, () => undefined, cageClip ?? undefined);
+          const cage =
+            cageSource === "box"
+              ? box(boxDivisions)
+              : await ctx.queue.replace("preview", (signal) => follow(signal, job()));
+          if (!toPreview()) break;
+          previewed = { key: cageKey(settings), revision, cage };
+          showPreview(cage);
+        }
+      } catch {
+        // Making the cage reports why these settings fail.
+        showPreview(undefined);
+      } finally {
+        isPreviewing = false;
+      }
+    },
     load(files, unasked = false) {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.cageFile, () =>

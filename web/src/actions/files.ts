@@ -2,7 +2,6 @@
 
 import type { BindOptions, NamedFile, Opened, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS } from "../defaults";
-import { cageKey } from "../derived";
 import type { DocumentMirror } from "../document";
 import { planDrop } from "../drop";
 import { type StepName, stateOfNextModel } from "../state";
@@ -29,6 +28,7 @@ export interface Files {
 
 export interface FileNeeds {
   readonly know: DocumentMirror["know"];
+  readonly made: DocumentMirror["made"];
   readonly bind: Pick<BindActions, "start">;
   readonly cage: Pick<CageActions, "load" | "make">;
   readonly controls: Pick<ControlActions, "load">;
@@ -79,7 +79,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       ...(cageOptions ? { cageOptions } : {}),
       ...(rigOptions ? { rigOptions } : {}),
     });
-    store.set({ cageMade: cageKey(store.get()) });
+    needs.made();
     needs.view.symmetry(symmetry ?? false);
     for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(sentence(settings.notices.join(" ")));
@@ -88,6 +88,9 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
+    if (opened.model.lies && sample === null) {
+      ctx.tell.say(T.model.lies, { label: T.model.stand, run: () => void actions.turn("z") });
+    }
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
     void prepare(cageFiles, sample !== null, opened.settings !== null);
   };
@@ -156,7 +159,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     await take(opened, sample, along);
   };
 
-  return {
+  const actions: Files = {
     openSample(id, bind) {
       // Free the worker for the sample: it also generates cages and binds.
       for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
@@ -189,6 +192,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       });
     },
   };
+  return actions;
 }
 
 /** The sample that a project was made from. The name of its model is not that of a file. */

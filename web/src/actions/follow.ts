@@ -3,6 +3,7 @@
 import { effect, untracked } from "@preact/signals";
 import { optionsInUse } from "../derived";
 import type { BindActions } from "./bind";
+import type { CageActions } from "./cage";
 import type { Context } from "./context";
 import type { Edit } from "./edit";
 import type { Pulling } from "./pull";
@@ -18,6 +19,17 @@ export interface Followers {
   edit: Pick<Edit, "active">;
   view: Pick<View, "refresh">;
   pull: Pick<Pulling, "prepare">;
+}
+
+/** Previews the cage while its settings change. */
+export function followSettings({ store }: Context, cage: Pick<CageActions, "preview">): void {
+  effect(() => {
+    const { step, cage: current, cageProgress, cageMade, editingRest } = store.get();
+    const { cageSource, cageOptions, cageClip, boxDivisions } = store.get();
+    // Reading these keys subscribes to their changes.
+    const all = [step, cageProgress, cageMade, editingRest, cageSource, cageOptions, cageClip, boxDivisions];
+    if (current && all.length > 0) untracked(() => void cage.preview());
+  });
 }
 
 export function followCage({ store }: Context, { bind, edit, view, pull }: Followers): void {

@@ -1,15 +1,7 @@
 /** Step 2: source of the cage, its problems, and reshaping. */
 
 import type { App } from "../app";
-import type {
-  Element as CageElement,
-  CageOptions,
-  CageState,
-  Check,
-  Mend,
-  Problem,
-  RestEdit,
-} from "../contract";
+import type { CageOptions, CageState, Check, Mend, Problem } from "../contract";
 import { SLIDERS } from "../defaults";
 import { isCageSparse } from "../derived";
 import { count, percent } from "../format";
@@ -18,13 +10,13 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import { Automatic } from "./cage-options";
 import { Badge, Button, Facts, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
-import { Icon, type IconName } from "./icons";
+import { Icon } from "./icons";
 import { Inside, Smooth } from "./inside";
 
 const SOURCES = ["auto", "hull", "box", "file"] as const satisfies readonly CageSource[];
 
 export function CagePanel({ app }: { app: App }) {
-  const { cageSource, boxDivisions, cageProgress, cage, check } = app.store.get();
+  const { cageSource, boxDivisions, cagePreview, cageProgress, cage, check } = app.store.get();
   const { set } = app.store;
   return (
     <div class="stack loose">
@@ -47,6 +39,7 @@ export function CagePanel({ app }: { app: App }) {
             onInput={(value) => set({ boxDivisions: value })}
           />
         )}
+        {cagePreview !== null && <p class="hint">{T.cage.preview(cagePreview)}</p>}
         {cageProgress !== null && (
           <progress max="1" value={cageProgress} aria-label={T.cage.making}>
             {percent(cageProgress)}
@@ -79,15 +72,8 @@ function sparse({ vertices, detail }: CageOptions): string {
   return detail > 1.01 * SLIDERS.detail.min ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
 }
 
-const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "extrude" | "remove"])[] = [
-  ["split_edge", "split", "split"],
-  ["collapse_edge", "merge", "collapse"],
-  ["extrude_face", "extrude", "extrude"],
-  ["delete_vertex", "trash", "remove"],
-];
-
 function Reshape({ app }: { app: App }) {
-  const { editingRest, element, selected } = app.store.get();
+  const { editingRest, element } = app.store.get();
   return (
     <div class="stack">
       <Toggle
@@ -96,40 +82,9 @@ function Reshape({ app }: { app: App }) {
         on={editingRest}
         onChange={(on) => app.edit.setEditingRest(on)}
       />
-      {editingRest && (
-        <div class="tool-grid">
-          {EDITS.map(([edit, icon, command]) => (
-            <Button
-              key={edit}
-              label={T.cage.edits[edit]}
-              icon={icon}
-              kind="small"
-              tip={`${T.cage.edits[edit]} (${app.key(command)})`}
-              disabled={selected.count < need(edit, element) || !suits(edit, element)}
-              onClick={() => app.edit.restEdit(deletion(edit, element))}
-            />
-          ))}
-        </div>
-      )}
       {editingRest && <p class="hint">{T.cage.hints[element]}</p>}
     </div>
   );
-}
-
-function suits(edit: RestEdit, element: CageElement): boolean {
-  if (edit === "split_edge" || edit === "collapse_edge") return element === "edge";
-  if (edit === "extrude_face") return element === "face";
-  return element !== "edge";
-}
-
-function need(edit: RestEdit, element: CageElement): number {
-  if (edit === "extrude_face") return 3;
-  if (edit === "delete_vertex") return element === "face" ? 3 : 1;
-  return 2;
-}
-
-function deletion(edit: RestEdit, element: CageElement): RestEdit {
-  return edit === "delete_vertex" && element === "face" ? "delete_face" : edit;
 }
 
 function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {

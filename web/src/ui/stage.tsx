@@ -13,6 +13,7 @@ import { Button, IconButton, Say, Segments } from "./controls";
 import { useFrames } from "./frame";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
+import { ReshapeTools } from "./reshape";
 import { hintOf, statusOf, underWay } from "./status";
 import { Toolbar } from "./toolbar";
 import { useTouch } from "./touch";
@@ -34,6 +35,7 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
         {cage && editingRest && <Encloses app={app} />}
         <Looks app={app} />
       </div>
+      {cage && editingRest && <ReshapeTools app={app} />}
       <Placing app={app} />
       {cage && <Tools app={app} />}
       {model && <Axes app={app} />}

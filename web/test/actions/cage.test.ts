@@ -5,7 +5,7 @@ import { createEdit } from "../../src/actions/edit";
 import type { Carriable } from "../../src/actions/poses";
 import type { App } from "../../src/app";
 import type { CageOptions } from "../../src/contract";
-import { isCageSparse } from "../../src/derived";
+import { hasUnmadeCage, isCageSparse } from "../../src/derived";
 import { nextActions } from "../../src/ui/panel";
 import { cageOf, createFake, settled } from "../fake";
 
@@ -16,6 +16,7 @@ function page() {
   const cage = createCage(fake.ctx, {
     edit: createEdit(fake.ctx),
     know: fake.mirror.know,
+    made: fake.mirror.made,
     bind: { again: async ({ grid }) => grids.push(grid ?? 0) > 0 },
     poses: { carry: async (before) => carried.push(before) > 0 },
   });
@@ -107,6 +108,54 @@ it("after a change of the cage settings, the next action is to make the cage", a
   expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", false]);
   store.set({ cageSource: "file" });
   expect(labels()).toEqual(["Open a cage file", "Bind the model"]);
+});
+
+it("changed settings are previewed, and the preview is taken when it is made", async () => {
+  const { cage, asked, store, calls, height } = page();
+  const change = (vertices: number) => store.set({ cageOptions: { ...store.get().cageOptions, vertices } });
+  store.set({ step: "cage" });
+  const first = cage.make();
+  await settled();
+  asked.at(-1)?.resolve(cageOf(8, 1));
+  await first;
+  await cage.preview();
+  expect([asked.length, store.get().cagePreview], "nothing to preview").toEqual([1, null]);
+  change(100);
+  const previewing = cage.preview();
+  await settled();
+  change(200);
+  void cage.preview();
+  expect(asked.length, "one at a time").toBe(2);
+  asked.at(-1)?.resolve(cageOf(10, 2));
+  await settled();
+  expect([store.get().cagePreview, height()]).toEqual([10, 1]);
+  asked.at(-1)?.resolve(cageOf(12, 3));
+  await previewing;
+  expect([store.get().cagePreview, calls.filter((name) => name === "showDraft").length]).toEqual([12, 2]);
+  await cage.make();
+  expect([asked.length, height(), store.get().cage?.info.vertices]).toEqual([3, 3, 12]);
+  await cage.preview();
+  expect(store.get().cagePreview).toBe(null);
+});
+
+it("undo of a cage returns to the settings of the cage that it shows", async () => {
+  const { cage, asked, store, show } = page();
+  const make = async (vertices: number) => {
+    store.set({ cageOptions: { ...store.get().cageOptions, vertices } });
+    const made = cage.make();
+    await settled();
+    asked.at(-1)?.resolve(cageOf(vertices));
+    await made;
+  };
+  await make(80);
+  await make(400);
+  for (const [key, vertices] of [
+    [1, 80],
+    [2, 400],
+  ] as const) {
+    show({ cage: key });
+    expect([store.get().cageOptions.vertices, hasUnmadeCage(store.get())]).toEqual([vertices, false]);
+  }
 });
 
 it("cancel keeps the current cage", async () => {

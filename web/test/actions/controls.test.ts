@@ -14,6 +14,7 @@ function page() {
   const cage = createCage(fake.ctx, {
     edit,
     know: fake.mirror.know,
+    made: fake.mirror.made,
     bind: createBind(fake.ctx),
     poses: { carry: async () => true },
   });

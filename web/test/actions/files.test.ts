@@ -16,6 +16,7 @@ function page() {
     steps.push(`${what} ${list[0]?.name}`) > 0;
   const files = createFiles(fake.ctx, {
     know: fake.mirror.know,
+    made: fake.mirror.made,
     bind: { start: does("bind") },
     cage: {
       async make() {
@@ -38,8 +39,22 @@ function page() {
     settle: () => undefined,
     overtaken: () => undefined,
   });
-  return { ...fake, files, steps };
+  return { ...fake, files, steps, offers: () => fake.offered };
 }
+
+it("asks whether to stand a model up that seems to lie on its back", async () => {
+  const { files, asked, said, offers } = page();
+  const opened = files.openFiles([file("statue.obj")]);
+  await settled();
+  asked[0]?.resolve({});
+  await settled();
+  asked[1]?.resolve({ ...OPENED, model: { ...MODEL, lies: true } });
+  await opened;
+  expect(said).toContain("The model seems to lie on its back.");
+  offers()[0]?.run();
+  await settled();
+  expect(asked.at(-1)).toMatchObject({ kind: "turn", input: { up: "z" } });
+});
 
 it("a dropped model gets a cage and is bound; the previous work is saved first", async () => {
   const { files, asked, store, steps } = page();

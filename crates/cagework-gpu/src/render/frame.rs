@@ -247,8 +247,10 @@ impl Renderer {
             self.slice =
                 scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.theme));
         }
-        let is_same =
-            |b: &SceneOptions| (&b.marks, &b.held, &b.joints) == (&scene.marks, &scene.held, &scene.joints);
+        let is_same = |b: &SceneOptions| {
+            (&b.marks, &b.held, &b.joints, &b.draft)
+                == (&scene.marks, &scene.held, &scene.joints, &scene.draft)
+        };
         if theme_changed || !before.is_some_and(is_same) {
             self.make_marks(context);
         }

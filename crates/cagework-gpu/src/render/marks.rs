@@ -24,7 +24,7 @@ pub(super) struct MarksView {
 }
 
 impl MarksView {
-    /// Problems, grabbed points and joints, topmost last.
+    /// A previewed cage, problems, grabbed points and joints, topmost last.
     pub(super) fn all(
         context: &GpuContext,
         layouts: &Layouts,
@@ -38,10 +38,13 @@ impl MarksView {
             view.segments.iter().chain(&view.points).for_each(|o| o.set_styles(context, styles));
             view
         };
-        let SceneOptions { marks, held, joints, .. } = scene;
+        let SceneOptions { marks, held, joints, draft, .. } = scene;
         // Joints are inside the model, and are drawn as strongly behind its surface as in front of it.
         let joints = (joints, [palette.joints(); 2]);
-        [(marks, with_behind(palette.marks())), (held, with_behind(palette.held())), joints].map(view).into()
+        let draft = (draft, with_behind(palette.draft()));
+        [draft, (marks, with_behind(palette.marks())), (held, with_behind(palette.held())), joints]
+            .map(view)
+            .into()
     }
 
     fn new(

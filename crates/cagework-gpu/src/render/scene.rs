@@ -82,6 +82,8 @@ pub struct SceneOptions {
     pub held: Marks,
     /// Joints of a skeleton, visible through surfaces.
     pub joints: Marks,
+    /// Edges of a cage that is previewed, as segments.
+    pub draft: Marks,
 }
 
 impl Default for SceneOptions {
@@ -107,6 +109,7 @@ impl Default for SceneOptions {
             marks: Marks::default(),
             held: Marks::default(),
             joints: Marks::default(),
+            draft: Marks::default(),
         }
     }
 }

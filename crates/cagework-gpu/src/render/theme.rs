@@ -237,6 +237,11 @@ impl Palette {
         Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
 
+    /// Style of the edges of a previewed cage.
+    pub(super) fn draft(&self) -> Style {
+        Style { colors: [linear(self.selected); 8], widths: [[1.5; 4]; 2], ..self.cage_lines() }
+    }
+
     /// Style of joints: dots and rings.
     pub(super) fn joints(&self) -> Style {
         let color = linear((self.wire.0, 1.0));

@@ -1,7 +1,9 @@
 //! Methods that create, read, reshape and pose the cage.
 
+use std::collections::BTreeSet;
+
 use cagework_core::bind::{estimate_memory, estimate_updates};
-use cagework_core::subdivided_box;
+use cagework_core::{PolygonMesh, subdivided_box};
 use cagework_editor::Command;
 use cagework_io::{decode_pose, encode_pose};
 use wasm_bindgen::JsValue;
@@ -59,6 +61,26 @@ impl Engine {
             self.change(|state| state.editor.amend());
         }
         self.cage_state()
+    }
+
+    /// Draws the edges of another cage in place of the current one, until this is called with empty arrays or the cage
+    /// changes. `corners`: as for `setCage`.
+    ///
+    /// # Errors
+    /// If the arrays are not a polygon mesh.
+    #[wasm_bindgen(js_name = showDraft)]
+    pub fn show_draft(&self, positions: &[f32], corners: &[u32]) -> Result<(), JsValue> {
+        let PolygonMesh { positions, faces } = polygon_mesh(positions, corners)?;
+        let sides = faces.iter().flat_map(|face| {
+            let next = face.iter().cycle().skip(1);
+            face.iter().zip(next).map(|(&a, &b)| [a.min(b), a.max(b)])
+        });
+        let edges: BTreeSet<[u32; 2]> = sides.collect();
+        self.change(|state| {
+            state.draft = edges.into_iter().map(|edge| edge.map(|i| positions[i as usize])).collect();
+            state.is_changed = true;
+        });
+        Ok(())
     }
 
     /// Properties of the cage for panels; undefined without a cage.

@@ -592,7 +592,11 @@ props: Array<string>,
 /**
  * Whether a model has a rig that an export keeps.
  */
-rigged: boolean, bounds: Bounds, notices: Array<string>,
+rigged: boolean, bounds: Bounds,
+/**
+ * Whether the models seem to lie on their back, because the file's up axis is z.
+ */
+lies: boolean, notices: Array<string>,
 /**
  * Properties of each model.
  */

@@ -70,6 +70,8 @@ export const cage = {
   reshape: "Reshape the cage",
   reshapeSentence: (key: string) =>
     `Edit the cage itself (${key} in the view). The model stays still and is bound again afterwards.`,
+  tools: "Reshape the cage",
+  growTip: "Grow the cage until it encloses the model",
   edits: {
     split_edge: "Split edge",
     collapse_edge: "Collapse edge",
@@ -89,6 +91,7 @@ export const cage = {
   outside: "Vertices outside",
   encloses: "Encloses the model",
   partOutside: "Part of the model is outside.",
+  preview: (n: number) => `The view shows a preview of ${plural(n, "vertex", "vertices")}.`,
   vertices: (n: number) => plural(n, "vertex", "vertices"),
   edges: "Edges",
   faces: "Faces",

@@ -19,6 +19,8 @@ export const model = {
   up: "Up axis",
   upY: "The standard of glTF",
   upZ: "For models that otherwise lie on their back",
+  lies: "The model seems to lie on its back.",
+  stand: "Stand it up",
   licences: "Licences",
   isOpen: "The model that is open",
   vertices: "Vertices",
