@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cagework_core::bind::BindError;
 use cagework_core::field::{CELLS, CELLS_RANGE, Field as CoreField, FieldWeights, InverseField};
 use cagework_io::write_field_npz;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -110,6 +110,15 @@ impl Field {
 }
 
 impl Field {
+    pub(crate) fn core(&self) -> &CoreField {
+        &self.field
+    }
+
+    /// Point that was subtracted from the positions of the field.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.cage.get().origin()
+    }
+
     /// Maps each of the points, `[n, 3]`.
     fn each<'py>(
         &self,

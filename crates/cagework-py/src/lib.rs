@@ -13,6 +13,7 @@ mod files;
 mod options;
 mod pull;
 mod reshape;
+mod splats;
 mod work;
 
 use pyo3::pymodule;
@@ -33,6 +34,8 @@ mod native {
     use crate::pull::pull;
     #[pymodule_export]
     use crate::reshape::reshape;
+    #[pymodule_export]
+    use crate::splats::Splats;
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "this is the conventional name in Python")]
     const __version__: &str = env!("CARGO_PKG_VERSION");

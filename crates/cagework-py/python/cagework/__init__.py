@@ -15,6 +15,7 @@ from cagework._errors import ArrayError, BindError, CageError, Error, ModelError
 from cagework._native import (
     Cage,
     Field,
+    Splats,
     __version__,
     bind,
     bind_many,
@@ -36,6 +37,7 @@ __all__ = [
     "ModelError",
     "OptionError",
     "PullError",
+    "Splats",
     "__version__",
     "bind",
     "bind_many",

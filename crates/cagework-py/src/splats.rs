@@ -1,0 +1,145 @@
+//! The class `Splats`: a capture of Gaussian splats.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use cagework_core::splats::{Splats as CoreSplats, n_harmonics};
+use cagework_io::{Model, ModelFormat};
+use glam::{Mat3, Quat, Vec3};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
+use pyo3::prelude::*;
+
+use crate::field::Field;
+use crate::{arrays, error, files, work};
+
+/// Gaussian splats of a file (3DGS .ply, .splat, .spz, .glb).
+///
+/// Splats(path)
+///
+/// Raises OSError, ModelError.
+#[pyclass(frozen, module = "cagework")]
+pub(crate) struct Splats {
+    /// The file, which `save` changes.
+    model: Arc<Model>,
+    splats: CoreSplats,
+}
+
+#[pymethods]
+impl Splats {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let model = work::run(py, move |_| files::Source::File(path).read())??;
+        let splats = model.splats().cloned().ok_or_else(|| error::model("it has no Gaussian splats"))?;
+        Ok(Self { model: Arc::new(model), splats })
+    }
+
+    fn __len__(&self) -> usize {
+        self.splats.len()
+    }
+
+    /// Centres, [n, 3], object units.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        arrays::array_of(py, self.splats.positions.clone(), self.model.origin())
+    }
+
+    /// Standard deviations along the axes, [n, 3] float32, object units.
+    #[getter]
+    fn scales<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        vectors(py, &self.splats.scales)
+    }
+
+    /// Rotations of the axes, unit quaternions x, y, z, w, [n, 4] float32.
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let flat = self.splats.rotations.iter().flat_map(Quat::to_array).collect();
+        PyArray1::from_vec(py, flat).reshape([self.splats.len(), 4])
+    }
+
+    /// Opacities, [n] float32, 0 to 1.
+    #[getter]
+    fn opacities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        PyArray1::from_slice(py, &self.splats.opacities)
+    }
+
+    /// Colours without spherical harmonics, [n, 3] float32, sRGB.
+    #[getter]
+    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        vectors(py, &self.splats.colors)
+    }
+
+    /// Coefficients of spherical harmonics of bands 1 to 3, [n, 0 | 3 | 8 | 15, 3] float32.
+    #[getter]
+    fn harmonics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let shape = [self.splats.len(), n_harmonics(self.splats.degree), 3];
+        vectors(py, &self.splats.harmonics)?.reshape(shape)
+    }
+
+    /// Covariance matrices, [n, 3, 3] float32, square object units.
+    #[getter]
+    fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let of_splat = |s: usize| {
+            let axes: Mat3 = self.splats.axes(s);
+            (axes * axes.transpose()).to_cols_array()
+        };
+        let flat = (0..self.splats.len()).flat_map(of_splat).collect();
+        PyArray1::from_vec(py, flat).reshape([self.splats.len(), 3, 3])
+    }
+
+    /// The splats deformed by a field. Splats that it does not move keep all digits.
+    fn deformed(&self, py: Python<'_>, field: &Bound<'_, Field>) -> PyResult<Self> {
+        let (field, mut model) = (field.get(), (*self.model).clone());
+        model.see_from(field.origin());
+        let rest = self.seen_from(field);
+        let splats = work::run(py, |_| rest.deformed(field.core()))?;
+        Ok(Self { model: Arc::new(model), splats })
+    }
+
+    /// How much each splat would bend beyond what an ellipsoid can show: the distance of the ends of its longest axis from
+    /// where the deformation moves them, as a fraction of its half length of sqrt(3) standard deviations. [n] float32.
+    fn first_order_errors<'py>(
+        &self,
+        py: Python<'py>,
+        field: &Bound<'py, Field>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (field, rest) = (field.get(), self.seen_from(field.get()));
+        let errors = work::run(py, |_| rest.first_order_errors(field.core()))?;
+        Ok(PyArray1::from_vec(py, errors))
+    }
+
+    /// Vertices and triangles of octahedra that `generate_cage` encloses: without haze, and without the largest splats.
+    fn shells<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
+        let (vertices, triangles) = work::run(py, |_| self.splats.shells())?;
+        Ok((arrays::array_of(py, vertices, self.model.origin())?, arrays::triples(py, &triangles)?))
+    }
+
+    /// Writes the splats; the extension selects the format. In the format of the file, splats that did not change keep
+    /// their bytes.
+    ///
+    /// Raises OSError, ModelError.
+    #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let format = ModelFormat::of_export(&path.to_string_lossy());
+        let format = format.ok_or_else(|| error::model("the name must end in .ply, .splat, .spz or .glb"))?;
+        let bytes =
+            work::run(py, |_| self.model.write_splats(format, &self.splats))?.map_err(error::model)?;
+        files::write(&path, &bytes)
+    }
+}
+
+impl Splats {
+    /// The splats with positions relative to the origin of a field.
+    fn seen_from(&self, field: &Field) -> CoreSplats {
+        let by = (self.model.origin() - field.origin()).as_vec3();
+        let mut splats = self.splats.clone();
+        if by != Vec3::ZERO {
+            splats.positions.iter_mut().for_each(|p| *p += by);
+        }
+        splats
+    }
+}
+
+fn vectors<'py>(py: Python<'py>, all: &[Vec3]) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let flat = all.iter().flat_map(Vec3::to_array).collect();
+    PyArray1::from_vec(py, flat).reshape([all.len(), 3])
+}
