@@ -151,8 +151,8 @@ impl Binder {
         Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
-    /// Harmonic coordinates at the points of a lattice around a cage, for `Engine.takeLattice`. Arguments as for
-    /// `bind`.
+    /// Harmonic coordinates at the points of a lattice around a cage, for `Engine.takeLattice`, or with a number of
+    /// `cells` along the longest side of the cage for `FieldMap`. Other arguments as for `bind`.
     ///
     /// # Errors
     /// Those of a bind.
@@ -162,13 +162,16 @@ impl Binder {
         cage: Vec<f32>,
         corners: Vec<u32>,
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+        cells: Option<u32>,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
         let mut request: JsBindOptions = decode(options)?;
         request.options.outside = OutsidePolicy::Extend;
+        let cells = cells.unwrap_or(field::CLIP_CELLS);
+        field::CELLS_RANGE.check(cells).map_err(|wrong| Fault::new(ErrorName::Error, wrong))?;
         let set = control_set(&cage, &corners, controls)?;
-        let lattice = Lattice::new(Controls::from(&set).surface(), field::CLIP_CELLS);
+        let lattice = Lattice::new(Controls::from(&set).surface(), cells);
         let binding = self.run(&lattice.points(), &set, request, progress).await?;
         let offsets = Offsets { frames: binding.frames, outside: Vec::new() };
         Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })

@@ -20,6 +20,7 @@ mod controls;
 #[cfg(target_family = "wasm")]
 pub mod engine;
 mod error;
+mod field;
 #[cfg(target_family = "wasm")]
 mod gpu;
 mod held;

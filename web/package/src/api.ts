@@ -100,6 +100,29 @@ export function createApi(open: () => Promise<Runtime>): Api {
       }
       return deformer.deform(pose);
     },
+    async field(cage, posed, { cells = 64, ...options } = {}) {
+      requireKnown(options, CALL_OPTIONS, BIND_ON_CPU);
+      const arrays = cageOf(cage);
+      const input = { cage: arrays, cells, options: bindOptions(options) };
+      const pose = poseOf(posed, arrays.positions);
+      await requireGpu(options);
+      const { pkg } = await runtime();
+      const { indptr, indices, data, offsets } = await run("lattice", input, options);
+      const { positions, corners, controls } = arrays;
+      const map = new pkg.FieldMap(positions, corners, controls, cells, indptr, indices, data, offsets);
+      map.pose(pose);
+      return {
+        pose: (next) => map.pose(poseOf(next, positions)),
+        map: (points) => map.map(pointsOf("points", points)),
+        inverse: (points) => map.inverse(pointsOf("points", points)),
+        gradient: (points) => map.gradient(pointsOf("points", points)),
+        texture() {
+          const [x = 0, y = 0, z = 0, spacing = 0] = map.frame;
+          const [nx = 0, ny = 0, nz = 0] = map.dims;
+          return { data: map.displacements, size: [nx, ny, nz], origin: [x, y, z], spacing };
+        },
+      };
+    },
     async reshape(model, cage, posed, options = {}) {
       const { dynamic: _, ...rigs } = RIG_DEFAULTS;
       requireKnown(options, CALL_OPTIONS, { name: null }, BIND_ON_CPU, rigs);

@@ -103,11 +103,37 @@ export type ReshapeCallOptions = CallOptions &
   Partial<BindOptions> &
   Partial<Omit<RigOptions, "dynamic">>;
 
+/** The deformation of the space in and around a cage, for points that are not bound. */
+export interface Field {
+  /** Moves the cage. Nothing is bound again. */
+  pose(posed: ArrayLike<number>): void;
+  /** Positions of points after the deformation, `[n, 3]`. */
+  map(points: ArrayLike<number>): Float32Array;
+  /** The points that `map` moves to these, `[n, 3]`; NaN where there is none. */
+  inverse(points: ArrayLike<number>): Float32Array;
+  /** Deformation gradients at points, `[n, 3, 3]`, by rows. */
+  gradient(points: ArrayLike<number>): Float32Array;
+  /**
+   * Displacements at the nodes of the lattice, for a 3-D texture of shaders: `[nz, ny, nx, 4]`; the fourth number has no
+   * meaning there. `origin` is the position of the first node and `spacing` the distance of nodes.
+   */
+  texture(): {
+    readonly data: Float32Array;
+    readonly size: readonly [number, number, number];
+    readonly origin: readonly [number, number, number];
+    readonly spacing: number;
+  };
+}
+
+/** Options of `field`. `cells`: of the lattice along the longest side of the cage, 8 to 256, default 64. */
+export type FieldCallOptions = BindCallOptions & { readonly cells?: number | undefined };
+
 /** The functions that index.ts exports and documents. */
 export interface Api {
   bind(points: ArrayLike<number>, cage: Cage, options?: BindCallOptions): Promise<Bound>;
   generateCage(mesh: Mesh, options?: CageCallOptions): Promise<GeneratedCage>;
   deform(weights: Weights, posed: ArrayLike<number>): Promise<Float32Array>;
+  field(cage: Cage, posed: ArrayLike<number>, options?: FieldCallOptions): Promise<Field>;
   reshape(
     model: File,
     cage: Cage,

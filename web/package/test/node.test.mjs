@@ -8,7 +8,7 @@ import { availableParallelism, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { inflateRawSync } from "node:zlib";
-import { bind, deform, generateCage, readModel, reshape } from "@cagework/core";
+import { bind, deform, field, generateCage, readModel, reshape } from "@cagework/core";
 import { sample } from "./sample.mjs";
 
 /** Rounding of 32-bit sums, over the model's size. */
@@ -107,6 +107,41 @@ test("an affine pose of a generated cage moves the model by the same map", async
   const wanted = affine(Float64Array.from(mesh.positions));
   const worst = followed.reduce((most, x, k) => Math.max(most, Math.abs(x - wanted[k])), 0);
   assert.ok(worst < 4 * ROUNDING * size, `${worst}`);
+});
+
+test("a field maps points, maps them back, and its texture holds the same displacements", async () => {
+  const made = await generateCage(mesh, { vertices: 60 });
+  const affine = (p) => p.map((x, k) => (k % 3 === 1 ? 1.5 * x + 0.25 * p[k - 1] - 1 : x));
+  const bent = await field(made, made.positions, { cells: 24 });
+  const points = Float32Array.from(mesh.positions.slice(0, 300));
+  const close = (a, b) =>
+    assert.ok(
+      a.every((x, k) => Math.abs(x - b[k]) < 1e-4 * size),
+      "positions differ",
+    );
+  close(bent.map(points), points);
+  bent.pose(affine(Float64Array.from(made.positions)));
+  close(bent.map(points), affine(Float64Array.from(points)));
+  close(bent.inverse(bent.map(points)), points);
+  assert.ok(Math.abs(bent.gradient(points)[4] - 1.5) < 1e-2);
+  // Trilinear interpolation, as a sampler does it.
+  const { data, size: n, origin, spacing } = bent.texture();
+  const at = [...points.slice(0, 3)].map((x, k) => (x - origin[k]) / spacing);
+  const by = [0, 0, 0];
+  for (let corner = 0; corner < 8; corner++) {
+    const node = at.map((x, k) => Math.floor(x) + ((corner >> k) & 1));
+    const share = at.reduce((all, x, k) => all * (1 - Math.abs(x - node[k])), 1);
+    for (let k = 0; k < 3; k++) by[k] += share * data[4 * (node[0] + n[0] * (node[1] + n[1] * node[2])) + k];
+  }
+  close(
+    by.map((x, k) => points[k] + x),
+    bent.map(points.slice(0, 3)),
+  );
+  await assert.rejects(
+    field(made, made.positions, { cells: 7 }),
+    /cells is 7; it must be a whole number from 8 to 256/,
+  );
+  assert.throws(() => bent.pose([1, 2, 3]), /posed has 3 numbers/);
 });
 
 for (const [options, line] of [

@@ -119,7 +119,12 @@ export interface Jobs {
     step: Progress;
     output: BoundArrays | undefined;
   };
-  lattice: { input: { cage: CageArrays; options: BindOptions }; step: Progress; output: BoundArrays };
+  lattice: {
+    /** `cells`: along the longest side of the cage; by default those of the lattice that deforms clips. */
+    input: { cage: CageArrays; cells?: number | undefined; options: BindOptions };
+    step: Progress;
+    output: BoundArrays;
+  };
   cage: {
     /** `positions` and `triangles` are what the cage must enclose; `model` is the model at rest, for the check. */
     input: {

@@ -146,9 +146,10 @@ function createWork(pkg: Package): Work {
       const bound = await by.bindSlice(positions, corners, controls, axis, fraction, options, step);
       return bound && taken(bound);
     },
-    async lattice({ cage, options }, step) {
+    async lattice({ cage, cells, options }, step) {
       const by = await binder(options.backend === "gpu");
-      return taken(await by.bindLattice(cage.positions, cage.corners, cage.controls, options, step));
+      const { positions, corners, controls } = cage;
+      return taken(await by.bindLattice(positions, corners, controls, cells, options, step));
     },
     async cage({ positions, triangles, model, options, smooth }, step) {
       const cage = (await binder(false)).generateCage(positions, triangles, options, smooth, step);

@@ -1,0 +1,120 @@
+//! The deformation as a field, for the npm package.
+
+use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
+use cagework_core::{Controls, Frames, Weights};
+use glam::Vec3;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::arrays::{flat, points};
+use crate::binder::Offsets;
+use crate::controls::control_set;
+use crate::error::{Answer, ErrorName, Fault};
+use crate::options::decode;
+
+/// The field of a posed cage, for points that are not bound.
+#[wasm_bindgen]
+pub struct FieldMap {
+    weights: FieldWeights,
+    rest: Vec<Vec3>,
+    field: Field,
+}
+
+#[wasm_bindgen]
+impl FieldMap {
+    /// Creates the field of the rest pose from the weights that `Binder.bindLattice` returned for this cage and number of
+    /// cells.
+    ///
+    /// # Errors
+    /// If the arrays do not match.
+    #[wasm_bindgen(constructor)]
+    #[expect(clippy::too_many_arguments, reason = "arrays of a cage and of a bind")]
+    pub fn new(
+        cage: &[f32],
+        corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+        cells: u32,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
+    ) -> Result<Self, JsValue> {
+        let set = control_set(cage, corners, controls)?;
+        let Offsets { frames, .. } = decode(offsets)?;
+        let controls = Controls::from(&set);
+        let weights = weights(controls.n_controls(), &frames, (indptr, indices, data))?;
+        let lattice = Lattice::new(controls.surface(), cells);
+        if weights.n_rows() != lattice.points().len() {
+            let message = format!("the lattice of {cells} cells has {} points", lattice.points().len());
+            return Err(Fault::new(ErrorName::Error, message).into());
+        }
+        let (weights, rest) = (FieldWeights::new(lattice, weights, frames), controls.rest().to_vec());
+        let field = weights.pose(&rest, &rest);
+        Ok(Self { weights, rest, field })
+    }
+
+    /// Moves the controls, `[n_controls, 3]`.
+    ///
+    /// # Errors
+    /// If the pose has another number of points.
+    pub fn pose(&mut self, posed: &[f32]) -> Result<(), JsValue> {
+        if posed.len() != 3 * self.rest.len() {
+            let message = format!("posed has {} numbers; it must have {}", posed.len(), 3 * self.rest.len());
+            return Err(Fault::new(ErrorName::Error, message).into());
+        }
+        self.field = self.weights.pose(&self.rest, &points(posed));
+        Ok(())
+    }
+
+    /// Positions of points after the deformation. `[n, 3]`
+    #[must_use]
+    pub fn map(&self, at: &[f32]) -> Vec<f32> {
+        flat(&points(at).into_iter().map(|p| self.field.map(p)).collect::<Vec<_>>())
+    }
+
+    /// The points that `map` moves to these; NaN where there is none. `[n, 3]`
+    #[must_use]
+    pub fn inverse(&self, at: &[f32]) -> Vec<f32> {
+        let inverse = InverseField::new(&self.field);
+        let find = |p: Vec3| inverse.find(p).unwrap_or(Vec3::NAN);
+        flat(&points(at).into_iter().map(find).collect::<Vec<_>>())
+    }
+
+    /// Deformation gradients at points, by rows. `[n, 3, 3]`
+    #[must_use]
+    pub fn gradient(&self, at: &[f32]) -> Vec<f32> {
+        points(at).into_iter().flat_map(|p| self.field.gradient(p).transpose().to_cols_array()).collect()
+    }
+
+    /// Position of the first node, then the distance of the nodes, object units.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn frame(&self) -> Vec<f32> {
+        self.field.lattice.origin.extend(self.field.lattice.cell).to_array().to_vec()
+    }
+
+    /// Number of nodes along x, y and z.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn dims(&self) -> Vec<u32> {
+        self.field.lattice.dims.to_array().to_vec()
+    }
+
+    /// Displacements at the nodes with a fourth number, x fastest, as an RGBA texture stores them. `[nz, ny, nx, 4]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn displacements(&self) -> Vec<f32> {
+        self.field.values.iter().flat_map(|value| value.to_array()).collect()
+    }
+}
+
+fn weights(
+    n_controls: usize,
+    frames: &Frames,
+    (indptr, indices, data): (Vec<u32>, Vec<u32>, Vec<f32>),
+) -> Answer<Weights> {
+    if !frames.fits(n_controls) {
+        return Err(Fault::new(ErrorName::Error, "offsets do not belong to this cage"));
+    }
+    Ok(Weights::new((n_controls + frames.n_columns()) as u32, indptr, indices, data)?)
+}
