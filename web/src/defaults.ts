@@ -4,6 +4,7 @@ import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generat
 
 export {
   BIND_DEFAULTS,
+  BOX_DIVISIONS,
   CAGE_DEFAULTS,
   COMPANION_ENDINGS,
   COORDINATES,
@@ -15,6 +16,12 @@ export {
   SHAPE_FORMATS,
   SLIDERS,
 } from "@cagework/core/contract/generated";
+
+/** The nearest value within the range of a slider. */
+export const clamped = (
+  value: number,
+  { min, max }: { readonly min: number; readonly max: number },
+): number => Math.min(max, Math.max(min, value));
 
 /** Options of the published method (Joshi et al. 2007). */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };

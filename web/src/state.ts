@@ -17,7 +17,7 @@ import type {
   Stage,
   View,
 } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import { BIND_DEFAULTS, BOX_DIVISIONS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import { cageKey } from "./derived";
 import type { Theme } from "./store";
 import type { Message } from "./strings";
@@ -190,7 +190,7 @@ const CAGE_SETTINGS = {
   cageSource: "auto",
   cageOptions: CAGE_DEFAULTS,
   cageClip: null,
-  boxDivisions: 2,
+  boxDivisions: BOX_DIVISIONS,
 } satisfies Partial<AppState>;
 
 /** Initial values of the keys that belong to the open model, see docs/page.md. */

@@ -14,7 +14,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
+pub(crate) use cages::{CageArgs, CageSource, CheckArgs, KindArg};
 use cagework_core::field as field_options;
 use cagework_core::options::{self, BindOptions, Choice, Number};
 use cagework_io::{Interpolation, MAX_SECONDS, ModelFormat, UpAxis};
@@ -107,8 +107,7 @@ pub(crate) struct BindArgs {
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = options::GRID.about(), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     /// Write the rest pose as reconstructed from the weights; the file extension selects the format.
     #[arg(short, long, value_name = "FILE")]
@@ -209,8 +208,7 @@ pub(crate) struct DeformArgs {
     /// Format of the lattice: arrays (.npz), or a script (.py) that makes a lattice object in Blender.
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT", requires = "lattice")]
     pub(crate) lattice_format: LatticeFormat,
-    /// Cells of the lattice of --lattice, splats and points along the longest side of the cage, 8 to 256.
-    #[arg(long, default_value_t = field_options::CELLS, value_name = "N", value_parser = number::<u32>(field_options::CELLS_RANGE))]
+    #[arg(long, help = field_options::CELLS_RANGE.about(), default_value_t = field_options::CELLS, value_name = "N", value_parser = number::<u32>(field_options::CELLS_RANGE))]
     pub(crate) lattice_cells: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,

@@ -1,12 +1,12 @@
 //! `cagework cage`: makes a cage for a model.
 
-use cagework_cage::generate::CageReport;
+use cagework_cage::generate::{BOX_DIVISIONS, CageReport};
 use cagework_core::PolygonMesh;
 use cagework_io::{Model, shown};
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
+use crate::args::{CageArgs, KindArg, ModelOutput};
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     };
     let cage = match args.kind() {
         KindArg::Box => {
-            let divisions = args.divisions.unwrap_or(DEFAULT_DIVISIONS);
+            let divisions = args.divisions.unwrap_or(BOX_DIVISIONS);
             (summary.divisions, summary.margin) = (Some(divisions), Some(args.margin));
             let states = model.states(args.around_clip.as_deref());
             let (positions, _) = states.map_err(|e| CliError::file(&args.model, e))?;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cagework_cage::check::{CageCheck, Code, Fix, Repair, Severity, check_smooth, repair_smooth};
+use cagework_cage::check::{CageCheck, Code, Fix, Severity, check_smooth, repair_smooth};
 use cagework_io::{UpAxis, shown};
 use serde::Serialize;
 
@@ -50,8 +50,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         check: check_smooth(&cage, inside, Some(args.grid), smooth),
     };
     if let Some(output) = &args.output {
-        let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
-        let repaired = repair_smooth(&cage, &repairs, inside, smooth)?;
+        let repaired = repair_smooth(&cage, &args.repair, inside, smooth)?;
         cage = repaired.mesh;
         write_cage(output, &cage, of_cage.origin())?;
         summary.repaired = repaired.done;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cagework_cage::CageOptions;
-use cagework_cage::generate::{CageReport, generate};
+use cagework_cage::generate::{BOX_MARGIN, CageReport, generate};
 use cagework_cage::samples::{self, Sample};
 use cagework_core::cage::MAX_FACES;
 use cagework_core::{
@@ -12,7 +12,7 @@ use cagework_core::{
 use cagework_io::{Model, PoseState, UpAxis};
 use glam::{DVec3, Vec3};
 
-use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
+use crate::args::{CageSource, ControlArgs, MemoryArgs, ModelOutput};
 use crate::controls::load_controls;
 use crate::error::CliError;
 use crate::files::{read, read_beside, shown_path};
@@ -108,7 +108,7 @@ pub(crate) fn load_cage(
             return load_cage_file(path, around.up(), Some(around.origin()), memory, controls);
         }
         CageSource::Box { divisions } => {
-            let mesh = box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?;
+            let mesh = box_mesh(&around.positions, *divisions, BOX_MARGIN)?;
             Model::of_mesh("box cage", &mesh, around.origin())?
         }
         CageSource::Auto(options) => {

@@ -264,7 +264,7 @@ fn prepare(
 
 fn slice(args: &RenderArgs, controls: Controls<'_>) -> Result<SliceView, CliError> {
     let options = args.solve.options(args.grid, args.read.memory);
-    let mut slice = Slice::new(controls, &options, args.axis as usize, args.at);
+    let mut slice = Slice::new(controls, &options, args.axis, args.at);
     let mut column = None;
     if args.show == ShowArg::Slice && !slice.cells.is_empty() {
         let weights: Weights =

@@ -26,6 +26,8 @@ pub const CLIP_CELLS: u32 = 48;
 /// Allowed numbers of cells. At 256, a lattice may have 57 million nodes, which the memory limit of the bind refuses.
 pub const CELLS_RANGE: Number = Number {
     name: "cells",
+    help: "Cells of the lattice along the longest side of the cage",
+    unit: "cells",
     allowed: "a whole number from 8 to 256",
     is_allowed: |n| n.fract() == 0.0 && (8.0..=256.0).contains(&n),
     slider: None,

@@ -180,6 +180,10 @@ pub struct OutOfRange {
 pub struct Number {
     /// Name of the option.
     pub name: &'static str,
+    /// Meaning of the option, for help and documentation.
+    pub help: &'static str,
+    /// Unit of the values.
+    pub unit: &'static str,
     /// The valid range, in words.
     pub allowed: &'static str,
     /// Whether a value is valid.
@@ -202,6 +206,8 @@ pub struct Slider {
 /// The `grid` option: cells along the longest side of the cage's box.
 pub const GRID: Number = Number {
     name: "grid",
+    help: "Cells along the longest side of the cage",
+    unit: "cells",
     allowed: "a whole number from 8 to 512",
     is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
     slider: None,
@@ -209,6 +215,8 @@ pub const GRID: Number = Number {
 /// The `tau` option: convergence threshold for delta.
 pub const TAU: Number = Number {
     name: "tau",
+    help: "Stop when delta falls below this (the paper's Eq. 2; for multigrid and cg the estimated remaining error)",
+    unit: "fraction of the range of weights",
     allowed: "a number above 0",
     is_allowed: |tau| tau.is_finite() && tau > 0.0,
     // The slider's values are exponents of ten.
@@ -217,6 +225,8 @@ pub const TAU: Number = Number {
 /// The `max_iterations` option: limit on iterations of the solver.
 pub const MAX_ITERATIONS: Number = Number {
     name: "max_iterations",
+    help: "Stop after this many Jacobi sweeps or cg steps, and after at most 60 V-cycles",
+    unit: "iterations",
     allowed: "a whole number from 1 on",
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
     slider: Some(Slider { min: 1.0, max: 1e6, step: 1.0 }),
@@ -224,6 +234,8 @@ pub const MAX_ITERATIONS: Number = Number {
 /// The `sparsify` option: total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
+    help: "In each row, drop the smallest weights up to this total, then restore the row's sum and rest position",
+    unit: "weight",
     allowed: "0 (keep all weights) or a threshold below 0.1",
     is_allowed: |w| (0.0..0.1).contains(&w),
     slider: None,
@@ -232,12 +244,30 @@ pub const SPARSIFY: Number = Number {
 /// The `smooth` option: number of subdivision steps from the cage to its surface.
 pub const SMOOTH: Number = Number {
     name: "smooth",
+    help: "Steps of Catmull-Clark subdivision of the cage, whose smooth surface the model follows; the vertices remain the controls",
+    unit: "steps",
     allowed: "a whole number from 0 to 3",
     is_allowed: |n| n.fract() == 0.0 && (0.0..=3.0).contains(&n),
     slider: None,
 };
 
+/// The `radius` option: radius of points and lines inside the cage.
+pub const INNER_RADIUS: Number = Number {
+    name: "radius",
+    help: "Radius of points and bones inside the cage",
+    unit: "fraction of the cage's longest side",
+    allowed: "a number above 0",
+    is_allowed: |radius| radius.is_finite() && radius > 0.0,
+    slider: Some(Slider { min: 0.005, max: 0.12, step: 0.0025 }),
+};
+
 impl Number {
+    /// Meaning and valid range, in one line of help.
+    #[must_use]
+    pub fn about(&self) -> String {
+        format!("{}: {}", self.help, self.allowed)
+    }
+
     /// Checks a value.
     ///
     /// # Errors
@@ -381,6 +411,7 @@ mod tests {
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
         assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());
+        assert_eq!(GRID.about(), "Cells along the longest side of the cage: a whole number from 8 to 512");
         assert!(BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().is_err());
     }
 

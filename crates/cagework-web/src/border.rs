@@ -1,11 +1,11 @@
-//! Generates TypeScript declarations of the serde types that Rust and the page exchange, and the page's default values
-//! and ranges.
+//! Generates TypeScript declarations of the serde types that Rust and the page exchange, the page's default values and
+//! ranges, and the table of ranges in docs/limits.md.
 
 use std::fmt::Write as _;
 use std::fs;
 
 use cagework_cage::check::{Code, Repair, Severity};
-use cagework_cage::generate::{CageOptions, Shape};
+use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, Shape};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::options::{
     Backend, CellShape, Choice, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
@@ -38,6 +38,11 @@ use crate::views::{
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
+
+/// Page that lists the ranges of numeric options, between two comments.
+const LIMITS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/limits.md");
+const TABLE_START: &str = "<!-- Written by crates/cagework-web/src/border.rs -->";
+const TABLE_END: &str = "<!-- end -->";
 
 /// Default memory limit of a bind in the page, bytes: half of the 4 GiB that a browser tab can address.
 const PAGE_MEMORY: u64 = 2 << 30;
@@ -182,11 +187,19 @@ fn generated_types_are_up_to_date() {
         let Some(slider) = number.slider else { continue };
         write!(text, " {name}: {},", serde_json::to_string(&slider).unwrap()).unwrap();
     }
-    text += " } as const;\n";
-    if fs::read_to_string(FILE).unwrap_or_default() != text {
-        fs::write(FILE, text).unwrap();
-        panic!(
-            "web/package/src/contract/generated.ts was out of date and has been rewritten: review and commit it"
-        );
+    writeln!(text, " }} as const;\nexport const BOX_DIVISIONS = {BOX_DIVISIONS};").unwrap();
+    let mut table = "| option | unit | meaning and range |\n|---|---|---|\n".to_owned();
+    for (name, number) in NUMBERS {
+        writeln!(table, "| {name} | {} | {} |", number.unit, number.about()).unwrap();
+    }
+    let limits = fs::read_to_string(LIMITS).unwrap();
+    let (head, rest) = limits.split_once(TABLE_START).expect("docs/limits.md has the table's first mark");
+    let (_, tail) = rest.split_once(TABLE_END).expect("docs/limits.md has the table's last mark");
+    let limits = format!("{head}{TABLE_START}\n\n{table}\n{TABLE_END}{tail}");
+    for (file, text) in [(FILE, text), (LIMITS, limits)] {
+        if fs::read_to_string(file).unwrap_or_default() != text {
+            fs::write(file, text).unwrap();
+            panic!("{file} was out of date and has been rewritten: review and commit it");
+        }
     }
 }

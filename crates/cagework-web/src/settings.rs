@@ -3,8 +3,10 @@
 use std::mem::discriminant;
 
 use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, DIVISIONS, TARGET, VOXELS};
-use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
+use cagework_core::options::{GRID, INNER_RADIUS, MAX_ITERATIONS, Number, SMOOTH, SPARSIFY, TAU};
+use cagework_editor::{BRUSH, PROPORTIONAL};
 use cagework_io::value_fault;
+use cagework_pose::pull::REACH;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
@@ -18,7 +20,7 @@ use crate::views::object;
 const MAX_VALUE_CHARS: usize = 40;
 
 /// Ranges of numeric options, by the names that the page uses.
-pub(crate) const NUMBERS: [(&str, Number); 9] = [
+pub(crate) const NUMBERS: [(&str, Number); 14] = [
     ("grid", GRID),
     ("tau", TAU),
     ("max_iterations", MAX_ITERATIONS),
@@ -28,6 +30,11 @@ pub(crate) const NUMBERS: [(&str, Number); 9] = [
     ("margin", CLEARANCE),
     ("voxels", VOXELS),
     ("divisions", DIVISIONS),
+    ("smooth", SMOOTH),
+    ("radius", INNER_RADIUS),
+    ("proportional", PROPORTIONAL),
+    ("brush", BRUSH),
+    ("reach", REACH),
 ];
 
 /// Settings of a project, with all values valid.

@@ -1,6 +1,7 @@
 /** Pulls points of the model: a worker computes the pose of the cage that moves them to their targets. */
 
 import type { SurfacePoint } from "../contract";
+import { clamped, SLIDERS } from "../defaults";
 import { controlCount } from "../derived";
 import { follow } from "../queue";
 import { T } from "../words";
@@ -38,7 +39,7 @@ const OFF = 0.01;
 /** Maximum number of frames that are solved after the pointer is released. */
 const SETTLING = 30;
 /** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
-const WIDEST = 1.2;
+const WIDEST = SLIDERS.reach.max / 2;
 /** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
 const NUDGE_PAUSE_MS = 600;
 /** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
@@ -242,7 +243,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     reach(factor) {
       const drag = current;
       if (!drag || drag.reach === null) return;
-      drag.reach = Math.min(2 * WIDEST, Math.max(0.05, drag.reach * factor));
+      drag.reach = clamped(drag.reach * factor, SLIDERS.reach);
       void attempt(ctx, T.failed.pull, () => grab(drag));
     },
     nudge(right, up) {

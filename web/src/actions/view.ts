@@ -2,7 +2,7 @@
 
 import { effect } from "@preact/signals";
 import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
-import { SCENE_DEFAULTS } from "../defaults";
+import { clamped, SCENE_DEFAULTS, SLIDERS } from "../defaults";
 import { drawn, elementInUse } from "../derived";
 import { follow } from "../queue";
 import type { Seen } from "../share";
@@ -130,7 +130,7 @@ export function createView(
       store.set({ symmetry: on, unmatched: on && store.get().cage ? engine().unmatched().length : 0 });
     },
     proportional(on, radius) {
-      const next = Math.min(1, Math.max(0.02, radius ?? store.get().proportional));
+      const next = clamped(radius ?? store.get().proportional, SLIDERS.proportional);
       engine().setProportional(on ? next : 0);
       store.set({ proportionalOn: on, proportional: next });
     },

@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import type { App } from "../app";
 import type { CageState, InnerKind } from "../contract";
+import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
 import { Button, Section, Segments, Slider, Toggle } from "./controls";
@@ -16,9 +17,6 @@ const KINDS: readonly (readonly [InnerKind, IconName])[] = [
   ["line", "bone"],
   ["face", "face"],
 ];
-/** Range of the slider for the radius of controls inside, as fractions of the cage's longest side. */
-const THINNEST = 0.005;
-const THICKEST = 0.12;
 
 export function Smooth({ app, cage }: { app: App; cage: CageState }) {
   const { smooth } = cage.controls;
@@ -97,9 +95,7 @@ function Radius({ app, cage }: { app: App; cage: CageState }) {
   return (
     <Slider
       label={T.cage.radius}
-      min={THINNEST}
-      max={THICKEST}
-      step={0.0025}
+      {...SLIDERS.radius}
       format={(share) => T.pose.ofCage(percent(share, 1))}
       value={held ?? cage.radius / longest}
       onInput={setHeld}

@@ -3,15 +3,13 @@
 import type { How } from "../actions/models";
 import type { App } from "../app";
 import type { MemberInfo, ModelInfo } from "../contract";
+import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
 import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { useTouch } from "./touch";
 
-/** Range of the slider for the radius of the brush, as fractions of the model's size. */
-const THINNEST = 0.01;
-const THICKEST = 0.3;
 const ALL = "all";
 const WAYS: readonly (readonly [How, IconName])[] = [
   ["rigid", "rigid"],
@@ -183,9 +181,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
       />
       <Slider
         label={T.models.size}
-        min={THINNEST}
-        max={THICKEST}
-        step={0.01}
+        {...SLIDERS.brush}
         format={(share) => T.cage.ofSize(percent(share))}
         value={painting.radius}
         onInput={(radius) => app.painting.brush({ radius })}

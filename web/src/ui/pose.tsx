@@ -3,6 +3,7 @@
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { Interpolation, Pivot } from "../contract";
+import { SLIDERS } from "../defaults";
 import { fittingPoses } from "../derived";
 import { coordinate, percent } from "../format";
 import { T } from "../words";
@@ -143,9 +144,7 @@ function Help({ app }: { app: App }) {
       {proportionalOn && (
         <Slider
           label={T.pose.far}
-          min={0.02}
-          max={1}
-          step={0.01}
+          {...SLIDERS.proportional}
           format={(value) => T.pose.ofCage(percent(value))}
           value={proportional}
           onInput={(value) => app.view.proportional(true, value)}

@@ -1,6 +1,7 @@
 //! Repairs that need no decision by the user.
 
 use std::collections::{HashMap, HashSet};
+use std::str::FromStr;
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use cagework_core::controls::ControlError;
 use cagework_core::crossing::same_places;
 use cagework_core::fill;
 use cagework_core::mesh::PolygonMesh;
+use cagework_core::options::{Choice, UnknownWord, choose};
 use cagework_core::words::counted;
 
 /// A repair.
@@ -34,6 +36,25 @@ pub enum Repair {
     Flip,
     /// Moves vertices outward until the cage encloses the model.
     Grow,
+}
+
+impl Choice for Repair {
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("weld", Self::Weld),
+        ("drop_degenerate", Self::DropDegenerate),
+        ("mirror", Self::Mirror),
+        ("fill_holes", Self::FillHoles),
+        ("flip", Self::Flip),
+        ("grow", Self::Grow),
+    ];
+}
+
+impl FromStr for Repair {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        choose(text)
+    }
 }
 
 /// A repaired mesh.

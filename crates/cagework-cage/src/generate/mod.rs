@@ -38,8 +38,8 @@ use collapse::Collapser;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
 pub use options::{
-    CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS, GeneratedCage, MAX_TARGET,
-    MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
+    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS,
+    GeneratedCage, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
 };
 use quads::Faces;
 use shell::Shell;

@@ -20,6 +20,8 @@ pub const MAX_VOXELS: usize = 128;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
     name: "target",
+    help: "Number of vertices of the cage; simple shapes get fewer, and holes and gaps may need more",
+    unit: "vertices",
     allowed: "a whole number from 8 to 400",
     is_allowed: |n| n.fract() == 0.0 && (f64::from(MIN_TARGET)..=f64::from(MAX_TARGET)).contains(&n),
     slider: Some(Slider { min: MIN_TARGET as f64, max: MAX_TARGET as f64, step: 2.0 }),
@@ -27,6 +29,8 @@ pub const TARGET: Number = Number {
 /// Range of [`CageOptions::detail`].
 pub const DETAIL: Number = Number {
     name: "detail",
+    help: "Root mean square distance of the cage from the model's shape that is tolerated to save vertices",
+    unit: "fraction of the model's longest side",
     allowed: "a fraction of the longest side from 0.005 to 0.2",
     is_allowed: |part| (f64::from(0.005_f32)..=f64::from(0.2_f32)).contains(&part),
     // The slider is logarithmic, from a quarter of the default to four times the default. The step is a share of its
@@ -36,6 +40,8 @@ pub const DETAIL: Number = Number {
 /// Range of [`CageOptions::clearance`].
 pub const CLEARANCE: Number = Number {
     name: "clearance",
+    help: "Minimum distance from the model, at least half a voxel; gaps up to twice as wide are closed",
+    unit: "fraction of the diagonal of the model's box",
     allowed: "a fraction of the diagonal from 0 to 0.25",
     is_allowed: |part| (0.0..=0.25).contains(&part),
     slider: Some(Slider { min: 0.0, max: 0.15, step: 0.005 }),
@@ -43,6 +49,8 @@ pub const CLEARANCE: Number = Number {
 /// Range of [`CageOptions::voxels`].
 pub const VOXELS: Number = Number {
     name: "voxels",
+    help: "Voxels along the model's longest side; gaps narrower than three voxels are closed",
+    unit: "voxels",
     allowed: "0 (automatic) or a whole number from 8 to 128",
     is_allowed: |n| n == 0.0 || n.fract() == 0.0 && (MIN_VOXELS as f64..=MAX_VOXELS as f64).contains(&n),
     slider: Some(Slider { min: 16.0, max: MAX_VOXELS as f64, step: 8.0 }),
@@ -51,10 +59,17 @@ pub const VOXELS: Number = Number {
 /// minutes.
 pub const DIVISIONS: Number = Number {
     name: "divisions",
+    help: "Quads along each edge of a box cage",
+    unit: "quads",
     allowed: "a whole number from 1 to 16",
     is_allowed: |n| n.fract() == 0.0 && (1.0..=16.0).contains(&n),
     slider: Some(Slider { min: 1.0, max: 8.0, step: 1.0 }),
 };
+
+/// Default number of quads along each edge of a box cage.
+pub const BOX_DIVISIONS: u32 = 2;
+/// Default distance between the model and a box cage, as a fraction of the diagonal of the model's box.
+pub const BOX_MARGIN: f32 = 0.05;
 
 choice! {
     /// Shape that the cage follows.

@@ -4,17 +4,15 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use cagework_cage::check::Repair;
-use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, DIVISIONS, Shape, Symmetry, TARGET, VOXELS};
+use cagework_cage::generate::{
+    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageOptions, DETAIL, DIVISIONS, Shape, Symmetry, TARGET, VOXELS,
+};
 use cagework_core::BindOptions;
 use cagework_core::options::{GRID, OutOfRange};
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
 
-/// Default number of quads along each edge of a box cage.
-pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
-/// Default distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
-pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
 /// Default maximum number of vertices of a hull cage.
 const DEFAULT_HULL_VERTICES: u32 = 24;
 
@@ -37,12 +35,9 @@ pub(crate) struct CageArgs {
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
-    /// Maximum number of vertices of the cage, 8 to 400; simple shapes get fewer [default: 80; 24 for a hull].
-    #[arg(long, value_name = "N", value_parser = super::number::<u32>(TARGET))]
+    #[arg(long, help = format!("{} [default: {}; {DEFAULT_HULL_VERTICES} for a hull]", TARGET.about(), CageOptions::default().target), value_name = "N", value_parser = super::number::<u32>(TARGET))]
     pub(crate) vertices: Option<u32>,
-    /// Root mean square distance of the cage from the model's shape that is tolerated to save vertices, as a fraction of its longest side,
-    /// 0.005 to 0.2.
-    #[arg(long, default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
+    #[arg(long, help = DETAIL.about(), default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
     pub(crate) detail: f32,
     /// Triangles only; no quads.
     #[arg(long)]
@@ -53,23 +48,19 @@ pub(crate) struct CageArgs {
     /// One closed part per connected component of the model, without bridges between them.
     #[arg(long)]
     pub(crate) per_component: bool,
-    /// Minimum distance from the model, as a fraction of the diagonal of its bounding box [default: half a voxel].
-    /// Gaps up to twice as wide are closed.
-    #[arg(long, default_value_t = CageOptions::default().clearance, value_name = "FRACTION", value_parser = super::number::<f32>(CLEARANCE))]
+    #[arg(long, help = CLEARANCE.about(), default_value_t = CageOptions::default().clearance, value_name = "FRACTION", value_parser = super::number::<f32>(CLEARANCE))]
     pub(crate) clearance: f32,
-    /// Voxels along the model's longest side, 8 to 128; gaps narrower than three voxels are closed. 0: derived from --vertices.
-    #[arg(long, default_value_t = CageOptions::default().voxels, value_name = "N", value_parser = super::number::<u32>(VOXELS))]
+    #[arg(long, help = VOXELS.about(), default_value_t = CageOptions::default().voxels, value_name = "N", value_parser = super::number::<u32>(VOXELS))]
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
     /// Enclose every frame of the clip with this name as well.
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
-    /// Quads along each edge of a box cage.
-    #[arg(long, value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
+    #[arg(long, help = DIVISIONS.about(), value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
     pub(crate) divisions: Option<u32>,
     /// Distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
-    #[arg(long, default_value_t = DEFAULT_MARGIN, value_name = "FRACTION", value_parser = positive)]
+    #[arg(long, default_value_t = BOX_MARGIN, value_name = "FRACTION", value_parser = positive)]
     pub(crate) margin: f32,
 }
 
@@ -116,12 +107,15 @@ pub(crate) struct CheckArgs {
     /// Model that should be inside the cage.
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side, 8 to 512.
+    /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side.
     #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
-    /// Repairs to apply before the check; several, separated by commas.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT", requires = "output")]
-    pub(crate) repair: Vec<RepairArg>,
+    /// Repairs to apply before the check; several, separated by commas: weld merges vertices at the same position,
+    /// drop-degenerate removes faces without area, duplicate faces and unused vertices, mirror completes half a cage
+    /// across its planar open boundary, fill-holes closes holes, flip orients all faces outward, grow moves vertices
+    /// outward until the cage encloses the model.
+    #[arg(long, value_parser = super::words::<Repair>(), value_delimiter = ',', value_name = "WHAT", requires = "output")]
+    pub(crate) repair: Vec<Repair>,
     /// File for the repaired cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE", requires = "repair")]
     pub(crate) output: Option<ModelOutput>,
@@ -154,9 +148,7 @@ impl FromStr for CageSource {
             Ok(Self::Auto(CageOptions { target, shape, ..CageOptions::default() }))
         };
         match kind {
-            "box" => {
-                Ok(Self::Box { divisions: number.map_or(Ok(DEFAULT_DIVISIONS), |n| DIVISIONS.parse(n))? })
-            }
+            "box" => Ok(Self::Box { divisions: number.map_or(Ok(BOX_DIVISIONS), |n| DIVISIONS.parse(n))? }),
             "auto" => generated(Shape::Follow, CageOptions::default().target),
             "hull" => generated(Shape::Hull, DEFAULT_HULL_VERTICES),
             _ => Ok(Self::File(PathBuf::from(text))),
@@ -170,34 +162,4 @@ pub(crate) enum KindArg {
     Auto,
     Box,
     Hull,
-}
-
-/// Repairs that `cagework check --repair` applies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RepairArg {
-    /// Merge vertices at the same position.
-    Weld,
-    /// Remove faces of zero area, duplicate faces and unused vertices.
-    DropDegenerate,
-    /// Complete half a cage: reflect it across its planar open boundary.
-    Mirror,
-    /// Close holes.
-    FillHoles,
-    /// Orient all faces outward.
-    Flip,
-    /// Move vertices outward until the cage encloses the model.
-    Grow,
-}
-
-impl From<RepairArg> for Repair {
-    fn from(arg: RepairArg) -> Self {
-        match arg {
-            RepairArg::Weld => Self::Weld,
-            RepairArg::DropDegenerate => Self::DropDegenerate,
-            RepairArg::Mirror => Self::Mirror,
-            RepairArg::FillHoles => Self::FillHoles,
-            RepairArg::Flip => Self::Flip,
-            RepairArg::Grow => Self::Grow,
-        }
-    }
 }

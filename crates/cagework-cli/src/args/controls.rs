@@ -8,9 +8,7 @@ use clap::Args;
 /// Argument for the subdivision of the cage.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct SmoothArgs {
-    /// Steps of Catmull-Clark subdivision of the cage, 0 to 3: the model follows the smooth surface, and the cage's vertices
-    /// remain the controls.
-    #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = super::number::<u32>(options::SMOOTH))]
+    #[arg(long, help = options::SMOOTH.about(), default_value_t = 0, value_name = "STEPS", value_parser = super::number::<u32>(options::SMOOTH))]
     pub(crate) smooth: u32,
 }
 

@@ -34,8 +34,7 @@ pub(crate) struct MapArgs {
     /// Map points of the deformed space back to the space at rest.
     #[arg(long)]
     pub(crate) inverse: bool,
-    /// Cells of the lattice along the longest side of the cage, 8 to 256.
-    #[arg(long, default_value_t = field::CELLS, value_name = "N", value_parser = number::<u32>(field::CELLS_RANGE))]
+    #[arg(long, help = field::CELLS_RANGE.about(), default_value_t = field::CELLS, value_name = "N", value_parser = number::<u32>(field::CELLS_RANGE))]
     pub(crate) cells: u32,
     /// File to write, in the format of the points; for a model, in any format.
     #[arg(short, long, value_name = "FILE")]

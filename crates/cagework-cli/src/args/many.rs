@@ -40,8 +40,7 @@ pub(crate) struct RefitArgs {
     /// Skip outputs that are newer than their model, cage, pose and controls. Options are not compared.
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
+    #[arg(short, long, help = options::GRID.about(), default_value_t = BindOptions::default().grid, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,

@@ -56,8 +56,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) column: u32,
     /// Axis perpendicular to the slice.
-    #[arg(long, value_enum, default_value_t = AxisArg::Z)]
-    pub(crate) axis: AxisArg,
+    #[arg(long, default_value = "z", value_parser = axis())]
+    pub(crate) axis: usize,
     /// Position of the slice along the axis, 0 to 1.
     #[arg(long, default_value_t = 0.5, value_name = "FRACTION")]
     pub(crate) at: f32,
@@ -88,8 +88,7 @@ pub(crate) struct RenderArgs {
     /// Picture to write (.png).
     #[arg(short, long, value_name = "FILE", value_parser = png_output)]
     pub(crate) output: PathBuf,
-    /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
+    #[arg(short, long, help = GRID.about(), default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
@@ -133,12 +132,9 @@ pub(crate) enum ShowArg {
     Slice,
 }
 
-/// Coordinate axis perpendicular to the slice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum AxisArg {
-    X,
-    Y,
-    Z,
+/// Parser of the index of a coordinate axis.
+fn axis() -> impl TypedValueParser<Value = usize> {
+    PossibleValuesParser::new(["x", "y", "z"]).map(|name| "xyz".find(&name).unwrap_or(2))
 }
 
 /// Width and height of a picture, pixels.

@@ -43,15 +43,11 @@ pub(crate) struct SolveArgs {
     /// Number of threads; 0 for all.
     #[arg(long, default_value_t = 0, value_name = "N")]
     threads: usize,
-    /// Stop when delta (the paper's Eq. 2; for multigrid and cg the estimated remaining error) falls below this.
-    #[arg(long, default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
+    #[arg(long, help = options::TAU.about(), default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
     tau: f32,
-    /// Stop after this many Jacobi sweeps or cg steps, and after at most 60 V-cycles.
-    #[arg(long, default_value_t = BindOptions::default().max_iterations, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
+    #[arg(long, help = options::MAX_ITERATIONS.about(), default_value_t = BindOptions::default().max_iterations, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
     max_iterations: u32,
-    /// In each row, drop the smallest weights up to this total, then restore the row's sum and rest position; 0 keeps all
-    /// weights.
-    #[arg(long, default_value_t = BindOptions::default().sparsify, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
+    #[arg(long, help = options::SPARSIFY.about(), default_value_t = BindOptions::default().sparsify, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
     sparsify: f32,
     /// Cells of the classic method: fractions of the cage's box along each axis (as published), or cubic.
     #[arg(long, default_value_t, value_parser = words::<CellShape>())]

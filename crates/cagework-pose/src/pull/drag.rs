@@ -8,6 +8,7 @@ use super::energy::Pull;
 use super::grip::{Grip, check as check_index};
 use super::{MAX_HANDLES, PullError};
 use crate::symmetry::Symmetry;
+use cagework_core::options::{Number, Slider};
 use cagework_core::rotation::nearest_rotation;
 
 /// Weight of the cage's own edges in the energy. Results are nearly equal from 0.02 to 0.4. Below this range, the cage
@@ -302,12 +303,22 @@ fn check(
         return Err(PullError::Value { what: "relax", value: options.relax, range: "from 0 to 1" });
     }
     match options.reach {
-        Reach::Of(value) if !(value > 0.0 && value.is_finite()) => {
-            Err(PullError::Value { what: "the reach", value, range: "positive, over the model's size" })
+        Reach::Of(value) if !(REACH.is_allowed)(value) => {
+            Err(PullError::Value { what: "the reach", value, range: REACH.allowed })
         }
         _ => Ok(()),
     }
 }
+
+/// How far along the surface a pull moves the model. Beyond the upper half of the slider it moves the whole model.
+pub const REACH: Number = Number {
+    name: "reach",
+    help: "Distance along the surface that a pull affects",
+    unit: "fraction of the model's size",
+    allowed: "a number above 0",
+    is_allowed: |reach| reach.is_finite() && reach > 0.0,
+    slider: Some(Slider { min: 0.05, max: 2.4, step: 0.05 }),
+};
 
 /// Reach in object units. Automatic: the distance that encloses 15 % of the area per grab, but at least 1.2 times the
 /// largest distance between two grabs.

@@ -30,7 +30,7 @@ mod tests;
 
 use thiserror::Error;
 
-pub use drag::{Drag, DragOptions, Reach};
+pub use drag::{Drag, DragOptions, REACH, Reach};
 pub use energy::Pull;
 pub use fit::{Fit, FitOptions};
 pub use grip::{Grip, Handle};

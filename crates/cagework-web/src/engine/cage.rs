@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use cagework_cage::generate::BOX_MARGIN;
 use cagework_core::bind::{estimate_memory, estimate_updates};
 use cagework_core::{PolygonMesh, subdivided_box};
 use cagework_editor::Command;
@@ -16,9 +17,6 @@ use crate::controls;
 use crate::error::{Answer, Fault};
 use crate::options::{JsBindOptions, decode};
 use crate::views::object;
-
-/// Distance between the model and a box cage, as a fraction of the model's diagonal.
-const BOX_MARGIN: f32 = 0.04;
 
 #[wasm_bindgen]
 impl Engine {

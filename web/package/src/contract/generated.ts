@@ -1175,4 +1175,5 @@ export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
 /** MIME types of exported models, by extension. */
 export const EXPORT_TYPES: Readonly<Record<string, string>> = { glb: "model/gltf-binary", vrm: "model/gltf-binary", gltf: "model/gltf-binary", obj: "model/obj", stl: "model/stl", };
 /** Sliders of options, by name. */
-export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, vertices: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, margin: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, } as const;
+export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, vertices: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, margin: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, } as const;
+export const BOX_DIVISIONS = 2;
