@@ -104,7 +104,7 @@ impl FieldMap {
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn displacements(&self) -> Vec<f32> {
-        self.field.values.iter().flat_map(|value| value.to_array()).collect()
+        self.field.values.iter().flat_map(glam::Vec4::to_array).collect()
     }
 }
 
