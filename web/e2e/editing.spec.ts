@@ -95,9 +95,9 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
   await test.step("moving the view leaves the model unchanged", async () => {
     const before = await cagePositions(page);
     const first = await handle(page, 0);
-    await page.mouse.move(620, 180);
+    await page.mouse.move(300, 130);
     await page.mouse.down();
-    await page.mouse.move(700, 220, { steps: 4 });
+    await page.mouse.move(380, 170, { steps: 4 });
     await page.mouse.up();
     await page.mouse.wheel(0, -300);
     const turned = async () => {

@@ -66,7 +66,7 @@ async function fits(page: Page): Promise<void> {
 
   await page.keyboard.press("Alt+a");
   await page.keyboard.press("n");
-  expect(await hiddenHandles(page), "See narrows the view").toBe(0);
+  await expect.poll(() => hiddenHandles(page), "See narrows the view").toBe(0);
   await page.keyboard.press("n");
 
   const before = await cagePositions(page);
@@ -86,7 +86,7 @@ async function fits(page: Page): Promise<void> {
   expect(bar.x + bar.width - view.x, "the toolbar is beside the model").toBeLessThan(0.15 * view.width);
   expect(bar.y + bar.height).toBeLessThanOrEqual(view.y + view.height);
   await shoot(page, "landscape");
-  expect(await hiddenHandles(page), "the view frames the cage again").toBe(0);
+  await expect.poll(() => hiddenHandles(page), "the view frames the cage again").toBe(0);
   await page.setViewportSize({ width: 1024, height: 640 });
 }
 

@@ -51,6 +51,9 @@ fn files() -> Sandbox {
     for name in ["probes.csv", "sliced.csv"] {
         sandbox.write(name, format!("x,y,z\n0,{},0\n", 0.65 * top));
     }
+    sandbox.write("plant.splat", crate::splats::capture());
+    sandbox.run("cage plant.splat -o plant-cage.obj").success();
+    sandbox.write("bent-plant.obj", wider(&sandbox, "plant-cage.obj"));
     sandbox.write("garments.txt", "jacket.glb\ntrousers.glb\n");
     sandbox
 }

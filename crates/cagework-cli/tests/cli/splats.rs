@@ -4,7 +4,7 @@ use predicates::str::contains;
 use crate::support::{CORNERS, Sandbox, box_obj};
 
 /// A `.splat` file of splats on a sphere of radius 0.7, and one far outside the cage.
-fn capture() -> Vec<u8> {
+pub(crate) fn capture() -> Vec<u8> {
     const N: usize = 3000;
     let mut bytes = Vec::new();
     for k in 0..N {
