@@ -14,7 +14,7 @@ type Box = Awaited<ReturnType<typeof boxOf>>;
 const overlap = (a: Box, b: Box) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
-/** Number of cage vertices that are outside the view or under panels and toolbars. */
+/** Number of cage vertices that are outside the view or under panels and toolbars. The axes cover only a corner. */
 const hiddenHandles = (page: Page) =>
   page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
@@ -25,7 +25,7 @@ const hiddenHandles = (page: Page) =>
       const [x = 0, y = 0, z = 0] = positions.subarray(k, k + 3);
       const [right = 0, down = 0] = engine?.project(x, y, z) ?? [];
       const there = document.elementsFromPoint(left + right, top + down);
-      const isClear = !there.some((element) => element.matches(".floating, .see, .panel"));
+      const isClear = !there.some((element) => element.matches(".floating:not(.axes), .see, .panel"));
       if (!isClear || !there.some(({ id }) => id === "viewport")) hidden += 1;
     }
     return hidden;

@@ -292,6 +292,7 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
+    axes: () => Float32Array.of(0.8, -0.2, 0.5, 0, 0.9, 0.3, -0.5, -0.3, 0.8),
     estimateUpdates: () => 0,
     gestureView: () => ({ kind: "grab", amounts: [0.25], axis: 0, plane: false }),
   };
@@ -327,6 +328,7 @@ export function createFake(): Fake {
     pullGrab: (grab) => job("pullGrab", grab),
     pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
+    onFrame: () => () => undefined,
     readSettings(text, bind) {
       const given = JSON.parse(text);
       return { notices: [], ...given, bind: { ...given.bind, memory_limit: bind.memory_limit } };

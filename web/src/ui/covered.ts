@@ -2,8 +2,8 @@
 
 type Box = Pick<DOMRect, "left" | "top" | "right" | "bottom">;
 
-/** Overlays along a side of the view. Those in a corner, such as the axes, cover too little. */
-const OVERLAYS = ".mode, .tools, .looks, .bottom-line";
+/** Overlays along a side of the view. Those in a corner, such as the axes and the status, cover too little. */
+const OVERLAYS = ".mode, .tools, .looks, .hint-line";
 
 /** Widths of the margins under overlays: left, top, right, bottom, CSS pixels. */
 export type Margins = [left: number, top: number, right: number, bottom: number];
