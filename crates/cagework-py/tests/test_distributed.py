@@ -9,6 +9,8 @@ import cagework as cw
 import distributed
 import pytest
 from cagework.distributed import reshape_files
+from distributed.protocol.pickle import dumps
+from distributed.utils import sync
 from support import bent, rigged_glb
 
 N_FILES = 200
@@ -93,6 +95,17 @@ def test_failures_are_reported_and_other_files_are_written(client, files, tmp_pa
     assert [path.name for path in (tmp_path / "out").iterdir()] == [files[0].name]
 
 
+def name_of_status(dask_worker):
+    return dask_worker.status.name
+
+
+def nanny_status():
+    """Status of the nanny, which restarts this worker process, but not if the process dies while the nanny starts it."""
+    worker = distributed.get_worker()
+    ask = worker.rpc(worker.nanny).run
+    return sync(worker.loop, ask, function=dumps(name_of_status))["result"]
+
+
 class AlwaysKilled:
     """Calls cagework.reshape, and kills its process at each call for one file."""
 
@@ -101,6 +114,8 @@ class AlwaysKilled:
 
     def __call__(self, file, *args, **options):
         if Path(file).name == self.name:
+            while nanny_status() != "running":
+                pass
             os.kill(os.getpid(), signal.SIGKILL)
         return cw.reshape(file, *args, **options)
 
