@@ -141,6 +141,27 @@ impl GpuContext {
         })
     }
 
+    /// Creates a texture that passes draw on. `used`: what else it is used for.
+    pub(crate) fn target(
+        &self,
+        label: &str,
+        [width, height]: [u32; 2],
+        sample_count: u32,
+        format: wgpu::TextureFormat,
+        used: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | used,
+            view_formats: &[],
+        })
+    }
+
     /// Whether the device only draws. Then deformation runs on the CPU, and shaders read tables from
     /// textures. Fixed when the device is opened.
     #[must_use]

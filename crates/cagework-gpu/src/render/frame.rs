@@ -445,24 +445,9 @@ impl Renderer {
 }
 
 impl Targets {
-    fn new(context: &GpuContext, format: wgpu::TextureFormat, [width, height]: [u32; 2]) -> Self {
-        let texture = |label, format| {
-            context.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: SAMPLES,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            })
-        };
-        Self {
-            format,
-            size: [width, height],
-            color: texture("samples", format),
-            depth: texture("depth", DEPTH_FORMAT),
-        }
+    fn new(context: &GpuContext, format: wgpu::TextureFormat, size: [u32; 2]) -> Self {
+        let texture =
+            |label, format| context.target(label, size, SAMPLES, format, wgpu::TextureUsages::empty());
+        Self { format, size, color: texture("samples", format), depth: texture("depth", DEPTH_FORMAT) }
     }
 }

@@ -17,16 +17,8 @@ pub(super) struct ShadowMap {
 
 impl ShadowMap {
     pub(super) fn new(context: &GpuContext, layouts: &Layouts) -> Self {
-        let texture = context.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("shadow"),
-            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: SHADOW_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+        let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
+        let texture = context.target("shadow", [SIDE; 2], 1, SHADOW_FORMAT, sampled);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let sampler = context.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow"),

@@ -113,16 +113,8 @@ impl SplatLayer {
 
 impl Layer {
     fn new(context: &GpuContext, layouts: &Layouts, width: u32, height: u32) -> Self {
-        let texture = context.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("layer of splats"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: LAYER_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+        let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
+        let texture = context.target("layer of splats", [width, height], 1, LAYER_FORMAT, sampled);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("layer of splats"),

@@ -29,18 +29,8 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         self.context.check()?;
-        let device = &self.context.device;
         let mut allocator = Allocator::new(&self.context, "the picture");
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("picture"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: PICTURE_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = self.context.target("picture", size, 1, PICTURE_FORMAT, wgpu::TextureUsages::COPY_SRC);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let row_bytes = 4 * width;
         let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);

@@ -63,7 +63,7 @@ pub(crate) fn read(
         }
     }
     let Some(degree) = parts.iter().map(|part| part.degree).max() else { return Ok(None) };
-    let count = parts.iter().map(|part| part.count).sum();
+    let count = parts.iter().map(|part| part.count).fold(0, u64::saturating_add);
     let mut raw = RawSplats::new(count, degree, held, memory_limit)?;
     for part in &parts {
         part.read(source, &mut raw)?;
