@@ -1,4 +1,5 @@
-//! Times of whole binds by the published and the embedded method, on one thread and on all threads.
+//! Times of whole binds by the embedded method with multigrid and by the classic (published) method with Jacobi, on one
+//! thread and on all threads.
 #![allow(missing_docs, reason = "criterion's macros make public functions without documentation")]
 
 use std::hint::black_box;
@@ -17,7 +18,7 @@ fn bind(criterion: &mut Criterion) {
                 b.iter(|| black_box(input.bind(Method::Embedded, Solver::Multigrid, grid, threads)));
             });
         }
-        // A bind by the published method takes seconds, so that only the grid of the ratios is measured.
+        // A classic bind takes seconds, so it is timed at one grid size only, the same as in benches/ratios.rs.
         group.bench_function(BenchmarkId::new(format!("classic Jacobi, {name}"), 64), |b| {
             b.iter(|| black_box(input.bind(Method::Classic, Solver::Jacobi, 64, threads)));
         });

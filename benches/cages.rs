@@ -15,18 +15,18 @@ use cagework_core::progress::Silent;
 /// Target numbers of cage vertices; 80 is the default of the options.
 const TARGETS: [u32; 3] = [24, 80, 200];
 
-/// Cells along the longest side of the cage.
+/// Number of cells of the bind grid along the longest side of the cage.
 const GRID: u32 = 64;
 
-/// Largest rest error relative to the cage's diagonal.
+/// Largest allowed rest error of a vertex, as a fraction of the cage's diagonal.
 const MAX_REST_ERROR: f64 = 5e-5;
 
-/// Number of times that a cage is generated; the fastest time is printed.
+/// Number of times that each cage is generated for timing; the table shows the shortest time.
 const TIMES: usize = 5;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // `cargo test --benches` runs this program too, only to check that it compiles.
+    // `cargo test --benches` also runs this program, without `--bench`. Skip the measurements then.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -56,7 +56,7 @@ fn main() {
     }
 }
 
-/// Prints a row of the table. Returns whether the cage passed.
+/// Prints a row of the table. Returns whether the cage is valid, encloses the model and has a small rest error.
 fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
     let options = CageOptions { target, ..CageOptions::default() };
     let run = || generate(&mesh.positions, &mesh.triangles, &options, &Silent);

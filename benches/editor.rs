@@ -1,5 +1,5 @@
 //! Times of the editor's operations on a model of 30,000 vertices: commands, undo, redo and the view that panels show.
-//! The aim is below 1 ms each.
+//! The target is below 1 ms per operation.
 
 use std::time::Instant;
 
@@ -10,9 +10,9 @@ use cagework_io::{Model, write_mesh_glb};
 use cagework_tests::creature::creature;
 use glam::Vec3;
 
-/// Runs of each operation.
+/// Number of timed runs of each operation.
 const RUNS: usize = 201;
-/// Vertices of the model.
+/// Number of vertices of the model.
 const VERTICES: usize = 30_000;
 
 /// Copies of the test animal side by side, truncated to [`VERTICES`] vertices.

@@ -26,7 +26,7 @@ const FRAMES: usize = 100;
 /// Size of the picture, pixels.
 const SIZE: [u32; 2] = [1280, 800];
 
-/// Vertices of the mesh.
+/// Number of vertices of the mesh.
 const VERTICES: usize = 50_000;
 
 /// Four copies of the animal, scaled by 1.0 to 0.94, truncated to [`VERTICES`] vertices.
@@ -122,7 +122,7 @@ fn play(session: &mut Session) {
 }
 
 fn main() {
-    // `cargo test --benches` runs this program too, only to check that it compiles.
+    // `cargo test --benches` also runs this program, without `--bench`. Skip the measurements then.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

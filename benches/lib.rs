@@ -1,4 +1,4 @@
-//! Input of the benches, and the single stages of a bind.
+//! Input of the benches, and functions that run single stages of a bind.
 //!
 //! Mesh and cage are the animal of `cagework_tests::creature`, or the files in the environment variables
 //! `CAGEWORK_BENCH_MESH` and `CAGEWORK_BENCH_CAGE` (OBJ, glTF, GLB).
@@ -21,7 +21,7 @@ use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};
 use glam::Vec3;
 
-/// Grids at which whole binds are timed.
+/// Grid sizes at which whole binds are timed, in cells along the cage's longest side.
 pub const GRIDS: [u32; 3] = [32, 64, 128];
 
 /// A mesh in a cage.
@@ -37,7 +37,7 @@ impl Input {
     /// Loads the files that the environment names, or generates the animal.
     ///
     /// # Panics
-    /// If only one file is named, or one cannot be read.
+    /// If only one of the two files is named, or a file cannot be read.
     #[must_use]
     pub fn load() -> Self {
         let [mesh, cage] =
@@ -57,7 +57,7 @@ impl Input {
         input
     }
 
-    /// Binds the input with the default tau.
+    /// Binds the input with the default tolerance `tau`.
     ///
     /// # Panics
     /// If the input cannot be bound.
@@ -67,7 +67,7 @@ impl Input {
         bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
     }
 
-    /// The grid levels of the embedded method.
+    /// The grid levels of the input's cage by the embedded method. `grid`: cells along the cage's longest side.
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
@@ -75,7 +75,7 @@ impl Input {
         Hierarchy::new(&embedding.boundaries((&self.cage).into()), self.cage.n_vertices())
     }
 
-    /// Sampling stencils of all points on the finest level.
+    /// Sampling stencils of the input's points on the finest level.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
         let overlaps = Overlaps::default();
@@ -88,14 +88,14 @@ impl Input {
 /// Reads a model.
 ///
 /// # Panics
-/// If it cannot be read.
+/// If the file cannot be read or is not a model.
 #[must_use]
 pub fn read(path: &str) -> Model {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
     Model::read(path, &bytes, &mut |_| None).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Solves for one batch of columns.
+/// Solves for one batch of the weights' columns.
 pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
     let rule = BindOptions::default().stop_rule().of_batch(hierarchy.n_batches());
     let report = workspace.solve(hierarchy, batch, rule, &mut |_, _| true);

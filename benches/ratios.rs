@@ -1,5 +1,5 @@
 //! Ratios of times measured in the same run: the cost of a solve in sweeps, the cost of a finer grid, and the speed-up
-//! of the embedded method over the published one.
+//! of the embedded method over the classic (published) method.
 
 use cagework_benches::{GRIDS, Input, fastest_ms, resident_workspaces, solve_batch};
 use cagework_core::options::{Method, Solver};
@@ -12,8 +12,8 @@ const TIMES: usize = 60;
 /// Number of repetitions of binds that take seconds.
 const TIMES_SLOW: usize = 3;
 
-/// Sum over all batches of the minimum time of each batch, ms. Batches take turns, so that each batch finds the caches
-/// as the previous batch left them.
+/// Sum over all batches of the minimum time of `call(batch)`, ms. The batches are called in turn, so that each batch
+/// finds the processor's caches as the previous batch left them.
 fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut fastest = vec![f64::INFINITY; n_batches];
     for _ in 0..TIMES {
@@ -25,7 +25,7 @@ fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
 }
 
 fn main() {
-    // `cargo test --benches` runs this program too, only to check that it compiles.
+    // `cargo test --benches` also runs this program, without `--bench`. Skip the measurements then.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

@@ -24,10 +24,10 @@ use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
 use cagework_tests::Random;
 use glam::{Quat, Vec3, Vec3Swizzles as _, vec3};
 
-/// Target numbers of vertices.
+/// Target numbers of cage vertices.
 const TARGETS: [u32; 4] = [40, 80, 120, 200];
 
-/// Cells along the longest side of the cage.
+/// Number of cells of the bind grid along the longest side of the cage.
 const GRID: u32 = 32;
 /// Angle of the bend, radians.
 const BEND: f32 = 1.2;
@@ -98,7 +98,7 @@ impl Patches {
         })
     }
 
-    /// Adds a block of 2 x 2 x 0.6 with a round hole through it. Its four outer side faces are missing.
+    /// Adds a block of 2 x 2 x 0.6 with a round hole through it. The wall of the hole is missing.
     fn holed(self, x: f32, y: f32) -> Self {
         self.patch([3, 32], |u, v| {
             let round = on_circle(TAU * v);
@@ -126,7 +126,7 @@ fn figure() -> Patches {
     halves.limb([0.0, 0.0, 1.0], [0.0, 0.0, 1.45], 0.2).limb([0.0, 0.0, 1.75], [0.0, 0.0, 1.8], 0.14)
 }
 
-/// Joins `n` parts. `add` adds the part of a given index.
+/// Joins `n` parts. `add(parts, k)` adds part `k` to the previous parts.
 fn each(n: u32, add: impl Fn(Patches, f32) -> Patches) -> Patches {
     (0..n).fold(Patches::default(), |parts, k| add(parts, k as f32))
 }
@@ -245,7 +245,7 @@ fn largest(of: &[f64]) -> f64 {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // `cargo test --benches` runs this program too, only to check that it compiles.
+    // `cargo test --benches` also runs this program, without `--bench`. Skip the measurements then.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -320,8 +320,8 @@ fn row(model: &TriMesh, target: u32) -> [f64; COLUMNS.len()] {
     ]
 }
 
-/// Angles in degrees between the normals of adjacent triangles: across each diagonal of a face, and across each edge,
-/// where the largest angle of all triangulations of both faces counts.
+/// Angles in degrees between the normals of adjacent triangles: across each diagonal of a face, and across each edge
+/// the largest angle over all triangulations of its two faces.
 fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     let normal = |[a, b, c]: [u32; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.positions[v as usize].as_dvec3());
@@ -346,7 +346,8 @@ fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     folds
 }
 
-/// Largest distance of the model from the exact bend, relative to its diagonal, and the number of flipped triangles.
+/// Bends the cage. Returns the largest distance of a deformed model vertex from its exactly bent position, relative to
+/// the model's diagonal, and the number of triangles whose normal is flipped against that of the exactly bent triangle.
 fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
     let bounds = Bounds::of(&model.positions).expect("there are vertices");
     let extent = bounds.extent();

@@ -3,7 +3,7 @@
 struct Camera {
     clip_from_world: mat4x4f,
     view_from_world: mat4x4f,
-    /// Eye, world space, object units.
+    /// Position of the eye, world space, object units.
     eye: vec3f,
     /// 1: perspective, 0: orthographic.
     perspective: f32,
@@ -35,14 +35,14 @@ struct Camera {
 /// A position outside the clip volume, for hidden primitives.
 const OUTSIDE_CLIP_VOLUME = vec4f(0.0, 0.0, 2.0, 1.0);
 
-/// sRGB from linear (IEC 61966-2-1).
+/// Converts a linear colour to sRGB (IEC 61966-2-1).
 fn srgb_from_linear(linear: vec3f) -> vec3f {
     let low = 12.92 * linear;
     let high = 1.055 * pow(max(linear, vec3f(1e-5)), vec3f(1.0 / 2.4)) - 0.055;
     return select(high, low, linear <= vec3f(0.0031308));
 }
 
-/// Linear from sRGB.
+/// Converts an sRGB colour to linear.
 fn linear_from_srgb(srgb: vec3f) -> vec3f {
     let high = pow((srgb + 0.055) / 1.055, vec3f(2.4));
     return select(high, srgb / 12.92, srgb <= vec3f(0.04045));

@@ -1,6 +1,6 @@
-// Inner sum of Eq. 2 in Joshi et al. 2007: for each cell, sums the squared changes of its weights between two fields
-// over the columns of a batch, and adds the sum to `changes`. One invocation per row of the fields. CPU:
-// cagework_core::stencil::change_norms.
+// Inner sum of equation 2 in K. Smith's paper (docs/method.md, sources): for each cell, sums the squared changes of its
+// weights between two fields over the columns of a batch, and adds the sum to `changes`. One invocation per row of the
+// fields. CPU: cagework_core::stencil::change_norms.
 
 /// Bits of `mode`. CHANGE_ABSOLUTE: sum absolute values instead of squares. CHANGE_FIRST, for the first batch:
 /// overwrite `changes` instead of adding to them.

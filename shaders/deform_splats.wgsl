@@ -6,7 +6,28 @@
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> rest: array<vec4f>;
-@group(0) @binding(3) var<storage, read_write> splats: array<vec4f>;
+/// Columns x and y of the rotation of each splat, in two rows. Not written unless the mode is WITH_TURNS.
+@group(0) @binding(3) var<storage, read_write> turns: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> splats: array<vec4f>;
+
+/// Value of `Work::mode`: also compute the rotations, which spherical harmonics need.
+const WITH_TURNS = 1u;
+/// Number of Newton steps. Five suffice if the singular values are within a factor of 10 of each other; the other five
+/// are for stronger deformations.
+const STEPS = 10u;
+
+/// The orthogonal matrix nearest to `f`, by Newton's method on R = (R + R^-T) / 2 (Higham 1986, "Computing the polar
+/// decomposition"). Returns the identity if `f` has no positive determinant. CPU: cagework_core::splats::turn_of.
+fn turn_of(f: mat3x3f) -> mat3x3f {
+    let size = determinant(f);
+    if size <= 0.0 { return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0); }
+    var r = pow(size, -1.0 / 3.0) * f;
+    for (var k = 0u; k < STEPS; k += 1u) {
+        let cofactors = mat3x3f(cross(r[1], r[2]), cross(r[2], r[0]), cross(r[0], r[1]));
+        r = 0.5 * (r + (1.0 / determinant(r)) * cofactors);
+    }
+    return r;
+}
 
 /// Derivative of u at node `k` along an axis, by central differences. A neighbour beyond the end of the lattice is
 /// replaced by the node itself; at a bound node, also a neighbour that is not bound. `at`: coordinate of the node along
@@ -51,6 +72,11 @@ fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
     }
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
     let bent = f * covariance * transpose(f);
+    if work.mode == WITH_TURNS {
+        let r = turn_of(f);
+        turns[2u * splat] = vec4f(r[0], r[1].x);
+        turns[2u * splat + 1u] = vec4f(r[1].yz, 0.0, 0.0);
+    }
     splats[3u * splat] = vec4f(center.xyz + by, center.w);
     splats[3u * splat + 1u] = vec4f(bent[0], bent[1].y);
     splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, 0.0, 0.0);

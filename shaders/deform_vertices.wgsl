@@ -1,17 +1,17 @@
 // Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), written to the vertex buffer that is drawn. One
-// invocation per bundle of 4 vertices, so that a control vertex is read once for all four. Bundles are stored in slices
-// of 8: first entry of each bundle, second entry of each bundle, and so on, so that adjacent invocations read adjacent
-// entries. CPU: cagework_core::stencil::deform_vertices.
+// invocation per bundle of 4 vertices, so that c_i' is read once for all four. Bundles are stored in slices of 8: first
+// entry of each bundle, second entry of each bundle, and so on, so that adjacent invocations read adjacent entries.
+// CPU: cagework_core::stencil::deform_vertices.
 
-/// Vertices per bundle: the components of a vec4f.
+/// Number of vertices per bundle, which is the number of components of a vec4f.
 const BUNDLE = 4u;
-/// Bundles per slice.
+/// Number of bundles per slice.
 const SLICE = 8u;
 
 @group(0) @binding(0) var<uniform> work: Work;
 /// First entry of each slice in `columns` and `weights`, divided by 8.
 @group(0) @binding(1) var<storage, read> slices: array<u32>;
-/// Control vertex of each entry. Entries that pad a bundle to the length of its slice have the weight 0.
+/// Index into `cage` of each entry. Entries that pad a bundle to the length of its slice have the weight 0.
 @group(0) @binding(2) var<storage, read> columns: array<u32>;
 /// Weights of the bundle's four vertices, one vec4f per entry.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;

@@ -5,7 +5,7 @@
 const X_COLOR = vec3f(0.55, 0.07, 0.09);
 const Z_COLOR = vec3f(0.06, 0.20, 0.62);
 
-/// How much of the floor's light the shadow takes away at most.
+/// Maximum fraction of the floor's light that the shadow removes.
 const SHADOW_STRENGTH = 0.55;
 
 @group(1) @binding(0) var shadow_map: texture_2d<f32>;
@@ -35,13 +35,14 @@ fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
     return cover * clamp(1.4 - 4.0 * slope, vec2f(0.0), vec2f(1.0));
 }
 
-/// The map interpolated by cubic B-splines, as four linear samples. `at`: 0 to 1 across the map.
+/// Value of the shadow map at `at`, 0 to 1 across the map, interpolated by cubic B-splines from four linear samples.
 fn shadow_at(at: vec2f) -> f32 {
     let size = vec2f(textureDimensions(shadow_map));
     let place = at * size - 0.5;
     let f = fract(place);
     let g = 1.0 - f;
-    // Weights of the four pixels along each axis, and positions between the first two and the last two.
+    // Weights of the four pixels along each axis. One linear sample between the first two pixels, at `low`, gives their
+    // weighted mean; another one, at `high`, that of the last two.
     let w0 = g * g * g / 6.0;
     let w1 = (4.0 - 6.0 * f * f + 3.0 * f * f * f) / 6.0;
     let w3 = f * f * f / 6.0;
@@ -67,7 +68,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let coarse = lines(0.1 * at, 0.1 * slope, width);
     var alpha = max(0.36 * max(fine.x, fine.y), max(coarse.x, coarse.y)) * camera.floor_color.a;
     var color = camera.floor_color.rgb;
-    // The line x = 0 is the z axis, and vice versa.
+    // The line x = 0 is the z axis, and the line z = 0 is the x axis.
     let axes = clamp(vec2f(width) - abs(at) / max(slope, vec2f(1e-6)), vec2f(0.0), vec2f(1.0));
     if axes.x > 0.0 { color = mix(color, Z_COLOR, axes.x); alpha = max(alpha, 0.75 * axes.x); }
     if axes.y > 0.0 { color = mix(color, X_COLOR, axes.y); alpha = max(alpha, 0.75 * axes.y); }
@@ -84,6 +85,6 @@ fn fragment(in: Varying) -> @location(0) vec4f {
         shadow = SHADOW_STRENGTH * border * shadow_at(0.5 + 0.5 * across);
     }
     if max(alpha, shadow) <= 0.002 { discard; }
-    // The grid over a black shadow.
+    // Blend the grid over the shadow, which is black.
     return to_target(color, alpha) + vec4f(0.0, 0.0, 0.0, (1.0 - alpha) * shadow);
 }

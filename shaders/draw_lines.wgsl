@@ -46,6 +46,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let distance = length(vec2f(in.place.x - nearest, in.place.y));
     let cover = clamp(in.half_width + 0.5 - distance, 0.0, 1.0);
     if cover <= 0.0 { discard; }
-    // Lines thinner than a pixel keep some coverage everywhere, so they have no gaps, but are drawn more transparent.
+    // The antialiased edge adds half a pixel on each side, so that a line thinner than a pixel has no gaps. Multiply its
+    // alpha by its width, so that it still looks thin.
     return to_target(in.color.rgb, in.color.a * cover * min(1.0, 2.0 * in.half_width));
 }

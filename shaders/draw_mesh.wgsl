@@ -8,10 +8,11 @@ struct Surface {
     mode: u32,
     /// Fragments with an alpha below this are discarded.
     alpha_cutoff: f32,
-    /// WEIGHTS: weight of the colour map's first colour. ERRORS: its error, as a base-10 logarithm. Other modes: 1 to
-    /// paint each vertex by its value instead of greying it.
+    /// WEIGHTS: weight of the colour map's first colour. ERRORS: base-10 logarithm of the error of the first colour.
+    /// Other modes: 1 to blend colours towards PAINT_COLOR, 0 to blend them towards grey.
     low: f32,
-    /// WEIGHTS and ERRORS: the same for the last colour. Other modes: 1 to grey or paint each vertex, otherwise 0.
+    /// WEIGHTS and ERRORS: like `low`, for the last colour. Other modes: 1 to blend by the values of the vertices, 0 to
+    /// leave colours unchanged.
     high: f32,
 }
 
@@ -21,12 +22,13 @@ const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
 
-/// At full strength, greying replaces the share GREY_DESATURATION of a colour by grey of GREY_BRIGHTNESS times the
-/// colour's luminance.
+/// At a vertex value of 1, blending towards grey replaces the share GREY_DESATURATION of a colour by a grey of
+/// GREY_BRIGHTNESS times the colour's luminance.
 const GREY_BRIGHTNESS = 0.7;
 const GREY_DESATURATION = 0.8;
 
-/// Colour of paint, linear, and how much of it covers the material.
+/// Colour that marks painted vertices, linear, and the fraction of the material's colour that it replaces at a vertex
+/// value of 1.
 const PAINT_COLOR = vec3f(0.04, 0.19, 0.86);
 const PAINT_COVER = 0.72;
 

@@ -1,4 +1,5 @@
-// Draws the mesh from above into the map of its shadow: how close it is to the floor. The target keeps the maximum.
+// Draws the mesh from above into the shadow map. Each texel stores how close the mesh is to the floor there. Where
+// triangles overlap, blending keeps the value of the lowest one.
 
 struct Varying {
     @builtin(position) clip: vec4f,

@@ -4,9 +4,9 @@
 /// Variance that is added to each splat on the screen, square pixels, so that no splat is smaller than about a pixel
 /// (Kerbl et al. 2023).
 const PIXEL_VARIANCE = 0.3;
-/// Alpha below which nothing is drawn.
+/// Alpha below which a splat is invisible, because colours have 8 bits. It limits the size of the drawn quad.
 const MIN_ALPHA = 1.0 / 255.0;
-/// Largest standard deviation of a splat on the screen, pixels.
+/// Limit on the standard deviation of a splat on the screen, pixels. Longer axes of a splat are shortened to it.
 const MAX_REACH = 1024.0;
 /// Limit of the normalised device coordinates at which the projection of a covariance is linearised. It prevents huge
 /// ellipses of splats far beside the picture.
@@ -20,7 +20,7 @@ struct Varying {
     @location(1) @interpolate(flat) color: vec4f,
 }
 
-/// Row k of the upper left part of `clip_from_world`.
+/// The first three entries of row k of `clip_from_world`.
 fn row_of_clip(k: u32) -> vec3f {
     return vec3f(camera.clip_from_world[0][k], camera.clip_from_world[1][k], camera.clip_from_world[2][k]);
 }

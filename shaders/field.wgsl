@@ -9,7 +9,7 @@ struct Field {
     /// Number of nodes along each axis.
     dims: vec3u,
     /// Displacement of each node, object units; x varies fastest. The fourth component is 1 at nodes that have weights
-    /// of the controls (bound nodes) and 0 at the others.
+    /// of the controls (bound nodes) and 0 at other nodes.
     values: array<vec4f>,
 }
 

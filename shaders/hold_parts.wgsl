@@ -7,7 +7,7 @@
 @group(0) @binding(1) var<storage, read> rest: array<vec4f>;
 /// Piece of each vertex, counted from 1; 0 for none.
 @group(0) @binding(2) var<storage, read> piece_of: array<u32>;
-/// Three rows of a matrix for each piece. The displacement of its vertex with rest position x is rows * (x, 1).
+/// Three rows of a matrix for each piece. A vertex of the piece with rest position x is displaced by rows * (x, 1).
 @group(0) @binding(3) var<storage, read> motions: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> positions: array<vec4f>;
 

@@ -1,6 +1,6 @@
-// Jacobi sweep, the smoothing of Joshi et al. 2007 (Algorithm 3): each row of u_out is the average of its neighbours in
-// u_in and its boundary values. One invocation per row and quad of columns. The caller swaps u_in and u_out after each
-// sweep. CPU: cagework_core::stencil::jacobi_cells.
+// Jacobi sweep (Algorithm 3 in K. Smith's paper, see docs/method.md): each row of u_out is the average of its
+// neighbours in u_in and its boundary values. One invocation per row and quad of columns. The caller swaps u_in and
+// u_out after each sweep. CPU: cagework_core::stencil::jacobi_cells.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> neighbours: array<u32>;

@@ -2,7 +2,8 @@
 
 @group(1) @binding(0) var positions: texture_2d<f32>;
 @group(1) @binding(1) var normals: texture_2d<f32>;
-/// For each vertex, the weight, the error, or how much it is greyed or painted (0 to 1).
+/// Value of each vertex from which draw_mesh.wgsl computes its colour: the weight of the shown control, the
+/// reproduction error, or the strength, 0 to 1, with which the colour is blended towards grey or PAINT_COLOR.
 @group(1) @binding(2) var values: texture_2d<f32>;
 
 fn point_at(index: u32) -> vec3f { return textureLoad(positions, place_of(index), 0).xyz; }

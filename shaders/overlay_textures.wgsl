@@ -1,4 +1,5 @@
-// Positions and items of overlays in textures, which the CPU uploads. See also overlay_buffers.wgsl.
+// Positions and items of overlays in textures, which the CPU uploads. Used instead of overlay_buffers.wgsl where shaders
+// cannot read storage buffers.
 
 @group(1) @binding(1) var positions: texture_2d<f32>;
 @group(1) @binding(2) var items: texture_2d<u32>;

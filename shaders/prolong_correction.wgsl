@@ -1,12 +1,12 @@
-// Prolongation: adds to each black row the mean correction of its two or eight coarse neighbours, which is zero outside
-// the cage. With PROLONG_REPLACE, for the initial guess of full multigrid, replaces the row by the mean of those coarse
-// neighbours that are unknowns. One invocation per table entry and quad of columns. CPU:
+// Prolongation: adds to each black row the mean correction of its two or eight coarse neighbours. Neighbours outside
+// the cage have the correction zero. With PROLONG_REPLACE, for the initial guess of full multigrid, replaces the row by
+// the mean of those coarse neighbours that are unknowns. One invocation per table entry and quad of columns. CPU:
 // cagework_core::stencil::prolong_correction.
 
 /// Value of `mode` that replaces values instead of adding corrections.
 const PROLONG_REPLACE = 1u;
-/// Number of words in an entry before the rows of its `n_sources` coarse neighbours. They are the fine row, and the
-/// bits of 1 / (number of coarse neighbours that are unknowns).
+/// Number of words in an entry before the rows of its `n_sources` coarse neighbours. These words are the fine row, and
+/// the bits of 1 / (number of coarse neighbours that are unknowns).
 const ENTRY_HEAD = 2u;
 
 @group(0) @binding(0) var<uniform> work: Work;

@@ -1,4 +1,4 @@
-// Restriction: the right-hand side of a coarse row is a weighted sum of 13 red residuals of the fine level, at the
+// Restriction: the right-hand side of a coarse row is a weighted sum of the 13 red residuals of the fine level at the
 // centre of the coarse cell and at its twelve edge neighbours. One invocation per coarse row and quad of columns. CPU:
 // cagework_core::stencil::restrict_residual.
 

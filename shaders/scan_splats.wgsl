@@ -1,6 +1,6 @@
-// Second of three kernels that sort splats by depth: replaces the count of each block and bin by the position of its
-// first splat in the sorted order, which is the sum of all counts in earlier bins and of earlier blocks in the same
-// bin. One workgroup; each invocation handles 32 bins. CPU: cagework_gpu::splats::sort_splats.
+// Second of three kernels that sort splats by one digit of their depth: replaces the count of each block and bin by the
+// position of its first splat in the sorted order, which is the sum of all counts in earlier bins and of earlier blocks
+// in the same bin. One workgroup; each invocation handles 32 bins. CPU: cagework_gpu::splats::sort_splats.
 
 const LANES = 128u;
 

@@ -13,7 +13,7 @@ struct Delta { target_index: u32, x: f32, y: f32, z: f32 }
 @group(0) @binding(4) var<storage, read> deltas: array<Delta>;
 /// For each joint, the matrix from mesh space to world space.
 @group(0) @binding(5) var<storage, read> palette: array<mat4x4f>;
-/// Weights of the morph targets.
+/// Current weights t_k of the morph targets. `[n_targets]`
 @group(0) @binding(6) var<storage, read> targets: array<f32>;
 @group(0) @binding(7) var<storage, read_write> positions: array<vec4f>;
 

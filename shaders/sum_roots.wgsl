@@ -1,5 +1,5 @@
-// Outer sum of Eq. 2 in Joshi et al. 2007: adds the square roots of the cells' changes, one partial sum per workgroup.
-// CPU: cagework_core::stencil::sum_roots.
+// Outer sum of equation 2 in K. Smith's paper (docs/method.md, sources): adds the square roots of the cells' changes,
+// one partial sum per workgroup. CPU: cagework_core::stencil::sum_roots.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> changes: array<f32>;

@@ -7,13 +7,13 @@ struct Work {
     first: u32,
     /// Number of items.
     count: u32,
-    /// Number of invocations in one row (y) of the dispatch's two-dimensional grid of workgroups.
+    /// Number of invocations along x of the two-dimensional dispatch. See `invocation`.
     stride: u32,
     /// Number of quads per row of a field: the number of the batch's columns / 4.
     n_quads: u32,
     /// Row of the field, or slot of the result, that belongs to item 0.
     first_row: u32,
-    /// Number of quads in all batches before this one.
+    /// Number of quads in all batches before the current one.
     first_quad: u32,
     /// Variant of the kernel. Kernels with variants define the values as constants.
     mode: u32,

@@ -16,10 +16,10 @@ use cagework_tests::{assert_close, dense};
 use glam::{Quat, Vec3};
 use pollster::block_on;
 
-/// Largest difference between GPU and CPU weights.
+/// Largest allowed difference between GPU and CPU weights.
 const WEIGHT_TOLERANCE: f32 = 1e-4;
 
-/// Largest difference between GPU and CPU positions, relative to the cage's diagonal.
+/// Largest allowed difference between GPU and CPU positions, as a fraction of the cage's diagonal.
 const POSITION_TOLERANCE: f32 = 1e-4;
 
 /// A GPU context. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
@@ -30,7 +30,7 @@ fn context(options: &ContextOptions) -> GpuContext {
     }
 }
 
-/// Every third vertex of the animal, to save time, and its cage.
+/// Every third vertex of the animal [`creature`], to save time, and the animal's cage.
 fn input() -> (Vec<Vec3>, Cage) {
     (creature().positions.into_iter().step_by(3).collect(), cage(&creature_cage()))
 }
@@ -104,8 +104,8 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
-/// Parts that stay or are rigid move as in an export, on devices that compute and on devices that only draw. They may
-/// be set before or after the weights, or copied to another device.
+/// Fixed and rigid parts move as in an export, on devices that compute and on devices that only draw. A session accepts
+/// the parts before or after the weights, and copies them when it recovers on another device.
 #[test]
 fn parts_are_restored_as_in_an_export() {
     let (rest, cage) = input();
@@ -139,8 +139,8 @@ fn parts_are_restored_as_in_an_export() {
     }
 }
 
-/// Green weights have a column for each vertex and each triangle of the cage. The controls of triangles are computed
-/// from the pose.
+/// Green weights have a column for each vertex and each triangle of the cage. The vectors that the columns of triangles
+/// multiply are computed from the pose.
 #[test]
 fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let (positions, _) = input();
@@ -191,7 +191,7 @@ fn session_that_only_draws_equals_the_cpu() {
 
 #[test]
 fn several_batches_give_the_same_weights() {
-    // At this grid a field exceeds the binding limit, while the table of samples does not.
+    // At this grid, a field of all columns exceeds the binding limit below, while the sampling table does not.
     let options = BindOptions { grid: 48, ..options(Method::Embedded, Solver::Multigrid) };
     let mut whole = session();
     let report = block_on(whole.bind(&options, &Silent)).expect("it binds");
@@ -252,7 +252,7 @@ fn lost_device_is_an_error_and_recovery_restores_everything() {
         assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
     }
 
-    // Recovery on a device that is lost as well fails, and a further attempt succeeds.
+    // Recovery on another lost device fails; a further attempt on a working device succeeds.
     let broken = context(&ContextOptions::default());
     broken.device.destroy();
     let error = block_on(session.recover(broken)).map(drop).unwrap_err();

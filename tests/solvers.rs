@@ -23,7 +23,8 @@ macro_rules! properties {
     };
 }
 
-/// Declares a module of tests: `every` for the properties of both methods, `embedded` for all properties.
+/// Declares a module of tests for one back end. `every`: properties of both methods. `embedded`: also the properties
+/// that only the embedded method has.
 macro_rules! solver_suite {
     ($name:ident, every, $back_end:expr) => {
         mod $name {
@@ -141,7 +142,7 @@ fn preconditioned_cg(method: Method) -> BackEnd {
     back_end
 }
 
-/// Solvers whose tau bounds the error. For Jacobi it bounds the change per sweep.
+/// Solvers whose tau bounds the error. Jacobi is not tested here, because its tau bounds the change per sweep.
 mod error_bounds {
     use super::*;
 
@@ -155,13 +156,14 @@ mod error_bounds {
     #[test]
     fn conjugate_gradient_error_is_below_tau() {
         let cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
-        // The limit is higher than for V-cycles, which reduce the error tenfold each and so end further below tau.
+        // The limit is higher than for multigrid, each of whose V-cycles reduces the error tenfold, so that the last
+        // one ends further below tau.
         suite::raw::tau_bounds_the_solver_error(&cg, &[32], 1e-5);
         suite::raw::tau_bounds_the_solver_error(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
     }
 }
 
-/// Properties of multigrid only.
+/// Properties that are tested only for multigrid.
 mod multigrid {
     use super::*;
 

@@ -21,7 +21,7 @@ fn bound(sample: &Sample, cage: &Cage, options: BindOptions) -> Binding {
     bind(&sample.mesh.positions, cage, &options, &Silent).unwrap()
 }
 
-/// Options of the paper's method.
+/// Options of the method in K. Smith's paper (docs/method.md, sources).
 fn paper(grid: u32, tau: f32) -> BindOptions {
     BindOptions { grid, tau, method: Method::Classic, solver: Solver::Jacobi, ..BindOptions::default() }
 }
@@ -32,7 +32,7 @@ fn weight_fades_through_the_inside_of_the_cage_and_not_through_the_air() {
     let binding = bound(&rat, &cage, BindOptions::default());
     let largest = |column| binding.weights.column(column).fold(0.0, f32::max);
     assert!(binding.weights.column(55).all(|w| w >= -1e-6) && largest(55) < 1.0);
-    // One hind leg, for a cage vertex at the other.
+    // Weights of a cage vertex at one hind leg, for the model vertices of the other hind leg.
     let other = rat.mesh.positions.iter().zip(binding.weights.column(48));
     let other: Vec<f32> = other
         .filter(|(p, _)| p.x < -0.2 && p.y < 0.15 && (-0.9..-0.1).contains(&p.z))

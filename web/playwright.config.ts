@@ -8,7 +8,7 @@ export default defineConfig({
   testDir: "e2e",
   outputDir: "../target/e2e",
   // Tests often wait for timers or a single thread: three tests in parallel keep two cores busy.
-  workers: 3,
+  workers: process.env.FIGURES ? 1 : 3,
   fullyParallel: true,
   forbidOnly: true,
   // On a busy machine, tests take several times as long as on an idle one.
@@ -18,7 +18,9 @@ export default defineConfig({
   reporter: [["list"]],
   projects: process.env.PICTURES
     ? [{ name: "pictures", testMatch: "pictures.ts" }]
-    : [{ name: "page", testMatch: "*.spec.ts" }],
+    : process.env.FIGURES
+      ? [{ name: "figures", testMatch: "figures.ts", fullyParallel: false }]
+      : [{ name: "page", testMatch: "*.spec.ts" }],
   use: {
     baseURL: BASE,
     // Draw few pixels, because the processor computes them. SHARP=1 makes sharp pictures for inspection.

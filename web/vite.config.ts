@@ -4,17 +4,17 @@ import { join } from "node:path";
 import { defineConfig, type Plugin, type Rolldown } from "vite";
 
 /** Files in which Vite lists the licences of bundled packages. crates/xtask/src/licences.rs reads and deletes them. */
-const LICENCES = { page: "licences-npm.json", workers: "licences-npm-workers.json" };
+export const LICENCES = { page: "licences-npm.json", workers: "licences-npm-workers.json" };
 
 /** Vite's licence plugin. It covers only the page, so `licencesOfWorkers` also calls it for the bundles of workers. */
 let licences: Plugin | undefined;
-const findLicences: Plugin = {
+export const findLicences: Plugin = {
   name: "find-licences",
   configResolved({ plugins }) {
     licences = plugins.find(({ name }) => name === "vite:license");
   },
 };
-const licencesOfWorkers = (): Plugin => ({
+export const licencesOfWorkers = (): Plugin => ({
   name: "licences-of-workers",
   generateBundle(options, bundle, isWrite) {
     const generate = licences?.generateBundle as Rolldown.FunctionPluginHooks["generateBundle"] | undefined;
@@ -25,8 +25,8 @@ const licencesOfWorkers = (): Plugin => ({
   },
 });
 
-/** Warning of imports of Node's modules in gltf-transform and draco3dgltf, which use them only in Node. */
-const FOR_NODE = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
+/** Vite's warning about Node modules that gltf-transform and draco3dgltf import, but use only in Node. */
+export const FOR_NODE = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
 
 const PUBLIC = join(import.meta.dirname, "public");
 
@@ -55,13 +55,30 @@ const writeServiceWorker: Plugin = {
   },
 };
 
+/** Writes gallery.html, which is index.html with another title and description: its script depends on the address. */
+const writeGallery: Plugin = {
+  name: "gallery",
+  generateBundle: {
+    order: "post",
+    handler(_, bundle) {
+      const page = bundle["index.html"];
+      if (page?.type !== "asset") throw new Error("the build has no index.html");
+      const source = String(page.source)
+        .replace("<title>", "<title>Gallery - ")
+        .replace(/(name="description"\s+content=")[^"]*/, `$1${DESCRIPTION}`);
+      this.emitFile({ type: "asset", fileName: "gallery.html", source });
+    },
+  },
+};
+const DESCRIPTION = "Live examples of cage deformation by harmonic coordinates, computed in your browser.";
+
 /** Configuration of the page's build. URLs are relative, so the page works under any path of any server. */
 export default defineConfig({
   root: import.meta.dirname,
   // The page imports its own npm package from the sources.
   resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },
   base: "./",
-  plugins: [findLicences, writeServiceWorker],
+  plugins: [findLicences, writeServiceWorker, writeGallery],
   build: {
     outDir: "../dist",
     emptyOutDir: true,

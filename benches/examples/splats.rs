@@ -1,5 +1,6 @@
-//! Bends a capture by its generated cage. Prints the errors of the lattice against weights bound for each splat at
-//! g = 128 (the table of docs/splats.md), and times for a million splats.
+//! Bends a capture of Gaussian splats by its generated cage. Prints the errors of interpolating the deformation in a
+//! lattice, compared with weights bound for each splat at g = 128 (the table of docs/splats.md), and times for a
+//! million splats.
 //!
 //! `cargo run --release -p cagework-benches --example splats -- CAPTURE [THREADS]`
 
@@ -19,13 +20,15 @@ use cagework_io::{Model, ModelFormat};
 use cagework_tests::random::Random;
 use glam::{DVec3, Mat3, Vec3};
 
-/// Cells of the solver's grid along the cage's longest side, for splats and lattice: the errors are those of the lattice.
+/// Number of cells of the solver's grid along the cage's longest side. Splats and lattice nodes are bound on the same
+/// grid, so that their difference is the error of interpolation in the lattice.
 const FINE_GRID: u32 = 128;
-/// Splats that are bound at a time.
+/// Number of splats that are bound at a time.
 const RUN: usize = 10_000;
-/// Points that are bound for each splat: centre, both ends of the longest half axis, and three pairs for differences.
+/// Number of points that are bound for each splat: its centre, both ends of its longest axis, and a pair along each
+/// coordinate axis for the differences that give the deformation gradient F.
 const POINTS: usize = 9;
-/// Half distance of a pair, as a fraction of the diagonal.
+/// Distance of the points of a pair from the centre, as a fraction of the diagonal of the splats' bounds.
 const STEP: f32 = 0.002;
 
 fn main() {
@@ -45,7 +48,8 @@ fn main() {
     times(splats, cage, &weights, &Team::new(threads));
 }
 
-/// Names and positions of the poses.
+/// Three test poses, each as its name and the posed positions of the cage's vertices. `diagonal`: length that
+/// displacements are relative to.
 fn poses(cage: &Cage, diagonal: f32) -> [(&'static str, Vec<Vec3>); 3] {
     let rest = cage.positions();
     let bounds = cage.bounds();
@@ -67,7 +71,8 @@ fn poses(cage: &Cage, diagonal: f32) -> [(&'static str, Vec<Vec3>); 3] {
     [("bend 120", rest.iter().map(bend).collect()), ("one vertex 0.3", pulled), ("noise 3 %", noise)]
 }
 
-/// Position error, relative error of F, and first-order error of each splat.
+/// For each splat: position error relative to the diagonal, relative error of the deformation gradient F, and error of
+/// F's first-order prediction at the end of the longest axis, relative to its half length.
 type Errors = [Vec<f32>; 3];
 
 fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
@@ -105,7 +110,7 @@ fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
     }
 }
 
-/// Longest half axis of a splat, sqrt(3) standard deviations long.
+/// Vector from a splat's centre along its longest axis, sqrt(3) standard deviations long.
 fn half_axis(splats: &Splats, splat: usize) -> Vec3 {
     let axes = splats.axes(splat).to_cols_array_2d().map(Vec3::from_array);
     let longest = axes.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
@@ -134,7 +139,7 @@ fn quantile(numbers: &mut [f32], share: f64) -> f32 {
     *numbers.select_nth_unstable_by(rank, f32::total_cmp).1
 }
 
-/// Times for a million splats: those of the capture, repeated with small offsets.
+/// Prints times for a million splats, which are copies of the capture's splats with small random offsets.
 fn times(capture: &Splats, cage: &Cage, weights: &FieldWeights, team: &Team) {
     const N: usize = 1_000_000;
     let mut random = Random::new(1);

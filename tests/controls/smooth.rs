@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::support::{bound, samples, scattered};
 
-/// One step of Catmull-Clark subdivision of values at vertices; the search for neighbours is independent of the core's.
-/// Returns the new values (of vertices, of edges sorted by their ends, of faces) and the new quads.
+/// One step of Catmull-Clark subdivision of values at vertices, which shares no code with `cagework_core`. Returns the
+/// new values (of vertices, of edges sorted by their ends, of faces) and the new quads.
 fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
@@ -52,7 +52,8 @@ fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     (new, quads)
 }
 
-/// A mesh subdivided `steps` times, and for each new vertex a row: its weights of the original vertices.
+/// A mesh subdivided `steps` times, and the subdivision matrix: for each new vertex, a row with the weights of the
+/// original vertices.
 fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) {
     let n = mesh.positions.len();
     let mut faces = Vec::new();
@@ -72,12 +73,13 @@ fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) 
     (PolygonMesh { positions: rows.iter().map(place).collect(), faces }, rows)
 }
 
-/// Tolerance for f32 weights of two binds with different batches of columns: rounding.
+/// Allowed difference between f32 weights of two binds that divide the columns into different batches. It is due to
+/// rounding.
 const ROUND_OFF: f64 = 1e-5;
 
-/// Boundary values on bent quads miss the rest position by up to 2 % of the bend. Restoring rows distributes this error
-/// among the controls in one bind, and among the vertices of the subdivided cage in the other bind. The weights of the
-/// two binds differ by at most this multiple of the error.
+/// On quads that are not planar, boundary values reproduce rest positions with an error of up to 2 % of the distance from
+/// a plane. Each bind then corrects its rows: that of the smooth cage distributes the error among the controls, that of
+/// the subdivided cage among its vertices. Their weights differ by at most this multiple of the error.
 const MAX_ERROR_RATIO: f64 = 2.0;
 
 #[test]
@@ -100,7 +102,7 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
         for v in 0..points.len() {
             let mut expected = vec![0.0; cage.n_vertices()];
             let (columns, weights) = by_route.weights.row(v);
-            // The remaining columns of the row are offsets.
+            // The remaining columns belong to the frames and contain offsets.
             for (&k, &w) in columns.iter().zip(weights).filter(|(k, _)| (**k as usize) < rows.len()) {
                 for (sum, share) in expected.iter_mut().zip(&rows[k as usize]) {
                     *sum += f64::from(w) * share;
@@ -120,9 +122,9 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
     }
 }
 
-/// Before weights are corrected to reproduce the rest positions, those of a smooth cage and those of the subdivided cage
-/// times the subdivision matrix are the same linear combinations of the same fields. They agree to 1e-5 even if quads
-/// are bent.
+/// Before weights are corrected to reproduce the rest positions, the weights of a smooth cage and those of the
+/// subdivided cage times the subdivision matrix are the same linear combinations of the same fields. They agree to 1e-5
+/// even if quads are bent.
 #[test]
 fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in
@@ -153,8 +155,8 @@ fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
     }
 }
 
-/// Vertices just outside the smooth surface follow a rigid motion fully; those further away follow it partially and are
-/// excluded.
+/// Vertices just outside the smooth surface follow a rigid motion fully. Vertices further away follow it partially, so
+/// the comparison excludes them.
 #[test]
 fn smooth_cage_keeps_the_rest_pose_and_rigid_motions() {
     let cage = cage(&l_shape());

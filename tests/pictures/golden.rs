@@ -8,17 +8,18 @@ use std::path::{Path, PathBuf};
 use cagework_gpu::Session;
 use image::RgbaImage;
 
-/// Size of all pictures, pixels.
+/// Width and height of all pictures, pixels.
 pub(crate) const SIZE: [u32; 2] = [320, 240];
 
-/// Largest mean difference of a channel, in 255ths. Other adapters round colours differently and have other sample positions,
-/// which moves edges by a fraction of a pixel.
+/// Largest allowed difference of two pictures, in 255ths, averaged over pixels and channels. Other adapters round
+/// colours differently and have other sample positions, which moves edges by a fraction of a pixel.
 const MEAN_TOLERANCE: f64 = 1.0;
 
 /// A pixel counts as different if a channel differs by more than this, in 255ths.
 const PIXEL_TOLERANCE: u8 = 40;
 
-/// Largest fraction of different pixels: about half of the edge pixels, because adapters rasterise lines and points differently.
+/// Largest allowed fraction of the picture's pixels that differ. Adapters rasterise lines and points differently, which
+/// changes pixels at edges; 1 % of a picture is about half of its pixels at edges.
 const MAX_DIFFERENT_FRACTION: f64 = 0.01;
 
 fn root() -> &'static Path {
@@ -57,7 +58,7 @@ fn write_picture(picture: &RgbaImage, name: &str) -> PathBuf {
     path
 }
 
-/// Describes the difference if it exceeds a tolerance.
+/// Describes how two pictures differ; `None` if they are equal within the tolerances.
 fn difference(a: &RgbaImage, b: &RgbaImage) -> Option<String> {
     if a.dimensions() != b.dimensions() {
         return Some(format!("{:?} pixels instead of {:?}", a.dimensions(), b.dimensions()));

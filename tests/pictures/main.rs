@@ -1,4 +1,4 @@
-//! Pictures of everything that can be drawn, compared with references.
+//! Pictures of meshes, cages, gizmos, slices, marks and heat maps, compared with references.
 
 // `cfg(test)` is always true here; it makes clippy treat these modules as tests.
 #[cfg(test)]
@@ -13,7 +13,7 @@ use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
 use cagework_gpu::render::{
     AxisView, Camera, Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, Projection, SceneOptions, Selection,
-    SliceView, Theme,
+    SliceView, Theme, ViewOptions,
 };
 use cagework_gpu::{ContextOptions, Session};
 use glam::{Quat, Vec2, Vec3};
@@ -24,7 +24,8 @@ use scenes::{bind, bow, classic, creature, creature_on, embedded, everywhere, te
 fn solid_in_its_cage() {
     for (theme, name) in [(Theme::Dark, "solid-dark"), (Theme::Light, "solid-light")] {
         let mut session = creature();
-        session.set_scene(SceneOptions { theme, ..SceneOptions::default() });
+        let view = ViewOptions { theme, ..ViewOptions::default() };
+        session.set_scene(SceneOptions { view, ..SceneOptions::default() });
         assert_picture(&mut session, name);
     }
 }
@@ -59,18 +60,22 @@ fn near_the_head(session: &Session) -> u32 {
     nearest.expect("a cage has vertices") as u32
 }
 
-/// The paper's figure 4: the rest pose reconstructed from classic weights, with the base mesh as a wireframe.
+/// Figure 4 of K. Smith's paper (docs/method.md, sources): the rest pose reconstructed from classic weights, with the
+/// base mesh as a wireframe.
 #[test]
 fn base_wireframe_over_the_reconstruction() {
     let mut session = creature();
     bind(&mut session, &classic(16));
     session.set_scene(SceneOptions {
-        theme: Theme::Light,
+        view: ViewOptions {
+            theme: Theme::Light,
+            base_wireframe: true,
+            floor: false,
+            ..ViewOptions::default()
+        },
         mesh: MeshStyle::Clay,
-        base_wireframe: true,
         cage_lines: false,
         handles: false,
-        floor: false,
         ..SceneOptions::default()
     });
     assert_picture(&mut session, "base-wireframe");
@@ -132,7 +137,7 @@ fn sliced(device: &ContextOptions, method: Method, with_values: bool, theme: The
     session.camera_mut().look_along(AxisView::Front);
     session.camera_mut().orbit(Vec2::new(0.5, 0.3));
     session.set_scene(SceneOptions {
-        theme,
+        view: ViewOptions { theme, ..ViewOptions::default() },
         mesh: MeshStyle::Hidden,
         handles: false,
         slice: Some(SliceView { slice: Arc::new(slice), column }),
@@ -191,7 +196,8 @@ fn problems_are_marked() {
             cage_vertices: vec![5, 60],
             rings: Vec::new(),
         };
-        session.set_scene(SceneOptions { marks, theme: Theme::Light, ..SceneOptions::default() });
+        let view = ViewOptions { theme: Theme::Light, ..ViewOptions::default() };
+        session.set_scene(SceneOptions { marks, view, ..SceneOptions::default() });
         assert_picture(&mut session, "marks");
     }
 }
@@ -205,12 +211,13 @@ fn orthographic_from_above() {
     assert_picture(&mut session, "orthographic-top");
 }
 
-/// Canvas formats that are not sRGB show the same colours.
+/// A picture drawn to a texture format without sRGB conversion has the same colours.
 #[test]
 fn formats_without_srgb_look_the_same() {
     let mut session = creature();
     // Blended elements would differ, because such formats blend sRGB values: draw opaque elements only.
-    let bare = SceneOptions { floor: false, cage_lines: false, handles: false, ..SceneOptions::default() };
+    let view = ViewOptions { floor: false, ..ViewOptions::default() };
+    let bare = SceneOptions { view, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.set_scene(bare);
     let expected = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
     let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);

@@ -1,4 +1,4 @@
-//! Sessions for the pictures.
+//! Sessions whose pictures the tests draw.
 
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use cagework_tests::creature;
 use glam::{Quat, Vec2, Vec3};
 use pollster::block_on;
 
-/// Options of a device that computes, and of one that only draws, as in browsers without WebGPU. Pictures must be equal
-/// on both.
+/// Options of a device that computes, and of one that only draws, as in browsers without WebGPU. Both devices must draw
+/// equal pictures.
 pub(crate) fn everywhere() -> [ContextOptions; 2] {
     [false, true].map(|draws_only| ContextOptions { draws_only, ..ContextOptions::default() })
 }
@@ -27,14 +27,14 @@ pub(crate) fn empty(options: &ContextOptions) -> Session {
     }
 }
 
-/// Undoes the rotation of the animal, and makes y its up axis.
+/// Undoes the rotation that [`creature::creature`] applies to the animal, and makes y the up axis.
 fn upright(p: Vec3) -> Vec3 {
     let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.2, -0.35, 0.5).inverse();
     let p = turn * p;
     Vec3::new(p.x, p.z, -p.y)
 }
 
-/// The animal in its cage of 112 vertices.
+/// A session with the animal of [`creature::creature`] in its cage of 112 vertices.
 pub(crate) fn creature() -> Session {
     creature_on(&ContextOptions::default())
 }
@@ -71,7 +71,7 @@ pub(crate) fn bind(session: &mut Session, options: &BindOptions) {
     assert!(report.converged);
 }
 
-/// Poses the cage so that the animal bows.
+/// Poses the cage of [`creature`] so that the animal lowers head and tail.
 pub(crate) fn bow(session: &mut Session) {
     let rest = session.cage().expect("there is one").positions().to_vec();
     let posed: Vec<Vec3> = rest

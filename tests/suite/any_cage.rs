@@ -79,8 +79,8 @@ pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
 }
 
 /// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956). Each step jumps to a
-/// random point of the largest sphere inside one of the boxes. Near the boundary of the union a walk ends with the
-/// trilinear coordinates in its box.
+/// random point of the largest sphere inside one of the boxes. A walk ends within 1e-4 of the union's boundary, with
+/// the trilinear coordinates of its last point in the box that contains this point.
 fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &mut Random) -> [f64; 16] {
     let mut sums = [0.0; 16];
     for _ in 0..n_walks {
@@ -147,7 +147,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     }
 }
 
-/// Edges with more than 60 % of their neighbourhood inside the cage.
+/// Re-entrant edges of a cage. An edge counts as re-entrant if more than 60 % of random points near it are inside.
 fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
     let mut random = Random::new(75);
     let sides = cage.faces().iter().flat_map(|f| (0..f.len()).map(|k| [f[k], f[(k + 1) % f.len()]]));
@@ -160,8 +160,8 @@ fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// Largest change of a weight between points 1/250 of a cell apart, on lines that pass re-entrant edges within 1.5
-/// cells but not within 0.1 cells.
+/// Largest change of a weight between points 1/250 of a cell apart, on lines near re-entrant edges that keep a distance
+/// of at least 0.1 cells from them.
 fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     let cell = cage.bounds().extent().max_element() / grid as f32;
     let edges = re_entrant_edges(cage, 0.1 * cell);
@@ -174,7 +174,7 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
         let n = (ends[0].distance(ends[1]) / (0.004 * cell)).ceil() as usize;
         let line: Vec<Vec3> = (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect();
         let way = (b - a).normalize();
-        // The exact field is arbitrarily steep on the edge itself.
+        // Keep a distance from the edge, on which the exact field is arbitrarily steep.
         let is_clear =
             |p: &Vec3| (*p - a).reject_from(way).length() > 0.1 * cell && points::is_inside(cage, *p);
         if line.iter().all(is_clear) { line } else { Vec::new() }
@@ -192,8 +192,8 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     largest
 }
 
-/// Next to re-entrant edges weights change by at most 4e-3 per 1/250 of a cell, and less on a finer grid: rays that hit
-/// an edge and rays that just miss it give the same values.
+/// Next to re-entrant edges, weights change by at most 4e-3 per 1/250 of a cell at g = 64, and by more at g = 32.
+/// Weights would jump if sampling rays that just miss an edge gave other values than rays that hit it.
 pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     let turn = Random::new(76).rotation();
     let rotated = moved(&l_shape(), |p| turn * p);
@@ -227,11 +227,11 @@ pub(crate) fn weights_are_continuous_in_the_corners_of_a_cage(back_end: &BackEnd
     }
 }
 
-/// Faces that no grid line hits, and fins thinner than a cell, give a notice with a grid that resolves them.
+/// If no grid line hits a face, or a part is thinner than a cell, the bind gives a notice that names a sufficient grid.
 pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &BackEnd) {
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
-    // The bar is rotated, so grid lines also leave it through its other sides.
+    // The bar is rotated, so that grid lines cross its adjacent sides and not only its opposite sides.
     let turn = Random::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
     for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {

@@ -40,8 +40,8 @@ pub(crate) fn tetrahedron_is_barycentric(back_end: &BackEnd) {
 }
 
 /// The classic method takes boundary values at the point of the cage closest to a cell's centre, and a vertex takes the
-/// weights of its cell. Each of the two moves a point by at most half a cell's diagonal, and the exact coordinates are
-/// linear.
+/// weights of its cell. Each of these two approximations moves a point by at most half a cell's diagonal. The exact
+/// coordinates are linear, so their slope times a cell's diagonal bounds the error.
 pub(crate) fn tetrahedron_is_barycentric_within_a_cell(back_end: &BackEnd) {
     let cage = cage(&tetrahedron(CORNERS));
     let points = points::inside(&cage, 300, 1);

@@ -21,7 +21,7 @@ use glam::{DVec3, Vec3};
 /// A function that binds a mesh to a cage.
 pub(crate) type Bind = fn(&[Vec3], &Cage, &BindOptions, &dyn Progress) -> Result<Binding, BindError>;
 
-/// A back end under test.
+/// A solver under test: a bind function, and the options that select the solver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BackEnd {
     pub(crate) bind: Bind,
@@ -29,14 +29,15 @@ pub(crate) struct BackEnd {
     pub(crate) options: BindOptions,
 }
 
-/// Grid size for properties that hold at any resolution.
+/// Number of grid cells along the cage's longest side, for properties that hold at any resolution.
 pub(crate) const GRID: u32 = 16;
 
-/// Threshold for delta at which the remaining error is below [`WEIGHT_TOLERANCE`]. At g = 16 a Jacobi sweep multiplies
-/// the error by cos(pi / 16) = 0.98, so the error is about 50 deltas.
+/// Threshold for delta ([`BindOptions::tau`]) at which the remaining error is below [`WEIGHT_TOLERANCE`]. At g = 16, a
+/// Jacobi sweep multiplies the error by cos(pi / 16) = 0.98, so the error is about 50 times the change per sweep,
+/// delta.
 pub(crate) const TAU: f32 = 1e-7;
 
-/// Largest error of weights solved to [`TAU`], including rounding.
+/// Largest allowed error of weights solved to [`TAU`], including rounding.
 pub(crate) const WEIGHT_TOLERANCE: f32 = 1e-5;
 
 impl BackEnd {
@@ -73,7 +74,7 @@ impl BackEnd {
     }
 }
 
-/// Positions `sum w c` of the vertices, in f64. `[n_vertices]`
+/// Positions that weights w and cage vertices c give the mesh vertices: `sum w c`, in f64. `[n_vertices]`
 pub(crate) fn combined(weights: &Weights, cage: &[Vec3]) -> Vec<DVec3> {
     weights
         .rows()

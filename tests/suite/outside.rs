@@ -10,12 +10,13 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::BackEnd;
 
-/// Tolerance for affine maps: 1e-5 relative to positions of size 5.
+/// Allowed distance of a deformed vertex from its expected position, object units: 1e-5 times 5, the largest extent of
+/// the points of [`some_outside`].
 const AFFINE_TOLERANCE: f32 = 5e-5;
 
-/// Points inside the C-shaped cage, points outside within 5 % of the cage's diagonal (5.1), some of them in the gap of
-/// the C, and corners of a box beyond 15 %. Returns all points, and the indices of the near and of the far points
-/// outside.
+/// Three groups of points: inside the C-shaped cage; outside, but within 5 % of the cage's diagonal of 5.1, some of
+/// them in the gap of the C; and corners of a box, farther away than 15 % of the diagonal. Returns all points, the
+/// indices of the second group, and those of the third.
 fn some_outside(n_inside: usize) -> (Vec<Vec3>, Vec<u32>, Vec<u32>) {
     let mut vertices = points::inside(&cage(&c_shape()), n_inside, 40);
     let near = [[-0.2, 1.5, 0.5], [2.0, -0.1, 0.4], [2.5, 1.2, 0.5], [3.0, 1.9, 0.7], [1.5, 0.3, 1.2]]
@@ -75,8 +76,7 @@ pub(crate) fn vertices_near_the_cage_follow_affine_maps_and_far_ones_stay(back_e
 
 /// A round bar that protrudes from an octagonal prism by up to 1.2 % of its diagonal is twisted by one radian per unit.
 /// The twist shears the surface at radius r = 1/2 by 1/2, so that it stretches edges by at most the larger singular
-/// value of that shear,
-/// 1.28.
+/// value of that shear, 1.28.
 pub(crate) fn protruding_model_deforms_smoothly(back_end: &BackEnd) {
     let ring = |n: u16, r: f32, z: f32| {
         (0..n).map(move |k| {

@@ -1,5 +1,5 @@
-//! Defining properties of harmonic coordinates (Joshi et al. 2007): non-negative, partition of unity, linear precision,
-//! locality.
+//! Defining properties of harmonic coordinates (Joshi et al. 2007): non-negativity, partition of unity, linear
+//! precision, locality.
 
 use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::{
@@ -13,10 +13,11 @@ use super::{BackEnd, WEIGHT_TOLERANCE, assert_combined};
 /// Smallest weight that counts as non-negative, because of rounding.
 const MIN_WEIGHT: f32 = -1e-6;
 
-/// Largest error of a sum of weights: rounding, and the error of [`super::TAU`].
+/// Largest allowed deviation of a sum of weights from 1. It is due to rounding, and to the solver's error at
+/// [`super::TAU`].
 const SUM_TOLERANCE: f64 = 1e-5;
 
-/// Largest rest error relative to the diagonal.
+/// Largest allowed rest error, as a fraction of the cage's diagonal.
 const REST_TOLERANCE: f64 = 1e-5;
 
 /// Cages of triangles and quads, convex and non-convex, aligned with the grid and rotated.
@@ -54,7 +55,7 @@ pub(crate) fn weights_are_not_negative(back_end: &BackEnd) {
 
 pub(crate) fn weights_sum_to_one(back_end: &BackEnd) {
     for cage in cages() {
-        // At this tau the sum is accurate everywhere, also before rows are restored.
+        // At this tau the sum is accurate everywhere, also before rows are corrected to sum to 1.
         let points = points::inside(&cage, 400, 5);
         let binding = back_end.bind_with(&points, &cage, |o| o.tau = 1e-8);
         for (v, (_, row)) in binding.weights.rows().enumerate() {
@@ -74,7 +75,7 @@ pub(crate) fn points_are_reproduced(back_end: &BackEnd) {
         assert_eq!(binding.outside, []);
         assert_combined(&binding.weights, cage.positions(), &points, REST_TOLERANCE * diagonal);
         assert!(binding.report.rest_error.max_rel <= REST_TOLERANCE);
-        // The raw error is the error before rows are restored.
+        // The raw error is the error before rows are corrected to reproduce the points at rest.
         let raw = binding.report.raw_error.point_rel;
         assert!(raw.max <= f64::from(WEIGHT_TOLERANCE), "{raw:?}");
     }
@@ -102,7 +103,8 @@ pub(crate) fn vertex_at_a_cage_vertex_has_weight_one(back_end: &BackEnd) {
     }
 }
 
-/// Vertices at the end of the upper arm have less than 1e-3 of their largest weight in the lower arm.
+/// A cage vertex at the end of the upper arm of a C has little influence in the lower arm: its weights there are below
+/// 1e-3 of its largest weight.
 pub(crate) fn influence_stays_in_its_arm_of_a_c(back_end: &BackEnd) {
     const MAX_RATIO: f32 = 1e-3;
     for mesh in [c_shape(), c_prism()] {

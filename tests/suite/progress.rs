@@ -47,15 +47,15 @@ pub(crate) fn break_cancels_in_every_stage(back_end: &BackEnd) {
         let options = cagework_core::BindOptions { grid: 24, ..back_end.options };
         let result = (back_end.bind)(&points, &cage, &options, &watch);
         assert!(matches!(result, Err(BindError::Cancelled(_))), "{stage:?}");
-        // After the break, only threads that were already reporting may report.
+        // After the first report that returned `Break`, only threads that were already reporting may report.
         let calls = after.into_inner().unwrap();
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         assert!(calls <= threads.max(1), "{calls} reports after the break in {stage:?}");
     }
 }
 
-/// Locating all points in the grid, between voxelizing and solving, can take minutes for faces with hundreds of
-/// corners.
+/// Between voxelizing and solving, a bind locates the points in the grid. This can take minutes if faces have hundreds
+/// of corners, so the bind must poll for cancellation.
 pub(crate) fn cancellation_is_polled_while_points_are_located(back_end: &BackEnd) {
     let cage = cage(&triangulated(&c_shape()));
     let points = points::inside(&cage, 2000, 52);

@@ -1,4 +1,5 @@
-//! Solver errors, measured in rows before they are restored: operator and sampling reproduce linear functions exactly.
+//! Solver errors, measured in rows of weights before they are corrected to reproduce the rest positions. Stencils and
+//! sampling reproduce linear functions exactly, so all errors of these rows come from the solver.
 
 use cagework_core::PolygonMesh;
 use cagework_tests::cages::{c_shape, cage, moved, sphere, triangulated};
@@ -6,11 +7,12 @@ use cagework_tests::{Random, points};
 
 use super::BackEnd;
 
-/// Largest distance between `sum w c` and the vertex at tau = 1e-5, relative to the cage's diagonal.
+/// Largest allowed distance of a vertex at tau = 1e-5 from `sum w c` (weights w, cage vertices c), as a fraction of the
+/// cage's diagonal.
 const MAX_POINT_ERROR: f64 = 5e-5;
 
-/// On a convex and a non-convex cage: the mean distance between `sum w c` and the vertex is below `mean` at tau = 1e-5, relative to the
-/// cage's diagonal, and at least ten times larger at tau = 1e-3.
+/// On a convex and a non-convex cage: the mean distance between `sum w c` and the vertex, relative to the cage's
+/// diagonal, is below `mean` at tau = 1e-5, and at least ten times larger at tau = 1e-3.
 pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mean: f64) {
     let turn = Random::new(30).rotation();
     let rotated = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
@@ -29,8 +31,8 @@ pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mea
     }
 }
 
-/// Rounding must not be biased: multiplying by 1/6, which f32 rounds up, shifts the sum of all columns by 2.7e-5 on average at
-/// g = 128; dividing by 6 shifts it by 1.0e-6.
+/// Rounding must not be biased: multiplying by 1/6, which f32 rounds up, shifts the sum of all columns by 2.7e-5 on
+/// average at g = 128; dividing by 6 shifts it by 1.0e-6.
 pub(crate) fn rounding_does_not_add_up_over_columns(back_end: &BackEnd) {
     let cage = cage(&sphere(1));
     let points = points::inside(&cage, 1000, 30);

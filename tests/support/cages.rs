@@ -33,7 +33,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     }
 }
 
-/// The octahedron with vertices at distance 1 on the axes, in the order +x, -x, +y, -y, +z, -z.
+/// The octahedron with vertices on the axes at distance 1 from the origin, in the order +x, -x, +y, -y, +z, -z.
 #[must_use]
 pub fn octahedron() -> PolygonMesh {
     let positions = Vec3::AXES.iter().flat_map(|&a| [a, -a]).collect();
@@ -45,7 +45,7 @@ pub fn octahedron() -> PolygonMesh {
     PolygonMesh { positions, faces: faces.collect() }
 }
 
-/// The regular icosahedron with vertices at distance 1.
+/// The regular icosahedron with vertices at distance 1 from the origin.
 #[must_use]
 pub fn icosahedron() -> PolygonMesh {
     let golden = f32::midpoint(1.0, 5.0_f32.sqrt());
@@ -56,7 +56,7 @@ pub fn icosahedron() -> PolygonMesh {
         Vec3::from(at)
     };
     let positions: Vec<Vec3> = (0..12).map(corner).collect();
-    // Adjacent corners are at a distance of 2.
+    // Before normalisation, adjacent corners are at a distance of 2 from each other.
     let is_near = |a: usize, b: usize| (positions[a].distance(positions[b]) - 2.0).abs() < 1e-3;
     let mut faces = Vec::new();
     for (a, b, c) in (0..12).flat_map(|a| (a..12).flat_map(move |b| (b..12).map(move |c| (a, b, c)))) {
@@ -114,7 +114,7 @@ pub fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(height)).collect(), faces }
 }
 
-/// A regular pentagon of radius 1, from z = 0 to 1.5.
+/// The prism over a regular pentagon of radius 1, from z = 0 to 1.5.
 #[must_use]
 pub fn pentagonal_prism() -> PolygonMesh {
     let outline: Vec<[f32; 2]> = (0..5)
@@ -125,7 +125,7 @@ pub fn pentagonal_prism() -> PolygonMesh {
 }
 
 /// The surface of a union of unit cubes with these minimum corners: a quad per exposed side, with shared vertices.
-/// Cubes must not touch in only an edge or a corner.
+/// No two cubes may touch only along an edge or at a corner.
 #[must_use]
 pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let filled: BTreeSet<[i32; 3]> = cubes.iter().copied().collect();
@@ -133,8 +133,8 @@ pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let mut mesh = PolygonMesh::default();
     for cube in &filled {
         for axis in 0..3 {
-            // (u, v, axis) is right-handed, so counter-clockwise in u and v faces in the positive direction of the
-            // axis.
+            // (u, v, axis) is right-handed, so a quad that is counter-clockwise in u and v faces in the positive
+            // direction of the axis.
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             for up in [false, true] {
                 let mut beside = *cube;
@@ -188,7 +188,7 @@ pub fn c_prism() -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(1.0)).collect(), faces }
 }
 
-/// A bar of length 4 and the given thickness, not aligned with an axis, and thinner than the cells of a coarse grid.
+/// A bar of length 4 with a square cross-section of side `thickness`, not aligned with an axis.
 #[must_use]
 pub fn thin_bar(thickness: f32) -> PolygonMesh {
     let long = blocks(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]);

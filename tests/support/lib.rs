@@ -1,7 +1,7 @@
 //! Helpers of tests and benches: cages with known coordinates, points inside them, seeded random numbers, comparison of
 //! lists.
 //!
-//! All inputs are generated, so that no test depends on a file outside the repository.
+//! All inputs of this library are generated, so that tests and benches need no files for them.
 
 pub mod cages;
 pub mod compare;

@@ -47,7 +47,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
     const rows = page.getByRole("table", { name: "Binds of this cage" }).locator("tbody tr");
     await expect(rows.getByRole("rowheader")).toHaveText([/Classic, Jacobi/, /Embedded, multigrid/]);
     const errors = (await rows.locator("td:last-child").allTextContents()).map(Number);
-    // The classic method gives each vertex the coordinates of the centre of its cell.
+    // The classic method gives each vertex the coordinates of its cell's centre, so it misses the rest positions.
     expect(errors[0], `rest errors ${errors}`).toBeGreaterThan(100 * (errors[1] ?? 1));
     await expect(page.locator(".curves li")).toHaveText(["Jacobi", "multigrid"]);
     await expect(page.locator(".plot polyline")).toHaveCount(2);
@@ -65,7 +65,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
     await bound(page);
   });
 
-  // Few vertices, whose binds are quick.
+  // Use a model with few vertices: the steps below bind several times.
   await dropBox(page, "small");
   for (const backend of ["gpu", "cpu"] as const) {
     await test.step(`${backend}: a bind reports progress and stops when cancelled`, async () => {
@@ -96,7 +96,7 @@ test("binds are compared in the panel, cancelled on both back ends, and rejected
           () => "done",
           (error: Error) => error.name,
         );
-        // After the cancellation, the worker accepts another bind. The engine keeps weights throughout.
+        // The worker accepts another bind after the cancelled one.
         const report = await session.bind({ ...options, grid: 16, tau: 1e-5 }, () => undefined).done;
         return { name, steps, grid: report.grid, backend: report.backend, bound: session.engine.bound };
       }, backend);

@@ -1,4 +1,4 @@
-/** How tests launch the browser, Debian's Chromium. */
+/** Launch options of Debian's Chromium, in which the tests run. */
 
 const QUIET = [
   "--headless=new",
@@ -21,8 +21,8 @@ const launch = (args: readonly string[]) => ({
   args: [...args, ...SOFTWARE, ...QUIET],
 });
 
-/** Chromium with WebGPU. */
+/** Launch options of Chromium with WebGPU. */
 export const WITH_WEBGPU = launch(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
 
-/** Chromium with WebGL2. The processor composes the page: this mode does not support WebGPU canvases. */
+/** Launch options of Chromium with WebGL2. The processor composes the page, and WebGPU canvases are not supported. */
 export const WITH_WEBGL = launch(["--disable-gpu-compositing"]);

@@ -14,6 +14,7 @@ import {
   openWith,
   pull,
   rested,
+  restPositions,
   shoot,
   test,
 } from "./support";
@@ -72,7 +73,8 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await page.getByRole("switch", { name: /Smooth its surface/ }).click();
     await boundTo(page, 2, 0);
     const smooth = await modelPositions(page);
-    // The B-spline surface gives the moved corner smaller weights, so that the model moves less.
+    // The moved corner has smaller weights in the smooth cage than in the plain cage, so the same pose moves the model
+    // less.
     expect(largestMove(plain, smooth)).toBeGreaterThan(0.01);
     await shoot(page, "controls-smooth");
     await page.keyboard.press("Control+z");
@@ -90,7 +92,8 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await boundTo(page, 0, 4);
     expect((await controls(page))?.elements).toEqual([{ point: 0 }, { line: [1, 2, 3] }]);
     const inside = (await cagePositions(page)).slice(3 * 8);
-    // A new control is midway through the worm along the view ray, which is less than half a radius from the axis.
+    // A new control is midway between the points where the view ray enters and leaves the worm. Its distance from the
+    // worm's axis is less than 0.2, half of the worm's radius.
     const wanted = [0.3, 0.9, 1.3, 1.7].flatMap(axis);
     expect(largestMove(wanted, inside)).toBeLessThan(0.2);
     await shoot(page, "controls-inside");
@@ -100,14 +103,14 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
     const before = await modelPositions(page);
     const { x, y } = await handle(page, 11);
-    // The pull would move the whole bone, which is selected. Select only its last vertex.
+    // A drag moves all selected controls. The whole bone is still selected: select only its last vertex.
     await page.mouse.click(x, y);
     await pull(page, { x, y }, 60, 0);
     await rested(page);
     const after = await modelPositions(page);
     const reached = largestMove(await cagePositions(page), await restPositions(page));
     expect(reached).toBeGreaterThan(0.2);
-    // The tube's surface is 0.4 from the bone, so that it moves by less than the control.
+    // The model's surface is 0.4 from the bone, so it moves by less than the control.
     expect(largestMove(before, after)).toBeGreaterThan(0.2 * reached);
     await shoot(page, "controls-posed");
   });
@@ -128,6 +131,3 @@ test("a smooth cage and interior controls are bound, posed, undone and saved", a
     expect(largestMove(before, await modelPositions(page))).toBe(0);
   });
 });
-
-const restPositions = (page: Page): Promise<number[]> =>
-  page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));

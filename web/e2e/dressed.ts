@@ -6,10 +6,11 @@ import { validationErrors } from "./models";
 import { bound, type Dropped, expect, largestMove, modelPositions, openWith } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
-/** Tolerance for distances within a rigid model, relative to the model's size. */
+/** Tolerance for distances between vertices of a rigid model, relative to the model's size. */
 export const RIGID = 1e-5;
 /** Tolerance for exported positions, object units. */
 export const SAME = 1e-5;
+/** Length of the buckle's diagonal, rounded up, object units. */
 export const BUCKLE = 0.2;
 
 export const step = (page: Page, name: string) =>
@@ -30,7 +31,7 @@ export async function dressed(page: Page): Promise<readonly Dropped[]> {
   return files;
 }
 
-/** Bends the cage so that every model changes shape and place, unless an option prevents that. */
+/** Bends the cage so that models change shape and place, except those whose options keep their shape or place. */
 export async function bend(page: Page): Promise<void> {
   await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;
@@ -63,7 +64,7 @@ export async function downloads(page: Page, kind: string, n: number): Promise<Dr
   );
 }
 
-/** Exports each model to a GLB of its own, and checks that the files are valid and equal what is drawn. */
+/** Exports each model to a GLB of its own, and checks that the files are valid and equal the drawn models. */
 export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" | "buckle", number[]>> {
   const drawn = apart(await modelPositions(page));
   const files = await downloads(page, "glb", 3);
@@ -84,8 +85,9 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
 }
 
 /**
- * The fractions of the body's upper half (skin) and of its lower half (trousers) whose vertices are within a distance
- * of rest, per coordinate. Positions read from the GPU need a larger tolerance than exported ones.
+ * The fraction of vertices that are at rest, for the body's upper half (skin) and its lower half (trousers). A vertex
+ * is at rest if each coordinate differs from `rest` by at most `within`. The tolerance must be larger for positions
+ * that are read from the GPU than for exported ones.
  */
 export function still(
   points: readonly number[],
@@ -112,7 +114,7 @@ export async function paintable(page: Page, id: number): Promise<{ x: number; y:
     } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
     for (let y = 0.1 * height; y < height; y += 6) {
       for (let x = 0.3 * width; x < 0.7 * width; x += 6) {
-        // A stroke from here may go 14 pixels right and down: that point must hit the model as well.
+        // Tests draw strokes of up to 14 pixels right and down, whose end must hit the model as well.
         const isOn = [0, 14].every((d) => engine?.paint(x + d, y + d, 0.005, 255));
         if (!isOn) continue;
         engine?.revert();

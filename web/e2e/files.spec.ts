@@ -44,7 +44,7 @@ test("good files get a cage and can be dragged, bad files leave the model open a
   }
 
   await test.step("a dropped folder is opened with the files in it", async () => {
-    // A real drop, simulated by the browser: a DataTransfer made by a script cannot hold folders.
+    // The browser simulates a real drop, because a DataTransfer that a script creates cannot contain folders.
     const folder = mkdtempSync(join(tmpdir(), "cagework-"));
     const model = join(folder, "garden");
     mkdirSync(join(model, "parts"), { recursive: true });
@@ -69,6 +69,20 @@ test("good files get a cage and can be dragged, bad files leave the model open a
     await expect(facts).toContainText(new RegExp(`Textures\\s*${textures}`));
     await shoot(page, "dropped-folder");
     rmSync(folder, { recursive: true });
+  });
+
+  await test.step("changed settings of the cage apply when it is made", async () => {
+    await page.getByRole("button", { name: "Cage", exact: false }).first().click();
+    const gaps = page.getByLabel("Gaps left open");
+    await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertices allow");
+    await gaps.fill("128");
+    await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of the model's size");
+    const primary = page.locator(".panel-foot .primary").filter({ visible: true });
+    await expect(primary).toHaveText("Make this cage");
+    await shoot(page, "cage-unmade");
+    await primary.click();
+    await bound(page);
+    await expect(primary).toHaveText("Pose it");
   });
 
   await test.step("a bad file is reported", async () => {
@@ -139,8 +153,8 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   const choice = page.getByRole("group", { name: "Up axis" });
   await choice.getByRole("radio", { name: "Z" }).click();
-  // The model turns by -90 degrees about x. Saved poses have 16 bits per coordinate, relative to the largest
-  // displacement.
+  // The model turns by -90 degrees about x. The tolerance allows for the rounding of saved poses, which have 16 bits
+  // per coordinate, relative to the largest displacement.
   const TOLERANCE = 1e-3;
   const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
   const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);
@@ -154,7 +168,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
   expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
   await shoot(page, "turned");
-  // An added model is turned as well, also if it is set to stay as it is while the cage bends.
+  // An added model is turned as well, even if it is set to stay in place while the cage bends.
   const chooser = page.waitForEvent("filechooser");
   await page.getByRole("button", { name: "Add to this cage" }).click();
   const beam = { name: "beam.obj", mimeType: "text/plain", buffer: Buffer.from(box([0.1, 0.2, 0.6])) };

@@ -1,5 +1,5 @@
-// Tests the page in Debian's Firefox by WebDriver BiDi: it opens, drags, undoes and exports with WebGL2 and with
-// WebGPU.
+// Tests the page in Debian's Firefox by WebDriver BiDi, with WebGL2 and with WebGPU: opening, a drag, undo and an
+// export.
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";

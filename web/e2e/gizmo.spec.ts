@@ -1,23 +1,23 @@
 /** The handles of the gizmo, and the split view. */
 
 import type { Page } from "@playwright/test";
-import type { GizmoHandle } from "../src/contract";
+import type { GizmoPart } from "../src/contract";
 import { box } from "./models";
 import { bound, cagePositions, drawn, expect, handle, openWith, reachable, shoot, test } from "./support";
 
-/** Tolerance for equal coordinates: rounding of `f32` in a model two units long. */
+/** Tolerance for coordinates that a drag must not change, object units. The cage is two units long. */
 const ALIKE = 1e-4;
 
 /** A place at which the pointer hits a handle of the gizmo, in window pixels. */
 interface Grip {
   readonly x: number;
   readonly y: number;
-  /** Unit vector from the centre of the gizmo, in screen space. */
+  /** Unit vector from the centre of the gizmo to this place, in screen space. */
   readonly away: readonly [number, number];
 }
 
 /** Finds a place at which the pointer hits the handle `wanted` of the gizmo. */
-async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
+async function grip(page: Page, wanted: GizmoPart): Promise<Grip> {
   const found = await page.evaluate((wanted) => {
     const engine = globalThis.cagework?.engine;
     const canvas = document.querySelector("canvas");
@@ -32,17 +32,18 @@ async function grip(page: Page, wanted: GizmoHandle): Promise<Grip> {
         const [x, y] = [cx + radius * away[0], cy + radius * away[1]];
         const element = document.elementFromPoint(left + x, top + y);
         const free = element && (element === canvas || element.contains(canvas));
-        if (free && engine.gizmoAt(x, y, 8) === wanted) return { x: left + x, y: top + y, away };
+        if (free && JSON.stringify(engine.gizmoAt(x, y, 8)) === wanted)
+          return { x: left + x, y: top + y, away };
       }
     }
     return null;
-  }, wanted);
-  if (!found) throw new Error(`the gizmo has no handle ${wanted}`);
+  }, JSON.stringify(wanted));
+  if (!found) throw new Error(`the gizmo has no handle ${JSON.stringify(wanted)}`);
   return found;
 }
 
 /** Drags a handle of the gizmo; returns cage positions before and after. */
-async function pull(page: Page, wanted: GizmoHandle, by: (grip: Grip) => readonly [number, number]) {
+async function pull(page: Page, wanted: GizmoPart, by: (grip: Grip) => readonly [number, number]) {
   const before = await cagePositions(page);
   const at = await grip(page, wanted);
   const [dx, dy] = by(at);
@@ -60,7 +61,7 @@ function along(axis: number, { before, after }: { before: number[]; after: numbe
 }
 
 const largest = (list: readonly number[]) => list.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-/** Drags by 36 pixels: away from the centre of the gizmo, and at right angles to that. */
+/** Displacements of 36 pixels for a drag: away from the centre of the gizmo, and at right angles to that. */
 const outwards = ({ away: [x, y] }: Grip) => [36 * x, 36 * y] as const;
 const across = ({ away: [x, y] }: Grip) => [-36 * y, 36 * x] as const;
 
@@ -74,7 +75,7 @@ function middle(list: readonly number[]): number[] {
 
 test("arrows, rings and boxes move along their own axis only", async ({ page }) => {
   await page.setViewportSize({ width: 820, height: 520 });
-  // A small model keeps the test short: it draws many frames.
+  // A small model keeps the test short, because the test draws many frames.
   await openWith(page, [
     { name: "cube.obj", bytes: box(0.5) },
     { name: "cube-cage.obj", bytes: box(1) },
@@ -88,7 +89,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   await test.step("an arrow moves along its axis", async () => {
     await page.keyboard.press("w");
     for (const [axis, name] of (["x", "y", "z"] as const).entries()) {
-      const moved = await pull(page, name, outwards);
+      const moved = await pull(page, { axis }, outwards);
       for (const other of [0, 1, 2]) {
         const far = largest(along(other, moved));
         if (other === axis) expect(far, `${name} moves along ${name}`).toBeGreaterThan(0.01);
@@ -101,7 +102,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   });
 
   await test.step("a square moves in its plane", async () => {
-    const moved = await pull(page, "plane_y", outwards);
+    const moved = await pull(page, { plane: 1 }, outwards);
     expect(largest(along(1, moved))).toBeLessThan(ALIKE);
     expect(largest([...along(0, moved), ...along(2, moved)])).toBeGreaterThan(0.01);
   });
@@ -109,7 +110,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   await test.step("a ring rotates around its axis", async () => {
     await page.keyboard.press("a");
     await page.keyboard.press("e");
-    const turned = await pull(page, "y", across);
+    const turned = await pull(page, { axis: 1 }, across);
     expect(largest(along(1, turned)), "heights stay").toBeLessThan(ALIKE);
     expect(largest([...along(0, turned), ...along(2, turned)])).toBeGreaterThan(0.05);
     const from = middle(turned.before);
@@ -130,7 +131,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
         );
       }, list);
     await page.keyboard.press("5");
-    const turned = await pull(page, "all", across);
+    const turned = await pull(page, "view", across);
     expect(largest(turned.after.map((value, k) => value - (turned.before[k] ?? 0)))).toBeGreaterThan(0.05);
     // In a parallel projection, a rotation about the view direction preserves distances on the screen.
     const [center] = await seen(middle(turned.before));
@@ -144,7 +145,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
 
   await test.step("a box stretches along its axis", async () => {
     await page.keyboard.press("t");
-    const scaled = await pull(page, "y", outwards);
+    const scaled = await pull(page, { axis: 1 }, outwards);
     expect(largest([...along(0, scaled), ...along(2, scaled)])).toBeLessThan(ALIKE);
     const from = middle(scaled.before)[1] ?? 0;
     const pairs = scaled.after
@@ -176,7 +177,8 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.evaluate(() => {
       const session = globalThis.cagework;
       const positions = session?.engine.restPositions();
-      // Only the last corner moves. (Both kinds of coordinates reproduce affine maps of the whole cage exactly.)
+      // Move only one corner. Both kinds of coordinates reproduce affine maps of the whole cage, so a pose that is such
+      // a map would show no difference.
       session?.engine.setCagePositions(
         positions?.map((value, k) => (k >= 21 ? 3 * value : value)) ?? new Float32Array(),
       );

@@ -12,7 +12,7 @@ import { bound, drop, expect, open, test } from "./support";
 const TARGET = join(import.meta.dirname, "../../target");
 const FOLDER = join(TARGET, "tmp/hostile");
 
-/** Files to drop together: a model, then its material and texture. A comment says what each demands. */
+/** Each entry lists files to drop together: a model, then its material and texture, if any. */
 const DROPS: readonly (readonly string[])[] = [
   // Recursion: nested arrays, 100,000 deep.
   ["deep.gltf"],
@@ -22,20 +22,21 @@ const DROPS: readonly (readonly string[])[] = [
   ["cycle.glb"],
   // 100,000 materials.
   ["materials.glb"],
-  // 3,000,000 numbers in a line, and a number of 10,000,000 digits: the most memory of all files.
+  // 3,000,000 numbers in a line, and a number of 10,000,000 digits. These two files take the most memory.
   ["numbers.obj"],
   ["token.obj"],
   // 40,000 instances of a mesh: minutes per frame without a graphics card.
   ["instances.glb"],
-  // A cage around 2000 triangles that intersect each other, and around a vertex at 1e30.
+  // Models that are hard to make a cage for: 2000 triangles that all intersect each other, and a vertex at 1e30.
   ["all_meet.obj"],
   ["far.obj"],
-  // A texture in a small file that has 67 million pixels.
+  // A texture of 67 million pixels in a small file.
   ["texture_large.obj", "large.mtl", "large.png"],
 ];
 
 /**
- * Upper limit per file, seconds of processor time, which depends little on load. No file takes 10 s on an idle machine.
+ * Upper limits per file: seconds of processor time, and bytes of resident memory of the largest process. Processor time
+ * depends little on the machine's load. No file takes 10 s on an idle machine.
  */
 const LONGEST_S = 30;
 const MOST_BYTES = 1e9;
@@ -56,7 +57,7 @@ const largestOf = (processes: readonly number[]): number =>
     ...statusOf(processes, "status").map((text) => 1024 * Number(/VmRSS:\s+(\d+)/.exec(text)?.[1] ?? 0)),
   );
 
-/** User and system time of the processes since their start, seconds. Linux counts in hundredths. */
+/** User and system time of the processes since their start, seconds. Linux counts in hundredths of a second. */
 const processorTimeOf = (processes: readonly number[]): number =>
   statusOf(processes, "stat").reduce((sum, text) => {
     const [user = 0, system = 0] = text.replace(/.*\) /, "").split(" ").slice(11, 13).map(Number);

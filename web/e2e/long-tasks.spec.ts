@@ -6,8 +6,9 @@ import { bound, carry, expect, letGo, open, test } from "./support";
 import { longestTask } from "./tasks";
 
 /**
- * Number of vertices, and the upper limit for a task of the main thread, ms of processor time: three times the page's
- * aim, for slow machines. Reading, caging or binding on the main thread would take seconds.
+ * Number of vertices, and the upper limit for a task of the main thread, ms of processor time. The limits allow for
+ * slow machines: they are three times the page's targets. Reading, caging or binding on the main thread would take
+ * seconds.
  */
 const LIMITS = [
   [30_000, 150],
@@ -34,7 +35,7 @@ const watch = (page: Page): Promise<void> =>
     };
   });
 
-// A small window: each pixel is computed by the processor.
+// The window is small, because the processor computes each pixel.
 test.use({ viewport: { width: 420, height: 420 } });
 
 for (const [vertices, most] of LIMITS) {
@@ -46,8 +47,8 @@ for (const [vertices, most] of LIMITS) {
     // The file is sent to the browser before the measurement.
     const files = await carry(page, [{ name: "torus.glb", bytes: await torus(vertices) }]);
     await watch(page);
-    // The limit is on processor time. The Long Tasks API reports wall-clock time, which grows under load: it is only
-    // recorded.
+    // The limit is on processor time. The Long Tasks API reports wall-clock time, which grows under load, so its
+    // durations are only recorded.
     const longest = await longestTask(browser, page, async () => {
       await letGo(page, files);
       await expect(page).toHaveTitle(/torus/, { timeout: 120_000 });

@@ -199,8 +199,8 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
 }
 
 /**
- * A body and a hat skinned to two joints, and a rigid buckle. The body has two morph targets of default weights 0 and
- * 1. A clip animates both joints and the morph targets.
+ * A body and a hat skinned to two joints, and a rigid buckle. The body has two morph targets with default weights 0
+ * and 1. A clip animates both joints and the morph targets.
  */
 export async function dancer(): Promise<Uint8Array> {
   const document = new Document();
@@ -222,8 +222,8 @@ export async function dancer(): Promise<Uint8Array> {
   const RINGS = 13;
 
   /**
-   * A closed, skinned tube. Each of `keys` is a morph target: radial displacement as a function of relative height, 0
-   * to 1.
+   * A closed, skinned tube. Each function in `keys` is a morph target: it returns the radial displacement at a relative
+   * height, 0 to 1.
    */
   const tube = (
     name: string,
@@ -308,7 +308,7 @@ export async function positionsOf(bytes: Uint8Array, name: string): Promise<numb
   return [...(mesh?.listPrimitives()[0]?.getAttribute("POSITION")?.getArray() ?? [])];
 }
 
-/** Vertices of the first primitive of a GLB at a keyframe of its morph target animation. */
+/** Vertex positions of a GLB's first primitive at the keyframe `seconds` of its morph target animation. */
 export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const [primitive] = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());
@@ -325,4 +325,29 @@ export async function shownAt(bytes: Uint8Array, seconds: number): Promise<numbe
     for (const [i, delta] of deltas.entries()) positions[i] = (positions[i] ?? 0) + weight * delta;
   }
   return positions;
+}
+
+/**
+ * A `.splat` file: splats on a vase, 2 high, with stripes. `floaters`: number of larger splats on its right, 1.2 from
+ * its axis.
+ */
+export function splats(n = 1000, floaters = 0): Uint8Array {
+  const bytes = Buffer.alloc(32 * (n + floaters));
+  for (let k = 0; k < n; k++) {
+    const y = (2 * (k + 0.5)) / n;
+    const angle = 2.399963 * k;
+    const radius = 0.4 + 0.15 * Math.sin(4 * y);
+    const at = [radius * Math.cos(angle), y, radius * Math.sin(angle)];
+    for (const [axis, value] of [...at, 0.05, 0.05, 0.05].entries())
+      bytes.writeFloatLE(value, 32 * k + 4 * axis);
+    const color = Math.floor(5 * y) % 2 === 0 ? [220, 90, 40, 250] : [40, 120, 200, 250];
+    bytes.set(color, 32 * k + 24);
+    bytes.set([255, 128, 128, 128], 32 * k + 28);
+  }
+  for (let k = n; k < n + floaters; k++) {
+    for (const [axis, value] of [1.2, (2 * (k - n + 0.5)) / floaters, 0, 0.15, 0.15, 0.15].entries())
+      bytes.writeFloatLE(value, 32 * k + 4 * axis);
+    bytes.set([60, 200, 80, 250, 255, 128, 128, 128], 32 * k + 24);
+  }
+  return new Uint8Array(bytes);
 }

@@ -37,7 +37,7 @@ const test = base.extend<{ site: Site }>({
       address: String(address).trim(),
       deploy() {
         renameSync(join(folder, "assets"), join(folder, "later"));
-        for (const name of ["index.html", "sw.js"]) {
+        for (const name of ["index.html", "gallery.html", "sw.js"]) {
           const path = join(folder, name);
           writeFileSync(
             path,
@@ -54,7 +54,10 @@ const test = base.extend<{ site: Site }>({
   },
 });
 
-/** Waits until the service worker has stored all files of the page. */
+/**
+ * Waits until the service worker has stored all files of the page. It stores them when it is installed, and becomes the
+ * controller of open pages when it is activated, which browsers do only after the installation has succeeded.
+ */
 const kept = (page: Page) => page.waitForFunction(() => navigator.serviceWorker.controller !== null);
 
 test("after the first visit everything works without a network", async ({ page, site }) => {
@@ -72,6 +75,8 @@ test("after the first visit everything works without a network", async ({ page, 
   await bound(page);
   await page.reload();
   await bound(page);
+  await page.goto(new URL("gallery.html", site.address).href);
+  await expect(page.locator("[data-live=true]").first()).toBeVisible({ timeout: 60_000 });
 });
 
 test("an open tab keeps its version and offers the new one", async ({ page, context, site }) => {
@@ -97,7 +102,8 @@ test("an open tab keeps its version and offers the new one", async ({ page, cont
   });
   await test.step("they are deleted after it is closed", async () => {
     expect(await other.evaluate(() => caches.keys())).toHaveLength(2);
-    // Each navigation deletes builds that no tab uses. The closed tab may hold its lock a moment longer.
+    // On each navigation, the service worker deletes the builds of which no tab holds the lock. The closed tab may hold
+    // its lock a moment longer.
     const builds = async () => {
       await other.reload();
       return other.evaluate(() => caches.keys());

@@ -4,22 +4,132 @@ import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { SCENE_DEFAULTS } from "../src/defaults";
-import { bound, drawn, grip, open } from "./support";
+import { encodeShare, type SharedView } from "../src/share";
+import { dressed } from "./dress";
+import { bound, drawn, grip, open, openWith, restPositions } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
 
-/** Side length, pixels: enough for high-density screens. */
+test("the sample of several models", async ({ page }) => {
+  await openWith(page, await dressed());
+  await expect(page).toHaveTitle(/dummy\.glb and 2 more/);
+  await bound(page);
+  const project = await page.evaluate(() => Array.from(globalThis.cagework?.engine.writeProject("{}") ?? []));
+  writeFileSync(join(FOLDER, "wardrobe.glb"), Uint8Array.from(project));
+});
+
+type Point = readonly [x: number, y: number, z: number];
+
+/** An example of gallery.html. */
+interface Example {
+  readonly sample: string;
+  /** Index of a pose of the sample, or a map of cage vertices, relative to the cage's centre, in units of half its height. */
+  readonly pose: number | ((vertex: Point) => Point);
+  /**
+   * Rotation and elevation of the camera, radians, and the distance of the eye relative to that at which the model at rest
+   * fills the view.
+   */
+  readonly camera: readonly [yaw: number, pitch: number, distance: number];
+  readonly smooth?: number;
+  readonly clip?: number;
+  readonly scene?: SharedView["scene"];
+}
+
+const EXAMPLES: Readonly<Record<string, Example>> = {
+  pull: { sample: "rat", pose: 1, camera: [0.9, 0.2, 1.1] },
+  capture: {
+    sample: "spot",
+    // Turns each height about the vertical axis, by 0 at the bottom to 0.9 at the top.
+    pose: ([x, y, z]) => {
+      const angle = 0.45 * (y + 1);
+      const [sine, cosine] = [Math.sin(angle), Math.cos(angle)];
+      return [cosine * x + sine * z, y, cosine * z - sine * x];
+    },
+    camera: [-0.6, 0.15, 1],
+    scene: { cage: false },
+  },
+  walk: {
+    sample: "humanoid",
+    // Stretches the part below the hips, which are near the middle.
+    pose: ([x, y, z]) => [x, y + 0.2 * Math.min(y + 1, 1), z],
+    camera: [0.7, 0.1, 1.2],
+    clip: 0,
+  },
+  dress: {
+    sample: "wardrobe",
+    // Widens the waist.
+    pose: ([x, y, z]) => [x * (1 + 0.5 * Math.exp(-(((y - 0.25) / 0.35) ** 2))), y, z],
+    camera: [0.4, 0.1, 1],
+  },
+  smooth: { sample: "clamp", pose: 0, camera: [0.2, 0.1, 1], smooth: 2 },
+  thin: { sample: "strider", pose: 1, camera: [0.6, 0.2, 1] },
+};
+
+/** Moves cage vertices by a map. `[n_cage, 3]` */
+function moved(rest: readonly number[], map: (vertex: Point) => Point): number[] {
+  const bounds = [0, 1, 2].map((axis) => {
+    const along = rest.filter((_, k) => k % 3 === axis);
+    return [Math.min(...along), Math.max(...along)] as const;
+  });
+  const middle = bounds.map(([low, high]) => (low + high) / 2);
+  const half = ((bounds[1]?.[1] ?? 0) - (bounds[1]?.[0] ?? 0)) / 2;
+  const relative = rest.map((x, k) => (x - (middle[k % 3] ?? 0)) / half);
+  const points = Array.from({ length: rest.length / 3 }, (_, v) =>
+    map(relative.slice(3 * v, 3 * v + 3) as unknown as Point),
+  );
+  return points.flatMap((point) => point.map((x, axis) => x * half + (middle[axis] ?? 0)));
+}
+
+test("links of the gallery", async ({ page }) => {
+  await page.setViewportSize({ width: 1440, height: 900 });
+  const links: Record<string, string> = {};
+  for (const [id, { sample, pose, camera, smooth = 0, clip, scene = {} }] of Object.entries(EXAMPLES)) {
+    await open(page, `./?${id}#sample=${sample}`);
+    const positions = typeof pose === "number" ? null : moved(await restPositions(page), pose);
+    const state = await page.evaluate(
+      ({ index, positions, camera: [yaw, pitch, distance], smooth }) => {
+        const engine = globalThis.cagework?.engine;
+        if (!engine) throw new Error("no session");
+        if (smooth > 0) engine.apply({ do: "subdivide", steps: smooth });
+        if (positions) engine.setCagePositions(Float32Array.from(positions));
+        else engine.apply({ do: "apply_pose", index });
+        engine.frameAll();
+        const view = engine.camera();
+        return {
+          pose: Array.from(engine.encodePose()),
+          camera: { ...view, yaw, pitch, distance: distance * view.distance },
+          controls: engine.cageControls(),
+        };
+      },
+      { index: typeof pose === "number" ? pose : 0, positions, camera, smooth },
+    );
+    links[id] = await encodeShare({
+      sample,
+      pose: Uint8Array.from(state.pose),
+      seen: { camera: state.camera, selected: [], scene },
+      ...(smooth > 0 ? { controls: { controls: state.controls, inner: [] } } : {}),
+      ...(clip === undefined ? {} : { clip }),
+    });
+  }
+  const path = join(import.meta.dirname, "../src/gallery/links.json");
+  writeFileSync(path, `${JSON.stringify(links, null, 2)}\n`);
+});
+
+/** Side length of a sample's picture, pixels: three times its size in the page, for high-density screens. */
 const SIDE = 216;
 
 test("pictures of the samples", async ({ page }) => {
   await open(page);
-  const ids = await page.evaluate(() => globalThis.cagework?.samples ?? []);
-  for (const id of ids) {
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  const samples = page.locator("[data-sample]");
+  for (const id of await samples.evaluateAll((all) => all.map((one) => one.getAttribute("data-sample")))) {
+    await page.locator(`[data-sample="${id}"]`).click();
+    await expect(page.locator(`[data-sample="${id}"]`)).toHaveAttribute("aria-current", "true");
+    await bound(page);
     const data = await page.evaluate(
-      async ([id, side, scene]) => {
+      async ([side, scene]) => {
         const session = globalThis.cagework;
         if (!session) throw new Error("no session");
-        await session.openSample(id);
         session.engine.setScene({ ...scene, theme: "light", cage: false, floor: false });
         session.engine.zoomAt(0, 0, 1);
         const picture = await createImageBitmap(await session.picture(4 * side, 4 * side));
@@ -31,7 +141,7 @@ test("pictures of the samples", async ({ page }) => {
         const file = await canvas.convertToBlob({ type: "image/webp", quality: 0.85 });
         return Array.from(new Uint8Array(await file.arrayBuffer()));
       },
-      [id, SIDE, SCENE_DEFAULTS] as const,
+      [SIDE, SCENE_DEFAULTS] as const,
     );
     writeFileSync(join(FOLDER, `${id}.webp`), Uint8Array.from(data));
   }
@@ -65,7 +175,7 @@ async function liftsAKnee(page: Page): Promise<void> {
   await page.mouse.move(knee.x, knee.y);
   await page.mouse.down();
   await page.mouse.move(knee.x - 70, knee.y - 110, { steps: 20 });
-  // A worker computes the pose of the pull.
+  // Leave the worker enough time to compute the pose of the pull.
   await page.waitForTimeout(2000);
   await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70 });
   await page.mouse.up();
@@ -77,11 +187,11 @@ async function visit(page: Page, stop: number, choice?: string): Promise<void> {
     location.hash = `tour=${stop}`;
   }, stop);
   const card = page.getByRole("region", { name: "Tour" });
-  await expect(card).toContainText(`${stop} of 10`);
+  await expect(card).toContainText(`${stop} of 11`);
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
   if (choice) await card.getByRole("radio", { name: choice, exact: true }).check({ force: true });
   await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
-  // A slice is computed after a delay, which its busy mark shows.
+  // While a slice is computed, an element has the attribute `data-busy`.
   await expect(page.locator("[data-busy]")).toHaveCount(0);
 }
 
@@ -106,7 +216,7 @@ test("pictures of the documents", async ({ page }) => {
     });
     writeFileSync(join(DOCUMENTS, `${name}.webp`), Uint8Array.from(data));
   }
-  // The split view is drawn only in the page, with tools above it, which are hidden for the picture.
+  // `session.picture` does not draw split views: take a screenshot of the view instead, and hide the tools above it.
   await visit(page, 9);
   await page.evaluate(() => {
     for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;

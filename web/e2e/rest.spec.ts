@@ -1,4 +1,7 @@
-/** Reshaping the rest cage: a box around a cube, whose corners are outside if a cage vertex moves inwards. */
+/**
+ * Reshaping the rest cage. The cage is a box around a cube, so that a corner of the cube is outside if the nearest cage
+ * vertex moves inwards.
+ */
 
 import type { Page } from "@playwright/test";
 import { box } from "./models";
@@ -12,13 +15,11 @@ import {
   modelPositions,
   openWith,
   reachable,
+  restPositions,
   shoot,
   spot,
   test,
 } from "./support";
-
-const restPositions = (page: Page): Promise<number[]> =>
-  page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
 
 /** Clicks the middle of an edge (`size` 2) or quad (4) that is visible; returns the indices of its corners. */
 async function choose(page: Page, size: 2 | 4): Promise<number[]> {
@@ -60,8 +61,8 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
     await expect(badge).toHaveText(/Encloses the model/);
     await page.keyboard.press("g");
     await page.keyboard.press("x");
-    // Half the distance from the cage's corner to the centre. The model's corner is a tenth of the way in, so that it
-    // is outside.
+    // Move the selected corner of the cage along x, half of the way to the centre. The model's corner is only a tenth
+    // of the way in, so it ends up outside.
     await page.keyboard.type(String(-0.5 * (corner[0] ?? 0)));
     await expect(badge).toHaveText(/outside/);
     await shoot(page, "rest-outside");
@@ -191,8 +192,8 @@ test("an edited cage is bound completely, on the chosen back end", async ({ page
     const before = await restPositions(page);
     await move(0.01);
     await page.keyboard.press("Enter");
-    // Escape comes after the pause that follows an edit: the bind of the previous edit is delayed, but must still
-    // happen.
+    // An edit is bound after a pause. The pause after the first move ends during the second move, which Escape cancels.
+    // The bind of the first move is delayed until the second move ends, but must still happen.
     await move(0.3);
     const since = await page.evaluate(() => performance.now());
     await page.waitForFunction((since) => performance.now() > since + 200, since);

@@ -42,7 +42,7 @@ async function restarted(page: Page, model: RegExp, posed: number[], trace: stri
   await page.keyboard.press("Escape");
 }
 
-/** Drags a handle, waits until the browser has saved the pose, and returns that. */
+/** Drags a handle, waits until the browser has saved the pose, and returns the pose. */
 async function savedPose(page: Page, name: string): Promise<number[]> {
   const before = await page.evaluate(() => Date.now());
   await drag(page, 50, 30);
@@ -61,7 +61,7 @@ test("after a panic, and without memory, the page restarts with the saved work b
   const posed = await savedPose(page, "model");
   await crash(page, "panic");
   await restarted(page, /model/, posed, "panicked at");
-  // Console messages and page state arrive separately.
+  // The test may receive the console's message after the state of the restarted page.
   await expect.poll(() => complaints.join(), "the console has the panic").toMatch(/panicked at/);
   await drag(page, -20, 10);
   await drop(page, [{ name: "huge.glb", bytes: new Uint8Array(100) }]);

@@ -1,4 +1,4 @@
-// Serves a folder (dist/ by default) at the root and below the path BELOW, without special headers.
+// Serves a folder (dist/ by default) at the root and below the path BELOW. Sets no header except Content-Type.
 
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";

@@ -75,7 +75,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
 
   await test.step("a model is hidden", async () => {
     const picture = () => drawing(page);
-    // Both pictures are taken with the pointer here, because handles near the pointer are highlighted.
+    // Both pictures are taken with the pointer on this button, because handles near the pointer are highlighted.
     await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
     const before = await picture();
     await press(page, "Hide shirt.glb");
@@ -121,7 +121,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
     expect(painted, "not all of it").toBeLessThan(0.9);
     await expect(row(page, "body.glb")).toContainText("painted");
     await page.getByRole("radio", { name: "Follow again" }).check({ force: true });
-    // Painted vertices have returned to their rest positions, so that the brush must be aimed again.
+    // Painted vertices have returned to their rest positions, so the brush must be aimed again.
     await pull(page, await paintable(page, 0), 2, 6);
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBeLessThan(painted);
     await undo(page);

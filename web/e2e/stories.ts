@@ -38,7 +38,7 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   const after = { cage: await cagePositions(page), model: await modelPositions(page) };
   const moved = largestMove(before.cage, after.cage);
   expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
-  // Weights are at most 1: no vertex of the model moves farther than the dragged cage vertex.
+  // Weights are at most 1, so no vertex of the model moves farther than the dragged cage vertex.
   const follows = largestMove(before.model, after.model);
   expect(follows).toBeGreaterThan(0.02 * moved);
   expect(follows).toBeLessThanOrEqual(1.001 * moved);
@@ -69,7 +69,8 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   const pixels = () => drawing(page);
   const { x, y } = await handle(page, await reachable(page));
   await page.mouse.click(x, y);
-  // Not always the vertex aimed at: a near one on the screen may cover it.
+  // The selected vertex may differ from the vertex at which the click was aimed, if another one covers it on the
+  // screen.
   const picked = await page.evaluate(() => globalThis.cagework?.engine.selection()[0]);
   expect(picked).toBeDefined();
   const plain = await pixels();
@@ -137,7 +138,10 @@ async function comparesAll(page: Page): Promise<void> {
   for (const gap of await apart()) expect(gap, "posed").toBeGreaterThan(1e-3 * size);
 }
 
-/** Drops a model named `name`, which must differ from the open model's: the title tells when it has been opened. */
+/**
+ * Drops a model called `name` and waits until it is bound. The name must differ from that of the open model, because
+ * the window's title tells when the new model is open.
+ */
 async function dropsAWorm(page: Page, name: string): Promise<void> {
   await drop(page, [{ name: `${name}.glb`, bytes: await glb() }]);
   await expect(page).toHaveTitle(new RegExp(name));

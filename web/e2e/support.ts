@@ -20,7 +20,7 @@ const OF_THE_DRIVER = /GL Driver Message .*queueSerial/;
 
 /** The test function. A test fails if the page has logged errors or warnings, or if a request has failed. */
 export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }>({
-  /** Whether the page may register its service worker. It would answer requests that tests want to intercept. */
+  /** Whether the page may register its service worker, which would answer requests that some tests intercept. */
   serviceWorker: [false, { option: true }],
   context: async ({ context, serviceWorker }, use) => {
     if (!serviceWorker) {
@@ -86,8 +86,8 @@ export async function handle(page: Page, vertex: number): Promise<{ x: number; y
 }
 
 /**
- * Index of a cage vertex that a click selects, -1 if there is none. It is inside the cage's bounding box by at least
- * the fraction `within` of its extents.
+ * Index of a cage vertex that a click selects; -1 if there is none. The distance of the vertex from each side of the
+ * cage's bounding box is at least the fraction `within` of the box's extent.
  */
 export async function reachable(page: Page, within = 0): Promise<number> {
   return page.evaluate((within) => {
@@ -151,7 +151,7 @@ export async function spot(
   return found;
 }
 
-/** Drags a cage vertex by (dx, dy) pixels, with Alt; returns the vertex's index. */
+/** Drags a cage vertex by (dx, dy) pixels, with Alt so that no other vertex moves; returns the vertex's index. */
 export async function drag(page: Page, dx: number, dy: number): Promise<number> {
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
@@ -231,6 +231,11 @@ export function cagePositions(page: Page): Promise<number[]> {
   return page.evaluate(() => Array.from(globalThis.cagework?.engine.cagePositions() ?? []));
 }
 
+/** Positions of the cage's vertices at rest. */
+export function restPositions(page: Page): Promise<number[]> {
+  return page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
+}
+
 /** Vertex positions of the model, read back from the GPU. */
 export function modelPositions(page: Page): Promise<number[]> {
   return page.evaluate(async () => Array.from((await globalThis.cagework?.readPositions()) ?? []));
@@ -251,7 +256,7 @@ export interface Dropped {
   readonly bytes: Uint8Array;
 }
 
-/** A DataTransfer, in the page, that holds the files. */
+/** Creates a DataTransfer with the files in the page, and returns a handle to it. */
 export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHandle<DataTransfer>> {
   const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
   return page.evaluateHandle((packed) => {
@@ -302,14 +307,16 @@ export async function drawn(page: Page): Promise<void> {
 }
 
 /**
- * Screenshot of the canvas alone. The elements above it are hidden: toasts disappear by themselves, and shadows vary.
+ * Screenshot of the canvas alone, to be compared with another one. Toasts and other elements above the canvas are
+ * hidden, because they change by themselves.
  */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
   const { x, y, width, height } = box;
-  // A constructed style sheet, which the Content-Security-Policy allows. `visibility: hidden` would remove the focus.
+  // Use a constructed style sheet, which the Content-Security-Policy allows. Hide by opacity, because
+  // `visibility: hidden` would remove the focus.
   const sheet = await page.evaluateHandle(() => {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(
@@ -360,7 +367,7 @@ export async function download(page: Page, kind: string): Promise<Dropped> {
   return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
 }
 
-/** More bytes than the memory of a wasm module can hold: copying them into it traps. */
+/** Size of an array that does not fit into the memory of a wasm module, bytes. Copying the array into it traps. */
 export const TOO_MUCH = 2_400_000_000;
 
 /** Crashes the wasm module outside any promise, so that the error reaches the window. */
@@ -369,7 +376,8 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
     ([how, bytes]) => {
       setTimeout(() => {
         const engine = globalThis.cagework?.engine;
-        // A box with more faces than an index can count panics; an array larger than the wasm memory traps.
+        // `boxCage` panics, because the number of grid points of a box with 3000 divisions per axis overflows 32 bits.
+        // `setCagePositions` traps, because the array is larger than the wasm memory.
         if (how === "panic") globalThis.cagework?.boxCage(3000);
         else engine?.setCagePositions(new Float32Array(bytes / 4));
       });
@@ -379,8 +387,8 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
 }
 
 /**
- * Makes workers trap when they read a file of `trap` bytes, and hang when they read a file of `hang` bytes, or any
- * file. Must be called before the page loads.
+ * Makes workers trap when they read a file of `trap` bytes, and hang when they read a file of `hang` bytes ("any": a
+ * file of any size). Must be called before the page loads.
  */
 export async function spoilReading(
   page: Page,

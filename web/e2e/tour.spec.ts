@@ -2,7 +2,7 @@
 
 import type { Page } from "@playwright/test";
 import { box } from "./models";
-import { bound, cagePositions, drag, drop, expect, largestMove, shoot, test } from "./support";
+import { bound, cagePositions, drag, drop, expect, grip, largestMove, shoot, test } from "./support";
 
 test.use({ hasTouch: true });
 
@@ -10,7 +10,7 @@ const card = (page: Page) => page.getByRole("region", { name: "Tour" });
 
 /** Waits until the tour shows the stop `stop` and its computations have ended. */
 async function arrived(page: Page, stop: number): Promise<void> {
-  await expect(card(page)).toContainText(`${stop} of 10`);
+  await expect(card(page)).toContainText(`${stop} of 11`);
   await expect(card(page)).toHaveAttribute("aria-busy", "false", { timeout: 60_000 });
 }
 
@@ -76,6 +76,18 @@ test("a link starts the tour, keys and touch navigate, binds are compared, and t
     await bound(page);
     expect((await cagePositions(page)).length / 3, "its two ends").toBe(n + 2);
     await shoot(page, "tour-phone");
+  });
+  await test.step("a tap on a splat draws its ellipses", async () => {
+    await visit(page, 11);
+    const ready = await page.evaluate(() => {
+      const engine = globalThis.cagework?.engine;
+      return [engine?.bound, engine?.hasLattice];
+    });
+    expect(ready, "the capture is bound, and its splats follow the cage").toEqual([true, true]);
+    const { x, y } = await grip(page, [0.5, 0.5]);
+    await page.touchscreen.tap(x, y);
+    await expect(card(page).getByRole("img")).toHaveCount(3);
+    await shoot(page, "tour-splat-phone");
   });
   await card(page).getByRole("button", { name: "Leave the tour" }).tap();
   await expect(page).toHaveTitle(/own/);

@@ -28,7 +28,7 @@ function sleeve(from: number, to: number, rings: number, radius: (y: number) => 
   return { positions, indices };
 }
 
-class Builder {
+export class Builder {
   readonly document = new Document();
   private readonly buffer = this.document.createBuffer();
   private readonly scene = this.document.createScene();

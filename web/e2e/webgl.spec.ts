@@ -1,6 +1,7 @@
 /** A browser without WebGPU: the page draws with WebGL2, and the processor computes. */
 
 import type { Page } from "@playwright/test";
+import { RIG_DEFAULTS } from "../src/defaults";
 import { PSEUDO } from "../src/words/pseudo";
 import { WITH_WEBGL } from "./browser";
 import {
@@ -75,24 +76,18 @@ test("without WebGPU the page exports, plays, and recovers from a lost context",
     await page.getByRole("button", { name: "Model", exact: false }).first().click();
     await page.getByRole("button", { name: /Legs close together/ }).click();
     await bound(page);
-    const pictures = await page.evaluate(async () => {
+    const pictures = await page.evaluate(async (rig) => {
       const session = globalThis.cagework;
       if (!session) throw new Error("no session");
-      await session.engine.startClip({
-        joints: "follow",
-        keep_travel: false,
-        rigid: [],
-        plain: false,
-        dynamic: false,
-      });
+      await session.engine.startClip(rig);
       const all: string[] = [];
       for (const seconds of [0.5, 1.5, 0.5]) {
-        session.engine.showClip(0, seconds, new Float32Array());
+        session.engine.showClip(0, seconds, new Float32Array(), true);
         all.push(new Uint8Array(await (await session.picture(160, 120, true)).arrayBuffer()).join());
       }
       session.engine.stopClip();
       return all;
-    });
+    }, RIG_DEFAULTS);
     expect(pictures[0], "equal times look equal").toBe(pictures[2]);
     expect(pictures[0], "different times look different").not.toBe(pictures[1]);
   });
@@ -114,7 +109,7 @@ test("without WebGPU the page exports, plays, and recovers from a lost context",
     await bound(page);
   });
   await test.step("a lost context comes back with model and pose", async () => {
-    // Loses the context of the page's own canvas, as a browser would.
+    // Lose the context of the page's own canvas, as happens when a browser resets the GPU.
     await survives(page, () =>
       page.evaluate(() => {
         const context = document.querySelector("canvas")?.getContext("webgl2");
@@ -142,7 +137,7 @@ test("without WebGPU and WebGL2 the page explains what to do", async ({ page }) 
   await expect(page.getByText(/Firefox/).first()).toBeVisible();
   await shoot(page, "no-webgl2");
   expect(await complaintsOfAxe(page)).toEqual([]);
-  // The built page has the other languages. words.spec.ts checks their texts.
+  // The built page must also contain languages other than English. words.spec.ts checks their texts.
   await page.goto("./?lang=pseudo");
   await expect(page.getByRole("heading", { name: PSEUDO.words.without.needs })).toBeVisible();
 });

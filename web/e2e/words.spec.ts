@@ -8,8 +8,8 @@ import { expect, test } from "./support";
 
 const WEB = join(import.meta.dirname, "..");
 
-/** Builds the page with gallery.ts in place of main.ts; returns its files by name. */
-async function gallery(): Promise<Map<string, string | Uint8Array>> {
+/** Builds the page with states.ts in place of main.ts; returns its files by name. */
+async function states(): Promise<Map<string, string | Uint8Array>> {
   const built = (await build({
     configFile: false,
     root: WEB,
@@ -18,10 +18,10 @@ async function gallery(): Promise<Map<string, string | Uint8Array>> {
     resolve: { alias: { "@cagework/core": join(WEB, "package/src") } },
     plugins: [
       {
-        name: "gallery",
+        name: "states",
         transformIndexHtml: {
           order: "pre",
-          handler: (html) => html.replace("./src/main.ts", "./e2e/gallery/gallery.ts"),
+          handler: (html) => html.replace("./src/main.ts", "./e2e/states/states.ts"),
         },
       },
     ],
@@ -32,7 +32,7 @@ async function gallery(): Promise<Map<string, string | Uint8Array>> {
   );
 }
 
-let built: ReturnType<typeof gallery> | undefined;
+let built: ReturnType<typeof states> | undefined;
 
 for (const [name, device] of [
   ["desktop computer", { viewport: { width: 1440, height: 900 } }],
@@ -41,19 +41,19 @@ for (const [name, device] of [
   test.describe(name, () => {
     test.use(device);
     test(`on a ${name} all text is in the catalogue and fits, and axe finds no fault`, async ({ page }) => {
-      built ??= gallery();
+      built ??= states();
       const files = await built;
-      await page.route("**/gallery/**", async (route) => {
-        const path = new URL(route.request().url()).pathname.replace(/.*\/gallery\//, "") || "index.html";
+      await page.route("**/states/**", async (route) => {
+        const path = new URL(route.request().url()).pathname.replace(/.*\/states\//, "") || "index.html";
         const types = { html: "text/html", js: "text/javascript", css: "text/css" };
         const contentType = types[path.split(".").at(-1) as keyof typeof types] ?? "image/webp";
         const body = files.get(path) ?? (await readFile(join(WEB, "public", path)));
         await route.fulfill({ contentType, body: typeof body === "string" ? body : Buffer.from(body) });
       });
-      await page.goto("./gallery/?lang=pseudo");
+      await page.goto("./states/?lang=pseudo");
       await page.waitForFunction(() => globalThis.visitAll);
       const names = await page.evaluate(() => [...(globalThis.visits?.keys() ?? [])]);
-      // The stops of the tour consist of the same parts.
+      // All stops of the tour consist of the same components, so axe checks only one of them.
       for (const name of names.filter((name) => !name.startsWith("stop") || name === "stop error")) {
         await page.evaluate((name) => globalThis.visits?.get(name)?.(), name);
         expect.soft(await complaintsOfAxe(page), name).toEqual([]);

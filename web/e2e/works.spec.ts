@@ -27,7 +27,8 @@ test("each tab reopens its own work, and a new tab lists the others", async ({ p
   await expect(second, "another tab has the only work open").toHaveTitle(/Rat/);
   await work(second, "workB");
 
-  // Opening work saves it again. The list below starts with the newest, which is B in any case.
+  // The list that the third tab shows starts with the work that was saved last. That is workB, which was saved after
+  // workA and may be saved again when it is opened.
   await second.reload();
   await expect(second, "a reloaded tab has its own work").toHaveTitle(/workB/);
   await bound(second);
@@ -66,7 +67,7 @@ test("changed work is saved before another model opens, listed, restored and del
     await show("clamp");
     expect(await savedSince(page, 0)).toBe(false);
     await drag(page, 50, 30);
-    // Open the rat before the delay of the autosave has passed.
+    // Open the rat before the page saves the clamp by itself, which happens after a pause.
     await show("rat");
     await showList(page);
     await expect(items).toHaveText([/^Clamp/]);
@@ -82,7 +83,7 @@ test("changed work is saved before another model opens, listed, restored and del
     await work(page, "workB");
     const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
     await expect(kept).toBeVisible();
-    // The same message about the clamp may still be visible: use the button next to this one.
+    // A similar message about the clamp may still be visible, so use the button next to the message about workA.
     await kept.locator("..").getByRole("button", { name: "Bring it back" }).click();
     await expect(page).toHaveTitle(/workA/);
     await bound(page);

@@ -30,7 +30,7 @@ const whole = (text) =>
     .replace(/(\bfrom |\bimport\(|\bimport )"(\.{1,2}\/[^"]+?)(?:\.js)?"/g, '$1"$2.js"')
     .replace(/(new URL\("\.{1,2}\/[^"]+)\.ts"/g, '$1.js"');
 /** Whether a file declares types of the public interface. Other declarations are not published. */
-const isPublic = (path) => /^(index|element|types|contract\/(generated|work))\.d\.ts$/.test(path);
+const isPublic = (path) => /^(index|element|three|types|contract\/(generated|work))\.d\.ts$/.test(path);
 for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true })) {
   if (!/\.(js|d\.ts)$/.test(entry.name)) continue;
   const path = join(entry.parentPath, entry.name);

@@ -13,7 +13,7 @@ export default defineConfig({
   timeout: 90_000,
   expect: { timeout: 60_000 },
   reporter: [["list"]],
-  // Small, because the tests draw on the processor.
+  // The window is small, because the tests draw on the processor.
   use: { baseURL: BASE, viewport: { width: 480, height: 360 } },
   webServer: {
     command: "node ../e2e/server.mjs",

@@ -1,79 +1,40 @@
 /** Creates and connects all actions. Panels and input handlers call them through `App`. */
 
-import { type BindActions, createBind } from "./actions/bind";
-import { type CageActions, createCage } from "./actions/cage";
-import { type ClipActions, createClips } from "./actions/clips";
+import { createBind } from "./actions/bind";
+import { createCage } from "./actions/cage";
+import { createClips } from "./actions/clips";
 import type { Context, Tell } from "./actions/context";
-import { type ControlActions, createControls } from "./actions/controls";
-import { createEdit, type Edit } from "./actions/edit";
-import { createExports, type Exports } from "./actions/exports";
-import { createFiles, type Files } from "./actions/files";
+import { createControls } from "./actions/controls";
+import { createEdit } from "./actions/edit";
+import { createExports } from "./actions/exports";
+import { createFiles } from "./actions/files";
 import { followCage, followSettings } from "./actions/follow";
-import { createModels, type Models } from "./actions/models";
-import { createPainting, type PaintActions } from "./actions/painting";
-import { createPoses, type PoseActions } from "./actions/poses";
+import { createModels } from "./actions/models";
+import { createPainting } from "./actions/painting";
+import { createPoses } from "./actions/poses";
 import { createProject } from "./actions/project";
-import { createPulling, type Pulling } from "./actions/pull";
-import { createTour, type TourActions } from "./actions/tour";
-import { createView, type View } from "./actions/view";
-import { createWorks, type WorkActions } from "./actions/works";
+import { createPulling } from "./actions/pull";
+import { createTour } from "./actions/tour";
+import { createView } from "./actions/view";
+import { createWorks } from "./actions/works";
 import type { NamedFile, Session } from "./contract";
 import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
-import { type DocumentMirror, followDocument } from "./document";
+import { followDocument } from "./document";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
 import { createQueue } from "./queue";
 import type { Store } from "./signals";
 import type { StepName } from "./state";
-import type { Explained } from "./strings";
+import type { Explanation } from "./strings";
 import { T } from "./words";
 
-export interface App {
-  readonly ctx: Context;
-  readonly store: Store;
-  /** Updates the state after a change of the document. */
-  readonly take: DocumentMirror["take"];
-  readonly edit: Edit;
-  readonly pull: Pulling;
-  readonly cage: CageActions;
-  readonly controls: ControlActions;
-  readonly bind: BindActions;
-  readonly poses: PoseActions;
-  readonly clips: ClipActions;
-  readonly view: View;
-  readonly files: Files;
-  readonly models: Models;
-  readonly painting: PaintActions;
-  readonly works: WorkActions;
-  readonly exports: Exports;
-  readonly tour: TourActions;
-  readonly mac: boolean;
-  /** Runs a command of the shortcut table. */
-  run(command: Command): void;
-  go(step: StepName): void;
-  /** Opens the browser's file dialog, and opens the chosen model. */
-  chooseModel(): void;
-  chooseFolder(): void;
-  /** Opens the file dialog, and adds the chosen models to the cage. */
-  chooseMore(): void;
-  chooseCage(): void;
-  /** Opens the file dialog, and reads inner controls from the chosen OBJ file. */
-  chooseControls(): void;
-  /** Opens the first sample. The open work stays saved in the browser. */
-  startFresh(): void;
-  /** Reloads the page with the open work. */
-  reload(): Promise<void>;
-  /** Returns the last position of the pointer, CSS pixels in the view. */
-  pointer: () => { x: number; y: number };
-  /** Text of the shortcut of a command, for example "Ctrl+Z". */
-  key(command: Command): string;
-}
-
 const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
+/** Files of clips must contain their buffers: the file dialog gives no access to files beside them. */
+const CLIPS = ".glb,.gltf";
 const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
 
-/** Windows in which See covers the panel, as in stage.css. */
+/** Media query for windows in which the See panel covers the panel of the step; stage.css has the same query. */
 const NARROW = "(max-width: 1279.98px)";
 
 export interface Needs {
@@ -85,9 +46,10 @@ export interface Needs {
   viewport: () => DOMRect;
 }
 
-export function createApp({ store, session, tell, viewport }: Needs): App {
-  const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
-  const ctx: Context = { session, store, queue: createQueue(), tell, fixFor, viewport };
+export function createApp({ store, session, tell, viewport }: Needs) {
+  const fixFor = (fix: NonNullable<Explanation["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
+  const engine = () => session().engine;
+  const ctx: Context = { session, engine, store, queue: createQueue(), tell, fixFor, viewport };
   const bind = createBind(ctx);
   const { take, know, made, checked } = followDocument(ctx);
   const edit = createEdit(ctx);
@@ -109,7 +71,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const models = createModels(ctx, { cage, edit, checked, openFiles, settle });
   const painting = createPainting(ctx, edit, settle);
   const project = createProject(ctx, controls.shared);
-  const exports = createExports(ctx, project);
+  const exports = createExports(ctx, project, pull);
   const startFresh = () => void files.openSample(store.get().samples[0] ?? "");
   const works = createWorks(ctx, { write: project.write, openFiles, startFresh });
   const files = createFiles(ctx, {
@@ -126,13 +88,13 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     overtaken: (sample) => tour.guide()?.overtaken(sample),
   });
   const tour = createTour(ctx, { bind, edit, view, files, works });
-  const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
+  const fixes: Record<NonNullable<Explanation["fix"]>, () => void> = {
     coarser: () => void bind.again({ grid: Math.max(16, store.get().bindOptions.grid / 2) }),
     fewer() {
       const { cage: found, cageOptions } = store.get();
-      const vertices = Math.min(cageOptions.vertices, found?.info.vertices ?? cageOptions.vertices);
+      const vertices = Math.min(cageOptions.target, found?.info.vertices ?? cageOptions.target);
       store.set({
-        cageOptions: { ...cageOptions, vertices: Math.max(SLIDERS.vertices.min, Math.floor(vertices / 2)) },
+        cageOptions: { ...cageOptions, target: Math.max(SLIDERS.target.min, Math.floor(vertices / 2)) },
       });
       void cage.regenerate().then((made) => made && bind.start());
     },
@@ -144,16 +106,17 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   };
   const reload = async () => {
     await works.flush();
-    // Once the work is saved, remove a share link from the address. The reloaded page would open the link instead of
-    // the work.
+    // Once the work is saved, remove a share link from the address. Otherwise the reloaded page would open the link
+    // instead of the work.
     if (store.get().savedAt !== null) history.replaceState(null, "", location.pathname + location.search);
     location.reload();
   };
   const mac = isMac(navigator.platform);
   const narrow = matchMedia(NARROW);
-  const app: App = {
+  const app = {
     ctx,
     store,
+    /** Updates the state after a change of the document. */
     take,
     edit,
     pull,
@@ -170,24 +133,36 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     exports,
     tour,
     mac,
-    run: (command) => commands[command](),
-    go(step) {
+    /** Runs a command of the shortcut table. */
+    run: (command: Command): void => commands[command](),
+    go(step: StepName) {
       if (step !== "cage" && store.get().placing) controls.arm(null);
       if (step !== "model") painting.on(null);
       if (step === "pose" || step === "export") edit.setEditingRest(false);
-      // In a narrow window, See covers the panel of the step.
+      // In a narrow window, the See panel covers the panel of the step.
       store.set({ step, seeOpen: store.get().seeOpen && !narrow.matches });
     },
+    /** Opens the browser's file dialog, and opens the chosen model. */
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
+    /** Opens the file dialog, and adds the chosen models to the cage. */
     chooseMore: () => choose(MODELS, false, (list) => void models.add(list)),
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
+    /** Opens the file dialog, fits the clips of the chosen files to the skeleton, and downloads them. */
+    chooseClips: () => choose(CLIPS, false, (list) => void exports.clips(list)),
+    /** Opens the file dialog, and reads interior controls from the chosen OBJ file. */
     chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
+    /** Opens the first sample. The open work stays saved in the browser. */
     startFresh,
+    /** Reloads the page with the open work. */
     reload,
+    /** Returns the last position of the pointer, CSS pixels in the view. input/pointer.ts replaces this function. */
     pointer: () => ({ x: 0, y: 0 }),
-    key: (command) => shortcutText(command, mac),
+    /** Text of the shortcut of a command, for example "Ctrl+Z". */
+    key: (command: Command) => shortcutText(command, mac),
   };
   const commands = createCommands(app);
   return app;
 }
+
+export type App = ReturnType<typeof createApp>;

@@ -4,4 +4,4 @@
  */
 
 export type * from "@cagework/core/contract";
-export type * from "./contract/session";
+export type { OpenedFile, ReadFile, Session } from "./session";

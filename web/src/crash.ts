@@ -1,4 +1,7 @@
-/** Crash recovery. After a panic or out-of-memory in wasm every call of the module fails, so the page restarts. */
+/**
+ * Crash recovery. After a panic or an out-of-memory error in wasm, every call of the module fails. The page therefore
+ * restarts.
+ */
 
 import { cageBroken } from "./derived";
 import type { Store } from "./signals";
@@ -6,7 +9,7 @@ import type { AppState } from "./state";
 import { forgetCrash, keepCrash, lastCrash } from "./store";
 import { T } from "./words";
 
-/** What is known about a crash. It is stored, so that the restarted page can show it. */
+/** Facts about a crash, stored so that the restarted page can show them. */
 export interface Crash {
   /** Sentence that says what was open or in progress. */
   readonly during: string;
@@ -19,18 +22,11 @@ export function isFatal(error: unknown): boolean {
   return error instanceof WebAssembly.RuntimeError || (error instanceof Error && error.name === "Panic");
 }
 
-export interface Crashes {
-  /** The crash that made the page restart; undefined after a normal start. */
-  readonly before: Crash | undefined;
-  /** Call this when a model is bound and drawn. The next crash then counts as a first crash. */
-  settled(): void;
-}
-
 /**
  * Listens for crashes. Calls `restart` after a first crash. Calls `ask` after another crash before a model is bound and
  * drawn: the work that the page reopens may be the cause, and the page would restart forever.
  */
-export function watchCrashes(store: Store, restart: () => void, ask: (crash: Crash) => void): Crashes {
+export function watchCrashes(store: Store, restart: () => void, ask: (crash: Crash) => void) {
   const before = lastCrash();
   let isSettled = before === undefined;
   let isDead = false;
@@ -47,7 +43,9 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
   addEventListener("error", ({ error }) => hear(error));
   addEventListener("unhandledrejection", ({ reason }) => hear(reason));
   return {
+    /** The crash that made the page restart; undefined after a normal start. */
     before,
+    /** Call this when a model is bound and drawn. The next crash then counts as a first crash. */
     settled() {
       if (isDead) return;
       isSettled = true;
@@ -55,6 +53,8 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
     },
   };
 }
+
+export type Crashes = ReturnType<typeof watchCrashes>;
 
 /** Sentence that says what was open or in progress when the page crashed. */
 export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): string {

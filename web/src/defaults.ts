@@ -9,12 +9,15 @@ export {
   COMPANION_ENDINGS,
   COORDINATES,
   EXPORT_TYPES,
+  HULL_TARGET,
   MODEL_ENDINGS,
   MODEL_TYPES,
   RIG_DEFAULTS,
   SCENE_DEFAULTS,
   SHAPE_FORMATS,
   SLIDERS,
+  SPLAT_FORMATS,
+  VIEW_DEFAULTS,
 } from "@cagework/core/contract/generated";
 
 /** The nearest value within the range of a slider. */
@@ -23,5 +26,5 @@ export const clamped = (
   { min, max }: { readonly min: number; readonly max: number },
 ): number => Math.min(max, Math.max(min, value));
 
-/** Options of the published method (Joshi et al. 2007). */
+/** Options of the published method (Joshi et al. 2007, as K. Smith describes it; see docs/method.md). */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };

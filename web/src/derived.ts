@@ -1,13 +1,27 @@
 /** Values derived from the state of the page. */
 
-import type { BindOptions, Element as CageElement, PoseView, RigOptions, SceneOptions } from "./contract";
-import type { AppState } from "./state";
+import type {
+  BindOptions,
+  Element as CageElement,
+  ModelInfo,
+  PoseView,
+  RigOptions,
+  SceneOptions,
+} from "./contract";
+import type { AppState, CageSettings } from "./state";
 
 /** The rig options that apply to the open model. */
 export function rigOf({ model, rigOptions }: AppState): RigOptions {
   // Options of a project may name parts that the open model does not have.
   const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
-  return { ...rigOptions, rigid, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
+  const follow = (model?.joints ?? 0) > 0 && rigOptions.joints !== "stay";
+  return {
+    ...rigOptions,
+    rigid,
+    ground: rigOptions.ground && follow,
+    feet: follow ? rigOptions.feet : "free",
+    dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0,
+  };
 }
 
 /** Whether the cage's faults forbid a bind. */
@@ -25,7 +39,12 @@ export function drawn(state: AppState): SceneOptions {
   };
 }
 
-/** Number of vertices and inner controls of the cage. */
+/** Whether the model has no faces: a capture of splats, or a point cloud. */
+export function isCapture(model: ModelInfo | null): boolean {
+  return model !== null && model.splats + model.points > 0;
+}
+
+/** Number of vertices and interior controls of the cage. */
 export function controlCount({ cage }: Pick<AppState, "cage">): number {
   return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
@@ -35,8 +54,6 @@ export function cageKey({ cageSource, cageOptions, cageClip, boxDivisions }: Cag
   if (cageSource === "auto") return JSON.stringify([cageOptions, cageClip]);
   return cageSource === "box" ? `box ${boxDivisions}` : cageSource;
 }
-
-export type CageSettings = Pick<AppState, "cageSource" | "cageOptions" | "cageClip" | "boxDivisions">;
 
 /** The settings of the Cage panel. */
 export function cageSettings({ cageSource, cageOptions, cageClip, boxDivisions }: AppState): CageSettings {
@@ -58,13 +75,13 @@ const FEW = 0.9;
 export function isCageSparse(state: AppState): boolean {
   const { cage, cageOptions, cageSource, sampleCage } = state;
   const isGenerated = cage !== null && cageSource === "auto" && !sampleCage && !hasUnmadeCage(state);
-  return isGenerated && cage.info.vertices < FEW * cageOptions.vertices;
+  return isGenerated && cage.info.vertices < FEW * cageOptions.target;
 }
 
 /** Whether the page asks to pull the sample, because nothing has been changed yet. */
 export function asksToPull(state: AppState): boolean {
-  const { step, grip, bound, posed, undoLabel, gesture, playing, clip, tour, scene } = state;
-  const isUntouched = grip !== null && bound && !posed && undoLabel === null && step !== "cage";
+  const { step, grip, bound, posed, undo, gesture, playing, clip, tour, scene } = state;
+  const isUntouched = grip !== null && bound && !posed && undo === null && step !== "cage";
   return isUntouched && scene.pull && !gesture && !playing && clip.clip === null && tour === null;
 }
 
@@ -74,8 +91,8 @@ export function fittingPoses(state: AppState): readonly PoseView[] {
 }
 
 /** Kind of element that clicks select. In pull mode these are vertices, unless the cage is being reshaped. */
-export function elementInUse({ element, scene, editingRest }: AppState): CageElement {
-  return scene.pull && !editingRest ? "vertex" : element;
+export function elementInUse({ tools, scene, editingRest }: AppState): CageElement {
+  return scene.pull && !editingRest ? "vertex" : tools.element;
 }
 
 /**

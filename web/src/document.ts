@@ -1,33 +1,21 @@
-/** Mirrors the document: updates the keys of the state whose values Rust determines. */
+/** Mirrors the document, which Rust stores: updates the keys of the state that show it. */
 
 import { attempt, type Context } from "./actions/context";
 import type { Check, View } from "./contract";
 import { SCENE_DEFAULTS } from "./defaults";
-import { type CageSettings, cageKey, cageSettings } from "./derived";
+import { cageKey, cageSettings } from "./derived";
 import { follow } from "./queue";
-import type { AppState } from "./state";
+import type { AppState, CageSettings } from "./state";
 import { T } from "./words";
 
 /** Number of checks kept for cages that undo may restore. */
 const KEPT_CHECKS = 32;
 
-export interface DocumentMirror {
-  /** Updates the state after a change of the document. */
-  take(view: View): void;
-  /** Stores and shows the result of a check. Cancels a check in progress. */
-  know(check: Check): void;
-  /** Keeps the settings of the current cage, by default those of the panel; undo of a later cage shows them again. */
-  made(settings?: CageSettings): void;
-  /** Resolves when the current cage has been checked. */
-  checked(): Promise<unknown>;
-}
-
-export function followDocument(ctx: Context): DocumentMirror {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+export function followDocument(ctx: Context) {
+  const { store, engine } = ctx;
   /** Finished checks, by the `keyOf` of models and cage. */
   const checks = new Map<string, Check>();
-  /** Settings of generated cages, by the key of the cage. */
+  /** Settings with which cages were made, by the key of the cage. */
   const settings = new Map<number, CageSettings>();
   let shown: View | undefined;
   let checking: Promise<unknown> = Promise.resolve();
@@ -44,7 +32,7 @@ export function followDocument(ctx: Context): DocumentMirror {
   const startCheck = () =>
     attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) => {
-        // Wait for the current task to end: an opened cage may come with its check, and taking that cancels this job.
+        // Wait for the current task to end: an opened cage may come with its check, and `know` then cancels this job.
         await new Promise((resolve) => setTimeout(resolve));
         if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
       }),
@@ -66,7 +54,7 @@ export function followDocument(ctx: Context): DocumentMirror {
     };
   };
 
-  /** The settings of the cage, if it was made before. */
+  /** The settings with which the document's cage was made, as a change of the state; empty if they are not known. */
   const settingsPatch = ({ cage }: View): Partial<AppState> => {
     const of = settings.get(cage);
     return of ? { ...of, cageMade: cageKey(of) } : {};
@@ -83,15 +71,21 @@ export function followDocument(ctx: Context): DocumentMirror {
   });
 
   return {
+    /** Stores and shows the result of a check. Cancels a check in progress. */
     know,
-    made(of = cageSettings(store.get())) {
+    /**
+     * Remembers the settings with which the current cage was made, by default those of the panel. When undo returns to
+     * this cage, the panel shows them again.
+     */
+    made(of: CageSettings = cageSettings(store.get())) {
       if (shown) settings.set(shown.cage, of);
       store.set({ cageMade: cageKey(of) });
     },
-    checked: () => checking,
-    take(view) {
+    /** Resolves when the current cage has been checked. */
+    checked: (): Promise<unknown> => checking,
+    /** Updates the state after a change of the document. */
+    take(view: View) {
       const before = shown;
-      const old = store.get();
       const isOther = keyOf(view) !== keyOf(before);
       // A bind in progress is for the previous models or cage.
       if (isOther) ctx.queue.cancel("bind");
@@ -99,25 +93,16 @@ export function followDocument(ctx: Context): DocumentMirror {
       const isNewlyBound = view.bound && (isOther || !before?.bound);
       const hasOtherColours =
         isOther || view.bound !== before?.bound || view.selected.last !== before.selected.last;
-      const { models, mesh: _, cage: __, undo, redo, forgotten, ...same } = view;
+      const { cage: _, ...same } = view;
       store.set({
-        ...same,
-        poses: unchanged(old.poses, view.poses),
-        shares: unchanged(old.shares, view.shares),
-        transition: unchanged(old.transition, view.transition),
-        pins: unchanged(old.pins, view.pins),
-        // Edges and faces can be selected only while the cage is reshaped.
-        ...(old.editingRest && !view.editingRest ? { element: "vertex" } : {}),
-        selected: unchanged(old.selected, view.selected),
-        undoLabel: undo,
-        redoLabel: redo,
-        ...(models === (before?.models ?? 0) ? {} : modelPatch()),
+        ...changed<typeof same>(store.get(), same),
+        ...(view.models === (before?.models ?? 0) ? {} : modelPatch()),
         ...(isOther ? cagePatch(view) : {}),
         ...(view.cage === before?.cage ? {} : settingsPatch(view)),
         ...(isNewlyBound ? { report: engine().boundReport() ?? null } : {}),
         ...(hasOtherColours ? { legend: engine().legend() ?? null } : {}),
       });
-      if (forgotten > 0 && !before?.forgotten) ctx.tell.say(T.did.forgotten);
+      if (view.forgotten > 0 && !before?.forgotten) ctx.tell.say(T.did.forgotten);
       if (!isOther) return;
       const { cage, check } = store.get();
       if (check) know(check);
@@ -127,9 +112,13 @@ export function followDocument(ctx: Context): DocumentMirror {
   };
 }
 
+export type DocumentMirror = ReturnType<typeof followDocument>;
+
 const keyOf = (view: View | undefined) => `${view?.mesh ?? 0} ${view?.cage ?? 0}`;
 
-/** Returns the old value if the new one is equal, so that panels that show it are not rendered again. */
-function unchanged<T>(old: T, value: T): T {
-  return JSON.stringify(old) === JSON.stringify(value) ? old : value;
+/** The values of `next` that differ from those of `old`, so that panels that show the others are not rendered again. */
+function changed<T extends object>(old: T, next: T): Partial<T> {
+  const isOther = (key: string) =>
+    JSON.stringify(old[key as keyof T]) !== JSON.stringify(next[key as keyof T]);
+  return Object.fromEntries(Object.entries(next).filter(([key]) => isOther(key))) as Partial<T>;
 }

@@ -72,7 +72,7 @@ function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]
 }
 
 /**
- * Says what dropping files will do while they are dragged. Until they are dropped, browsers reveal only their number.
+ * While files are dragged, says what dropping them will do. Until the drop, browsers reveal only the number of files.
  */
 export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
   if (files > 1) {

@@ -5,7 +5,7 @@ import { T } from "./words";
 
 export { createEta, type Eta } from "@cagework/core/eta";
 
-/** The remaining time in words, rounded to the precision of the estimate. */
+/** The remaining time in words, rounded to seconds or, from one minute on, to minutes. */
 export function timeLeft(ms: number): string {
   if (ms < 1500) return T.eta.second;
   const isShort = ms < 60_000;

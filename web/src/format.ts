@@ -85,7 +85,7 @@ export function decimals(value: number): string {
   return format.decimals.format(value);
 }
 
-/** Formats a fraction as percent, clamped to 0 and 100. */
+/** Formats a fraction as a percentage, clamped to the range from 0 to 100 %. */
 export function percent(share: number, maximumFractionDigits = 0): string {
   const clamped = Math.min(1, Math.max(0, share));
   return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
@@ -95,8 +95,8 @@ export function percent(share: number, maximumFractionDigits = 0): string {
 const FIELD = 9;
 
 /**
- * Formats a coordinate for a number field: up to five significant digits, no trailing zeros, no minus zero. Values
- * below the rounding errors of an object of the given size become zero.
+ * Formats a coordinate for a number field: up to five significant digits, no trailing zeros, no negative zero. Values
+ * below 1e-6 of `size`, the size of the object, are rounding errors and become zero.
  */
 export function coordinate(value: number, size = 0): string {
   if (Math.abs(value) <= 1e-6 * size) return "0";

@@ -1,6 +1,7 @@
 /** Entry point of the page. */
 
 import { lackOf } from "@cagework/core/session/adapter";
+import { loadPart } from "@cagework/core/session/parts";
 import { createApp } from "./app";
 import type { Session } from "./contract";
 import { watchCrashes } from "./crash";
@@ -14,7 +15,7 @@ import { createStore } from "./signals";
 import { isFresh, startUp } from "./start";
 import { INITIAL } from "./state";
 import { forgetCrash } from "./store";
-import { explain } from "./strings";
+import { explain, messageOf, textOf } from "./strings";
 import { askAfterCrash } from "./ui/crashed";
 import { createLost } from "./ui/lost";
 import { mount, mountUnsupported } from "./ui/page";
@@ -34,8 +35,22 @@ function restart(): void {
   location.reload();
 }
 
+/** Shows the gallery, which is downloaded only here. */
+async function gallery(): Promise<void> {
+  // Tell the service worker which build is in use. The gallery does not register it.
+  keepOffline(() => undefined);
+  try {
+    const { showGallery } = await loadPart(import("./gallery/gallery"));
+    await showGallery();
+  } catch (error) {
+    document.body.textContent = textOf(messageOf(error));
+  }
+}
+
 async function main(): Promise<void> {
   await chooseLanguage();
+  // gallery.html has the content of index.html. Some servers omit the ending in the address.
+  if (/\/gallery(\.html)?$/.test(location.pathname)) return gallery();
   const stage = createStage(byId("stage"));
   const store = createStore({ ...INITIAL, busy: T.opening.starting });
   const { Toasts, tell, offer } = createToasts();

@@ -26,7 +26,7 @@ export interface Queue {
 interface Line {
   /** Controllers that abort unfinished work. */
   readonly stops: Set<AbortController>;
-  /** The work added last. */
+  /** Promise of the work added last. The next work starts when this promise settles. */
   last: Promise<unknown>;
 }
 

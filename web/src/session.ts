@@ -6,10 +6,29 @@ import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenedOn, openOn } from "@cagework/core/session/open";
-import { createApart, load } from "@cagework/core/session/reader";
+import { createApart, type Hear, load } from "@cagework/core/session/reader";
 import { polygons } from "@cagework/core/session/reading";
-import type { BindOptions, Job, OpenContents, Opened, ReadFile, Session, View } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./defaults";
+import type {
+  BindEvent,
+  BindOptions,
+  BindReport,
+  CageArrays,
+  CageOptions,
+  Check,
+  CheckedCage,
+  Coordinates,
+  GrabInput,
+  GrabResult,
+  Job,
+  ModelInfo,
+  NamedFile,
+  OpenContents,
+  PullFrame,
+  Repair,
+  UpAxis,
+  View,
+} from "./contract";
+import { BIND_DEFAULTS } from "./defaults";
 import { once, prepareSample } from "./session/opening";
 import { T } from "./words";
 
@@ -21,17 +40,40 @@ declare global {
 /** Time after which drawing starts even if no model has been opened, ms. */
 const LONGEST_EMPTY = 3000;
 
-/** Fields of `ReadModel` with the same values for all samples, which have no companion files and no notices. */
-const OWN = {
-  siblings: new Map(),
-  up: undefined,
-  used: 0,
-  pixels: 0,
-  textures: [],
-  notices: [],
-  took: 0,
-  vertices: 0,
+/**
+ * Samples that are read as files: from the folder `samples`, except the knot, whose splats Rust computes by a formula.
+ * Rust builds the other samples.
+ */
+const SAMPLE_FILES: Readonly<Record<string, string>> = {
+  spot: "spot.splat",
+  knot: "knot.spz",
+  wardrobe: "wardrobe.glb",
 };
+
+async function download(address: string, signal: AbortSignal | undefined): Promise<Blob> {
+  const answer = await fetch(address, { signal: signal ?? null });
+  if (!answer.ok) throw new Error(`${address}: ${answer.status} ${answer.statusText}`);
+  return answer.blob();
+}
+
+/** Methods that work "in the worker" share one worker, which runs their jobs in sequence. */
+export type Session = Awaited<ReturnType<typeof start>>;
+
+/** A file that a worker has read successfully. */
+export type ReadFile = Pick<ReadModel, "vertices" | "pixels">;
+
+/** What the page needs from a file whose models are in the engine. */
+export interface OpenedFile {
+  readonly model: ModelInfo;
+  /** Check of the cage in the file; null without a cage. */
+  readonly check: Check | null;
+  /** Settings of a project, JSON; null for other files. */
+  readonly settings: string | null;
+  /** Point of a sample that the page asks the user to pull first. */
+  readonly grip?: Float32Array;
+  /** Sentences about parts of a project that could not be restored. */
+  readonly notices: readonly string[];
+}
 
 /** Opens a session, see `openOn`. */
 export function openSession(canvases: Canvases, needs: Needs): Promise<Session> {
@@ -45,12 +87,12 @@ interface Needs {
   changed(view: View): void;
 }
 
-async function start(opened: OpenedOn & Needs): Promise<Session> {
+async function start(opened: OpenedOn & Needs) {
   const { artifact, module, canvas, adapter, lack, fresh, changed } = opened;
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
   const client = createClient(module, openWorker);
-  const samples = pkg.Binder.samples();
+  const samples = [...pkg.Binder.samples(), ...Object.keys(SAMPLE_FILES)];
   const buildSample = prepareSample(client, samples[0], fresh);
   const frames = createFrames();
   /** Reports errors of `changed` here, because Rust ignores errors of its callbacks. */
@@ -77,9 +119,6 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     ),
   );
   setTimeout(begin, LONGEST_EMPTY);
-  /** Selects the CPU backend if the GPU cannot compute: without WebGPU, and for conjugate gradients. */
-  const possible = (options: BindOptions): BindOptions =>
-    lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
   /** The canvas in use. WebGL2 reports a lost context only by an event of the canvas. */
   let guarded: HTMLCanvasElement;
   const guard = (canvas: HTMLCanvasElement) => {
@@ -123,10 +162,10 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     read: ReadModel,
     sample: string | null,
     poses: OpenContents["poses"] = [],
-  ): Promise<Opened> {
-    const models = await load(pkg, read);
+  ): Promise<OpenedFile> {
+    const models = load(pkg, read);
     const settings = models[0].settings ?? null;
-    // A project saved without a cage contains an empty one.
+    // A project that was saved without a cage contains an empty cage.
     const cage = read.cage?.positions.length ? read.cage : undefined;
     const contents: OpenContents = {
       sample,
@@ -144,24 +183,46 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
     return { model, check: cage?.check ?? null, settings, notices };
   }
 
-  const session: Session = {
+  const session = {
+    /** The engine on the page's thread: document, picking, gestures, drawing, exports. */
     engine,
+    /** Name of the GPU, as the report card shows it. */
     adapter,
+    /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
     lack,
+    /** Identifiers of the built-in samples; the first one is opened at start. */
     samples,
-    readFiles: (files, used, hear) => reading("read", { files, up: undefined, used }, hear),
+    /**
+     * Reads one model with its companion files, or a project GLB, in a worker of its own. Companion files in folders
+     * are found by `path`. Decodes textures, Draco and meshopt data; decoders are downloaded when first needed. If
+     * reading fails or crashes, the open model is not affected. `used`: pixels of the textures of other models that are
+     * drawn together with this one.
+     */
+    readFiles: (files: readonly NamedFile[], used: number, hear?: Hear): Job<ReadFile> =>
+      reading("read", { files, up: undefined, used }, hear),
+    /**
+     * Until the returned function is called, one worker reads all files. The worker is replaced only after a failure.
+     */
     shareReader: reading.share,
-    open: (read: ReadFile) => openRead(read as ReadModel, null).finally(begin),
-    add(reads: readonly ReadFile[], label, hear) {
+    /**
+     * Opens a file that was read; a project brings its cage and poses. Call it once for each file. `sample`: identifier
+     * of the sample, if the file is one.
+     */
+    open: (read: ReadFile, sample: string | null = null) =>
+      openRead(read as ReadModel, sample).finally(begin),
+    /**
+     * Adds models to the open cage, and keeps cage and pose. `label` returns the name of the undo step for a number of
+     * models; without it, no step is added. Resolves with the notices of the readers.
+     */
+    add(reads: readonly ReadFile[], label?: (models: number) => string): Job<readonly string[]> {
       let isGivenUp = false;
       const work = async () => {
-        const all: Awaited<ReturnType<typeof load>>[number][] = [];
+        const all: ReturnType<typeof load>[number][] = [];
         try {
-          for (const [k, read] of reads.entries()) {
+          for (const read of reads) {
             if (isGivenUp) throw named("Cancelled", "cancelled");
-            hear?.(k);
             // If the file is a project, add its models and ignore its cage.
-            all.push(...(await load(pkg, read as ReadModel)));
+            all.push(...load(pkg, read as ReadModel));
           }
         } catch (error) {
           for (const loaded of all) loaded.free();
@@ -177,23 +238,33 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
         },
       };
     },
-    async openSample(id) {
-      const { glb, cage, poses, grip } = await buildSample(id);
+    async openSample(id: string, signal?: AbortSignal): Promise<OpenedFile> {
+      const name = SAMPLE_FILES[id];
+      if (name) {
+        const content =
+          id === "knot" ? pkg.Binder.knotCapture() : await download(`./samples/${name}`, signal);
+        const file = new File([content as BlobPart], name);
+        const read = await reading("read", { files: [{ name, path: name, file }], up: undefined, used: 0 })
+          .done;
+        signal?.throwIfAborted();
+        return openRead(read, id).finally(begin);
+      }
+      const { read, poses, grip } = await buildSample(id);
       const words = T.samples[id];
-      const name = `${words?.name ?? id}.glb`;
       const named = poses.map((pose, k) => ({ ...pose, name: words?.poses[k] ?? pose.name }));
-      const content = new Blob([glb as BlobPart]);
-      const opened = await openRead({ ...OWN, name, content, cage }, id, named).finally(begin);
+      const opened = await openRead(read, id, named).finally(begin);
       return { ...opened, grip };
     },
-    async turn(bytes, up) {
+    /** Opens a project again with another up axis: rotates model, cage and poses. */
+    async turn(bytes: Uint8Array, up: UpAxis) {
       const name = "turned.glb";
       const file = new Blob([new Uint8Array(bytes)]);
       return openRead(await reading("read", { files: [{ name, path: name, file }], up, used: 0 }).done, null);
     },
-    readSettings: (text, bind) =>
-      pkg.readSettings(text, JSON.stringify({ bind, cage: CAGE_DEFAULTS, rig: RIG_DEFAULTS })),
-    readCage(files, hear) {
+    /** Reads the page's settings of a project. Defaults replace invalid values; `notices` name the invalid values. */
+    readSettings: pkg.readSettings,
+    /** Reads a cage from a file, like a model, and checks it. */
+    readCage(files: readonly NamedFile[], hear?: Hear): Job<CheckedCage> {
       const { smooth } = engine.cageControls();
       const input = {
         files,
@@ -204,27 +275,57 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
       };
       return reading("readCage", input, hear);
     },
-    boxCage: (divisions) => polygons(engine.boxCage(divisions)),
-    checkCage: () => ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
-    repair: (kind) => ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
-    takeCage: ({ positions, corners, controls, notices = [] }, label) =>
+    /** A box around the model, with faces of about equal size: `divisions` of them along its longest side. */
+    boxCage: (divisions: number): CageArrays => polygons(engine.boxCage(divisions)),
+    /** Checks the cage at rest, in a worker of its own. */
+    checkCage: (): Job<Check> => ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
+    /** Repairs the cage at rest, in a worker of its own. Cancels `checkCage`. */
+    repair: (kind: Repair): Job<CheckedCage> =>
+      ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
+    /** Sets the cage, as an undo step if there is a label. An invalid cage is kept as a draft, with `usable` false. */
+    takeCage: ({ positions, corners, controls, notices = [] }: CheckedCage, label?: string) =>
       engine.setCage(positions, corners, controls, [...notices], label),
-    cageArrays: cage,
-    carryPoses: (old, poses) =>
+    /** Returns the cage at rest, with its interior controls. */
+    cageArrays: cage as () => CageArrays,
+    /**
+     * Converts poses of `old`, another cage of the model, to poses of the open cage, in the worker.
+     * `poses`: `[n_poses, n_old_controls, 3]`.
+     */
+    carryPoses: (old: CageArrays, poses: Float32Array) =>
       ofNow(
         client.run("carry", { model: engine.modelPositions(), cage: engine.restPositions(), old, poses }),
       ),
-    generateCage(options, onProgress, clip) {
-      const [positions, triangles] = engine.modelStates(clip);
-      const model = engine.modelPositions();
-      const { smooth } = engine.cageControls();
-      const input = { positions, triangles, model, options, smooth };
+    /** Generates a cage for the model, in the worker. `clip`: name of a clip whose frames it also encloses. */
+    generateCage(
+      options: CageOptions,
+      onProgress: (fraction: number) => void,
+      clip?: string,
+    ): Job<CheckedCage> {
+      const input = () => {
+        const [positions, triangles] = engine.modelStates(clip);
+        const { smooth } = engine.cageControls();
+        return { positions, triangles, model: engine.modelPositions(), options, smooth };
+      };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },
-    bind: (options, listener) =>
-      startBind({ client, engine, adapter, options: possible(options), listener, cage: cage() }),
-    estimateMemory: (options) => engine.estimateMemory(possible(options)),
-    bindByFormula: (kind) =>
+    /**
+     * Binds in the worker. A model that is not bound yet is first bound with the option `grid` set to 32, unless the
+     * requested grid is as coarse or the bind is very large (see `startBind`). Each result is adopted as soon as it is
+     * ready, without a change of the pose. After `cancel()`, `done` rejects with name "Cancelled", and adopted results
+     * remain in use.
+     */
+    bind: (options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> =>
+      startBind({ client, engine, adapter, options, listener, cage }),
+    /**
+     * Number of bytes that a bind with these options needs. Throws the error that the bind would end with. Fast enough
+     * to be called on every change.
+     */
+    estimateMemory: (options: BindOptions) => engine.estimateMemory(options),
+    /**
+     * Computes closed-form coordinates for comparison, in the worker. Needed once per cage before `scene.compare` shows
+     * them.
+     */
+    bindByFormula: (kind: Coordinates): Job<void> =>
       chain(
         ofNow(client.run("formula", { kind, positions: engine.modelPositions(), cage: cage() })),
         ({ indptr, indices, data }) =>
@@ -233,8 +334,9 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
             data.subarray(start, end),
           ]),
       ),
-    loadSlice(axis, fraction, grid) {
-      const options = possible({ ...BIND_DEFAULTS, grid });
+    /** Computes cells and coordinates of one plane of the grid, in the worker. `scene.slice` then shows them. */
+    loadSlice(axis: 0 | 1 | 2, fraction: number, grid: number): Job<void> {
+      const options = { ...BIND_DEFAULTS, grid };
       const job = client.run("slice", { cage: cage(), axis, fraction, options });
       const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
       return chain(ofNow(job), (rows) => {
@@ -242,47 +344,73 @@ async function start(opened: OpenedOn & Needs): Promise<Session> {
         engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });
     },
-    loadLattice(grid) {
-      const options = possible({ ...BIND_DEFAULTS, grid });
+    /**
+     * Computes the lattice by which the cage deforms splats and moving models (`RigOptions.dynamic`), in the worker.
+     * Needed once per cage.
+     */
+    loadLattice(grid: number): Job<void> {
+      const options = { ...BIND_DEFAULTS, grid };
       return chain(
         ofNow(client.run("lattice", { cage: cage(), options })),
         ({ indptr, indices, data, offsets }) => engine.takeLattice(indptr, indices, data, offsets),
       );
     },
+    /** Prepares pulls of the open model, in a worker for pulls. */
     preparePull: () =>
       ofNow(
-        pulling().run("pullOpen", {
+        pulling().run("pullOpen", () => ({
           positions: engine.modelPositions(),
           triangles: engine.modelTriangles(),
           cage: cage(),
-        }),
+        })),
       ),
-    pullGrab: (grab) => ofNow(pulling().run("pullGrab", grab)),
-    pullFrame: (to) => ofNow(pulling().run("pullFrame", { to })),
-    zip: (files) =>
+    /** Starts a pull with grabbed and pinned points, in the worker for pulls. */
+    pullGrab: (grab: GrabInput): Job<GrabResult> => ofNow(pulling().run("pullGrab", grab)),
+    /** Solves one frame of the pull, in the worker for pulls. `to`: targets of the grabbed points, `[n_grabs, 3]`. */
+    pullFrame: (to: Float32Array): Job<PullFrame> => ofNow(pulling().run("pullFrame", { to })),
+    /** A zip archive of files with distinct names. */
+    zip: (files: readonly { readonly name: string; readonly bytes: Uint8Array }[]) =>
       pkg.Engine.zipFiles(
         files.map(({ name }) => name),
         files.map(({ bytes }) => bytes),
       ),
+    /** Requests a frame; repeated calls are merged. Changes through `engine` request a frame themselves. */
     draw: frames.ask,
+    /**
+     * Calls `listener` after each drawn frame with the milliseconds that the main thread spent on the frame. Returns a
+     * function that removes the listener.
+     */
     onFrame: frames.listen,
-    async picture(width, height, alone = false) {
+    /** PNG of the scene, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
+    async picture(width: number, height: number, alone = false) {
       const pixels = new Uint8ClampedArray(await engine.picture(width, height, alone));
       const canvas = new OffscreenCanvas(width, height);
       canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
       return canvas.convertToBlob({ type: "image/png" });
     },
-    readPositions: (kind = "harmonic") => engine.readPositions(kind),
-    onLost(listener) {
+    /** Posed positions as drawn, by default with harmonic coordinates. For tests. */
+    readPositions: (kind: Coordinates = "harmonic") => engine.readPositions(kind),
+    /**
+     * Calls `listener` when the GPU device is lost, after which the page calls `recover()`. Returns a function that
+     * removes the listener.
+     */
+    onLost(listener: (reason: string) => void): () => void {
       losses.add(listener);
       return () => losses.delete(listener);
     },
-    async recover(fresh) {
+    /**
+     * Restores the view on a new device. `canvas` must be new, because one with a lost context cannot be used again.
+     */
+    async recover(fresh: HTMLCanvasElement) {
       guard(fresh);
       await engine.recover(fresh);
       void watch();
     },
+    /** For tests: destroys the device, as a driver reset would. */
     loseDevice: () => engine.lose(),
+    /** Ends the idle worker, which frees its memory. The next job starts another one. */
+    rest: client.rest,
+    /** Size of the wasm module's memory on this thread, bytes. */
     memory: () => memory.buffer.byteLength,
     close() {
       frames.stop();

@@ -5,50 +5,55 @@ import { PageError } from "./strings";
 import { T } from "./words";
 
 /** Camera, selected vertices and scene options of a link. */
-export interface Seen {
+export interface SharedView {
   readonly camera: CameraView;
   readonly selected: readonly number[];
   readonly scene: Partial<SceneOptions>;
 }
 
-/** Smoothing of the cage and controls inside it, with their rest positions. */
+/** Smoothing of the cage, and its interior controls with their rest positions. */
 export interface SharedControls {
   readonly controls: CageControls;
-  /** Rest positions of the controls inside, object units. `[n_inner, 3]` */
+  /** Rest positions of the interior controls, object units. `[n_inner, 3]` */
   readonly inner: readonly number[];
 }
 
-export interface Shared {
+/** The content of a share link. */
+export interface ShareLink {
   /** Identifier of the sample. Links contain no files, so only samples can be shared. */
   sample: string;
-  /** The pose, packed by `Engine.encodePose`. */
+  /** The pose, encoded by `Engine.encodePose`. */
   pose?: Uint8Array;
-  seen?: Seen;
-  /** Smoothing and controls inside; undefined for a plain cage without controls inside. */
+  seen?: SharedView;
+  /** Undefined for a cage without smoothing and without interior controls. */
   controls?: SharedControls;
+  /** Index of the clip that plays. */
+  clip?: number;
 }
 
 /** Maximum length of a fragment that is decoded, characters. A pose of 400 cage vertices takes about 3 kB. */
 const LONGEST = 16_384;
 
 /** Encodes the fragment of a link, including the #. */
-export async function encodeShare(shared: Shared): Promise<string> {
+export async function encodeShare(shared: ShareLink): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
   if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
   for (const key of ["seen", "controls"] as const) {
     const value = shared[key];
     if (value) fields.set(key, toBase64Url(await pack(new TextEncoder().encode(JSON.stringify(value)))));
   }
+  if (shared.clip !== undefined) fields.set("clip", String(shared.clip));
   return `#${fields}`;
 }
 
-/** Decodes the fragment of an address. Returns undefined if it is no share link; throws if the link is damaged. */
-export async function decodeShare(fragment: string): Promise<Shared | undefined> {
+/** Decodes the fragment of an address. Returns undefined if it is not a share link; throws if the link is damaged. */
+export async function decodeShare(fragment: string): Promise<ShareLink | undefined> {
   const fields = new URLSearchParams(fragment.slice(1));
   const sample = fields.get("sample");
   const pose = fields.get("pose");
   const seen = fields.get("seen");
   const controls = fields.get("controls");
+  const clip = fields.get("clip");
   if (sample === null && pose === null) return undefined;
   if (!sample) throw new PageError(T.link.noSample);
   if (fragment.length > LONGEST) throw new PageError(T.link.long(LONGEST));
@@ -57,6 +62,7 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
     ...(pose === null ? {} : { pose: await read("pose", pose) }),
     ...(seen === null ? {} : { seen: parse(await read("view", seen)) }),
     ...(controls === null ? {} : { controls: parseControls(await read("controls", controls)) }),
+    ...(clip === null ? {} : { clip: parseClip(clip) }),
   };
 }
 
@@ -69,13 +75,18 @@ async function read(what: "pose" | "view" | "controls", text: string): Promise<U
 }
 
 /** Decodes camera and scene. Checks only the structure of the JSON; the engine checks the values. */
-function parse(json: Uint8Array): Seen {
-  const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
+function parse(json: Uint8Array): SharedView {
+  const seen: Partial<SharedView> | null = JSON.parse(new TextDecoder().decode(json));
   if (!seen?.camera || !Array.isArray(seen.selected)) throw new PageError(T.link.unreadable.view);
   return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
 }
 
-/** Decodes inner controls. Checks only the structure of the JSON; the engine checks the values. */
+function parseClip(text: string): number {
+  if (!/^\d{1,4}$/.test(text)) throw new PageError(T.link.unreadable.clip);
+  return Number(text);
+}
+
+/** Decodes interior controls. Checks only the structure of the JSON; the engine checks the values. */
 function parseControls(json: Uint8Array): SharedControls {
   const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
   if (!said?.controls || !Array.isArray(said.inner)) throw new PageError(T.link.unreadable.controls);

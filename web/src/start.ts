@@ -51,13 +51,13 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
     document.title = share === null ? name : `${percent(share)} - ${name}`;
   });
   effect(() => {
-    const { model, cage, steps, appliedOptions, symmetry } = store.get();
-    const { bound, undoLabel, sampleCage, tour } = store.get();
+    const { model, cage, steps, appliedOptions, tools } = store.get();
+    const { bound, undo, sampleCage, tour } = store.get();
     // Do not save a sample that was not modified.
-    const isUntouched = sampleCage && undoLabel === null;
+    const isUntouched = sampleCage && undo === null;
     const isWork = bound && !isUntouched && tour === null;
     // Reading these keys subscribes this effect to their changes, after which the work must be saved.
-    if (isWork && [model, cage, steps, appliedOptions, symmetry]) untracked(() => app.works.touch());
+    if (isWork && [model, cage, steps, appliedOptions, tools]) untracked(() => app.works.touch());
   });
   effect(() => {
     if (store.get().step) untracked(() => app.view.scene({}));
@@ -99,7 +99,11 @@ async function open(app: App, crash: Crash | undefined): Promise<void> {
   }
 }
 
-/** Opens the work that `toOpen` chooses. Otherwise opens a sample and, if several works are saved, shows their list. */
+/**
+ * Opens the work that `toOpen` of works/entry.ts chooses. If it chooses none, or the work cannot be opened, opens the
+ * first sample and, if several works are saved, shows their list. Opens nothing if the user has dropped files in the
+ * meantime.
+ */
 async function openFirst(app: App): Promise<void> {
   if (await app.works.restore()) return;
   const { works, samples } = app.store.get();
@@ -120,18 +124,25 @@ async function openShared(app: App): Promise<Link> {
   try {
     const link = await decodeShare(location.hash);
     if (!link) return { opened };
-    const { sample, pose, seen, controls } = link;
+    const { sample, pose, seen, controls, clip } = link;
     if (!app.store.get().samples.includes(sample)) {
       throw new PageError(T.link.unknown(sample.slice(0, 40)));
     }
     opened = await app.files.openSample(sample);
     if (!opened) return { opened };
     app.store.set({ step: "pose" });
+    // A capture has no cage of its own: wait until one is generated.
+    if (!app.store.get().cage) await app.files.prepared();
     if (controls) app.controls.takeShared(controls);
     const { engine } = app.ctx.session();
     if (pose) engine.decodePose(pose);
     engine.amend();
     if (seen) app.view.show(seen);
+    if (clip !== undefined) {
+      if (!app.store.get().model?.clips[clip]) throw new PageError(T.link.noClip(clip));
+      await app.files.prepared();
+      await app.clips.choose(clip);
+    }
     return { opened };
   } catch (damage) {
     return { opened, damage };

@@ -3,21 +3,22 @@
 import type {
   BindOptions,
   BindReport,
-  Element as CageElement,
-  CageOptions,
   CageState,
   Check,
   InnerKind,
   Lack,
   Legend,
   ModelInfo,
-  Pivot,
-  RigOptions,
-  SceneOptions,
   Stage,
-  View,
 } from "./contract";
-import { BIND_DEFAULTS, BOX_DIVISIONS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import {
+  BIND_DEFAULTS,
+  BOX_DIVISIONS,
+  CAGE_DEFAULTS,
+  RIG_DEFAULTS,
+  SCENE_DEFAULTS,
+  VIEW_DEFAULTS,
+} from "./defaults";
 import { cageKey } from "./derived";
 import type { Theme } from "./store";
 import type { Message } from "./strings";
@@ -53,105 +54,6 @@ export type DropPlace = "page" | "cage" | "list";
 
 export type CageSource = "auto" | "hull" | "box" | "file";
 
-export interface AppState extends Omit<View, "models" | "mesh" | "cage" | "undo" | "redo" | "forgotten"> {
-  step: StepName;
-  adapter: string;
-  /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
-  lack: Lack | null;
-  /** Identifiers of the built-in samples. */
-  samples: readonly string[];
-  /** Describes the operation that blocks the page; null without one. */
-  busy: string | null;
-  /** Progress of the operation that blocks the page, in words. */
-  busyStep: string;
-  /** Cancels the operation that blocks the page; null if it cannot be cancelled. */
-  cancelBusy: (() => void) | null;
-  /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */
-  goOn: (() => void) | null;
-  model: ModelInfo | null;
-  /** Point of the sample to pull first, until the model has been pulled. */
-  grip: Float32Array | null;
-  cage: CageState | null;
-  /** Result of the cage's check; null until it is known. */
-  check: Check | null;
-  cageSource: CageSource;
-  cageOptions: CageOptions;
-  /** `cageKey` of the settings with which the cage was made or opened. */
-  cageMade: string;
-  /** Name of a clip whose frames generated cages also enclose; null for none. */
-  cageClip: string | null;
-  boxDivisions: number;
-  /** Number of vertices of the previewed cage; null without a preview. */
-  cagePreview: number | null;
-  /** Finished fraction of the cage generation, 0 to 1; null if no generation runs. */
-  cageProgress: number | null;
-  /** Bind options chosen in the Bind panel. */
-  bindOptions: BindOptions;
-  /** Options of the last finished bind; null before the first. */
-  appliedOptions: BindOptions | null;
-  bindRun: BindRun | null;
-  report: BindReport | null;
-  /** Reports of earlier binds of this cage, for comparison, latest first. */
-  earlier: readonly BindReport[];
-  /** Number of bytes that the next bind needs, or a message why it cannot run. */
-  memory: number | Message;
-  scene: SceneOptions;
-  seeOpen: boolean;
-  legend: Legend | null;
-  slice: Slice;
-  element: CageElement;
-  symmetry: boolean;
-  unmatched: number;
-  /**
-   * Radius of proportional editing, as a fraction of the cage's diagonal. Remembered while `proportionalOn` is false.
-   */
-  proportional: number;
-  proportionalOn: boolean;
-  /** Whether clicks and taps add to the selection. */
-  additive: boolean;
-  /** Centre of rotation and scaling. */
-  pivot: Pivot;
-  boxArmed: boolean;
-  /** Kind of inner control that clicks add; null for none. */
-  placing: InnerKind | null;
-  ortho: boolean;
-  /** Label of the gesture in progress; null without one. */
-  gesture: string | null;
-  /** Number of sampled model vertices outside the cage during a gesture that reshapes it; otherwise 0. */
-  strays: number;
-  /** Whether the worker for pulls is prepared, or being prepared, for the current model and cage. */
-  pullReady: boolean;
-  /** Whether pulls move the whole model. */
-  pullWhole: boolean;
-  playing: boolean;
-  /** The brush that paints which vertices of a model stay in place; null while nothing is painted. */
-  painting: Painting | null;
-  /** The clip shown in place of the cage's pose. */
-  clip: ClipState;
-  /** Identifier of the only model to export; null to export all. */
-  exportOnly: number | "zip" | null;
-  /** How the model's skeleton follows the cage. */
-  rigOptions: RigOptions;
-  /** Name of the pose that the animation approaches; null for the rest pose. */
-  playingPose: string | null;
-  undoLabel: string | null;
-  redoLabel: string | null;
-  theme: Theme;
-  /** Time of the last save in this browser, ms since 1970; null before the first. */
-  savedAt: number | null;
-  /** Work saved in this browser, newest first. */
-  works: readonly Work[];
-  /** Whether the list of saved work is shown. */
-  worksOpen: boolean;
-  /** State of the tour; null while it is not running. */
-  tour: TourState | null;
-  sheetOpen: boolean;
-  /** Whether the instructions for enabling WebGPU are shown. */
-  waysOpen: boolean;
-  /** Files that are dragged over the window; null if none are. */
-  hovering: { readonly files: number; readonly to: DropPlace } | null;
-}
-
 export const NO_CLIP: ClipState = {
   clip: null,
   seconds: 0,
@@ -163,106 +65,130 @@ export const NO_CLIP: ClipState = {
 
 /** Keys that mirror the document in Rust. `document.ts` sets them whenever the document changes. */
 export const DOCUMENT_STATE = {
-  model: null,
-  sample: null,
-  cage: null,
-  check: null,
-  sampleCage: false,
-  report: null,
-  earlier: [],
-  bound: false,
-  legend: null,
-  editingRest: false,
-  selected: { count: 0, last: null, center: null },
-  posed: false,
+  ...VIEW_DEFAULTS,
+  model: null as ModelInfo | null,
+  cage: null as CageState | null,
+  /** Result of the cage's check; null until it is known. */
+  check: null as Check | null,
+  report: null as BindReport | null,
+  /** Reports of earlier binds of this cage, for comparison, latest first. */
+  earlier: [] as readonly BindReport[],
+  legend: null as Legend | null,
+  /** Whether the worker for pulls is prepared, or being prepared, for the current model and cage. */
   pullReady: false,
-  pins: [],
-  poses: [],
-  shares: [],
-  transition: { interpolation: "linear", loops: true, back: 1 },
-  animationSeconds: 0,
-  steps: 0,
-  undoLabel: null,
-  redoLabel: null,
-} satisfies Partial<AppState>;
+};
 
 const CAGE_SETTINGS = {
-  cageSource: "auto",
+  cageSource: "auto" as CageSource,
   cageOptions: CAGE_DEFAULTS,
-  cageClip: null,
-  boxDivisions: BOX_DIVISIONS,
-} satisfies Partial<AppState>;
+  /** Name of a clip whose frames generated cages also enclose; null for none. */
+  cageClip: null as string | null,
+  boxDivisions: BOX_DIVISIONS as number,
+};
+
+export type CageSettings = typeof CAGE_SETTINGS;
 
 /** Initial values of the keys that belong to the open model, see docs/page.md. */
 export const MODEL_STATE = {
   ...CAGE_SETTINGS,
-  grip: null,
+  /**
+   * Point of the sample that the page asks the user to pull first; null for other models, and once the model has been
+   * pulled.
+   */
+  grip: null as Float32Array | null,
+  /** `cageKey` of the settings with which the cage was made or opened. */
   cageMade: cageKey(CAGE_SETTINGS),
-  cagePreview: null,
-  cageProgress: null,
+  /** Number of vertices of the previewed cage; null without a preview. */
+  cagePreview: null as number | null,
+  /** Finished fraction of the cage generation, 0 to 1; null if no generation runs. */
+  cageProgress: null as number | null,
+  /** Bind options chosen in the Bind panel. */
   bindOptions: BIND_DEFAULTS,
-  appliedOptions: null,
-  bindRun: null,
-  memory: 0,
-  slice: { axis: 2, position: 0.5, busy: false },
-  element: "vertex",
-  symmetry: false,
-  unmatched: 0,
+  /** Options of the last finished bind; null before the first. */
+  appliedOptions: null as BindOptions | null,
+  bindRun: null as BindRun | null,
+  /** Number of bytes that the next bind needs, or a message that says why it cannot run. */
+  memory: 0 as number | Message,
+  slice: { axis: 2, position: 0.5, busy: false } as Slice,
   boxArmed: false,
-  placing: null,
+  /** Kind of interior control that clicks add; null for none. */
+  placing: null as InnerKind | null,
   ortho: false,
-  gesture: null,
+  /** Label of the gesture in progress; null without one. */
+  gesture: null as string | null,
+  /** Number of sampled model vertices outside the cage during a gesture that reshapes it; otherwise 0. */
   strays: 0,
+  /** Whether pulls move the whole model. */
   pullWhole: false,
   playing: false,
-  painting: null,
+  /** The brush that paints which vertices of a model stay in place; null while nothing is painted. */
+  painting: null as Painting | null,
+  /** The clip shown in place of the cage's pose. */
   clip: NO_CLIP,
-  exportOnly: null,
+  /**
+   * Identifier of the only model to export; "zip" to export all in one archive, null to export all as separate files.
+   */
+  exportOnly: null as number | "zip" | null,
+  /** Options that determine how the model's skeleton follows the cage. */
   rigOptions: RIG_DEFAULTS,
-  playingPose: null,
-  savedAt: null,
-} satisfies Partial<AppState>;
-
-type ModelState = Pick<AppState, keyof typeof MODEL_STATE>;
-
-/**
- * Initial values of the keys that stay when another model is opened: the user's choices and the state of the page
- * itself.
- */
-export const PERSON_STATE: Omit<AppState, keyof typeof MODEL_STATE | keyof typeof DOCUMENT_STATE> = {
-  step: "model",
-  adapter: "",
-  lack: null,
-  samples: [],
-  busy: null,
-  busyStep: "",
-  cancelBusy: null,
-  goOn: null,
-  scene: SCENE_DEFAULTS,
-  seeOpen: false,
-  proportional: 0.2,
-  proportionalOn: false,
-  additive: false,
-  pivot: "middle",
-  theme: "auto",
-  works: [],
-  worksOpen: false,
-  tour: null,
-  sheetOpen: false,
-  waysOpen: false,
-  hovering: null,
+  /** Name of the pose that the animation approaches; null for the rest pose. */
+  playingPose: null as string | null,
+  /** Time of the last save in this browser, ms since 1970; null before the first. */
+  savedAt: null as number | null,
+  /** Addresses of pictures of saved poses, by `PoseView.hash`. */
+  pictures: {} as Readonly<Record<number, string>>,
 };
 
-export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
+/**
+ * Initial values of the keys that do not change when another model is opened: the user's choices and the state of the
+ * page itself.
+ */
+export const PERSON_STATE = {
+  step: "model" as StepName,
+  adapter: "",
+  /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
+  lack: null as Lack | null,
+  /** Identifiers of the built-in samples. */
+  samples: [] as readonly string[],
+  /** Describes the operation that blocks the page; null without one. */
+  busy: null as string | null,
+  /** Progress of the operation that blocks the page, in words. */
+  busyStep: "",
+  /** Cancels the operation that blocks the page; null if it cannot be cancelled. */
+  cancelBusy: null as (() => void) | null,
+  /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */
+  goOn: null as (() => void) | null,
+  scene: SCENE_DEFAULTS,
+  seeOpen: false,
+  /** Whether clicks and taps add to the selection. */
+  additive: false,
+  theme: "auto" as Theme,
+  /** Work saved in this browser, newest first. */
+  works: [] as readonly Work[],
+  /** Whether the list of saved work is shown. */
+  worksOpen: false,
+  /** State of the tour; null while it is not running. */
+  tour: null as TourState | null,
+  sheetOpen: false,
+  /** Whether the instructions for enabling WebGPU are shown. */
+  waysOpen: false,
+  /** Number of files that are dragged over the window, and their target; null if none are. */
+  hovering: null as { readonly files: number; readonly to: DropPlace } | null,
+};
+
+export const INITIAL = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
+
+export type AppState = typeof INITIAL;
 
 /**
- * Values of the `MODEL_STATE` keys when another model is opened. Backend and memory limit stay: they suit the computer.
+ * Values of the `MODEL_STATE` keys when another model is opened. Keeps the backend and the memory limit, which depend
+ * on the computer.
  */
-export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): ModelState {
+export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): typeof MODEL_STATE {
   return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };
 }
 
-/** State of the tour. */
+/** Current stop of the tour, and its binds. */
 export interface TourState {
   /** Index of the stop, from 0. */
   readonly stop: number;
@@ -291,6 +217,6 @@ export interface ClipState {
   readonly playing: boolean;
   readonly speed: number;
   readonly loop: boolean;
-  /** Weights of the morph targets that the clip does not animate; empty for the file's weights. */
+  /** A weight per morph target, used where the clip does not animate it. Empty: the file's default weights apply. */
   readonly targets: readonly number[];
 }

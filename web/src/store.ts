@@ -8,7 +8,7 @@ const TOUR = "cagework.tour";
 
 const CRASH = "cagework.crash";
 
-/** Stores a crash for the page after the restart in this tab. Returns false if storage is unavailable. */
+/** Stores a crash in this tab, so that the restarted page can report it. Returns false if storage is unavailable. */
 export function keepCrash(crash: Crash): boolean {
   try {
     sessionStorage.setItem(CRASH, JSON.stringify(crash));
@@ -38,7 +38,7 @@ export function forgetCrash(): void {
 
 export type Theme = "auto" | "light" | "dark";
 
-/** The theme chosen last. */
+/** The theme that the user chose last; "auto" if none is stored. */
 export function loadTheme(): Theme {
   const theme = readItem(THEME);
   return theme === "light" || theme === "dark" ? theme : "auto";

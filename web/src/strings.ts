@@ -28,7 +28,8 @@ export function sentence(text: string): Message {
   return { english: /[.!?:]$/.test(first) ? first : `${first}.` };
 }
 
-export interface Explained {
+/** An error as the page shows it. */
+export interface Explanation {
   /** Headline: what failed. */
   title: string;
   message: Message;
@@ -36,7 +37,7 @@ export interface Explained {
   fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
 
-const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullable<Explained["fix"]>>>> = {
+const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullable<Explanation["fix"]>>>> = {
   Memory: "coarser",
   WeightsMemory: "fewer",
   Gpu: "cpu",
@@ -50,8 +51,8 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullab
   Unloaded: "reload",
 };
 
-/** An error with headline, message and remedy. */
-export function explain(error: unknown, title: string): Explained {
+/** Headline (`title`), message and remedy for an error. The error's name determines the remedy. */
+export function explain(error: unknown, title: string): Explanation {
   const name = error instanceof Error ? error.name : "";
   const message = messageOf(error);
   const fix = FIXES[name as ErrorName];

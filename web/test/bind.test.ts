@@ -4,16 +4,19 @@ import { expect, it } from "vitest";
 import type { Engine } from "../src/contract";
 import { BIND_DEFAULTS } from "../src/defaults";
 
-/** Binds a model of `vertices` vertices in a cage of 8. Returns the grids of the passes, fetched ranges, and rests of the worker. */
+/**
+ * Binds a model of `vertices` vertices in a cage of 8. Returns the grid of each pass, the inputs of the `rows` jobs,
+ * and how often the worker was ended.
+ */
 async function bindOf(vertices: number) {
   const grids: number[] = [];
   const fetched: unknown[] = [];
   let rests = 0;
   const nonzeros = 8 * vertices;
   const client = {
-    run(job: string, input: { options?: { grid: number } }) {
-      if (job === "rows") fetched.push(input);
-      else grids.push(input.options?.grid ?? 0);
+    run(job: string, input: unknown) {
+      if (typeof input === "function") grids.push(input().options.grid);
+      else if (job === "rows") fetched.push(input);
       const kept = { key: 7, indptr: Uint32Array.of(0, nonzeros), offsets: {}, report: { backend: "cpu" } };
       return { done: Promise.resolve(kept), cancel: () => {} };
     },
@@ -30,7 +33,7 @@ async function bindOf(vertices: number) {
     adopt: async (_: unknown, rows: (start: number, end: number) => unknown) => void (await rows(0, 1)),
   } as unknown as Engine;
   const positions = new Float32Array(24);
-  const cage = { positions, corners: new Uint32Array(), controls: undefined } as never;
+  const cage = () => ({ positions, corners: new Uint32Array(), controls: undefined }) as never;
   await startBind({ client, engine, adapter: "", options: BIND_DEFAULTS, listener: () => {}, cage }).done;
   return { grids, fetched, rests };
 }

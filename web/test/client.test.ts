@@ -11,14 +11,16 @@ afterEach(() => {
 
 const MODULE = {} as WebAssembly.Module;
 
-/** A client whose workers are simulated: they record jobs and answer when the test calls `answer`, `stop` or `miss`. */
+/** A client with simulated workers that record their jobs. `answer`, `stop` and `miss` simulate events of a worker. */
 function workers() {
   const all: { target: EventTarget; jobs: number[]; isOver: boolean }[] = [];
+  const moved: ArrayBuffer[] = [];
   const client = createClient(MODULE, () => {
     const made = { target: new EventTarget(), jobs: [] as number[], isOver: false };
     all.push(made);
     return Object.assign(made.target, {
-      postMessage(message: ToWorker) {
+      postMessage(message: ToWorker, transfer: ArrayBuffer[] = []) {
+        moved.push(...transfer);
         if (message.kind === "job" && message.input === undefined) throw new TypeError("cannot be sent");
         if (message.kind === "job") made.jobs.push(message.id);
       },
@@ -34,8 +36,8 @@ function workers() {
   /** The error event of a worker whose script cannot be loaded: it has no message. */
   const miss = (of: number) => all[of]?.target.dispatchEvent(new Event("error"));
   const jobs = () => all.map((one) => one.jobs);
-  const run = (id: string) => client.run("sample", { id });
-  return { all, client, answer, stop, miss, jobs, run };
+  const run = (id: string) => client.run("sample", { id, name: `${id}.glb` });
+  return { all, client, moved, answer, stop, miss, jobs, run };
 }
 
 const said = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
@@ -52,6 +54,22 @@ it("a job that ignores its cancellation loses its worker, and other jobs are sen
   ]);
   answer(1, { kind: "done", id: 1, output: "b" as never });
   expect(await said(second.done)).toBe("b");
+});
+
+it("arrays are moved to the worker, and made again for a new worker", async () => {
+  const { client, moved, run, jobs } = workers();
+  const first = run("a");
+  const made: ArrayBuffer[] = [];
+  const positions = () => {
+    const array = new Float32Array(3);
+    made.push(array.buffer);
+    return array;
+  };
+  client.run("check", () => ({ cage: {} as never, model: positions() }));
+  first.cancel();
+  vi.advanceTimersByTime(1000);
+  expect(await said(first.done)).toBe("Cancelled");
+  expect([made.length, moved, jobs()]).toEqual([2, made, [[0, 1], [1]]]);
 });
 
 it("a queued job is cancelled at once and the running one continues", async () => {

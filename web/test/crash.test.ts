@@ -104,11 +104,11 @@ it("a worker is replaced after a trap, and the next job uses the new one", async
     return worker as unknown as Worker;
   };
   const client = createClient({} as WebAssembly.Module, open);
-  const job = client.run("sample", { id: "rat" });
+  const job = client.run("sample", { id: "rat", name: "rat.glb" });
   workers[0]?.say({ kind: "failed", id: 0, name: "RuntimeError", message: "unreachable" });
   await expect(job.done).rejects.toThrow("too much memory");
   expect(workers[0]?.terminate).toHaveBeenCalledOnce();
-  client.run("sample", { id: "clamp" });
+  client.run("sample", { id: "clamp", name: "clamp.glb" });
   expect(workers[1]?.jobs.map(({ id }) => id)).toEqual([1]);
   // A late error event of the first worker must not affect the second.
   workers[0]?.dispatchEvent(Object.assign(new Event("error", { cancelable: true }), { message: "Panic" }));

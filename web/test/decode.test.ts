@@ -27,7 +27,7 @@ async function twoBuffers(change: (json: Json) => void) {
 describe("meshopt files", () => {
   const cases: [string, (json: Json) => void][] = [
     ["marked as fallback", () => undefined],
-    // The extension is optional, as in its sample file: programs without it read the fallback buffer.
+    // The extension is optional, as in the extension's sample file: programs without it read the fallback buffer.
     ["that others read", (json) => delete json.extensionsRequired],
     ["without a mark", (json) => delete json.buffers[1]?.extensions],
     // The fallback buffer names a file that does not exist.

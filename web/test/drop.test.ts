@@ -72,7 +72,7 @@ describe("dropped files", () => {
   it("list the formats if no file can be opened", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .splat, and .spz files.",
+      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, .off, .3mf, .splat, and .spz files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

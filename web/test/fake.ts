@@ -15,15 +15,16 @@ import type {
   Job,
   MemberInfo,
   ModelInfo,
-  Opened,
+  OpenedFile,
   Session,
   View,
 } from "../src/contract";
+import { VIEW_DEFAULTS } from "../src/defaults";
 import { type DocumentMirror, followDocument } from "../src/document";
 import { createQueue } from "../src/queue";
 import { createStore, type Store } from "../src/signals";
 import { INITIAL } from "../src/state";
-import { type Explained, textOf } from "../src/strings";
+import { type Explanation, textOf } from "../src/strings";
 
 /** A job that the tested code has requested. The test resolves or rejects it. */
 export interface Asked {
@@ -43,8 +44,8 @@ export interface Fake {
   readonly said: string[];
   /** Buttons of the last message in `said`. */
   offered: readonly { readonly label: string; run(): void }[];
-  readonly problems: (Explained & { fix?: Fix["label"] })[];
-  /** Coordinates, besides those of the bind, that count as computed; tests add to the list. */
+  readonly problems: (Explanation & { fix?: Fix["label"] })[];
+  /** Kinds of closed-form coordinates that count as computed; tests add to the list. */
   readonly others: string[];
   /** Names of the engine functions called that have no implementation in the fake. */
   readonly calls: string[];
@@ -56,7 +57,7 @@ export interface Fake {
   show(patch: Partial<View>): void;
   /** Replaces the engine's description of its models. */
   showModel(model: ModelInfo): void;
-  /** Replaces the cage. If it has a check, the page stores that too and requests none. */
+  /** Replaces the cage. If `cage` includes a check, the page stores the check and does not request one. */
   showCage(cage: CheckedCage): void;
   /** Replaces or adds functions of the engine. */
   teach(functions: Partial<Engine>): void;
@@ -85,14 +86,17 @@ export const MODEL: ModelInfo = {
   faces: 6,
   materials: 0,
   textures: 0,
+  splats: 0,
+  points: 0,
   skins: 0,
   joints: 0,
   clips: [],
   targets: [],
   props: [],
   rigged: false,
+  vrm: false,
   bounds: BOUNDS,
-  lies: false,
+  suggestedUp: null,
   notices: [],
   members: [memberOf(0, "cube.obj")],
 };
@@ -113,7 +117,7 @@ export function cageOf(n: number, height = 0): CheckedCage {
 /** Controls of a cage without smoothing and without interior controls. */
 export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
-export const OPENED: Opened = { model: MODEL, check: null, settings: null, notices: [] };
+export const OPENED: OpenedFile = { model: MODEL, check: null, settings: null, notices: [] };
 
 /** A report of a converged multigrid bind on a grid of 64; `patch` replaces fields. */
 export function reportOf(patch: Partial<BindReport> = {}): BindReport {
@@ -175,7 +179,8 @@ export function createFake(): Fake {
       entry = { kind, input, resolve: (output) => resolve(output as T), reject, cancelled: false };
       asked.push(entry);
     });
-    // The caller handles the rejection. Without this handler, one before the caller awaits `done` would fail the test.
+    // The caller handles the rejection. Without this handler, a rejection before the caller awaits `done` would fail
+    // the test.
     done.catch(() => undefined);
     const cancel = () => {
       if (!entry || entry.cancelled) return;
@@ -204,26 +209,7 @@ export function createFake(): Fake {
       notices: [...(rest.notices ?? [])],
     },
   });
-  let view: View = {
-    models: 0,
-    mesh: 0,
-    cage: 0,
-    poses: [],
-    shares: [],
-    transition: { interpolation: "linear", loops: true, back: 1 },
-    animationSeconds: 0,
-    pins: [],
-    posed: false,
-    editingRest: false,
-    sample: null,
-    sampleCage: false,
-    selected: { count: 0, last: null, center: null },
-    steps: 0,
-    undo: null,
-    redo: null,
-    forgotten: 0,
-    bound: false,
-  };
+  let view: View = VIEW_DEFAULTS;
   let model = MODEL;
   const show = (patch: Partial<View>) => {
     view = { ...view, ...patch };
@@ -288,7 +274,7 @@ export function createFake(): Fake {
       posed = Float32Array.from(positions);
     },
     selection: () => Uint32Array.of(0),
-    unmatched: () => new Uint32Array(),
+    setTools: (tools) => show({ tools }),
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
@@ -305,11 +291,11 @@ export function createFake(): Fake {
     samples: ["rat"],
     readFiles: (files) => job("read", files),
     zip: (files) => Uint8Array.of(files.length),
-    open: (read) => job<Opened>("open", read).done,
+    open: (read) => job<OpenedFile>("open", read).done,
     shareReader: () => () => {},
     add: (reads, label) => job("add", { reads, label }),
-    openSample: (id) => job<Opened>("sample", id).done,
-    turn: (project, up) => job<Opened>("turn", { project, up }).done,
+    openSample: (id) => job<OpenedFile>("sample", id).done,
+    turn: (project, up) => job<OpenedFile>("turn", { project, up }).done,
     readCage: (files) => job("readCage", files),
     boxCage: (divisions) => cageOf(8, divisions),
     generateCage: (options) => job("cage", options),
@@ -329,13 +315,14 @@ export function createFake(): Fake {
     pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
     onFrame: () => () => undefined,
-    readSettings(text, bind) {
+    readSettings(text, memory_limit) {
       const given = JSON.parse(text);
-      return { notices: [], ...given, bind: { ...given.bind, memory_limit: bind.memory_limit } };
+      return { notices: [], ...given, bind: { ...given.bind, memory_limit } };
     },
   };
   const ctx: Context = {
     session: () => session as Session,
+    engine: () => engine,
     store,
     queue: createQueue(),
     viewport: () => ({ width: 400, height: 300 }) as DOMRect,

@@ -31,8 +31,8 @@ it("each file is read by a worker of its own", async () => {
   const apart = createApart(open);
   for (const k of [0, 1]) {
     const job = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
-    opened[k]?.answer({ name: "a.obj" });
-    expect(await job.done).toEqual({ name: "a.obj" });
+    opened[k]?.answer({ vertices: 3 });
+    expect(await job.done).toEqual({ vertices: 3 });
     expect(opened[k]?.closed).toBeGreaterThan(0);
   }
   expect(opened.length).toBe(2);
@@ -44,10 +44,10 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
   const release = apart.share();
   const read = () => apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   const first = read();
-  opened[0]?.answer({ name: "a.obj" });
+  opened[0]?.answer({ vertices: 3 });
   await first.done;
   const again = read();
-  expect([(await again.done).name, opened.length, opened[0]?.closed]).toEqual(["a.obj", 1, 0]);
+  expect([(await again.done).vertices, opened.length, opened[0]?.closed]).toEqual([3, 1, 0]);
   release();
   expect(opened[0]?.closed).toBe(1);
   const alone = read();
@@ -102,6 +102,5 @@ it("OBJ and glTF read their sibling files, other formats none", async () => {
     const find = siblingOf((await readFiles([dropped(name), ...beside])).siblings);
     expect([text(find("./fox.mtl")), text(find("textures/fur.png"))]).toEqual(["fox.mtl", "fur.png"]);
   }
-  // Regression: an OBJ was shown without its colours, because only glTF siblings were read.
   expect((await readFiles([dropped("fox.stl"), ...beside])).siblings.size).toBe(0);
 });

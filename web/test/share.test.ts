@@ -21,6 +21,14 @@ describe("share links", () => {
     await expect(decodeShare("#sample=rat&controls=****")).rejects.toThrow("Its controls cannot be read");
   });
 
+  it("restore a clip", async () => {
+    const shared = { sample: "humanoid", clip: 3 };
+    const link = await encodeShare(shared);
+    expect(link).toBe("#sample=humanoid&clip=3");
+    expect(await decodeShare(link)).toEqual(shared);
+    await expect(decodeShare("#sample=humanoid&clip=-1")).rejects.toThrow("Its clip cannot be read");
+  });
+
   it("use only characters allowed in a URL", async () => {
     expect(await encodeShare({ sample: "rat", pose })).toMatch(/^#sample=rat&pose=[A-Za-z0-9_-]+$/);
   });

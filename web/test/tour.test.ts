@@ -2,9 +2,9 @@ import { expect, it, vi } from "vitest";
 import { stopOf } from "../src/actions/tour";
 import type { View } from "../src/actions/view";
 import type { BindOptions } from "../src/contract";
-import { createGuide } from "../src/tour/guide";
-import { isOf, STOPS } from "../src/tour/stops";
-import { cageOf, createFake, MODEL, reportOf } from "./fake";
+import { createGuide, type GuideNeeds } from "../src/tour/guide";
+import { isOf, STOPS, type StopName } from "../src/tour/stops";
+import { cageOf, createFake, MODEL, reportOf, settled } from "./fake";
 
 /** A page with the rat sample in its own cage, and a tour whose binds finish at once. */
 function page() {
@@ -19,8 +19,17 @@ function page() {
   vi.stubGlobal("window", { history: { replaceState: () => undefined } });
   const view: Partial<View> = {
     scene: (patch) => store.set({ scene: { ...store.get().scene, ...patch } }),
-    slice: () => undefined,
+    sliceNow: async () => true,
     compare: async () => undefined,
+  };
+  const files: GuideNeeds["files"] = {
+    async openSample(id) {
+      guide.overtaken(id);
+      opened.push(id);
+      fake.show({ sample: id, sampleCage: true });
+      return true;
+    },
+    prepared: async () => undefined,
   };
   const guide = createGuide(fake.ctx, {
     bind: {
@@ -33,17 +42,10 @@ function page() {
     },
     edit: { setEditingRest: () => undefined },
     view: view as View,
-    files: {
-      async openSample(id) {
-        guide.overtaken(id);
-        opened.push(id);
-        fake.show({ sample: id, sampleCage: true });
-        return true;
-      },
-    },
+    files,
     works: { flush: async () => undefined, open: async () => true, restore: async () => false },
   });
-  return { ...fake, guide, opened, binds };
+  return { ...fake, guide, opened, binds, view, files };
 }
 
 it("leaving the tour restores the user's settings and sample", async () => {
@@ -64,6 +66,25 @@ it("leaving the tour restores the user's settings and sample", async () => {
   expect(store.get().scene.colour, "as it was").toBe("material");
   expect(opened.at(-1)).toBe("rat");
   expect(binds.every(({ memory_limit }) => memory_limit === own.memory_limit)).toBe(true);
+});
+
+it.each<[StopName, string]>([
+  ["grid", "its slice is shown"],
+  ["splat", "its capture has a cage and is bound"],
+])("stop %s is busy until %s", async (stop) => {
+  const { guide, store, view, files } = page();
+  let end = () => {};
+  const ended = new Promise<void>((resolve) => {
+    end = resolve;
+  });
+  view.sliceNow = () => ended.then(() => true);
+  files.prepared = () => ended;
+  const started = guide.start(STOPS.indexOf(stop));
+  await settled();
+  expect(store.get().tour?.doing).not.toBeNull();
+  end();
+  await started;
+  expect(store.get().tour?.doing).toBeNull();
 });
 
 it("opening a file ends the tour and restores the settings", async () => {

@@ -8,6 +8,7 @@ mod many;
 mod pose;
 mod render;
 mod rig;
+mod size;
 mod solve;
 
 use std::error::Error;
@@ -18,7 +19,9 @@ pub(crate) use cages::{CageArgs, CageSource, CheckArgs, KindArg};
 use cagework_core::field as field_options;
 use cagework_core::options::{self, BindOptions, Choice, Number};
 use cagework_io::{Interpolation, MAX_SECONDS, ModelFormat, UpAxis};
-use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
+use clap::builder::{
+    NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser,
+};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
@@ -27,6 +30,7 @@ pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
+pub(crate) use size::SizeArgs;
 pub(crate) use solve::{MemoryArgs, SolveArgs};
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
@@ -167,7 +171,9 @@ pub(crate) enum LatticeFormat {
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj --times 0.4,1.2 \
-    --interpolation cubic -o poses.glb"
+    --interpolation cubic -o poses.glb\n  \
+    cagework deform face.vrm --cage cage.obj --weights face.npz --pose a.obj --pose b.obj --name happy --name smirk \
+    --expression -o faces.vrm"
 )]
 pub(crate) struct DeformArgs {
     /// Mesh that was bound.
@@ -186,6 +192,14 @@ pub(crate) struct DeformArgs {
     /// key in the file is a pose.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
+    /// Name of a pose and of its morph target; give one per --pose, in the same order [default: the name of the file].
+    /// For a file with several poses it precedes the name of the keyframe or shape key.
+    #[arg(long, value_name = "NAME", requires = "output", conflicts_with = "dynamic", value_parser = NonEmptyStringValueParser::new())]
+    pub(crate) name: Vec<String>,
+    /// Make each pose an expression of a VRM, with the name of the pose: one of its presets if it has that name, otherwise
+    /// a custom one. The model stays at rest, and gets an animation only with --times or --interpolation.
+    #[arg(long, requires = "output", conflicts_with_all = ["dynamic", "shape_only"])]
+    pub(crate) expression: bool,
     /// Moved inner controls (.obj): the same vertices in the same order. Give one per --pose, or none if they do not move.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose_controls: Vec<PathBuf>,
@@ -212,9 +226,11 @@ pub(crate) struct DeformArgs {
     pub(crate) lattice_cells: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    #[command(flatten)]
+    pub(crate) size: SizeArgs,
     /// Experimental: apply the clip to the model first, then bend every frame with the cage. Writes the frames as morph
     /// targets, without a skeleton.
-    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only"])]
+    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only", "ground", "feet"])]
     pub(crate) dynamic: Option<String>,
     /// With --dynamic or --lattice, and for splats and points: steps of Catmull-Clark subdivision of the cage, as for `bind`.
     #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = number::<u32>(options::SMOOTH))]
@@ -252,7 +268,7 @@ pub(crate) struct BenchArgs {
     /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE", requires = "mesh")]
     pub(crate) cage: Option<CageSource>,
-    /// Cells along the longest side of the cage; several, separated by commas.
+    /// Numbers of cells along the longest side of the cage, separated by commas; each is timed.
     #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: Vec<u32>,
     /// Timed binds per case; medians are reported.

@@ -1,4 +1,5 @@
-//! `cagework bench`: times the published method and the default method, on one thread and on all threads.
+//! `cagework bench`: times the published method (classic grid, Jacobi) and the default method (embedded boundary,
+//! multigrid), each on one thread and on all threads.
 
 use std::fmt::Write as _;
 
@@ -21,7 +22,7 @@ struct Bench {
     mesh: String,
     vertices: usize,
     cage_vertices: usize,
-    /// Number of threads in the cases that use all of them.
+    /// Number of threads in the cases that use all threads.
     threads: usize,
     runs: u32,
     grids: Vec<GridBench>,
@@ -36,7 +37,7 @@ struct GridBench {
     ratios: Ratios,
 }
 
-/// Timings of one method on one number of threads.
+/// Timings of one method with one number of threads.
 #[derive(Debug, Serialize)]
 struct Case {
     method: Method,
@@ -102,7 +103,7 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
 
 fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBench, CliError> {
     let mut reports: [Vec<BindReport>; CASES.len()] = Default::default();
-    // Run the cases in turn, so that a change of the machine's speed affects all of them equally and cancels in the
+    // Interleave the cases, so that a change in the machine's speed affects all of them equally and cancels in the
     // ratios.
     for _ in 0..runs {
         for (reports, (method, solver, threads)) in reports.iter_mut().zip(CASES) {

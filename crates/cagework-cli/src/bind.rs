@@ -105,8 +105,8 @@ fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
 }
 
-/// Checks the memory needed while a file of `to_write` bytes is encoded: `options.held`, the weights, and the file.
-/// Returns it, bytes.
+/// Returns the memory in use while an output is encoded, bytes: `options.held`, the weights of `points` points, and
+/// `to_write`, the memory for encoding.
 ///
 /// # Errors
 /// If the needed memory exceeds the limit.

@@ -2,20 +2,22 @@
 
 use cagework_cage::generate::{BOX_DIVISIONS, CageReport};
 use cagework_core::PolygonMesh;
-use cagework_io::{Model, shown};
-use glam::DVec3;
+use cagework_io::{MemoryError, Model, shown};
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::{CageArgs, KindArg, ModelOutput};
 use crate::bind::export;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, write};
-use crate::load::{box_mesh, generate_for, load_any};
+use crate::files::{check_outputs, json, models_of_folders, print, write};
+use crate::load::{box_mesh, generate_for, load_any, states_of};
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct CageSummary {
     output: String,
+    /// Number of models that the cage encloses.
+    models: usize,
     kind: &'static str,
     vertices: usize,
     faces: usize,
@@ -26,45 +28,102 @@ struct CageSummary {
     /// Report of the cage generator; `None` for a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<CageReport>,
+    notices: Vec<String>,
+}
+
+/// Vertices and triangles of all models that the cage encloses.
+struct CageInput {
+    /// Positions of the vertices relative to `origin`, Y up. `[n_vertices]`, object units
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Origin of the first model, in the axes of its file.
+    origin: DVec3,
+    models: usize,
+    notices: Vec<String>,
 }
 
 /// Runs `cagework cage`.
 ///
 /// # Errors
-/// If the model cannot be read, or the cage cannot be made or written.
+/// If a model cannot be read, or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
-    check_outputs(&[&args.output.path], &[&args.model])?;
-    let model = load_any(&args.model, args.read.axis(), args.read.memory)?;
+    let around = enclosed(args)?;
     let mut summary = CageSummary {
         output: args.output.path.display().to_string(),
+        models: around.models,
         kind: "box",
         vertices: 0,
         faces: 0,
         divisions: None,
         margin: None,
         report: None,
+        notices: around.notices,
     };
     let cage = match args.kind() {
         KindArg::Box => {
             let divisions = args.divisions.unwrap_or(BOX_DIVISIONS);
             (summary.divisions, summary.margin) = (Some(divisions), Some(args.margin));
-            let states = model.states(args.around_clip.as_deref());
-            let (positions, _) = states.map_err(|e| CliError::file(&args.model, e))?;
-            box_mesh(&positions, divisions, args.margin)?
+            box_mesh(&around.positions, divisions, args.margin)?
         }
         kind => {
             summary.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
-            let (cage, report) = generate_for(&model, args.around_clip.as_deref(), &args.options())?;
+            let (cage, report) = generate_for(&around.positions, &around.triangles, &args.options())?;
             summary.report = Some(report);
             cage
         }
     };
     (summary.vertices, summary.faces) = (cage.positions.len(), cage.faces.len());
-    write_cage(&args.output, &model.up().mesh_turned_back(&cage), model.origin())?;
+    write_cage(&args.output, &args.read.axis().mesh_turned_back(&cage), around.origin)?;
     if as_json {
         return print(&json(&summary));
     }
     print(&text(&summary))
+}
+
+/// Reads the models that the cage encloses, one at a time, and joins their vertices and triangles.
+fn enclosed(args: &CageArgs) -> Result<CageInput, CliError> {
+    let paths = models_of_folders(&args.models, &[&args.output.path])?;
+    check_outputs(&[&args.output.path], &paths.iter().map(AsRef::as_ref).collect::<Vec<_>>())?;
+    let mut all = CageInput {
+        positions: Vec::new(),
+        triangles: Vec::new(),
+        origin: DVec3::ZERO,
+        models: paths.len(),
+        notices: Vec::new(),
+    };
+    let (mut unknown_clip, mut has_clip) = (None, args.around_clip.is_none());
+    for path in &paths {
+        let mut model = load_any(path, args.read.axis(), args.read.memory)?;
+        if all.positions.is_empty() {
+            all.origin = model.origin();
+        }
+        let n_notices = model.notices.len();
+        model.see_from(all.origin);
+        all.notices.extend(model.notices[n_notices..].iter().map(|n| format!("{}: {n}", shown(&model.name))));
+        let (positions, triangles) = match states_of(&model, args.around_clip.as_deref()) {
+            Ok(states) => {
+                has_clip = true;
+                states
+            }
+            Err(unknown) => {
+                unknown_clip = unknown_clip.or(Some(unknown));
+                states_of(&model, None)?
+            }
+        };
+        let first = all.positions.len() as u32;
+        let n_positions = all.positions.len() + positions.len();
+        let bytes = 12 * (n_positions + all.triangles.len() + triangles.len()) as u64;
+        // Vertices and triangles take 12 bytes each. Cap the limit at `u32::MAX` of them, so that indices fit in 32
+        // bits.
+        MemoryError::check(bytes, args.read.memory.bytes().min(12 * u64::from(u32::MAX)))
+            .map_err(|e| CliError::file(path, format!("with the models before it, {e}")))?;
+        all.positions.extend(positions);
+        all.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
+    }
+    match unknown_clip {
+        Some(unknown) if !has_clip => Err(unknown),
+        _ => Ok(all),
+    }
 }
 
 /// Writes a cage in the output's format. `origin` is added to all its positions.
@@ -85,16 +144,21 @@ fn three_digits(length: f32) -> String {
 }
 
 fn text(summary: &CageSummary) -> String {
+    let around = match summary.models {
+        1 => String::new(),
+        n => format!(" around {n} models"),
+    };
+    let notices: String = summary.notices.iter().map(|notice| format!("\nnote: {notice}")).collect();
     let Some(report) = &summary.report else {
         return format!(
-            "wrote {}: a box of {} vertices and {} faces",
+            "wrote {}: a box{around} of {} vertices and {} faces{notices}",
             shown(&summary.output),
             summary.vertices,
             summary.faces
         );
     };
     let mut text = format!(
-        "wrote {}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; minimum distance from the model {}",
+        "wrote {}{around}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; minimum distance from the model {}",
         shown(&summary.output),
         summary.vertices,
         summary.faces,
@@ -117,7 +181,7 @@ fn text(summary: &CageSummary) -> String {
     for notice in &report.notices {
         text.push_str(&format!("\nnote: {notice}"));
     }
-    text
+    text + &notices
 }
 
 #[cfg(test)]

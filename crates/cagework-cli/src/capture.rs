@@ -1,4 +1,5 @@
-//! `cagework deform` for files without faces, Gaussian splats and point clouds: through the field of the cage, without weights.
+//! `cagework deform` for files without faces (Gaussian splats and point clouds): maps them by the deformation field of
+//! the cage, without weights.
 
 use std::time::Instant;
 
@@ -19,9 +20,10 @@ struct CaptureSummary {
     /// Number of splats or points.
     points: usize,
     is_splats: bool,
-    /// Number of points outside the cage. Near the cage they move with it, farther out less and less.
+    /// Number of points outside the cage. Near the cage they move with it; with growing distance they move less.
     outside_points: usize,
-    /// Number of splats whose deformation differs from the first-order one by more than 10 % of their size.
+    /// Number of splats for which the deformation differs from its first-order approximation by more than 10 % of half
+    /// the longest axis, at an end of this axis.
     inexact_splats: usize,
     /// Time to compute the field and the points, without reading and writing files, ms.
     deform_ms: f64,
@@ -72,7 +74,7 @@ pub(crate) fn deform(
         ));
     }
     notices.extend(model.lost_in(output.format));
-    write(&output.path, &bytes)?;
+    write(&output.path, &args.size.apply(bytes, &output.path)?)?;
     let summary = CaptureSummary {
         output: output.path.display().to_string(),
         points,

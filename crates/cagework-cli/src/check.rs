@@ -20,7 +20,7 @@ struct CheckSummary {
     repaired: Vec<String>,
     /// Path of the repaired cage; `None` if nothing was written.
     output: Option<String>,
-    /// Faults that remain after the repairs.
+    /// Result of the check of the cage after the repairs.
     #[serde(flatten)]
     check: CageCheck,
 }

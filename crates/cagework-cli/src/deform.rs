@@ -33,6 +33,9 @@ struct DeformSummary {
     /// Number of vertices outside the cage that do not follow it at all.
     staying_vertices: usize,
     poses: Vec<String>,
+    /// Whether the poses are expressions of a VRM.
+    #[serde(skip)]
+    expressions: bool,
     /// Length of the animation; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     animation_seconds: Option<f32>,
@@ -51,6 +54,9 @@ struct DeformSummary {
 /// # Errors
 /// If a file cannot be read or written, or files do not match.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
+    if let Some(output) = &args.output {
+        args.size.check(output)?;
+    }
     if let (Some(clip), Some(output)) = (&args.dynamic, &args.output) {
         return dynamic::run(args, clip, output, as_json);
     }
@@ -74,8 +80,14 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let lattice = args.lattice.as_deref().map(|path| field::write_lattice(args, path, &model)).transpose()?;
     match (&args.output, &args.weights, &lattice) {
         (Some(output), _, _) if is_capture => {
-            // Refuses --times and --interpolation.
+            // Fails if --times or --interpolation is given.
             timeline(args, &[], 1)?;
+            if args.expression || !args.name.is_empty() {
+                return Err(CliError::Mismatch {
+                    message: "--name and --expression need a mesh, but the model has no faces".into(),
+                    hint: "leave them out",
+                });
+            }
             capture::deform(args, &model, output, lattice, as_json)
         }
         (Some(output), Some(weights), _) => deform(args, &model, weights, output, lattice, as_json),
@@ -87,7 +99,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-/// Deforms the mesh.
+/// Deforms the mesh by all poses with the given weights, and writes the result and a summary.
 fn deform(
     args: &DeformArgs,
     model: &Model,
@@ -111,20 +123,35 @@ fn deform(
         })
     };
     require_room(args.pose.len())?;
+    check_names(args)?;
+    if args.expression && (model.vrm().is_none() || format != ModelFormat::Gltf) {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "--expression needs a VRM to read and to write, but {}",
+                match model.vrm() {
+                    None => format!("{} has no VRM data", shown_path(&args.mesh)),
+                    Some(_) => format!("{} is none", shown_path(output)),
+                }
+            ),
+            hint: "leave it out: several poses are written as morph targets to a .glb",
+        });
+    }
 
     let cage = load_cage(&args.cage, model, args.read.memory, &ControlArgs::default())?;
     let saved = load_weights(weights, model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
     let (n_cage, n_inner) = (cage.cage.n_vertices(), saved.inner_controls.len());
     let (mut names, mut poses, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &args.pose {
+    for (k, path) in args.pose.iter().enumerate() {
+        let name = args.name.get(k).cloned().unwrap_or_else(|| pose_name(path));
         for state in cage.load_states(path)? {
-            names.push(format!("{} {}", pose_name(path), state.name).trim_end().to_owned());
+            names.push(format!("{name} {}", state.name).trim_end().to_owned());
             seconds.extend(state.seconds);
             poses.push(state.positions);
         }
     }
     require_room(poses.len())?;
+    args.rig.check_clips(model, &args.mesh, poses.len())?;
     let to_write = model.bytes_to_write(format) + model.bytes_of_poses(poses.len());
     MemoryError::check(model.bytes() + saved.weights.bytes() as u64 + to_write, args.read.memory.bytes())
         .map_err(|e| CliError::file(output, format!("for {} poses {e}", poses.len())))?;
@@ -138,11 +165,14 @@ fn deform(
     let timeline = timeline(args, &seconds, poses.len())?;
     let rest = rest_of(&cage.cage, &saved);
     let animation_seconds = timeline.as_ref().map(Timeline::seconds);
-    let options = ReshapeOptions { timeline, ..args.rig.options(model, &args.mesh)? };
+    let expressions = args.expression;
+    let (of_rig, of_names) = args.rig.options(model, &args.mesh)?;
+    let options = ReshapeOptions { timeline, expressions, ..of_rig };
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
     let mut notices = model.notices.clone();
+    notices.extend(of_names);
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
     let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
@@ -151,7 +181,7 @@ fn deform(
     let (bytes, rig) = deformation.into_file(model, &poses.names, output_file, &options)?;
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
-    write(output, &bytes)?;
+    write(output, &args.size.apply(bytes, output)?)?;
 
     let summary = DeformSummary {
         output: output.display().to_string(),
@@ -161,6 +191,7 @@ fn deform(
         outside_vertices,
         staying_vertices,
         poses: poses.names,
+        expressions,
         animation_seconds,
         rig,
         deform_ms,
@@ -170,12 +201,38 @@ fn deform(
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// When the animation shows each pose; `None` for a single pose, which has none. `seconds`: key times of the poses that
-/// are keyframes.
+/// Checks that `--name` is given once per `--pose` or not at all, with different names.
+fn check_names(args: &DeformArgs) -> Result<(), CliError> {
+    let (names, n_poses) = (&args.name, args.pose.len());
+    if !names.is_empty() && names.len() != n_poses {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "--name: {} for {}",
+                counted(names.len(), "name", "names"),
+                counted(n_poses, "file of poses", "files of poses")
+            ),
+            hint: "give one --name per --pose, in the same order",
+        });
+    }
+    match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
+        None => Ok(()),
+        Some((_, name)) => Err(CliError::Mismatch {
+            message: format!("--name: '{}' is given twice", shown(name)),
+            hint: "give each pose a name of its own",
+        }),
+    }
+}
+
+/// Time at which the animation shows each pose; `None` if the output gets no animation: for a single pose, and for
+/// expressions without `--times` and `--interpolation`. `seconds`: key times of the poses that are keyframes.
 fn timeline(args: &DeformArgs, seconds: &[f32], n_poses: usize) -> Result<Option<Timeline>, CliError> {
     let DeformArgs { times, interpolation, .. } = args;
-    if n_poses < 2 {
-        return if times.is_empty() && interpolation.is_none() {
+    let is_plain = times.is_empty() && interpolation.is_none();
+    if args.expression && is_plain {
+        return Ok(None);
+    }
+    if n_poses < 2 && !args.expression {
+        return if is_plain {
             Ok(None)
         } else {
             Err(CliError::Mismatch {
@@ -187,7 +244,7 @@ fn timeline(args: &DeformArgs, seconds: &[f32], n_poses: usize) -> Result<Option
         };
     }
     let timeline = if times.is_empty() {
-        // Times of several files are unrelated.
+        // Key times of several files are unrelated, so they are used only if all poses are in one file.
         let is_clip = args.pose.len() == 1 && seconds.len() == n_poses;
         if is_clip { Timeline::at_keys(seconds) } else { Timeline::every_second(n_poses) }
     } else if times.len() == n_poses {
@@ -217,12 +274,12 @@ pub(crate) enum Deformation {
     /// A rigged model: displacements of all bound points, `[n_poses][n_points]`, object units, and indices of the
     /// points outside the cage.
     Rig { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
-    /// A model without rig: vertex positions in each pose. `[n_poses][n_vertices]`, object units
+    /// A model that is written without a rig: vertex positions in each pose. `[n_poses][n_vertices]`, object units
     Shape(Vec<Vec<Vec3>>),
 }
 
 impl Deformation {
-    /// Deforms a model by all poses. If `shape_only` is set, its rig is ignored.
+    /// Deforms a model by all poses. Its rig is ignored if `shape_only` is set or `format` is not glTF.
     pub(crate) fn new(
         model: &Model,
         saved: SavedWeights,
@@ -237,12 +294,12 @@ impl Deformation {
         }
         let saved = saved.of_vertices();
         let bound = (&saved.weights, &saved.frames);
-        let posed = |pose: &Vec<Vec3>| model.deformed(bound, (&poses.rest, pose), &options.parts);
+        let posed = |pose: &Vec<Vec3>| model.deformed(bound, (&poses.rest, pose), options);
         Self::Shape(poses.positions.iter().map(posed).collect())
     }
 
-    /// Encodes the model: deformed by a single pose, or at rest with several poses as morph targets. Also returns a
-    /// report of the changes to its rig.
+    /// Encodes the model: deformed by one pose, or at rest with the poses as morph targets if there are several or if
+    /// they become expressions of a VRM. Also returns a report of the changes to its rig.
     ///
     /// # Errors
     /// If the weights lack the rig's points, or the model cannot be written in that format.
@@ -310,15 +367,15 @@ pub(crate) fn pose_name(path: &Path) -> String {
 }
 
 fn text(summary: &DeformSummary) -> String {
-    let poses = if let [only] = summary.poses.as_slice() {
-        format!("pose {}", shown(only))
-    } else {
-        format!(
-            "{} poses as morph targets ({}) and an animation of {} s",
-            summary.poses.len(),
-            shown(&summary.poses.join(", ")),
-            summary.animation_seconds.unwrap_or_default()
-        )
+    let poses = match summary.poses.as_slice() {
+        [only] if !summary.expressions => format!("pose {}", shown(only)),
+        all => {
+            let kind = if summary.expressions { "VRM expressions" } else { "morph targets" };
+            let names = shown(&all.join(", "));
+            let clip = summary.animation_seconds.map(|s| format!(" and an animation of {s} s"));
+            let n = counted(all.len(), "pose", "poses");
+            format!("{n} as {kind} ({names}){}", clip.unwrap_or_default())
+        }
     };
     let mut out = format!(
         "deformed {} vertices by {} cage vertices{} in {:.1} ms\nwrote {}: {poses}\n",

@@ -19,7 +19,7 @@ use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{LoadedCage, load_any, load_cage, load_cage_file};
 use crate::progress::Bar;
 
-/// Points that one thread maps at a time.
+/// Number of points that one thread maps at a time.
 const POINTS_PER_RUN: usize = 4096;
 
 /// Output of `--json`.
@@ -27,7 +27,7 @@ const POINTS_PER_RUN: usize = 4096;
 struct MapSummary {
     output: String,
     points: usize,
-    /// Numbers of the points without an inverse, from 0. They are unchanged.
+    /// Indices of the points without an inverse, from 0. These points are unchanged.
     not_found: Vec<usize>,
     lattice: [u32; 3],
     notices: Vec<String>,
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &MapArgs, as_json: bool) -> Result<(), CliError> {
         let local = |p: &DVec3| up.vector_turned(*p - origin).as_vec3();
         let points: Vec<Vec3> = file.positions.iter().map(local).collect();
         let mapped = map(&field, &points, args.inverse);
-        // Displacements are added in f64, so that points that stay keep all digits.
+        // Displacements are added in f64, so that points with the displacement 0 keep all digits of their coordinates.
         let moved = file.positions.iter().zip(points.iter().zip(&mapped.points));
         let moved: Vec<DVec3> = moved
             .map(|(p, (from, to))| *p + up.vector_turned_back(to.as_dvec3() - from.as_dvec3()))
@@ -147,7 +147,7 @@ pub(crate) fn write_lattice(
     Ok(LatticeSummary { output: output.display().to_string(), nodes: dims.to_array(), spacing: cell })
 }
 
-/// The cage and the field of `cagework deform`.
+/// Loads the cage, and computes the field of the only pose, for `--lattice` and for splats and points.
 ///
 /// # Errors
 /// If a file cannot be read, files do not match, or the bind fails.
@@ -174,7 +174,8 @@ pub(crate) fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<(Cage,
     Ok((cage.cage, field))
 }
 
-/// The field of a pose of a cage. `held`: memory in use, bytes; `cells`: those of the lattice along the longest side.
+/// The field of a pose of a cage. `held`: memory in use, bytes. `cells`: number of lattice cells along the longest
+/// side.
 fn field_of(
     cage: &LoadedCage,
     pose: &Path,
@@ -191,7 +192,7 @@ fn field_of(
     Ok(FieldWeights::bind(cage.controls(), cells, &options, &bar)?.pose(rest, &poses[0]))
 }
 
-/// Mapped points, and the numbers of those without an inverse.
+/// Mapped points, and the indices of those without an inverse.
 struct MappedPoints {
     points: Vec<Vec3>,
     not_found: Vec<usize>,

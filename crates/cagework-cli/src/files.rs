@@ -5,9 +5,10 @@ mod whole;
 
 use std::fs;
 use std::io::{ErrorKind, Read as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use cagework_io::ModelFormat;
 use cap_fs_ext::OpenOptionsSyncExt as _;
 use cap_std::ambient_authority;
 use cap_std::fs::{Dir, File, OpenOptions};
@@ -60,6 +61,36 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>,
     }
 }
 
+/// Replaces each folder by the models in it, ordered by name, without hidden files and without the files `except`.
+///
+/// # Errors
+/// If a folder cannot be read, or has no models.
+pub(crate) fn models_of_folders(given: &[PathBuf], except: &[&Path]) -> Result<Vec<PathBuf>, CliError> {
+    let mut models = Vec::with_capacity(given.len());
+    for path in given {
+        if !path.is_dir() {
+            models.push(path.clone());
+            continue;
+        }
+        let entries = fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let mut found: Vec<PathBuf> = entries
+            .map_err(|e| CliError::file(path, reason(&e)))?
+            .into_iter()
+            .filter(|entry| ModelFormat::is_name_of_model(&entry.file_name().to_string_lossy()))
+            .map(|entry| entry.path())
+            .filter(|file| file.is_file())
+            .filter(|file| !except.iter().any(|other| same_file::is_same_file(file, other).unwrap_or(false)))
+            .collect();
+        if found.is_empty() {
+            let endings = ModelFormat::ALL.map(|format| format.facts().endings).concat().join(", .");
+            return Err(CliError::file(path, format!("the folder has no models (.{endings})")));
+        }
+        found.sort();
+        models.append(&mut found);
+    }
+    Ok(models)
+}
+
 fn record_input(path: &Path) {
     INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner).push(FileIdentity::new(path));
 }
@@ -89,7 +120,8 @@ fn content(file: File) -> Result<Vec<u8>, String> {
     if let Some(problem) = too_large(metadata.len()) {
         return Err(problem);
     }
-    // The length is also 0 for files in /proc and similar file systems, which are not empty.
+    // Files in /proc and similar file systems report a length of 0 as well. They are rejected too, although they are
+    // not empty.
     if metadata.len() == 0 {
         return Err("is empty".into());
     }

@@ -28,15 +28,18 @@ struct FitSummary {
     cage: usize,
     lambda: f64,
     energy: f64,
-    /// Root mean square of the distances from the targets at rest; `largest_before` is their maximum.
+    /// Root mean square of the points' distances from their targets, with the cage at rest.
     rms_before: f64,
+    /// Largest distance of a point from its target, with the cage at rest.
     largest_before: f64,
-    /// Root mean square of the distances from the targets after the fit; `largest` is their maximum.
+    /// Root mean square of the points' distances from their targets after the fit.
     rms: f64,
+    /// Largest distance of a point from its target after the fit.
     largest: f64,
     steps: usize,
     settled: bool,
-    /// Time of the precomputation for this model and cage, ms. It includes binding the sample points.
+    /// Time of the precomputation for this model and cage, ms. It includes the bind of the
+    /// [`Probes`](cagework_pose::pull::Probes).
     precompute_ms: f64,
     fit_ms: f64,
     notices: Vec<String>,
@@ -111,8 +114,8 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// The vertices of the target model as targets of the vertices with the same indices. Vertices outside the cage get
-/// importance 0.
+/// Targets of all vertices of the bound model: the vertices of `target` with the same indices. Vertices outside the
+/// cage get importance 0.
 fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, CliError> {
     let (given, expected) = (target.positions.len(), bound.model.positions.len());
     if given != expected {

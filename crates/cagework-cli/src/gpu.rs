@@ -23,7 +23,7 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
     let TexturePlan { side, admitted, mut notices } = TexturePlan::new(&[&look], 0);
     let mut textures = Vec::new();
-    // Groups whose image cannot be decoded are drawn in their base colour.
+    // Triangle groups whose texture cannot be decoded are drawn in their base colour.
     let numbers: Vec<Option<u32>> = look
         .images
         .iter()

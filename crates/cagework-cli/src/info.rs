@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 
 use cagework_core::crossing::notices;
 use cagework_core::mesh::weld;
+use cagework_core::words::counted;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};
+use cagework_io::{Clip, Model, ModelFormat, Vrm, escaped, read_inner_controls, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -14,6 +15,9 @@ use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::files::{json, print, read};
 use crate::load::{cage_mesh, load_any};
+
+/// Largest number of part names that the text output lists.
+const MAX_LISTED_NAMES: usize = 30;
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
@@ -32,7 +36,11 @@ struct Info {
     clips: Vec<Clip>,
     /// Names of meshes that are attached to a joint but not skinned, such as a hat; `--rigid` accepts them.
     props: Vec<String>,
-    /// `None` unless the file is a capture.
+    /// Names of parts that `--rigid` and `--mask` accept, with their kinds.
+    parts: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vrm: Option<Vrm>,
+    /// `None` unless the file is a capture of Gaussian splats.
     #[serde(skip_serializing_if = "Option::is_none")]
     splats: Option<SplatInfo>,
     bounds: BoundsInfo,
@@ -42,10 +50,10 @@ struct Info {
     notices: Vec<String>,
 }
 
-/// Gaussian splats.
+/// Facts about a capture of Gaussian splats.
 #[derive(Debug, Serialize)]
 struct SplatInfo {
-    /// Degree of the spherical harmonics.
+    /// Degree of the spherical harmonics that give the splats' colours.
     degree: u8,
     median_opacity: f32,
     /// Median of the largest standard deviation of each splat, object units.
@@ -143,6 +151,8 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         clips: model.clips(),
         // Ignore errors of the rig here; commands that deform it report them.
         props: model.props().unwrap_or_default(),
+        parts: model.part_names(),
+        vrm: model.vrm(),
         splats: model.splats().map(|splats| SplatInfo {
             degree: splats.degree,
             median_opacity: median(splats.opacities.clone()),
@@ -164,7 +174,8 @@ fn median(mut numbers: Vec<f32>) -> f32 {
     if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
-/// World position with Y up, rounded to the decimal digits of the file.
+/// World position with Y up. Along axes on which the origin is 0, converts the `f32` through its shortest decimal, so
+/// that 0.1 in the file is printed as 0.1.
 fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     let origin = model.up().vector_turned(model.origin()).to_array();
     let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
@@ -197,20 +208,39 @@ fn text(info: &Info) -> String {
     row("triangles", info.triangles.to_string());
     row(
         "document",
-        format!("{} nodes, {} primitives, {} materials", info.nodes, info.primitives, info.materials),
+        [
+            counted(info.nodes, "node", "nodes"),
+            counted(info.primitives, "primitive", "primitives"),
+            counted(info.materials, "material", "materials"),
+        ]
+        .join(", "),
     );
     if info.skins + info.morph_targets + info.clips.len() > 0 {
         row(
             "rig",
-            format!("{} skins, {} joints, {} morph targets", info.skins, info.joints, info.morph_targets),
+            [
+                counted(info.skins, "skin", "skins"),
+                counted(info.joints, "joint", "joints"),
+                counted(info.morph_targets, "morph target", "morph targets"),
+            ]
+            .join(", "),
         );
     }
     for (number, clip) in info.clips.iter().enumerate() {
         let name = shown(&clip.label(number));
         row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
     }
+    if let Some(vrm) = &info.vrm {
+        row("VRM", format!("{}, {} springs, {} colliders", shown(&vrm.version), vrm.springs, vrm.colliders));
+        if !vrm.expressions.is_empty() {
+            row("expressions", escaped(&vrm.expressions.join(", ")));
+        }
+    }
     if !info.props.is_empty() {
         row("on joints", escaped(&info.props.join(", ")));
+    }
+    if !info.parts.is_empty() {
+        row("parts", listed(&info.parts));
     }
     let [min, max] = [info.bounds.min, info.bounds.max];
     row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));
@@ -229,6 +259,16 @@ fn text(info: &Info) -> String {
         let _ = writeln!(out, "note: {notice}");
     }
     out
+}
+
+/// The names separated by commas. After [`MAX_LISTED_NAMES`], only the number of further names follows; `--json` lists
+/// all.
+fn listed(names: &[String]) -> String {
+    let first = escaped(&names[..names.len().min(MAX_LISTED_NAMES)].join(", "));
+    match names.len().saturating_sub(MAX_LISTED_NAMES) {
+        0 => first,
+        more => format!("{first} and {more} more (--json lists all)"),
+    }
 }
 
 #[cfg(test)]

@@ -64,12 +64,23 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
     Ok(model)
 }
 
+/// Reads a model, or a glTF of clips without triangles.
+///
+/// # Errors
+/// As [`load_any`].
+pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
+    let bytes = read(path)?;
+    let mut beside = |relative: &str| read_beside(path, relative);
+    let mut model = Model::read_with_clips(&path.display().to_string(), &bytes, &mut beside, memory.bytes())?;
+    model.set_up(up);
+    Ok(model)
+}
+
 /// The built-in sample, which `demo`, `bench` and `evaluate` use by default.
 #[derive(Debug)]
 pub(crate) struct BuiltInSample {
     /// Identifier of the sample, such as `rat`.
     pub(crate) name: String,
-    /// The sample's mesh.
     pub(crate) mesh: PolygonMesh,
     /// The sample's mesh as a model.
     pub(crate) model: Model,
@@ -78,10 +89,10 @@ pub(crate) struct BuiltInSample {
     pub(crate) poses: Vec<(String, Vec<Vec3>)>,
 }
 
-/// Builds the first sample, which the page also opens first.
+/// Builds the first sample, which the web page also opens first.
 ///
 /// # Errors
-/// Never for the present samples: a test of cagework-cage binds each of them.
+/// If there is no sample, or its cage is not valid. A test of cagework-cage binds every sample, so this does not occur.
 pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     let missing = || CliError::Cage { name: "built-in sample".into(), source: CageError::Empty };
     let id = samples::all().first().ok_or_else(missing)?.id;
@@ -93,7 +104,7 @@ pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     Ok(BuiltInSample { name: id.to_owned(), mesh, model, cage, poses })
 }
 
-/// Reads or generates the cage of a model. A cage file has the same up axis as the model.
+/// Reads or generates the cage of a model. A cage file is read with the up axis of the model.
 ///
 /// # Errors
 /// If the file cannot be read or is not a valid cage, or no cage can be generated.
@@ -113,7 +124,9 @@ pub(crate) fn load_cage(
         }
         CageSource::Auto(options) => {
             let options = CageOptions { smooth: controls.smooth.smooth, ..*options };
-            Model::of_mesh("generated cage", &generate_for(around, None, &options)?.0, around.origin())?
+            let (positions, triangles) = states_of(around, None)?;
+            let cage = generate_for(&positions, &triangles, &options)?.0;
+            Model::of_mesh("generated cage", &cage, around.origin())?
         }
     };
     LoadedCage::new(model, around.up(), memory, controls)
@@ -136,18 +149,25 @@ pub(crate) fn load_cage_file(
     LoadedCage::new(model, up, memory, controls)
 }
 
-/// Generates a cage around a model, its morph targets and the frames of a clip, and shows a progress bar.
+/// Vertices and triangles of a model that a cage should enclose: at rest, in its morph targets and in the frames of a
+/// clip.
 ///
 /// # Errors
-/// The errors of [`generate`]. If the model has no clip with this name.
+/// If the model has no clip with this name.
+pub(crate) fn states_of(model: &Model, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), CliError> {
+    model.states(clip).map_err(|e| CliError::file(model.name.as_ref(), e))
+}
+
+/// Generates a cage around triangles, and shows a progress bar.
+///
+/// # Errors
+/// The errors of [`generate`].
 pub(crate) fn generate_for(
-    model: &Model,
-    clip: Option<&str>,
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
     options: &CageOptions,
 ) -> Result<(PolygonMesh, CageReport), CliError> {
-    let (positions, triangles) = model.states(clip).map_err(|e| CliError::file(model.name.as_ref(), e))?;
-    let bar = Bar::start();
-    let made = generate(&positions, &triangles, options, &bar)?;
+    let made = generate(positions, triangles, options, &Bar::start())?;
     Ok((made.cage.to_polygon_mesh(), made.report))
 }
 

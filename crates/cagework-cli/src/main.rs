@@ -35,8 +35,9 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser as _;
 
-/// A bind allocates and frees about 30 MB within milliseconds. The system allocator returns such blocks to the kernel
-/// each time, and the resulting page faults took a fifth of a bind's time at g = 64.
+/// Allocator that reuses large freed blocks. A bind allocates and frees about 30 MB within milliseconds. The system
+/// allocator returned such blocks to the kernel each time, and the resulting page faults took a fifth of the bind's
+/// time at g = 64.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

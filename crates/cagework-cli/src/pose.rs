@@ -26,8 +26,8 @@ pub(crate) struct BoundModel {
 }
 
 impl BoundModel {
-    /// Weights into which the frames are folded, so that positions are linear in the controls. `[n_vertices,
-    /// n_controls]`
+    /// The weights with the [`Frames`] folded in, so that deformed positions are linear in the positions of the
+    /// controls. `[n_vertices, n_controls]`
     pub(crate) fn rows(&self) -> Weights {
         self.frames.folded(&self.weights)
     }
@@ -70,11 +70,11 @@ impl BoundModel {
     }
 }
 
-/// Does the precomputation that all pulls of this model and cage share: binds the sample points and factorises the
-/// energy.
+/// Precomputes what pulls and fits of this model and cage share: binds the [`Probes`], at which the gradients of the
+/// weights are sampled, and builds a [`Pull`] from them.
 ///
 /// # Errors
-/// If the cage is too large, or the sample points cannot be bound.
+/// If the cage is too large, or the probes cannot be bound.
 pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Result<Pull, CliError> {
     let mesh = model.tri_mesh();
     let wrong = |e| CliError::file(&args.mesh, e);

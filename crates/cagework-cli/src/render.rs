@@ -1,5 +1,6 @@
 //! `cagework render`: draws a picture of a model in its cage on the GPU.
 
+use std::f32::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -7,10 +8,12 @@ use std::time::Instant;
 use cagework_core::bind::Binding;
 use cagework_core::field::{CELLS, FieldWeights};
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Controls, Coordinates, Weights};
+use cagework_core::{BindOptions, Bounds, Controls, Coordinates, Weights};
 use cagework_gpu::Session;
-use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
-use cagework_io::{Model, shown};
+use cagework_gpu::render::{
+    DrawModel, MeshStyle, Projection, SceneOptions, Selection, SliceView, ViewOptions, check_layers,
+};
+use cagework_io::{Clip, Model, shown};
 use glam::Vec3;
 use serde::Serialize;
 
@@ -54,8 +57,10 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&[&args.output], &inputs)?;
     check_compare(args)?;
+    check_pictures(args)?;
     let model = load_any(&args.model, args.read.axis(), args.read.memory)?;
     check_capture(args, &model)?;
+    let frames = frames(args, &model)?;
     let cage = args
         .cage
         .as_ref()
@@ -64,12 +69,18 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let (drawn, mut notices) = gpu::draw_model(&model);
     notices.splice(0..0, model.notices.iter().cloned());
     let mut session = Session::new(gpu::open()?);
+    // Keep a copy of the model, which the frames of a clip draw with other positions.
+    let moving = (!frames.is_empty()).then(|| drawn.clone());
     pollster::block_on(session.set_model(drawn))?;
     let mut scene = scene_of(args);
     let mut other = None;
-    // Floaters of a capture can be far away: frame its cage.
+    // Stray splats of a capture can be far away, so frame the cage instead.
     let is_framed_by_cage = model.splats().is_some() && cage.is_some();
-    let mut points = if is_framed_by_cage { Vec::new() } else { model.positions.clone() };
+    let mut points = match (is_framed_by_cage, frames.is_empty()) {
+        (true, _) => Vec::new(),
+        (false, true) => model.positions.clone(),
+        (false, false) => frames.concat(),
+    };
     if let Some(cage) = &cage {
         pollster::block_on(session.set_cage(cage.controls()))?;
         points.extend(prepare(args, &model, cage, &mut session, &mut scene)?);
@@ -89,7 +100,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         }
         other = Some(twin);
     }
-    let size = args.size.0;
+    let size = args.size();
     let part = if other.is_some() { [half(size[0]), size[1]] } else { size };
     let camera = session.camera_mut();
     (camera.yaw, camera.pitch) = args.view.angles();
@@ -98,20 +109,41 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     camera.set_viewport(glam::Vec2::from(part.map(|s| s as f32)));
     session.frame_all();
-    session.camera_mut().fit(&points);
+    let bounds = Bounds::of(&points).filter(|_| moving.is_some() || args.turntable.is_some());
+    if let Some(bounds) = bounds {
+        session.camera_mut().frame(bounds);
+    }
+    // Fit the camera to a cylinder about the axis of the turn, so that all views have the same scale.
+    let fitted = if args.turntable.is_some() { cylinder(&points) } else { points };
+    session.camera_mut().fit(&fitted);
     check_layers(session.context(), session.camera(), &model.positions, &model.triangles, part)?;
 
     let started = Instant::now();
-    let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
+    let mut pictures = Vec::new();
+    for positions in frames {
+        let Some(moving) = &moving else { break };
+        pollster::block_on(session.set_model(DrawModel { positions, ..moving.clone() }))?;
+        bounds.iter().for_each(|&bounds| session.set_floor(bounds));
+        pictures.push(pollster::block_on(session.picture(part, args.scale))?);
+    }
+    let n_views = if pictures.is_empty() { args.n_pictures() } else { 0 };
+    for view in 0..n_views {
+        session.camera_mut().yaw = args.view.angles().0 + TAU * view as f32 / n_views as f32;
+        pictures.push(pollster::block_on(session.picture(part, args.scale))?);
+    }
     let compared = args.compare.map(|right| {
         let of = if right == Coordinates::Harmonic { " of the plain cage" } else { "" };
         ["harmonic coordinates".to_owned(), format!("{} coordinates{of}", right.name())]
     });
+    let mut divider = DIVIDER_WIDTH;
     if let Some(mut other) = other {
         *other.camera_mut() = *session.camera();
-        let right = pollster::block_on(other.picture(part, args.scale))?;
-        rgba = beside(&rgba, &right, part[0], size[0]);
+        pictures.push(pollster::block_on(other.picture(part, args.scale))?);
+        divider = size[0] - 2 * part[0];
     }
+    let n = pictures.len() as u32;
+    let size = [n * part[0] + (n - 1) * divider, size[1]];
+    let rgba = beside(&pictures, part[0], divider);
     let render_ms = started.elapsed().as_secs_f64() * 1e3;
     write(&args.output, &gpu::png(rgba, size)?)?;
     let summary = RenderSummary {
@@ -125,6 +157,49 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
+/// Rejects strips that are too wide, and several numbers of `--at` without a clip.
+fn check_pictures(args: &RenderArgs) -> Result<(), CliError> {
+    let ([width, _], n) = (args.size(), args.n_pictures());
+    let total = n as u64 * u64::from(width + DIVIDER_WIDTH);
+    if n > 1 && total > u64::from(MAX_STRIP_WIDTH) {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{n} pictures of {width} pixels are {total} pixels wide, above the limit of {MAX_STRIP_WIDTH}"
+            ),
+            hint: "give a smaller --size, or fewer pictures",
+        });
+    }
+    if args.clip.is_none() && args.at.len() > 1 {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "--at has {} numbers, but without --clip it is the place of one slice",
+                args.at.len()
+            ),
+            hint: "give one number, or --clip",
+        });
+    }
+    Ok(())
+}
+
+/// Positions of the vertices at each time of the clip; empty without a clip. `[n_times][n_vertices]`
+fn frames(args: &RenderArgs, model: &Model) -> Result<Vec<Vec<Vec3>>, CliError> {
+    let Some(name) = &args.clip else { return Ok(Vec::new()) };
+    let clips = model.clips();
+    let clip = Clip::named(&clips, name).map_err(|e| CliError::file(&args.model, e))?;
+    let seconds = clips[clip].seconds;
+    if let Some(at) = args.at.iter().find(|at| !(0.0..=seconds).contains(*at)) {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "--at: {at} s is outside of the clip '{}', which lasts {seconds} s",
+                shown(name)
+            ),
+            hint: "give times from 0 to the length of the clip",
+        });
+    }
+    let times = if args.at.is_empty() { &[0.0] } else { args.at.as_slice() };
+    model.frames_at(clip, times).map_err(|e| CliError::file(&args.model, e))
+}
+
 /// Rejects arguments for which `--compare` has nothing to show.
 fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     let hint = "leave out --compare, or --show the model";
@@ -132,14 +207,14 @@ fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
         let message = "--compare shows a deformed model, but --show is a slice of the grid".to_owned();
         return Err(CliError::Mismatch { message, hint });
     }
-    if args.compare.is_some() && args.size.0[0] < MIN_PAIR_WIDTH {
+    if args.compare.is_some() && args.size()[0] < MIN_PAIR_WIDTH {
         let message = format!("--compare needs a picture at least {MIN_PAIR_WIDTH} pixels wide");
         return Err(CliError::Mismatch { message, hint: "give a larger --size" });
     }
     Ok(())
 }
 
-/// Rejects files without faces and splats, and displays that a capture of splats does not have.
+/// Rejects files that have neither faces nor splats, and values of `--show` that a capture of splats does not support.
 fn check_capture(args: &RenderArgs, model: &Model) -> Result<(), CliError> {
     let is_drawn = matches!(args.show, ShowArg::Solid | ShowArg::Cells | ShowArg::Slice);
     if model.splats().is_none() {
@@ -155,7 +230,10 @@ fn check_capture(args: &RenderArgs, model: &Model) -> Result<(), CliError> {
 /// Minimum width of a picture that consists of two parts, pixels: one column for each part, and the divider.
 const MIN_PAIR_WIDTH: u32 = 2 + DIVIDER_WIDTH;
 
-/// Width of the divider between the two parts of a picture, pixels.
+/// Maximum width of an output that consists of several pictures side by side, pixels.
+const MAX_STRIP_WIDTH: u32 = 16384;
+
+/// Width of the divider between the parts of a picture, pixels.
 const DIVIDER_WIDTH: u32 = 2;
 
 /// RGBA colour of the divider, visible on dark and light backgrounds.
@@ -166,12 +244,26 @@ fn half(width: u32) -> u32 {
     (width - DIVIDER_WIDTH) / 2
 }
 
-/// Joins two RGBA pictures, each `part` pixels wide, to one that is `width` pixels wide, with the divider between them.
-fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
+/// Points on the rims of a vertical cylinder that contains `points`. Its axis goes through the centre of their bounding
+/// box.
+fn cylinder(points: &[Vec3]) -> Vec<Vec3> {
+    let Some(bounds) = Bounds::of(points) else { return Vec::new() };
+    let middle = bounds.center();
+    let radius = points.iter().map(|p| (*p - middle).with_y(0.0).length()).fold(0.0, f32::max);
+    let rim = (0..72).map(|k| {
+        let (sin, cos) = (TAU * k as f32 / 72.0).sin_cos();
+        Vec3::new(cos, 0.0, sin)
+    });
+    rim.flat_map(|way| [bounds.min.y, bounds.max.y].map(|y| (middle + radius * way).with_y(y))).collect()
+}
+
+/// Joins RGBA pictures side by side into one, each `part` pixels wide, with dividers of `divider` pixels between them.
+fn beside(pictures: &[Vec<u8>], part: u32, divider: u32) -> Vec<u8> {
     let row = 4 * part as usize;
-    let line = DIVIDER_COLOR.repeat((width - 2 * part) as usize);
-    let rows = left.chunks_exact(row).zip(right.chunks_exact(row));
-    rows.flat_map(|(left, right)| [left, &line, right].concat()).collect()
+    let line = DIVIDER_COLOR.repeat(divider as usize);
+    let height = pictures.first().map_or(0, |picture| picture.len() / row);
+    let rows = (0..height).map(|y| pictures.iter().map(|p| &p[y * row..][..row]).collect::<Vec<_>>());
+    rows.flat_map(|parts| parts.join(line.as_slice())).collect()
 }
 
 /// Scene options that depend only on the arguments.
@@ -187,20 +279,23 @@ fn scene_of(args: &RenderArgs) -> SceneOptions {
     let chosen =
         if matches!(args.show, ShowArg::Weights | ShowArg::Slice) { vec![column] } else { Vec::new() };
     SceneOptions {
-        theme: args.theme,
+        view: ViewOptions {
+            theme: args.theme,
+            base_wireframe: args.show == ShowArg::Wireframe,
+            floor: !args.no_floor,
+            ..ViewOptions::default()
+        },
         mesh,
         mesh_edges: args.show == ShowArg::Edges,
-        base_wireframe: args.show == ShowArg::Wireframe,
         cage_lines: !args.no_cage,
         handles: !args.no_cage && !args.no_handles,
-        floor: !args.no_floor,
         selection: Selection { vertices: chosen, ..Selection::default() },
         ..SceneOptions::default()
     }
 }
 
-/// Sets the weights, pose and slice that the picture needs. Returns the positions of the controls at rest and posed,
-/// which the camera frames.
+/// Sets the weights, pose and slice that the picture needs. Returns the rest and posed positions of the controls, so
+/// that the camera frames both.
 fn prepare(
     args: &RenderArgs,
     model: &Model,
@@ -264,7 +359,7 @@ fn prepare(
 
 fn slice(args: &RenderArgs, controls: Controls<'_>) -> Result<SliceView, CliError> {
     let options = args.solve.options(args.grid, args.read.memory);
-    let mut slice = Slice::new(controls, &options, args.axis, args.at);
+    let mut slice = Slice::new(controls, &options, args.axis, args.at.first().copied().unwrap_or(0.5));
     let mut column = None;
     if args.show == ShowArg::Slice && !slice.cells.is_empty() {
         let weights: Weights =

@@ -7,8 +7,9 @@ use glam::{DVec3, Vec3};
 
 use crate::error::CliError;
 
-/// Encodes a rigged model, deformed by one pose, or at rest with several poses as morph targets. `by`: displacements of
-/// all bound points, `[n_poses][n_points]`, object units; `outside`: indices of the points outside the cage.
+/// Encodes a rigged model: deformed by one pose, or at rest with the poses as morph targets if there are several or if
+/// they become expressions. `by`: displacements of all bound points, `[n_poses][n_points]`, object units; `outside`:
+/// indices of the points outside the cage.
 ///
 /// # Errors
 /// If the weights lack the rig's points, or the model cannot be written.
@@ -31,7 +32,7 @@ pub(crate) fn write(
         },
         e => CliError::file(output, e),
     };
-    if by.len() == 1 {
+    if by.len() == 1 && !options.expressions {
         return model.write_reshaped(&by.remove(0), outside, &[], options).map_err(wrong);
     }
     let rest = vec![DVec3::ZERO; by.first().map_or(0, Vec::len)];

@@ -1,5 +1,5 @@
-//! Tests small files that try to provoke endless work or allocation. Five commands read each file, under limits of the
-//! operating system. Prints a table of times and memory (`--nocapture`).
+//! Tests small files that try to provoke endless work or allocation. Five commands read each file, with address space
+//! and time limited by the operating system. Prints a table of times and memory (`--nocapture`).
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 #![cfg(target_os = "linux")]
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Time limit of a command, seconds. It suits a build without optimisation.
+/// Time limit of a command, seconds, long enough for a build without optimisation.
 const SECONDS: f64 = 10.0;
 
 /// Memory limit of a command, MB.
@@ -28,9 +28,10 @@ struct Run {
 }
 
 /// Runs the command in `folder` with 4 GB of address space, and polls its memory use until it ends.
-fn run(folder: &Path, args: &str) -> Run {
+/// `label`: part of the name of the file for the messages.
+fn run(folder: &Path, args: &str, label: &str) -> Run {
     let limits = format!("ulimit -v 4000000; exec timeout -s KILL {SECONDS} \"$0\" {args}");
-    let stderr = folder.with_extension("stderr");
+    let stderr = folder.with_extension(format!("{label}.stderr"));
     let began = Instant::now();
     let mut child = Command::new("sh")
         .args(["-c", &limits, env!("CARGO_BIN_EXE_cagework")])
@@ -320,6 +321,29 @@ fn assert_orderly_end(name: &str, run: &Run) {
     assert!(run.megabytes <= MEGABYTES, "{name}: {} MB", run.megabytes);
 }
 
+/// Runs five commands on a file. Returns one table row per command. `output`: name of the files to write.
+fn rows_of(folder: &Path, name: &str, output: &str) -> String {
+    let mut rows = String::new();
+    for command in [
+        "info FILE",
+        "cage FILE -o ../OUT.obj",
+        "check FILE",
+        "bind FILE --cage box:2 -g 16 -o ../OUT.glb --weights ../OUT.npz",
+        "render FILE -o ../OUT.png --size 64x64",
+    ] {
+        let run = run(folder, &command.replace("FILE", name).replace("OUT", output), output);
+        let (subcommand, message) =
+            (command.split(' ').next().unwrap(), run.stderr.lines().next().unwrap_or_default());
+        let (code, seconds, message) =
+            (run.code.unwrap_or(-1), run.seconds, message.chars().take(100).collect::<String>());
+        let megabytes = run.megabytes;
+        writeln!(rows, "| {name} | {subcommand} | {code} | {seconds:.1} | {megabytes} | {message} |")
+            .unwrap();
+        assert_orderly_end(&format!("{rows}\n{name}, {subcommand}"), &run);
+    }
+    rows
+}
+
 #[test]
 fn every_command_ends_with_success_or_an_error_message() {
     // Keep the files, because a test of the page opens them too (web/e2e/hostile.spec.ts).
@@ -329,34 +353,27 @@ fn every_command_ends_with_success_or_an_error_message() {
     for (name, bytes) in &files {
         fs::write(folder.join(name), bytes).unwrap();
     }
-    let mut table = String::from("| file | command | exit | s | MB | stderr |\n|---|---|---|---|---|---|\n");
-    let models = files.iter().filter(|(name, _)| !name.ends_with(".mtl") && !name.ends_with(".png"));
-    for (name, _) in models {
-        for command in [
-            "info FILE",
-            "cage FILE -o ../cage.obj",
-            "check FILE",
-            "bind FILE --cage box:2 -g 16 -o ../out.glb --weights ../out.npz",
-            "render FILE -o ../out.png --size 64x64",
-        ] {
-            let run = run(folder, &command.replace("FILE", name));
-            let (subcommand, message) =
-                (command.split(' ').next().unwrap(), run.stderr.lines().next().unwrap_or_default());
-            let (code, seconds, message) =
-                (run.code.unwrap_or(-1), run.seconds, message.chars().take(100).collect::<String>());
-            writeln!(
-                table,
-                "| {name} | {subcommand} | {code} | {seconds:.1} | {} | {message} |",
-                run.megabytes
-            )
-            .unwrap();
-            assert_orderly_end(&format!("{table}\n{name}, {subcommand}"), &run);
-        }
-    }
+    let models: Vec<&str> = files
+        .iter()
+        .map(|(name, _)| *name)
+        .filter(|name| !name.ends_with(".mtl") && !name.ends_with(".png"))
+        .collect();
+    // Each command runs on one thread and CI has two cores, so each of two threads runs the commands on half of the
+    // models.
+    let (even, odd): (Vec<_>, Vec<_>) = models.into_iter().enumerate().partition(|(k, _)| k % 2 == 0);
+    let rows: String = std::thread::scope(|scope| {
+        let halves = [(even, "even"), (odd, "odd")].map(|(models, half)| {
+            scope
+                .spawn(move || models.iter().map(|(_, name)| rows_of(folder, name, half)).collect::<String>())
+        });
+        halves.into_iter().map(|half| half.join().unwrap()).collect()
+    });
+    let table = format!("| file | command | exit | s | MB | stderr |\n|---|---|---|---|---|---|\n{rows}");
     std::io::stdout().write_all(table.as_bytes()).unwrap();
 }
 
-/// The files have repeated, distinct and instanced positions, because only equal positions share their weights.
+/// Binds files with repeated, distinct and instanced positions. Vertices at equal positions are sampled once, so the
+/// memory depends on the number of distinct positions as well.
 #[test]
 fn memory_estimate_is_near_the_peak() {
     let folder = tempfile::tempdir().unwrap();
@@ -377,14 +394,14 @@ fn memory_estimate_is_near_the_peak() {
         nodes.for_each(|(i, node)| node["translation"] = json!([i as f64 * 1e-5, 0.0, 0.0]));
     });
     fs::write(folder.join("nodes.glb"), many).unwrap();
-    let program = run(folder, "bind tetrahedron.glb --cage box:2 -g 8").megabytes;
+    let program = run(folder, "bind tetrahedron.glb --cage box:2 -g 8", "memory").megabytes;
     for bind in [
         "repeated.obj --cage box:2 -g 16 --weights out.npz",
         "distinct.obj --cage box:2 -g 16",
         "nodes.glb --cage box:2 -g 16",
         "tetrahedron.glb --cage box:4 -g 80 --threads 8",
     ] {
-        let run = run(folder, &format!("bind {bind} --report report.json"));
+        let run = run(folder, &format!("bind {bind} --report report.json"), "memory");
         assert_eq!(run.code, Some(0), "{bind}: {}", run.stderr);
         let report: Value = serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
         let estimated = report["memory_bytes"]["estimated"].as_f64().unwrap() / 1e6;

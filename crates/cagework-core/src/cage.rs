@@ -35,16 +35,18 @@ pub use subdivided_box::subdivided_box;
 use topology::Surface;
 pub use topology::{Side, sides_of};
 
-/// Smallest diagonal of a cage, object units: keeps squares and cubes of lengths within the range of f32 and f64.
+/// Smallest allowed diagonal of a cage, object units. Squares and cubes of lengths are then within the range of f32 and
+/// f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
-/// Largest diagonal of a cage, object units, for the same reason.
+/// Largest allowed diagonal of a cage, object units, for the same reason as [`MIN_DIAGONAL`].
 pub const MAX_DIAGONAL: f64 = 1e12;
 
-/// Largest number of faces of a cage: more would take minutes to check, and usually mean that a model was given as its
-/// cage.
+/// Largest allowed number of faces of a cage. Checking more faces would take minutes. So many faces usually mean that a
+/// model was given as its own cage.
 pub const MAX_FACES: usize = 100_000;
 
-/// A point within this distance of the cage (over its diagonal) is on the surface: resolution of f32 coordinates.
+/// A point counts as on the surface if its distance from the cage, as a fraction of the cage's diagonal, is at most
+/// this: the resolution of f32 coordinates.
 pub(crate) const CAGE_TOLERANCE: f64 = 1e-6;
 
 /// Largest number of corners for which hat values need no heap memory.
@@ -70,8 +72,8 @@ pub struct Cage {
 impl Cage {
     /// Checks a polygon mesh and builds a cage from it.
     ///
-    /// Repaired, with a notice: inverted faces, and vertices split at a seam (equal positions along open edges, as in
-    /// glTF files; the first one replaces the others).
+    /// Inverted faces are turned, and vertices split at a seam (equal positions along open edges, as in glTF files) are
+    /// joined: the first one replaces the others. A notice reports each repair.
     ///
     /// # Errors
     /// [`CageError`] naming the face, edge or vertex.
@@ -268,15 +270,16 @@ impl Cage {
     }
 
     /// Dirichlet values ("hats") of the cage vertices at a point of the surface, given by one of [`Self::facets`] and
-    /// barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. They sum to 1 and reproduce
-    /// the point (on a bent face up to 2 % of its bend).
+    /// barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. The values sum to 1 and
+    /// reproduce the point; on a bent quad, with an error of up to 2 % of the distance of one corner from the plane of
+    /// the others.
     ///
-    /// Hats are linear on triangles. On planar quads they are the coordinates of Meyer et al. 2002 (bilinear on a
-    /// rectangle), blended with pseudo-harmonic coordinates where a corner is nearly straight. On all other polygons
-    /// they are pseudo-harmonic coordinates (after Gordon and Wixom 1974: means over the chords through the point),
-    /// which depend continuously on the corners. A bent face is a patch over its best-fitting plane, with the
-    /// coordinates of its projected outline. All hats are non-negative and linear along edges, so neighbouring faces
-    /// agree.
+    /// Hats are linear on triangles. On convex planar quads they are the coordinates of Meyer et al. 2002 (bilinear on
+    /// a rectangle), blended with pseudo-harmonic coordinates if a corner is nearly straight. On all other planar
+    /// polygons they are pseudo-harmonic coordinates (after Gordon and Wixom 1974: means over the chords through the
+    /// point), which depend continuously on the corners. A bent face is a patch over its best-fitting plane, with the
+    /// coordinates of its projected outline; if that outline crosses itself or a side of it vanishes, hats are linear
+    /// on the triangles of the face. All hats are non-negative and linear along edges, so neighbouring faces agree.
     ///
     /// # Panics
     /// If there is no such facet.

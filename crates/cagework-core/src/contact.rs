@@ -20,8 +20,8 @@ const MAX_FOLD_COSINE: f64 = 0.9994;
 /// Limit on the pairs that [`meeting`] lists, against memory exhaustion.
 const MAX_PAIRS: usize = 100_000;
 
-/// Limit on comparisons of boxes in a search, which take some seconds: 40,000 triangles that all meet have 800 million
-/// pairs.
+/// Limit on comparisons of boxes in a search, 540 million, which take some seconds. A search reaches it if 40,000
+/// triangles all meet, which have 800 million pairs.
 const MAX_COMPARISONS: u64 = 1 << 29;
 
 /// Cost of an intersection test of triangles, in comparisons of boxes.
@@ -32,22 +32,22 @@ const COMPARISONS_PER_TRIANGLE_TEST: u64 = 40;
 pub struct Corners {
     /// Vertex indices, distinct.
     pub index: [u32; 3],
-    /// Positions of these vertices.
+    /// Positions of the corners.
     pub at: [DVec3; 3],
 }
 
 impl Corners {
-    /// Smallest corner of the bounding box.
+    /// Corner of the bounding box with the smallest coordinates.
     pub fn min(&self) -> DVec3 {
         self.at[0].min(self.at[1]).min(self.at[2])
     }
 
-    /// Largest corner of the bounding box.
+    /// Corner of the bounding box with the largest coordinates.
     pub fn max(&self) -> DVec3 {
         self.at[0].max(self.at[1]).max(self.at[2])
     }
 
-    /// Normal, not normalised: twice the area long.
+    /// Normal, not normalised: its length is twice the area.
     pub fn normal(&self) -> DVec3 {
         (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
     }
@@ -100,8 +100,8 @@ pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     }
 }
 
-/// Sort key by `x` (`f64::total_cmp`), then by `number`. The crate also sorts `[u32; 3]` elsewhere; sorting another
-/// type would add 2 kB to the wasm module.
+/// Sort key by `x` (`f64::total_cmp`), then by `number`. It is a `[u32; 3]`, which the crate also sorts elsewhere: the
+/// sort of another type would be compiled separately and add 2 kB to the wasm module.
 fn ascending(x: f64, number: u32) -> [u32; 3] {
     let bits = x.to_bits();
     let key = if bits >> 63 == 1 { !bits } else { bits | 1 << 63 };
@@ -122,7 +122,8 @@ pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
 /// Calls `each` with every pair of triangles of one surface that [`meet`], smaller index first. Returns whether the
 /// search was complete: it stops if `each` breaks, or after 2^29 comparisons.
 ///
-/// Sweep along x: `O(n log n)` for surfaces whose triangles are small against the whole.
+/// Sorts the triangles by x and compares each with those whose ranges of x overlap: `O(n log n + n a)`, where `a` is
+/// their mean number, about `sqrt(n)` on an evenly tessellated surface.
 pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
     let mut order: Vec<[u32; 3]> = (0u32..).zip(triangles).map(|(t, c)| ascending(c.min().x, t)).collect();
     order.sort_unstable();
@@ -153,7 +154,8 @@ pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> Con
 }
 
 /// Whether a separating axis puts two triangles more than `gap` apart. Exact for a gap of 0 (touching counts as
-/// meeting). With a gap it may miss pairs whose closest points are both corners.
+/// meeting). With a gap, the test may return false for triangles that are farther apart, if their closest points are
+/// both corners.
 fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
     // Relative coordinates keep precision if the triangles are far from the origin.
     let origin = a[0];
@@ -177,7 +179,8 @@ fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
         || eb.iter().any(|&w| separates(nb.cross(w)))
 }
 
-/// Whether two triangles with the same first corner also meet elsewhere.
+/// Whether two triangles with the same first corner also meet elsewhere: whether the cones spanned by their edges from
+/// this corner share a direction.
 fn cones_meet(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
     let (a, b) = ([a[1] - a[0], a[2] - a[0]], [b[1] - b[0], b[2] - b[0]]);
     let (na, nb) = (a[0].cross(a[1]), b[0].cross(b[1]));
@@ -199,7 +202,7 @@ fn enters(a: [DVec3; 2], b: [DVec3; 2], nb: DVec3) -> bool {
     is_in_cone(crossing, b, nb)
 }
 
-/// Whether a direction in the plane of a cone lies in it or on its boundary.
+/// Whether a direction in the plane of a cone lies in the cone or on its boundary.
 fn is_in_cone(d: DVec3, b: [DVec3; 2], nb: DVec3) -> bool {
     let limit = -PLANE_TOLERANCE * d.length() * nb.length();
     nb.dot(b[0].cross(d)) >= limit * b[0].length() && nb.dot(d.cross(b[1])) >= limit * b[1].length()

@@ -40,7 +40,7 @@ impl<'a> From<&'a Cage> for Controls<'a> {
 }
 
 impl<'a> Controls<'a> {
-    /// An owned copy.
+    /// Copies these controls into an owned set.
     #[must_use]
     pub fn to_set(&self) -> ControlSet {
         self.set.cloned().unwrap_or_else(|| ControlSet::plain(self.cage))
@@ -106,11 +106,12 @@ impl<'a> Controls<'a> {
         self.origins.map_or(Some(face), |origins| origins[face as usize])
     }
 
-    /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it.
-    /// Calls `each(control, value)` for non-zero values, possibly several times per control. All values sum to 1.
+    /// Dirichlet values at a point of the surface, given by one of the surface's facets (`triangle`, see
+    /// [`Cage::facets`]) and barycentric coordinates in it. Calls `each(control, value)` for non-zero values, possibly
+    /// several times per control. All values sum to 1.
     ///
     /// # Panics
-    /// If the triangle does not exist.
+    /// If there is no such facet.
     #[inline]
     pub fn values_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
         let Some(rows) = self.rows else { return self.surface.hats_at(triangle, barycentric, each) };
@@ -142,7 +143,7 @@ mod tests {
         })
     }
 
-    /// A box divided into 27 boxes, whose surface takes the values of the box's eight corners by rows of B. The
+    /// A box with nine quads on each side, whose surface takes the values of the eight corners by rows of B. The
     /// harmonic function with these values is trilinear. On the small quads it is bilinear, as their hats are.
     #[test]
     fn rows_mix_the_values_of_the_surface() {

@@ -1,4 +1,4 @@
-//! Kinds of coordinates. A new closed form takes a file in `coordinates/` and an entry of `kinds!` below.
+//! Kinds of coordinates. A new closed form needs a file in `coordinates/` and an entry in `kinds!` below.
 
 mod closed_form;
 mod green;

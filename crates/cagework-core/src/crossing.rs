@@ -10,17 +10,17 @@ use crate::contact::{Corners, each_meeting};
 use crate::mesh::PolygonMesh;
 use crate::words::{counted, grouped};
 
-/// Limit on the locations that are listed of each kind; counts are complete.
+/// Limit on the number of locations in each list of a report. Counts include locations that are not listed.
 pub const MAX_PLACES: usize = 2000;
 
-/// Distance, as a fraction of the mesh's diagonal, up to which vertices have the same position: rounding to six
-/// decimals in a file.
+/// Distance, as a fraction of the mesh's diagonal, up to which vertices count as being at the same position. It is
+/// larger than the rounding of coordinates to six decimals in a file.
 const WELD_DISTANCE: f64 = 2e-6;
 
 /// Intersecting faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossings {
-    /// The faces, ascending.
+    /// Indices of the intersecting faces, ascending.
     pub faces: Vec<u32>,
     /// Locations of intersecting pairs of triangles, object units; at most [`MAX_PLACES`].
     pub points: Vec<[f32; 3]>,
@@ -93,8 +93,9 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
             face_of.push(f);
         }
     }
-    // Identify vertices at the same position, so that neighbours across a seam do not count as intersecting. Exception:
-    // the corners of one triangle stay separate, as they may coincide in parts that are tiny relative to the diagonal.
+    // Merge vertices within `WELD_DISTANCE` (relative to the diagonal) of each other, so that neighbours across a seam
+    // do not count as intersecting. Exception: the corners of one triangle stay separate, as they may coincide in parts
+    // that are tiny relative to the diagonal.
     let (mut first, _) = same_places(mesh);
     for Corners { index, .. } in &triangles {
         let named = index.map(|i| first[i as usize]);
@@ -115,7 +116,8 @@ fn between(a: &Corners, b: &Corners) -> DVec3 {
     0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
-/// For each vertex, the first vertex at its position; and the number of vertices that have an earlier one there.
+/// For each vertex, the first vertex at the same position; and the number of vertices at the position of an earlier
+/// vertex.
 #[must_use]
 pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     let reach = WELD_DISTANCE * mesh.diagonal();

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use crate::frames::Frames;
 use crate::weights::Weights;
@@ -79,8 +80,36 @@ pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Ve
     deform_vertices(weights, &frames.columns(controls))
 }
 
-/// Displacement of each bound point: `sum_i w_i (c_i' - c_i)` over all columns. It is exactly zero if no control of the
-/// point has moved, unlike the difference of two deformed shapes.
+/// A pose moves a point beyond the range of 32-bit floats.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error(
+    "the pose moves point {point} to {to}, but 32-bit floats end at {:e}: use smaller coordinates",
+    f32::MAX
+)]
+pub struct NotFinite {
+    /// Index of the point.
+    pub point: usize,
+    /// Position with a coordinate that is infinite or NaN.
+    pub to: Vec3,
+}
+
+/// [`deform_bound`] of a pose from outside the program.
+///
+/// # Errors
+/// [`NotFinite`] for the first point whose position is not finite.
+///
+/// # Panics
+/// As [`deform_bound`].
+pub fn deform_finite(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Result<Vec<Vec3>, NotFinite> {
+    let points = deform_bound(weights, frames, controls);
+    match points.iter().position(|p| !p.is_finite()) {
+        Some(point) => Err(NotFinite { point, to: points[point] }),
+        None => Ok(points),
+    }
+}
+
+/// Displacement of each bound point: `sum_i w_i (c_i' - c_i)` over all columns. It is exactly zero if no column with a
+/// weight of the point has moved, unlike the difference of two deformed shapes.
 ///
 /// `rest`, `posed`: `[n_controls]`, object units. Returns `[n_rows]`.
 ///
@@ -145,14 +174,22 @@ mod tests {
     }
 
     #[test]
+    fn points_moved_beyond_the_range_of_floats_are_errors() {
+        let far = |x: f32| deform_finite(&weights(), &Frames::default(), &[Vec3::ZERO, Vec3::X * x, Vec3::X]);
+        assert_eq!(far(f32::MAX).unwrap()[1], Vec3::X * f32::MAX);
+        let message = "the pose moves point 1 to [inf, NaN, NaN], but 32-bit floats end at 3.4028235e38: use smaller coordinates";
+        assert_eq!(far(f32::INFINITY).unwrap_err().to_string(), message);
+    }
+
+    #[test]
     fn normals_of_a_cube_point_away_from_its_centre() {
         let cage = crate::Cage::new(&crate::cage::shapes::cube()).unwrap();
         let mut positions = cage.positions().to_vec();
         positions.push(Vec3::splat(9.0));
         let normals = vertex_normals(&positions, cage.triangles());
         for (p, n) in positions[..8].iter().zip(&normals) {
-            // A corner has two triangles of one face and one of another, so its normal is weighted by a factor of at
-            // most 2.
+            // A corner has one or two triangles of each of its faces, so the weights of the faces' normals differ by a
+            // factor of at most 2.
             let away = (p - Vec3::splat(0.5)).normalize();
             assert!((n.length() - 1.0).abs() <= ROUNDING && n.dot(away) > 0.9, "{n} at {p}");
         }

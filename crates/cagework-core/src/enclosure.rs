@@ -1,7 +1,7 @@
 //! Finds the points that a cage encloses; updated incrementally while the cage is dragged.
 //!
 //! A winding number is a sum over the cage's triangles. When a few vertices move, only the terms of their triangles
-//! change, and only for points inside the bounding box of those triangles before and after.
+//! change. For points outside the bounding box of these triangles before and after the move, the changes sum to zero.
 
 mod columns;
 
@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 
 use self::columns::Columns;
 use crate::cage::Cage;
+use crate::geometry::winding_number;
 use crate::mesh::Bounds;
 
 /// Winding number above which a point is inside. Off the surface, winding numbers are integers; on it, they lie between
@@ -30,7 +31,9 @@ impl Enclosure {
         let corners: Vec<[DVec3; 3]> =
             (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t)).collect();
         let columns = Columns::new(&corners);
-        let winding = |p: DVec3| columns.winding_number(p).unwrap_or_else(|| winding_number(p, &corners));
+        let winding = |p: DVec3| {
+            columns.winding_number(p).unwrap_or_else(|| winding_number(p, corners.iter().copied()))
+        };
         let winding = points.iter().map(|p| winding(p.as_dvec3())).collect();
         Self { points: points.to_vec(), cage: cage.clone(), winding }
     }
@@ -42,8 +45,8 @@ impl Enclosure {
         outside.map(|(v, _)| v as u32).collect()
     }
 
-    /// Points outside the cage with its vertices at `positions` (`[n_cage]`, object units), ascending. Time is
-    /// proportional to the number of triangles that have changed.
+    /// Points outside the cage with its vertices at `positions` (`[n_cage]`, object units), ascending. Updates only the
+    /// points near triangles that have changed, by the terms of these triangles.
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.
@@ -62,7 +65,8 @@ impl Enclosure {
             let reached = swept.is_some_and(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());
             let winding = if reached {
                 let p = p.as_dvec3();
-                rest - winding_number(p, &before) + winding_number(p, &after)
+                let of = |triangles: &[[DVec3; 3]]| winding_number(p, triangles.iter().copied());
+                rest - of(&before) + of(&after)
             } else {
                 rest
             };
@@ -74,42 +78,10 @@ impl Enclosure {
     }
 }
 
-/// [`crate::geometry::winding_number`] with a single arc tangent: each half solid angle is the argument of a complex
-/// number, and the product of these numbers has the sum of the angles as its argument. Full turns are counted
-/// separately.
-#[must_use]
-pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
-    let (mut re, mut im) = (1.0_f64, 0.0_f64);
-    let mut turns = 0_i32;
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|p| p - point);
-        let (la, lb, lc) = (a.length(), b.length(), c.length());
-        let x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        let y = a.dot(b.cross(c));
-        let size = x.abs() + y.abs();
-        if size == 0.0 {
-            continue;
-        }
-        let (x, y) = (x / size, y / size);
-        let product = (re * x - im * y, re * y + im * x);
-        // The sum of two angles of equal sign may exceed half a turn, which changes the product's sign.
-        if im >= 0.0 && y >= 0.0 && product.1 < 0.0 {
-            turns += 1;
-        } else if im < 0.0 && y < 0.0 && product.1 >= 0.0 {
-            turns -= 1;
-        }
-        let size = product.0.abs() + product.1.abs();
-        (re, im) = (product.0 / size, product.1 / size);
-    }
-    let angle = im.atan2(re) + f64::from(turns) * std::f64::consts::TAU;
-    angle / std::f64::consts::TAU
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cage::subdivided_box;
-    use crate::geometry;
     use crate::mesh::PolygonMesh;
 
     /// Tolerance for f64 rounding of sums of a few hundred angles.
@@ -126,28 +98,11 @@ mod tests {
         steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Vec3::new(x, y, z)))).collect()
     }
 
-    #[test]
-    fn product_of_angles_is_the_sum_of_angles() {
-        let cage = box_cage();
-        let triangles: Vec<_> =
-            (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)).collect();
-        for p in points() {
-            let p = p.as_dvec3();
-            let expected = geometry::winding_number(p, triangles.iter().copied());
-            let actual = winding_number(p, &triangles);
-            assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
-            // An open part of the surface, whose winding number is not an integer.
-            let expected = geometry::winding_number(p, triangles[..20].iter().copied());
-            let actual = winding_number(p, &triangles[..20]);
-            assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
-        }
-    }
-
     /// The column method equals the sum over all triangles.
     #[test]
     fn ray_crossings_equal_the_sum_of_angles() {
         let cage = box_cage();
-        // Rotated, twisted and dented, so that a line leaves the cage more than once.
+        // The second cage is rotated, twisted and dented, so that a line leaves it more than once.
         let bend =
             |p: &Vec3| glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.2 + p.y, 0.5) * (*p * p.length());
         let bent =
@@ -160,7 +115,7 @@ mod tests {
             // Points below, above and on each vertex: lines pass edges, and points lie on faces.
             let around = cage.positions().iter().flat_map(|p| [-0.4, 0.0, 0.4].map(|z| *p + z * Vec3::Z));
             for p in points().into_iter().chain(around) {
-                let expected = winding_number(p.as_dvec3(), &triangles);
+                let expected = winding_number(p.as_dvec3(), triangles.iter().copied());
                 match columns.winding_number(p.as_dvec3()) {
                     Some(actual) => {
                         assert!((actual - expected).abs() < ROUNDING, "{p}: {actual}, {expected}");

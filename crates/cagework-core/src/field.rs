@@ -1,10 +1,13 @@
 //! The deformation as a field in space, for points that are not bound: probes and points of other files, Gaussian
 //! splats, and vertices that a skeleton moves before the cage does (dynamic binding, Joshi et al. 2007).
 //!
-//! Weights are bound at the nodes of a regular lattice that lie inside the cage or within two cells of it. For a pose,
-//! each of these nodes has a displacement u = sum_i w_i (c_i' - c_i). At the other nodes, u solves Laplace's equation
-//! with u = 0 on the lattice's boundary. Every node also has a deformation gradient F = I + du/dx, by finite
-//! differences. Between nodes, u and F are interpolated trilinearly.
+//! The nodes of a regular lattice that lie inside the cage or within two lattice cells of it are *bound*: they have
+//! weights. For a pose, a bound node has the displacement u = sum_i w_i (c_i' - c_i), with its weights w_i and the rest
+//! and posed positions c_i and c_i' of the controls. At the other nodes, u solves Laplace's equation with u = 0 on the
+//! lattice's boundary. Every node also has a deformation gradient F = I + du/dx, by finite differences. Between nodes,
+//! u and F are interpolated trilinearly.
+
+use std::sync::OnceLock;
 
 use glam::{DMat3, DVec3, IVec3, Mat3, UVec3, Vec3, Vec4};
 
@@ -23,7 +26,8 @@ pub const CELLS: u32 = 64;
 /// Number of cells along the longest side of the cage's box in the lattice that deforms animation clips. It is smaller
 /// than [`CELLS`] because the page computes this lattice when a clip starts.
 pub const CLIP_CELLS: u32 = 48;
-/// Allowed numbers of cells. At 256, a lattice may have 57 million nodes, which the memory limit of the bind refuses.
+/// Allowed numbers of cells. At 256, a lattice may have 57 million nodes, whose memory exceeds the default limit of a
+/// bind.
 pub const CELLS_RANGE: Number = Number {
     name: "cells",
     help: "Cells of the lattice along the longest side of the cage",
@@ -42,6 +46,9 @@ const BOUND_CELLS: u32 = 2;
 /// Cascade that solves for the nodes that are not bound: strides of successively finer lattices, and the number of
 /// Gauss-Seidel sweeps on each.
 const STRIDES: [(u32, usize); 4] = [(8, 40), (4, 12), (2, 8), (1, 8)];
+/// Distance from the bound nodes, in lattice cells, up to which nodes are relaxed at stride 1. Beyond it the field is
+/// so smooth that interpolation from stride 2 suffices.
+const RELAXED_CELLS: u8 = 4;
 /// Edge of the cells into which [`InverseField`] sorts deformed nodes, in lattice cells.
 const INVERSE_CELLS: f32 = 2.0;
 /// Limit on the index of a sorting cell along an axis, so that three indices fit into one key.
@@ -61,19 +68,24 @@ pub struct Lattice {
     pub origin: Vec3,
     /// Edge of a cell, object units.
     pub cell: f32,
-    /// Nodes along each axis.
+    /// Number of nodes along each axis.
     pub dims: UVec3,
     /// Nodes inside the cage or within `BOUND_CELLS` cells of it, ascending.
     bound: Vec<u32>,
+    /// Nodes that are not bound, but within `RELAXED_CELLS` cells of a bound one, without those on the lattice's
+    /// boundary. Nodes whose coordinates have an even sum come first: no two of them are neighbours.
+    relaxed: Vec<u32>,
 }
 
 impl Lattice {
-    /// The lattice around a cage in its rest pose, with `cells` cells along the longest side of its box.
+    /// The lattice around a cage in its rest pose, with `cells` cells along the longest side of the cage's box.
     #[must_use]
     pub fn new(cage: &Cage, cells: u32) -> Self {
         let (cell, margin, dims) = Self::size(cage, cells);
-        let mut lattice = Self { origin: cage.bounds().min - margin * cell, cell, dims, bound: Vec::new() };
+        let origin = cage.bounds().min - margin * cell;
+        let mut lattice = Self { origin, cell, dims, bound: Vec::new(), relaxed: Vec::new() };
         lattice.bound = lattice.around(cage);
+        lattice.relaxed = lattice.around_bound();
         lattice
     }
 
@@ -105,7 +117,7 @@ impl Lattice {
         (self.index(first.as_uvec3()), (at - first).clamp(Vec3::ZERO, Vec3::ONE))
     }
 
-    /// As [`Self::place`]; `None` outside the lattice.
+    /// Cell of a point, as in [`Self::place`]; `None` for points outside the lattice.
     pub(crate) fn cell_of(&self, point: Vec3) -> Option<(usize, Vec3)> {
         let at = (point - self.origin) / self.cell;
         let is_inside = at.cmpge(Vec3::ZERO).all() && at.cmple((self.dims - 1).as_vec3()).all();
@@ -137,20 +149,47 @@ impl Lattice {
         let mut is_bound = vec![true; n as usize];
         let mut reached = vec![0];
         while let Some(index) = reached.pop() {
-            let node = self.node(index);
-            for axis in 0..3 {
-                let step = self.stride_of(axis) as u32;
-                let before = (node[axis] > 0).then(|| index - step);
-                let after = (node[axis] + 1 < self.dims[axis]).then(|| index + step);
-                for next in before.into_iter().chain(after) {
-                    if is_bound[next as usize] && !is_near[next as usize] {
-                        is_bound[next as usize] = false;
-                        reached.push(next);
-                    }
+            for next in self.neighbours(index) {
+                if is_bound[next as usize] && !is_near[next as usize] {
+                    is_bound[next as usize] = false;
+                    reached.push(next);
                 }
             }
         }
         (0..n).filter(|&index| is_bound[index as usize]).collect()
+    }
+
+    /// Computes [`Self::relaxed`] by a breadth-first search from the bound nodes.
+    fn around_bound(&self) -> Vec<u32> {
+        let mut is_reached = vec![false; self.dims.element_product() as usize];
+        self.bound.iter().for_each(|&index| is_reached[index as usize] = true);
+        let (mut last, mut relaxed) = (self.bound.clone(), Vec::new());
+        for _ in 0..RELAXED_CELLS {
+            let mut next = Vec::new();
+            for other in last.iter().flat_map(|&index| self.neighbours(index)) {
+                if !std::mem::replace(&mut is_reached[other as usize], true) {
+                    next.push(other);
+                }
+            }
+            relaxed.extend(next.iter().copied().filter(|&index| {
+                let node = self.node(index);
+                node.cmpgt(UVec3::ZERO).all() && (node + 1).cmplt(self.dims).all()
+            }));
+            last = next;
+        }
+        relaxed.sort_unstable_by_key(|&index| (self.node(index).element_sum() % 2, index));
+        relaxed
+    }
+
+    /// The nodes next to a node along each axis.
+    fn neighbours(&self, index: u32) -> impl Iterator<Item = u32> + '_ {
+        let node = self.node(index);
+        (0..3).flat_map(move |axis| {
+            let step = self.stride_of(axis) as u32;
+            let before = (node[axis] > 0).then(|| index - step);
+            let after = (node[axis] + 1 < self.dims[axis]).then(|| index + step);
+            before.into_iter().chain(after)
+        })
     }
 
     /// Difference between the indices of neighbouring nodes along an axis.
@@ -164,7 +203,8 @@ impl Lattice {
         [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1].map(|step| first + step)
     }
 
-    /// Longest side of the cage's box, object units. Up to `STRIDES[0].0` cells too large where the lattice was padded.
+    /// Estimates the longest side of the cage's box from the size of the lattice, object units. The estimate is up to
+    /// `STRIDES[0].0` cells too large, because the lattice is padded.
     fn longest_side(&self) -> f32 {
         let cells = self.dims.max_element() as f32 - 1.0;
         cells / (1.0 + 2.0 * MARGIN) * self.cell
@@ -233,7 +273,7 @@ impl FieldWeights {
         for (&node, by) in lattice.bound.iter().zip(by) {
             values[node as usize] = by.as_vec3().extend(1.0);
         }
-        let mut field = Field { lattice: lattice.clone(), values, gradients: Vec::new() };
+        let mut field = Field::of_values(lattice.clone(), values);
         for (level, (stride, sweeps)) in STRIDES.into_iter().enumerate() {
             if level > 0 {
                 field.interpolate(stride);
@@ -242,29 +282,26 @@ impl FieldWeights {
                 field.relax(stride);
             }
         }
-        field.gradients = field.node_gradients();
         field
     }
 }
 
 /// A deformation in space: displacement and gradient at the nodes of a lattice.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Field {
     /// The lattice at whose nodes the field is stored.
     pub lattice: Lattice,
     /// Displacements, object units. The fourth component is 1 at bound nodes, otherwise 0. `[dims.z, dims.y, dims.x]`
     pub values: Vec<Vec4>,
-    /// F - I at the nodes. `[dims.z, dims.y, dims.x]`
-    gradients: Vec<Mat3>,
+    /// F - I at the nodes, computed when first needed: the GPU computes its own. `[dims.z, dims.y, dims.x]`
+    gradients: OnceLock<Vec<Mat3>>,
 }
 
 impl Field {
     /// A field with the given displacements, laid out as in [`Self::values`].
     #[must_use]
     pub fn of_values(lattice: Lattice, values: Vec<Vec4>) -> Self {
-        let mut field = Self { lattice, values, gradients: Vec::new() };
-        field.gradients = field.node_gradients();
-        field
+        Self { lattice, values, gradients: OnceLock::new() }
     }
 
     /// Displacement of a point; zero outside the lattice. Object units.
@@ -279,7 +316,8 @@ impl Field {
         if self.lattice.cell_of(point).is_none() {
             return Mat3::IDENTITY;
         }
-        Mat3::IDENTITY + self.interpolated(point, |node| self.gradients[node])
+        let gradients = self.gradients();
+        Mat3::IDENTITY + self.interpolated(point, |node| gradients[node])
     }
 
     /// Deformation gradient F of a node.
@@ -288,15 +326,14 @@ impl Field {
     /// If the lattice has no such node.
     #[must_use]
     pub fn node_gradient(&self, node: usize) -> Mat3 {
-        Mat3::IDENTITY + self.gradients[node]
+        Mat3::IDENTITY + self.gradients()[node]
     }
 
-    /// Displacement of a node and columns of F - I at the node; the fourth component of each has no meaning.
+    /// Displacement of a node and columns of F - I at the node.
     #[inline(always)]
-    pub(crate) fn lanes(&self, node: usize) -> [f32; 16] {
-        let Mat3 { x_axis, y_axis, z_axis } = self.gradients[node];
-        let columns = [self.values[node], x_axis.extend(0.0), y_axis.extend(0.0), z_axis.extend(0.0)];
-        std::array::from_fn(|lane| columns[lane / 4][lane % 4])
+    pub(crate) fn components(&self, node: usize) -> [f32; 12] {
+        let (value, gradient) = (self.values[node].to_array(), self.gradients()[node].to_cols_array());
+        std::array::from_fn(|k| if k < 3 { value[k] } else { gradient[k - 3] })
     }
 
     /// Position of a point after the deformation.
@@ -341,6 +378,10 @@ impl Field {
             mix(c011, c111, share.x),
         ];
         mix(mix(y00, y10, share.y), mix(y01, y11, share.y), share.z)
+    }
+
+    fn gradients(&self) -> &[Mat3] {
+        self.gradients.get_or_init(|| self.node_gradients())
     }
 
     /// F - I at each node: central differences, or one-sided ones at the boundary of the lattice and, at bound nodes,
@@ -392,9 +433,19 @@ impl Field {
         }
     }
 
-    /// One Gauss-Seidel sweep over the nodes of a stride that are not bound. Nodes on the lattice's boundary stay 0.
+    /// One Gauss-Seidel sweep over the nodes of a stride that are not bound; at stride 1, over [`Lattice::relaxed`].
+    /// Nodes on the lattice's boundary stay 0.
     fn relax(&mut self, stride: u32) {
         let dims = self.lattice.dims;
+        if stride == 1 {
+            let [x, y, z] = [0, 1, 2].map(|axis| self.lattice.stride_of(axis));
+            for k in self.lattice.relaxed.iter().map(|&index| index as usize) {
+                let around = |step: usize| self.values[k - step] + self.values[k + step];
+                let sum = around(x) + around(y) + around(z);
+                self.values[k] = (sum / 6.0).truncate().extend(0.0);
+            }
+            return;
+        }
         let steps = [0, 1, 2].map(|axis| stride as usize * self.lattice.stride_of(axis));
         let inner = |n: u32| (stride..n - 1).step_by(stride as usize);
         for z in inner(dims.z) {
@@ -413,8 +464,9 @@ impl Field {
 
 /// The inverse of a field's map.
 ///
-/// Newton's method starts at the bound node that the field moves closest to the target. Outside the cage, a strongly
-/// bent field may move further points to the same target; this start selects the one in or near the cage.
+/// Newton's method starts at the bound node that the field moves closest to the target. A strongly bent field may move
+/// several points to the same target; this start selects the one that lies inside the cage or nearest to it. If
+/// Newton's method does not converge from this node, it starts again at the target.
 #[derive(Debug)]
 pub struct InverseField<'a> {
     field: &'a Field,

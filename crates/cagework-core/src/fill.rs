@@ -50,8 +50,8 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
 }
 
 /// Cost of a triangle that folds back onto the face behind one of its sides, as a multiple of the triangle's area, for
-/// each such side. It decides between triangulations of equal area: around a missing corner of a cube, one of two lies
-/// on the remaining faces.
+/// each such side. It decides between triangulations of equal area: of the two that close a missing corner of a cube,
+/// one lies on the remaining faces.
 const FOLD_COST: f64 = 1.0;
 
 /// Cosine of the angle between two faces above which they are folded onto each other (8 degrees).

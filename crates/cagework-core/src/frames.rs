@@ -4,14 +4,15 @@
 //! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`, where `c_i'` are the posed controls and the vectors `e_f'` are
 //! computed from them. The first three `e_f'` are the unit vectors: their entries `x_f` are a constant offset. The next
 //! three are the columns of the affine map nearest to the motion of the whole cage (least squares over its vertices).
-//! For each *hold*, three more are the columns of the hold's matrix. The three entries of a matrix are a share of the
-//! vertex's rest vector `d = p - sum_i w_i c_i` at the rest position `p`.
+//! For each *hold*, three more are the columns of the hold's matrix. The three entries `x_f` of a matrix are a share
+//! of the vertex's rest vector `d = p - sum_i w_i c_i` at the rest position `p`.
 //!
-//! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of its bones, or without one if no
-//! bone ends at it. Its matrix is `R F`. `F = sum_j c_j' grad w_j`, from the coordinates of the cage without inner
-//! controls, is the Jacobian of the cage's motion at the joint. `R` belongs to the bone. The cage and the previous bone
-//! of the line predict a direction of the bone; `R` is the smallest rotation from it to the posed direction, so that
-//! the bone does not roll. If one affine map moves all controls, `F` is the matrix of that map and `R` the identity.
+//! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of the *bones* (segments of the
+//! polyline) that end at it, or without a bone if there are none. Its matrix is `R F`. `F = sum_j c_j' grad w_j`, from
+//! the coordinates of the cage without inner controls, is the Jacobian of the cage's motion at the joint. `R` belongs
+//! to the bone. The cage and the previous bone of the polyline predict a direction of the bone; `R` is the smallest
+//! rotation from the predicted to the posed direction, so that the bone does not roll. If one affine map moves all
+//! controls, `F` is the matrix of that map and `R` the identity.
 
 use std::borrow::Cow;
 
@@ -39,7 +40,8 @@ pub struct Frames {
     pub joints: Vec<u32>,
     /// The two joints of each bone, as indices into `joints`; bones of a line are consecutive. `[n_bones]`
     pub bones: Vec<[u32; 2]>,
-    /// Weight and gradient (per object unit) of each vertex of the cage at each joint. `[n_joints, n_cage]`
+    /// Weights of the cage vertices at each joint in the cage without inner controls, and their gradients (per object
+    /// unit). `[n_joints, n_cage]`
     pub plain: Vec<[f32; 4]>,
 }
 
@@ -49,7 +51,8 @@ impl Frames {
     pub fn of_cage(rest: &[Vec3]) -> Self {
         let rest = || rest.iter().map(|p| p.as_dvec3());
         let mean = rest().sum::<DVec3>() / rest().count() as f64;
-        // Minimum of sum |A (c - mean) - (c' - mean')|^2: A = (sum c' (c - mean)^T) M^-1.
+        // The sum |A (c - mean) - (c' - mean')|^2 is least for A = (sum c' (c - mean)^T) M^-1, with
+        // M = sum (c - mean) (c - mean)^T.
         let spread = rest().map(|c| c - mean).map(|d| DMat3::from_cols(d * d.x, d * d.y, d * d.z));
         let inverse = spread.fold(DMat3::ZERO, |sum, one| sum + one).inverse();
         Self {
@@ -58,7 +61,7 @@ impl Frames {
         }
     }
 
-    /// Whether there are frames.
+    /// Whether the weights have columns of frames.
     #[must_use]
     pub fn is_used(&self) -> bool {
         !self.whole.is_empty()
@@ -77,7 +80,7 @@ impl Frames {
             && self.plain.iter().flatten().chain(self.whole.iter().flatten()).all(|x| x.is_finite())
     }
 
-    /// Number of columns.
+    /// Number of columns of the frames; 0 without frames.
     #[must_use]
     pub fn n_columns(&self) -> usize {
         if self.is_used() { HOLD_COLUMN + 3 * self.holds().count() } else { 0 }
@@ -139,15 +142,15 @@ impl Frames {
             let goes = before * (moved[b].0 - moved[a].0);
             turns.push(match (goes.try_normalize(), (to - from).try_normalize()) {
                 (Some(goes), Some(posed)) => DMat3::from_quat(DQuat::from_rotation_arc(goes, posed)) * before,
-                // A bone of zero length has no direction.
+                // A bone of zero length has no direction: use the rotation of an earlier bone that it meets.
                 _ => before,
             });
         }
         turns
     }
 
-    /// Weights of the controls alone that move vertices like these weights as long as no bone rotates, for solvers
-    /// whose unknowns are the controls. Omits constant offsets.
+    /// Weights of the controls alone that move vertices as `weights` do while no bone rotates, for solvers whose
+    /// unknowns are the controls. Omits constant offsets.
     ///
     /// # Panics
     /// If `weights` has fewer columns than these frames.
@@ -185,9 +188,9 @@ impl Frames {
         Weights::from_parts(n_controls as u32, indptr, all, data)
     }
 
-    /// Distributes a vertex's rest vector over the holds by its `weights` at the joints. Calls `each(column, share)`
-    /// with the hold's first column, counted from the first frame column. Shares sum to 1. Without weight at any joint,
-    /// the matrix of the whole cage gets the share 1.
+    /// Distributes a vertex's rest vector over the holds (see the module) in proportion to the vertex's `weights` for
+    /// the joints. Calls `each(column, share)` with the hold's first column, counted from the first frame column.
+    /// Shares sum to 1. Without weight at any joint, the matrix of the whole cage gets the share 1.
     ///
     /// Along a line, the share blends from bone to bone within about `radius` of the joint. `lengths`: rest lengths of
     /// the bones.
@@ -202,7 +205,8 @@ impl Frames {
         if total <= 0.0 {
             return each(CAGE_COLUMN, 1.0);
         }
-        // Distance of the vertex from the joint along a bone, plus the radius, to the fourth power.
+        // Fourth power of the radius plus the vertex's distance from the joint along a bone. The distance is estimated
+        // from the weight of the bone's other joint.
         let along = |joint: usize, bone: usize| {
             let [a, b] = self.bones[bone];
             let other = if a as usize == joint { b } else { a };

@@ -1,5 +1,7 @@
 //! Geometry in f64: closest point on a triangle, triangle-box overlap, winding number.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 
 /// Relative enlargement of the box in [`triangle_box_overlaps`]: above f64 rounding, far below a cell.
@@ -20,7 +22,7 @@ pub struct ClosestPoint {
 /// Closest point of `triangle` to `point`. Degenerate triangles are treated as a segment or point.
 ///
 /// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster method of section 5.1.5
-/// picks a wrong side of degenerate triangles.
+/// may choose the wrong edge of a degenerate triangle.
 #[must_use]
 pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestPoint {
     let [a, b, c] = triangle;
@@ -77,7 +79,8 @@ fn share_of_segment(point: DVec3, p: DVec3, q: DVec3) -> f64 {
 }
 
 /// Whether a triangle and an axis-aligned box (centre, half edge lengths) overlap. Conservative: a triangle that misses
-/// the box by less than 1e-9 of their size may count as overlapping, so that no surface slips between two boxes.
+/// the box by a relative distance of less than 1e-9 may count as overlapping, so that no surface slips between two
+/// boxes.
 ///
 /// Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes).
 #[must_use]
@@ -107,19 +110,39 @@ pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -
 /// Winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1 inside (also of
 /// a solid with cavities), 0 outside, in between on the surface.
 ///
-/// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle".
+/// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle". Each half solid angle is the argument
+/// of a complex number. The product of these numbers has the sum of the angles as its argument, apart from full turns,
+/// which are counted separately: a single arc tangent suffices.
 #[must_use]
 pub fn winding_number(point: DVec3, triangles: impl IntoIterator<Item = [DVec3; 3]>) -> f64 {
-    let solid_angle: f64 = triangles
-        .into_iter()
-        .map(|triangle| {
-            let [a, b, c] = triangle.map(|p| p - point);
-            let (la, lb, lc) = (a.length(), b.length(), c.length());
-            let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-            2.0 * a.dot(b.cross(c)).atan2(denominator)
-        })
-        .sum();
-    solid_angle / (4.0 * std::f64::consts::PI)
+    /// Magnitude of the product below which it is scaled up, far above underflow.
+    const MIN_SIZE: f64 = 1e-100;
+    let (mut re, mut im) = (1.0_f64, 0.0_f64);
+    let mut turns = 0_i32;
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|p| p - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        let y = a.dot(b.cross(c));
+        let per_size = (x.abs() + y.abs()).recip();
+        if !per_size.is_finite() {
+            continue;
+        }
+        let (x, y) = (x * per_size, y * per_size);
+        let was_upper = im >= 0.0;
+        (re, im) = (re * x - im * y, re * y + im * x);
+        // The sum of two angles of equal sign may exceed half a turn, which changes the product's sign.
+        if was_upper && y >= 0.0 && im < 0.0 {
+            turns += 1;
+        } else if !was_upper && y < 0.0 && im >= 0.0 {
+            turns -= 1;
+        }
+        let size = re.abs() + im.abs();
+        if size < MIN_SIZE {
+            (re, im) = (re / size, im / size);
+        }
+    }
+    im.atan2(re) / TAU + f64::from(turns)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ pub const NO_CELL: u32 = u32::MAX;
 /// A box of equal cells with unknowns at their centres; x runs fastest, then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// Cells along x, y, z.
+    /// Numbers of cells along x, y and z.
     pub dims: [u32; 3],
     /// Centre of cell (0, 0, 0), object units.
     pub origin: DVec3,
@@ -33,19 +33,20 @@ impl Grid {
         Self { dims, origin: min + h * (SHIFT - 0.5), cell: DVec3::splat(h) }
     }
 
-    /// The grid of every second centre along each axis: cell (x, y, z) has the centre of cell (2x, 2y, 2z) here.
+    /// The grid of every second centre along each axis: its cell (x, y, z) has the centre of this grid's cell
+    /// (2x, 2y, 2z).
     #[must_use]
     pub fn coarsened(&self) -> Self {
         Self { dims: self.dims.map(|d| (d - 1) / 2 + 1), origin: self.origin, cell: 2.0 * self.cell }
     }
 
-    /// Number of cells.
+    /// Number of cells, inside and outside the cage.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.dims.iter().map(|&d| d as usize).product()
     }
 
-    /// Index of a cell.
+    /// Index of a cell in arrays over the grid, x fastest.
     #[inline]
     #[must_use]
     pub fn index(&self, [x, y, z]: [u32; 3]) -> usize {
@@ -53,7 +54,7 @@ impl Grid {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
     }
 
-    /// Cell at an index.
+    /// Cell with this index: the inverse of [`Self::index`].
     #[inline]
     #[must_use]
     pub fn cell(&self, index: usize) -> [u32; 3] {

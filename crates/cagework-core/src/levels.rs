@@ -2,7 +2,7 @@
 //!
 //! Unknowns are stored by colour, red before black, each in grid order (x fastest). One zero row follows each colour
 //! and stands for missing neighbours: `[red .., 0, black .., 0]`. A red-black half sweep then streams through
-//! contiguous memory, and a *run* of complete stencils needs seven indices instead of seven gathers per cell.
+//! contiguous memory, and a *run* of complete stencils is stored as seven numbers instead of seven indices per cell.
 
 use std::ops::Range;
 
@@ -15,7 +15,8 @@ mod build;
 /// Coarsening stops at this many unknowns, where a few dozen sweeps take negligible time.
 const COARSEST_UNKNOWNS: usize = 200;
 
-/// A level's view of the cage: which cells are unknowns, and where their arms end on the cage.
+/// A level's view of the cage: which cells are unknowns, and which of their arms end on the cage. The six *arms* of a
+/// cell are the segments from its centre to the centres of its neighbours, or to the cage if it is nearer.
 pub trait Boundary: Sync {
     /// The level's grid.
     fn grid(&self) -> Grid;
@@ -34,7 +35,7 @@ pub trait Boundary: Sync {
 pub struct Run {
     /// Index of the run's first cell among the cells of its colour.
     pub start: u32,
-    /// Number of cells.
+    /// Number of cells of the run.
     pub len: u32,
     /// Index of the first cell's -x neighbour among the cells of the other colour; the +x neighbour follows.
     pub x: u32,
@@ -67,7 +68,7 @@ pub struct BoundaryTerm {
 /// Stencils of one colour, in the order of a half sweep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Colour {
-    /// Number of cells.
+    /// Number of unknowns of this colour.
     pub n_cells: u32,
     /// Cells with complete stencils.
     pub runs: Vec<Run>,
@@ -94,11 +95,13 @@ pub struct Level {
     pub grid: Grid,
     /// Stencils of the red cells, then of the black cells.
     pub colours: [Colour; 2],
-    /// Terms of the right-hand sides, ascending in `cut_cell`, then `column`.
+    /// Terms of the right-hand sides, ascending in `cut_cell`, then `column`; in a
+    /// [`Hierarchy`](crate::solve::hierarchy::Hierarchy), sorted by batch first.
     pub boundary: Vec<BoundaryTerm>,
     /// Row of each grid cell in the level's fields; [`NO_CELL`] if it is not an unknown. `[nz, ny, nx]`
     pub row_of: Vec<u32>,
-    /// Cells without any arm, because the axes classify their neighbours differently. They are not unknowns.
+    /// Number of inside cells that are not unknowns because they have no arm: no neighbour is an unknown, and no arm
+    /// ends on the cage. This happens if lines along x, y and z classify cells differently.
     pub isolated: u64,
 }
 
@@ -115,7 +118,7 @@ impl Level {
         (self.colours[0].n_cells + self.colours[1].n_cells) as usize
     }
 
-    /// First row of each colour.
+    /// First row of the cells of a colour: 0 red, 1 black.
     #[must_use]
     pub fn first_row(&self, colour: usize) -> usize {
         if colour == 0 { 0 } else { self.colours[0].n_cells as usize + 1 }
@@ -138,7 +141,7 @@ impl Level {
     #[must_use]
     pub fn rows_at<const N: usize>(&self, cell: [u32; 3], offsets: &[[i32; 3]; N]) -> [u32; N] {
         let [sx, sy, sz] = self.grid.strides().map(|s| s as isize);
-        // Fast path: no bounds checks at least one cell from the grid's sides.
+        // Fast path: a cell that is at least one cell away from the grid's sides needs no bounds checks.
         let is_within = (0..3).all(|a| cell[a] > 0 && cell[a] + 1 < self.grid.dims[a]);
         let center = if is_within { self.grid.index(cell) } else { 0 };
         offsets.map(|offset| {
@@ -174,7 +177,7 @@ impl Level {
         self.grid.center(cell)
     }
 
-    /// Size in bytes.
+    /// Memory of the level's stencils and tables, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.row_of.as_slice())
@@ -191,7 +194,8 @@ impl Level {
     }
 }
 
-/// The finest level and the coarser ones that `coarsen` makes from it, until at most `COARSEST_UNKNOWNS` remain.
+/// The finest level and the coarser ones that `coarsen` makes from it, down to the first level with at most
+/// `COARSEST_UNKNOWNS` unknowns. Ends earlier if the next level has none.
 pub fn coarsened_until_few<C>(
     finest: C,
     unknowns: impl Fn(&C) -> &[bool],

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Axis-aligned bounding box, in object units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Smallest corner.
+    /// Corner with the smallest coordinates.
     pub min: Vec3,
-    /// Largest corner.
+    /// Corner with the largest coordinates.
     pub max: Vec3,
 }
 

@@ -1,4 +1,4 @@
-//! Options of a bind: names, words, ranges and defaults, for the command, the page and the packages.
+//! Options of a bind: names, values, ranges and defaults, for the command, the page and the packages.
 
 use std::str::FromStr;
 
@@ -10,14 +10,14 @@ pub const MIN_GRID: u32 = 8;
 /// Largest value of the `grid` option.
 pub const MAX_GRID: u32 = 512;
 
-/// An option with a fixed set of words as values.
+/// An option whose values are a fixed set of names.
 pub trait Choice: Copy + 'static {
-    /// Each value with its word, as it is parsed and serialised.
+    /// All values, each with the name by which files and the command line refer to it.
     const ALL: &'static [(&'static str, Self)];
 }
 
-/// Defines an enum with its words in serde, [`Choice`](crate::options::Choice), `FromStr` (which accepts `-` for `_`)
-/// and `Display` (which writes `-`).
+/// Defines an enum and the names of its variants in serde, [`Choice`](crate::options::Choice), `FromStr` (which accepts
+/// `-` for `_`) and `Display` (which writes `-`).
 #[macro_export]
 macro_rules! choice {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal,)+ }) => {
@@ -50,7 +50,8 @@ pub(crate) use choice;
 choice! {
     /// Discretisation of the cage.
     Method {
-        /// As published: cells that the cage touches take its values, and a vertex takes the weights of its cell.
+        /// As in K. Smith's paper (`docs/method.md`, sources): cells that the cage touches take the cage's values, and
+        /// a vertex takes the weights of its cell.
         Classic = "classic",
         /// The exact cage surface ends the stencils' arms, and weights are interpolated.
         #[default]
@@ -61,7 +62,7 @@ choice! {
 choice! {
     /// Solver of Laplace's equation.
     Solver {
-        /// Jacobi sweeps (Algorithm 3 of the paper).
+        /// Jacobi sweeps (K. Smith, Algorithm 3).
         Jacobi = "jacobi",
         /// Full multigrid with V-cycles.
         #[default]
@@ -72,7 +73,7 @@ choice! {
 }
 
 impl Method {
-    /// Default solver of a method: the paper's Jacobi sweeps for the classic method, multigrid for the embedded one.
+    /// Default solver: Jacobi for the classic method, as in K. Smith's paper; multigrid for the embedded method.
     #[must_use]
     pub fn usual_solver(self) -> Solver {
         match self {
@@ -96,21 +97,21 @@ choice! {
 choice! {
     /// Cell shape of the classic method.
     CellShape {
-        /// Rectangular cells, g along each axis of the cage's box, as published.
+        /// Rectangular cells: `grid` of them along each axis of the cage's box, as in K. Smith's paper.
         #[default]
         Box = "box",
-        /// Cubic cells, g along the longest axis.
+        /// Cubic cells: `grid` of them along the longest axis of the cage's box.
         Cubic = "cubic",
     }
 }
 
 choice! {
-    /// Norm of the change of a cell in Eq. 2 of the paper.
+    /// Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
     DeltaNorm {
         /// Euclidean norm of a cell's change: `sqrt(sum_i (w_i^n - w_i^(n-1))^2)`.
         #[default]
         Euclidean = "euclidean",
-        /// Eq. 2 literally: `sqrt(sum_i |w_i^n - w_i^(n-1)|)`.
+        /// Eq. 2 as printed: `sqrt(sum_i |w_i^n - w_i^(n-1)|)`.
         Literal = "literal",
     }
 }
@@ -118,8 +119,8 @@ choice! {
 choice! {
     /// Treatment of mesh vertices outside the cage.
     OutsidePolicy {
-        /// Weights are extended linearly within 5 % of the cage's diagonal. Beyond, vertices follow less and less, and
-        /// from 15 % on they stay in place.
+        /// Weights are extended linearly up to 5 % of the cage's diagonal from the cage. Farther out, displacements
+        /// fade to zero at 15 %.
         #[default]
         Extend = "extend",
         /// Vertices outside the cage stay in place.
@@ -130,30 +131,30 @@ choice! {
 }
 
 choice! {
-    /// Processor of a bind.
+    /// Processor that computes a bind.
     Backend {
-        /// The CPU.
+        /// Computes on the CPU, with the number of threads that the options request.
         #[default]
         Cpu = "cpu",
-        /// The GPU.
+        /// Computes on the GPU, with WebGPU kernels.
         Gpu = "gpu",
     }
 }
 
-/// Error: the word is not a value of the option.
+/// Error: the text is not the name of a value of the option.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{word:?} is not one of {known}")]
 pub struct UnknownWord {
-    /// The word as given.
+    /// The rejected text.
     word: String,
-    /// Valid words, separated by commas.
+    /// All accepted words, separated by commas.
     known: String,
 }
 
-/// Parses the word of an option's value; `-` and `_` are equivalent.
+/// Parses the name of an option's value; `-` and `_` are equivalent.
 ///
 /// # Errors
-/// [`UnknownWord`] lists the valid words.
+/// [`UnknownWord`] lists the valid names.
 pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
     let word = text.replace('-', "_");
     let found = T::ALL.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
@@ -167,7 +168,7 @@ pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{option} is {value}; it must be {allowed}")]
 pub struct OutOfRange {
-    /// Name of the option.
+    /// Name of the option, as users write it.
     pub option: &'static str,
     /// The value as given.
     pub value: String,
@@ -175,29 +176,29 @@ pub struct OutOfRange {
     pub allowed: &'static str,
 }
 
-/// A numeric option.
+/// Name, help text, unit and valid range of a numeric option.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    /// Name of the option.
+    /// Name of the option, as users write it.
     pub name: &'static str,
     /// Meaning of the option, for help and documentation.
     pub help: &'static str,
-    /// Unit of the values.
+    /// Unit of the option's values, for help and documentation.
     pub unit: &'static str,
-    /// The valid range, in words.
+    /// The valid range in words, for error messages.
     pub allowed: &'static str,
-    /// Whether a value is valid.
+    /// Tests whether a value is in the valid range.
     pub is_allowed: fn(f64) -> bool,
-    /// Values that a slider offers.
+    /// Range and step of a slider for the option; `None` if the option has no slider.
     pub slider: Option<Slider>,
 }
 
-/// Range and step of a slider; may be narrower than the valid range.
+/// Range and step of a slider. The range may be narrower than the valid one.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Slider {
-    /// Least value.
+    /// Least value that the slider offers.
     pub min: f64,
-    /// Greatest value.
+    /// Greatest value that the slider offers.
     pub max: f64,
     /// Distance between neighbouring values.
     pub step: f64,
@@ -212,7 +213,7 @@ pub const GRID: Number = Number {
     is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
     slider: None,
 };
-/// The `tau` option: convergence threshold for delta.
+/// The `tau` option: convergence threshold for delta ([`crate::solve::stop`]).
 pub const TAU: Number = Number {
     name: "tau",
     help: "Stop when delta falls below this (the paper's Eq. 2; for multigrid and cg the estimated remaining error)",
@@ -291,12 +292,12 @@ impl Number {
     }
 }
 
-/// Options of a bind.
+/// Options of a bind: grid, discretisation, solver, and limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindOptions {
-    /// Cells along the longest side (each side for classic box cells), 8 to 512. Default 64.
+    /// Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
     pub grid: u32,
     /// Discretisation of the cage. Default embedded.
     pub method: Method,
@@ -306,23 +307,25 @@ pub struct BindOptions {
     pub preconditioner: Preconditioner,
     /// Cell shape of the classic method. Default box.
     pub cell_shape: CellShape,
-    /// Delta of Jacobi sweeps. Default Euclidean.
+    /// Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
     pub delta_norm: DeltaNorm,
-    /// Number of threads; 0 uses all. Default 0. (The page has one.)
+    /// Number of threads; 0 uses one per processor. Default 0. The page uses a single thread.
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub threads: usize,
-    /// Convergence threshold for delta. Default 1e-5.
+    /// Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
+    /// of the other solvers. Default 1e-5.
     pub tau: f32,
     /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
     pub max_iterations: u32,
-    /// Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all.
-    /// Default 0.
+    /// Total of the smallest weights that are dropped from each row, after which the row's sum and rest position are
+    /// restored. 0 drops none. Default 0.
     pub sparsify: f32,
-    /// Fails before the bind if it needs more bytes of memory, including `held`. Default 4 GiB; 2 GiB in wasm.
+    /// Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
+    /// exceed this. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
     /// Treatment of vertices outside the cage. Default extend.
     pub outside: OutsidePolicy,
-    /// Bytes that the caller holds during the bind (model, document), which count towards the limit. Default 0.
+    /// Size of the caller's own data (model, document), bytes, which counts towards the memory limit. Default 0.
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub held: u64,
@@ -366,7 +369,7 @@ impl BindOptions {
         SPARSIFY.check(self.sparsify)
     }
 
-    /// Whether the solver needs coarse levels.
+    /// Whether the solver uses multigrid, which needs coarser levels of the grid.
     #[must_use]
     pub fn needs_coarse_levels(&self) -> bool {
         match self.solver {

@@ -20,16 +20,17 @@ pub enum Stage {
     Simplify,
 }
 
-/// A progress report.
+/// Progress of a bind or of cage generation, passed to [`Progress::report`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProgressEvent {
-    /// Current stage.
+    /// Stage that is in progress.
     pub stage: Stage,
     /// Completed share of the whole work, 0 to 1.
     pub fraction: f32,
     /// Number of iterations of the solver in this stage: sweeps, V-cycles or steps.
     pub iteration: u32,
-    /// Latest delta (Eq. 2), if the stage has one.
+    /// Latest delta of the solver, which it compares with its tolerance ([`crate::solve::stop`]); `None` if the stage
+    /// has none.
     pub delta: Option<f32>,
 }
 

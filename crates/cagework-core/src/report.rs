@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solver};
 
-/// Report of a bind.
+/// Options, grid, convergence, times and errors of a bind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindReport {
-    /// Discretisation of the cage: classic (as published) or embedded.
+    /// Discretisation of the cage: classic (K. Smith; `docs/method.md`, sources) or embedded.
     pub method: Method,
     /// Solver of Laplace's equation: Jacobi, multigrid, or conjugate gradients.
     pub solver: Solver,
@@ -17,11 +17,11 @@ pub struct BindReport {
     pub preconditioner: Preconditioner,
     /// Processor that computed the bind.
     pub backend: Backend,
-    /// Name of the GPU, if it solved.
+    /// Name of the GPU, if it computed the solution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "typescript", ts(optional))]
     pub adapter: Option<String>,
-    /// Number of threads that solved.
+    /// Number of threads of the solver.
     pub threads: usize,
     /// Requested number of cells along the longest side.
     pub grid: u32,
@@ -29,23 +29,23 @@ pub struct BindReport {
     pub dims: [u32; 3],
     /// Edge lengths of a cell, object units.
     pub cell_size: [f32; 3],
-    /// Shape of the cells: rectangular (as published) or cubic.
+    /// Shape of the cells: rectangular (K. Smith) or cubic.
     pub cell_shape: CellShape,
-    /// Norm of the change of a cell in Eq. 2 of the paper.
+    /// Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2; `docs/method.md`, sources).
     pub delta_norm: DeltaNorm,
-    /// Convergence threshold for delta.
+    /// Convergence threshold for delta, the last value of `delta_history`.
     pub tau: f32,
     /// Cells of the finest grid by kind.
     pub cells: CellCounts,
-    /// Unknowns of each level, finest first; one entry for Jacobi.
+    /// Number of unknowns of each level, finest first; one entry for Jacobi.
     pub levels: Vec<u64>,
     /// Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients; maximum over batches.
     pub iterations: u32,
-    /// Whether delta fell below tau within the limit on iterations.
+    /// Whether delta fell to tau within the limit on iterations, or f32 precision was exhausted.
     pub converged: bool,
-    /// Whether f32 precision ended the solve before delta fell below tau.
+    /// Whether f32 precision ended the solve before delta fell to tau.
     pub at_round_off: bool,
-    /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the mean change of a cell per sweep. Other
+    /// Delta after every `delta_interval` iterations. Jacobi: mean change of a cell per sweep (K. Smith, Eq. 2). Other
     /// solvers: estimated remaining error, RMS over cells. `[iterations / delta_interval]`, rounded up.
     pub delta_history: Vec<f32>,
     /// Iterations per entry of `delta_history`: 1 except for Jacobi on the GPU.
@@ -55,14 +55,15 @@ pub struct BindReport {
     pub residual_history: Vec<f32>,
     /// Wall-clock time of the stages, milliseconds.
     pub timings_ms: Timings,
-    /// Bytes of working memory.
+    /// Working memory of the bind: estimated and largest actual size, bytes.
     pub memory_bytes: MemoryBytes,
-    /// Rest error: distance of `sum_i w_i c_i` from the mesh vertex (Eq. 3), over vertices inside the cage.
+    /// Rest error: distance of `sum_i w_i c_i`, over all columns, from the mesh vertex.
     pub rest_error: RestError,
-    /// Error of the rows of weights before correction, which is the error of the solver alone.
+    /// Error of the rows of weights before they are corrected. With the embedded method, it is the error of the solver
+    /// alone.
     #[serde(default)]
     pub raw_error: RawError,
-    /// Statistics of the stored weights.
+    /// Range, largest sum error, and number of the stored weights.
     pub weights: WeightStats,
     /// Number of mesh vertices (rows).
     pub vertices: u64,
@@ -79,15 +80,15 @@ pub struct BindReport {
     /// Number of mesh vertices outside the cage that stay in place.
     #[serde(default)]
     pub staying_vertices: u64,
-    /// Largest distance from the cage of a mesh vertex outside it, object units.
+    /// Largest distance between the cage and a mesh vertex outside it, object units.
     #[serde(default)]
     pub outside_distance: f32,
-    /// Number of mesh vertices inside balls and tubes.
+    /// Number of mesh vertices inside the balls and tubes around inner points and bones.
     #[serde(default)]
     pub held_vertices: u64,
-    /// Number of cells that lines along the three axes classify differently.
+    /// Number of cells for which lines along x, y and z disagree about inside and outside the cage.
     pub ambiguous_cells: u64,
-    /// Notices in whole sentences, such as flipped faces or unused vertices.
+    /// Notices in whole sentences, for example about flipped faces or unused vertices.
     pub notices: Vec<String>,
 }
 
@@ -99,15 +100,16 @@ fn one() -> u32 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CellCounts {
-    /// Cells inside the cage, whose weights are the unknowns.
+    /// Cells inside the cage, without the boundary cells.
     pub interior: u64,
-    /// Cells that the cage's surface intersects.
+    /// Classic method: cells that the cage's surface intersects. Embedded method: cells with their centre inside the
+    /// cage and less than a cell from it along an axis.
     pub boundary: u64,
     /// Cells outside the cage.
     pub exterior: u64,
 }
 
-/// Stage times in milliseconds.
+/// Wall-clock time of each stage of a bind, milliseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Timings {
@@ -121,29 +123,30 @@ pub struct Timings {
     pub total: f64,
 }
 
-/// Working memory, bytes.
+/// Working memory of a bind, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemoryBytes {
-    /// Estimate before the bind.
+    /// Estimate that is compared with the memory limit before the bind starts.
     pub estimated: u64,
     /// Largest sum of buffers alive at the same time.
     pub peak: u64,
 }
 
-/// Reconstruction error of the rest pose (Eq. 3).
+/// Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
+/// K. Smith's paper (`docs/method.md`, sources).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RestError {
-    /// Mean, object units.
+    /// Mean over the vertices, object units.
     pub mean: f64,
-    /// 99th percentile, object units.
+    /// 99th percentile over the vertices, object units.
     pub p99: f64,
-    /// Largest, object units.
+    /// Largest error of a vertex, object units.
     pub max: f64,
-    /// Mean, as a fraction of the diagonal of the cage's bounding box.
+    /// Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
     pub mean_rel: f64,
-    /// Largest, as a fraction of the diagonal of the cage's bounding box.
+    /// Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
     pub max_rel: f64,
 }
 
@@ -152,21 +155,21 @@ pub struct RestError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RawError {
-    /// `|sum_i w_i - 1|`.
+    /// Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
     pub sum: MeanMax,
     /// Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
     pub point_rel: MeanMax,
-    /// Smallest value, before negative values are clamped to 0.
+    /// Smallest weight, before negative weights are set to 0.
     pub min_weight: f32,
 }
 
-/// Mean and maximum.
+/// Mean and maximum of an error over the mesh vertices inside the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MeanMax {
-    /// Mean.
+    /// Mean of the error.
     pub mean: f64,
-    /// Largest.
+    /// Largest error of a vertex.
     pub max: f64,
 }
 

@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DQuat};
 
-/// Limit on Newton steps. Five suffice at a simple root; at a double root each step only halves the distance to it.
+/// Limit on Newton steps. Five suffice at a simple root; at a double root each step only halves the distance to the
+/// root.
 const STEPS: usize = 40;
 
 /// The proper rotation R that maximises the trace of `R^T m`.
@@ -26,11 +27,13 @@ pub fn nearest_rotation(m: DMat3) -> DMat3 {
         [xz - zx, xy + yx, yy - xx - zz, yz + zy],
         [yx - xy, xz + zx, yz + zy, zz - xx - yy],
     ];
-    // det(k - l) = l^4 + c2 l^2 + c1 l + c0: the trace of k is 0.
+    // Characteristic polynomial: det(k - l I) = l^4 + c2 l^2 + c1 l + c0. The term in l^3 vanishes, because the trace
+    // of k is 0.
     let c2 = -2.0 * a.as_flattened().iter().map(|x| x * x).sum::<f64>();
     let c1 = -8.0 * m.determinant();
     let c0 = determinant4(&k);
-    // An upper bound on the sum of m's singular values, which is an upper bound on all eigenvalues.
+    // Start at sqrt(3) times the Frobenius norm of m: an upper bound on the sum of m's singular values, which is an
+    // upper bound on the eigenvalues of k.
     let mut l = (-1.5 * c2).sqrt();
     for _ in 0..STEPS {
         let value = ((l * l + c2) * l + c1) * l + c0;

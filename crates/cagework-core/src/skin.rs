@@ -9,7 +9,7 @@ pub struct Skin {
     pub positions: Vec<Vec3>,
     /// First entry of each vertex in `joints`. `[n_vertices + 1]`
     pub joint_starts: Vec<u32>,
-    /// `(index into the palette, weight)`; weights of a vertex sum to 1.
+    /// Index into the palette of [`skin_vertices`], and weight. The weights of a vertex sum to 1.
     pub joints: Vec<(u32, f32)>,
     /// First entry of each vertex in `deltas`. `[n_vertices + 1]`
     pub delta_starts: Vec<u32>,
@@ -17,7 +17,7 @@ pub struct Skin {
     pub deltas: Vec<(u32, Vec3)>,
 }
 
-/// A skeleton with an animation clip. Joints are axis-aligned in the rest pose.
+/// A skeleton with an animation clip. In the rest pose, the axes of all joints are parallel to the model's.
 #[derive(Clone, Debug)]
 pub struct Rig {
     /// Joints, parents before children, the root first.
@@ -26,7 +26,7 @@ pub struct Rig {
     pub influences: Vec<[(u32, f32); 4]>,
     /// Name of the clip.
     pub clip: &'static str,
-    /// Times of the keys, seconds.
+    /// Times of the clip's keyframes, seconds, ascending. `[n_keys]`
     pub times: Vec<f32>,
     /// Rotation of each joint relative to its rest pose. `[n_joints, n_keys]`
     pub turns: Vec<Vec<Quat>>,
@@ -34,10 +34,10 @@ pub struct Rig {
     pub root: Vec<Vec3>,
 }
 
-/// A joint.
+/// A joint of the skeleton of a [`Rig`].
 #[derive(Clone, Copy, Debug)]
 pub struct Joint {
-    /// Name.
+    /// Name of the joint's node in exported files.
     pub name: &'static str,
     /// Rest position, object units.
     pub at: Vec3,
@@ -50,25 +50,37 @@ impl Skin {
     #[must_use]
     pub fn with_copies(&self, copies: &[u32]) -> Self {
         let mut all = self.clone();
-        for &v in copies {
-            let v = v as usize;
-            let [joints, deltas] = [&self.joint_starts, &self.delta_starts]
-                .map(|starts| starts[v] as usize..starts[v + 1] as usize);
-            all.positions.push(self.positions[v]);
-            all.joints.extend_from_slice(&self.joints[joints]);
-            all.deltas.extend_from_slice(&self.deltas[deltas]);
-            all.joint_starts.push(all.joints.len() as u32);
-            all.delta_starts.push(all.deltas.len() as u32);
-        }
+        all.append(self, copies);
         all
+    }
+
+    /// The skin of the given vertices alone.
+    #[must_use]
+    pub fn of_vertices(&self, vertices: &[u32]) -> Self {
+        let mut own = Self { joint_starts: vec![0], delta_starts: vec![0], ..Self::default() };
+        own.append(self, vertices);
+        own
+    }
+
+    fn append(&mut self, from: &Self, vertices: &[u32]) {
+        for &v in vertices {
+            let v = v as usize;
+            let [joints, deltas] = [&from.joint_starts, &from.delta_starts]
+                .map(|starts| starts[v] as usize..starts[v + 1] as usize);
+            self.positions.push(from.positions[v]);
+            self.joints.extend_from_slice(&from.joints[joints]);
+            self.deltas.extend_from_slice(&from.deltas[deltas]);
+            self.joint_starts.push(self.joints.len() as u32);
+            self.delta_starts.push(self.deltas.len() as u32);
+        }
     }
 }
 
 /// Positions of all vertices: `sum_j w_j M_j (p + sum_k t_k d_k)` (glTF 2.0, sections 3.7.2.2 and 3.7.3.3), with the
 /// joint matrices `M_j`, target weights `t_k` and displacements `d_k`.
 ///
-/// `palette`: matrix from mesh space to world space of each joint. `targets`: weights of the morph targets. Returns
-/// `[n_vertices]`.
+/// `palette`: for each joint, the matrix from mesh space to world space. `targets`: weights of the morph targets.
+/// Returns `[n_vertices]`.
 ///
 /// # Panics
 /// If a joint or target index is out of range.

@@ -18,11 +18,11 @@ use crate::weights::Weights;
 /// A layer of cells normal to an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// The axis, 0 to 2.
+    /// Axis to which the layer is normal: 0 is x, 1 is y, 2 is z.
     pub axis: usize,
-    /// Index of the layer.
+    /// Index of the layer along [`Self::axis`], from 0 at the lower end of the grid.
     pub layer: u32,
-    /// Cells along [`Self::u`] and [`Self::v`].
+    /// Numbers of cells along [`Self::u`] and [`Self::v`].
     pub dims: [u32; 2],
     /// Corner at which the first cell of the slice begins, in the plane of the cell centres, object units.
     pub corner: Vec3,
@@ -30,11 +30,11 @@ pub struct Slice {
     pub u: Vec3,
     /// Edge vector of a cell along the remaining axis.
     pub v: Vec3,
-    /// Kind of each cell, u fastest; none is untyped. `[dims[1], dims[0]]`
+    /// Kind of each cell, u fastest; no cell is [`CellKind::Untyped`]. `[dims[1], dims[0]]`
     pub kinds: Vec<CellKind>,
     /// Indices of the cells that are not exterior, ascending: the rows of [`Self::weights`].
     pub cells: Vec<u32>,
-    /// Harmonic coordinates at the centres of [`Self::cells`], once computed. `[n_cells, n_cage]`
+    /// Harmonic coordinates at the centres of [`Self::cells`]; `None` before [`Self::set_weights`]. `[n_cells, n_cage]`
     pub weights: Option<Weights>,
 }
 
@@ -211,7 +211,7 @@ mod tests {
             for (&cell, p) in slice.cells.iter().zip(&centers) {
                 let t = *p / Vec3::new(1.0, 2.0, 4.0);
                 let expected = (Vec3::ONE - (t - corner).abs()).to_array().iter().product::<f32>();
-                // Error of the solver at tau = 1e-5.
+                // tau = 1e-5 bounds the RMS error over cells; the error of a single cell may be larger.
                 assert!((values[cell as usize] - expected).abs() < 1e-4);
             }
             let outside = (0..slice.kinds.len()).filter(|&c| slice.kinds[c] == CellKind::Exterior);

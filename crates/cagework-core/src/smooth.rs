@@ -1,4 +1,4 @@
-//! Smooth cages: Catmull-Clark subdivision. The rows hold its basis functions.
+//! Smooth cages by Catmull-Clark subdivision.
 //!
 //! Each vertex of the subdivided mesh is a weighted mean of the cage's vertices: a row of B (see [`crate::controls`]).
 //! Values on the surface are close to cubic B-splines, so that the cage's edges do not show in the model. The columns
@@ -56,7 +56,7 @@ pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivision {
     Subdivision { mesh: PolygonMesh { positions, faces }, rows, face_of }
 }
 
-/// One subdivision step: rows of the new vertices, new faces, and the original face of each.
+/// One subdivision step: rows of the new vertices, new faces, and the original face of each new face.
 fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec<u32>>, Vec<u32>) {
     let n = rows.len();
     let mean = |of: &mut dyn Iterator<Item = &Row>| {
@@ -88,7 +88,8 @@ fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec
             new.push(row.clone());
             continue;
         }
-        // (F + 2 R + (n - 3) P) / n with F the mean of the face points and R the mean of the edges' midpoints.
+        // A vertex P of valence n moves to (F + 2 R + (n - 3) P) / n, with F the mean of the face points and R the mean
+        // of the edges' midpoints. 2 R is P plus the mean of the neighbours, so the weight of P is (n - 2) / n in all.
         let valence = faces.len() as f64;
         let of_faces = faces.iter().map(|&f| (&face_points[f], 1.0 / (valence * valence)));
         let of_edges = edges.iter().map(|&w| (&rows[w as usize], 1.0 / (valence * edges.len() as f64)));

@@ -4,6 +4,7 @@
 
 mod harmonics;
 mod sorted;
+mod stand_in;
 
 use glam::{IVec3, Mat3, Quat, Vec3};
 
@@ -15,20 +16,21 @@ use crate::team::map_indices;
 pub use harmonics::{MAX_DEGREE, harmonic_basis, n_harmonics, rotate_harmonics};
 pub use sorted::{SortedSplats, deform_splats};
 
-/// Length of a splat's half axis at which the error of its first-order deformation is measured, standard deviations:
-/// the mean of the Gaussian over two points at this distance has the same variance.
+/// Length of a splat's half axis at which the error of its first-order deformation is measured, standard deviations: a
+/// uniform distribution along an axis of this half length has the same variance as the Gaussian.
 const AXIS_SIGMAS: f32 = 1.732_050_8;
-/// Error of the first-order deformation above which a splat is counted, as a fraction of its half axis.
+/// Error of the first-order deformation above which a splat counts as inexact, as a fraction of its half axis.
 pub const MAX_FIRST_ORDER_ERROR: f32 = 0.1;
-/// Half diagonal of the octahedra that stand for splats when a cage is made, standard deviations.
+/// Half diagonal of the octahedra that represent splats for cage generation, standard deviations.
 const SHELL_SIGMAS: f32 = 1.5;
 /// Opacity below which a splat does not belong to the captured object.
 const MIN_SHELL_OPACITY: f32 = 0.1;
-/// Share of the splats, the largest ones, that do not belong to the captured object.
+/// Share of the splats, from the largest down, that do not belong to the captured object.
 const LARGEST_SHARE: f64 = 0.01;
 
-/// Cells along the longest side of a capture, of whose small splats one each gets an octahedron. They are a third of the
-/// voxels of a cage of 80 vertices.
+/// Number of grid cells along the longest side of a capture. Of the splats smaller than a cell, only the largest in
+/// each cell gets an octahedron. A cell is 0.3 times as long as a voxel in the generation of a cage of 80 vertices,
+/// which does not resolve smaller splats.
 const SHELL_CELLS: f32 = 128.0;
 
 /// Gaussian splats. All arrays have one entry per splat, unless stated otherwise.
@@ -127,11 +129,7 @@ impl Splats {
             let (position, gradient) = (self.positions[splat], field.gradient(self.positions[splat]));
             let shape = (gradient != Mat3::IDENTITY).then(|| {
                 let (scale, rotation) = decompose(gradient * self.axes(splat));
-                let turn = if self.degree > 0 {
-                    nearest_rotation(gradient.as_dmat3()).as_mat3()
-                } else {
-                    Mat3::IDENTITY
-                };
+                let turn = if self.degree > 0 { turn_of(gradient) } else { Mat3::IDENTITY };
                 (scale, rotation, turn)
             });
             Bent { position: position + field.displacement(position), shape }
@@ -148,8 +146,8 @@ impl Splats {
         deformed
     }
 
-    /// Error of the first-order deformation of each splat: distance of the true images of both ends of its longest half
-    /// axis from the linear ones, at most, as a fraction of the half axis.
+    /// Error of the first-order deformation of each splat, as a fraction of its longest half axis: the distance between
+    /// the true and the linear image of an end of this axis. The larger of the errors of the two ends counts.
     #[must_use]
     pub fn first_order_errors(&self, field: &Field) -> Vec<f32> {
         map_indices(self.len(), |splat| {
@@ -174,8 +172,9 @@ impl Splats {
         self.first_order_errors(field).into_iter().filter(|&error| error > MAX_FIRST_ORDER_ERROR).count()
     }
 
-    /// A triangle soup with an octahedron per splat, from which a cage can be generated. Transparent splats and the
-    /// largest ones are left out, unless nothing remains: captures contain haze and background.
+    /// A triangle soup of octahedra in the place of splats, from which a cage can be generated. Transparent splats and
+    /// the largest ones are left out, unless nothing remains: captures contain haze and background. Of the small splats
+    /// in a cell of a grid, only the largest gets an octahedron.
     #[must_use]
     pub fn shells(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let mut sizes: Vec<f32> = self.scales.iter().map(|s| s.max_element()).collect();
@@ -196,8 +195,29 @@ impl Splats {
 }
 
 impl Splats {
-    /// Drops splats whose octahedron is smaller than a cell of a grid, except the largest one in each cell: the time to
-    /// generate a cage is proportional to the number of triangles.
+    /// Round splats that show a point cloud. Their size is proportional to the distance between neighbouring points on
+    /// a surface. `colors`: sRGB, one per point.
+    #[must_use]
+    pub fn of_points(points: &[Vec3], colors: Vec<Vec3>) -> Self {
+        /// Standard deviation, as a fraction of the distance between neighbours.
+        const RADIUS: f32 = 0.6;
+        /// Opacity: the splats are opaque, apart from their soft edge.
+        const OPACITY: f32 = 0.95;
+        let OccupiedCells { size, cells, .. } = OccupiedCells::by(points);
+        let n = points.len();
+        let radius = RADIUS * size * (cells.len() as f32 / n.max(1) as f32).sqrt();
+        Self {
+            positions: points.to_vec(),
+            scales: vec![Vec3::splat(radius); n],
+            rotations: vec![Quat::IDENTITY; n],
+            opacities: vec![OPACITY; n],
+            colors,
+            ..Self::default()
+        }
+    }
+
+    /// Drops splats whose octahedron is smaller than a cell of a grid, except the largest one in each cell, because the
+    /// time to generate a cage is proportional to the number of triangles.
     fn thin_out(&self, kept: &mut Vec<usize>) {
         let centers: Vec<Vec3> = kept.iter().map(|&s| self.positions[s]).collect();
         let longest = Bounds::of(&centers).map_or(0.0, |bounds| bounds.extent().max_element());
@@ -214,37 +234,65 @@ impl Splats {
     }
 }
 
-/// Octahedra around the centres of all cells of a grid that contain points: the shells of a point cloud. The grid
-/// is the finest one of a cascade whose cells have six occupied neighbours or more on average, as those of a sampled
-/// surface do.
+/// Rotation of a splat, and of its spherical harmonics, in a deformation with this gradient.
+#[must_use]
+pub fn turn_of(gradient: Mat3) -> Mat3 {
+    nearest_rotation(gradient.as_dmat3()).as_mat3()
+}
+
+/// Colour, sRGB, of a splat that is seen along a unit vector from the eye, in the axes of its spherical harmonics.
+#[must_use]
+pub fn color_along(color: Vec3, harmonics: &[Vec3], direction: Vec3) -> Vec3 {
+    color + harmonic_basis(direction).iter().zip(harmonics).map(|(&y, &c)| y * c).sum::<Vec3>()
+}
+
+/// Octahedra around the centres of all cells of a grid that contain points: the shells of a point cloud.
 #[must_use]
 pub fn shells_of_points(points: &[Vec3]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    /// Cells along the longest side of the box, finest first.
-    const CELLS: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
-    /// Half diagonal of an octahedron that covers a cell, cells.
+    /// Half diagonal of an octahedron that covers a cell, in cells.
     const REACH: f32 = 1.5;
-    let Some(bounds) = Bounds::of(points) else { return (Vec::new(), Vec::new()) };
-    let longest = bounds.extent().max_element();
-    for cells in CELLS {
-        let size = (longest / cells).max(f32::MIN_POSITIVE);
-        let mut occupied: Vec<[i32; 3]> =
-            points.iter().map(|&p| ((p - bounds.min) / size).floor().as_ivec3().to_array()).collect();
-        occupied.sort_unstable();
-        occupied.dedup();
-        let is_neighbour = |&[x, y, z]: &[i32; 3], k: i32| {
-            let other = [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1];
-            occupied.binary_search(&other).is_ok()
-        };
-        let neighbours = |cell: &[i32; 3]| (0..27).filter(|&k| k != 13 && is_neighbour(cell, k)).count();
-        let total: usize = occupied.iter().map(neighbours).sum();
-        if total >= 6 * occupied.len() || cells == CELLS[CELLS.len() - 1] {
-            let center = |cell: &[i32; 3]| bounds.min + size * (IVec3::from_array(*cell).as_vec3() + 0.5);
-            let of_cell =
-                |cell: &[i32; 3]| octahedron(center(cell), Mat3::from_diagonal(Vec3::splat(REACH * size)));
-            return (occupied.iter().flat_map(of_cell).collect(), octahedra(occupied.len()));
+    let OccupiedCells { min, size, cells } = OccupiedCells::by(points);
+    let center = |cell: &[i32; 3]| min + size * (IVec3::from_array(*cell).as_vec3() + 0.5);
+    let of_cell = |cell: &[i32; 3]| octahedron(center(cell), Mat3::from_diagonal(Vec3::splat(REACH * size)));
+    (cells.iter().flat_map(of_cell).collect(), octahedra(cells.len()))
+}
+
+/// Cells of a grid that contain points. The grid is the finest one of a cascade whose cells have six occupied
+/// neighbours or more on average, as those of a sampled surface do.
+#[derive(Default)]
+struct OccupiedCells {
+    /// Lowest corner of cell (0, 0, 0), object units.
+    min: Vec3,
+    /// Edge length of a cell, object units.
+    size: f32,
+    cells: Vec<[i32; 3]>,
+}
+
+impl OccupiedCells {
+    /// Numbers of cells along the longest side of the points' box, in the order in which they are tried.
+    const CELLS: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
+
+    fn by(points: &[Vec3]) -> Self {
+        let Some(bounds) = Bounds::of(points) else { return Self::default() };
+        let longest = bounds.extent().max_element();
+        for cells in Self::CELLS {
+            let size = (longest / cells).max(f32::MIN_POSITIVE);
+            let mut occupied: Vec<[i32; 3]> =
+                points.iter().map(|&p| ((p - bounds.min) / size).floor().as_ivec3().to_array()).collect();
+            occupied.sort_unstable();
+            occupied.dedup();
+            let is_neighbour = |&[x, y, z]: &[i32; 3], k: i32| {
+                let other = [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1];
+                occupied.binary_search(&other).is_ok()
+            };
+            let neighbours = |cell: &[i32; 3]| (0..27).filter(|&k| k != 13 && is_neighbour(cell, k)).count();
+            let total: usize = occupied.iter().map(neighbours).sum();
+            if total >= 6 * occupied.len() || cells == Self::CELLS[Self::CELLS.len() - 1] {
+                return Self { min: bounds.min, size, cells: occupied };
+            }
         }
+        Self::default()
     }
-    (Vec::new(), Vec::new())
 }
 
 /// Corners of an octahedron with the given half diagonals.
@@ -276,7 +324,7 @@ pub fn splat_covariance(axes: Mat3) -> [f32; 6] {
 pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
     /// Limit on the sweeps; three or four suffice.
     const SWEEPS: usize = 8;
-    /// Cosine of the angle between two columns that are orthogonal up to rounding.
+    /// Largest cosine between two columns that count as orthogonal: f32 rounding.
     const ORTHOGONAL: f32 = 1e-7;
     let largest = axes.to_cols_array().iter().fold(0.0_f32, |a, x| a.max(x.abs()));
     if largest == 0.0 || !largest.is_finite() {

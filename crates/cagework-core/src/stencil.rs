@@ -1,8 +1,9 @@
 //! CPU twins of the GPU kernels: the same computation in plain serial f32 loops, with additions in the same order.
 //!
-//! They specify `shaders/`, with arguments in the order of the shaders' bindings, and are not optimised; solvers use
-//! the fast versions in [`crate::solve::rows`]. Fields are flat, `[row][lane]`, with rows in the level's order and
-//! `n_lanes` columns of one batch; geometry comes in the arrays of [`tables`], which the GPU receives as well.
+//! These functions specify the kernels in `shaders/`, with arguments in the order of the shaders' bindings. They are
+//! not optimised; solvers use the fast versions in [`crate::solve::rows`]. Fields are flat, `[row][lane]`, with rows in
+//! the level's order and `n_lanes` columns of one batch. Geometry comes in the arrays of [`tables`], which the GPU
+//! receives as well.
 
 mod reduce;
 pub mod tables;
@@ -21,7 +22,8 @@ use crate::solve::rows::Prolong;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
 
-/// Changes of a weight below this count as zero, because their squares would be denormal.
+/// Changes of a weight below this count as zero. The limit has a margin over 1e-19, below which the square of a change
+/// is denormal in f32.
 const MIN_CHANGE: f32 = 1e-18;
 
 /// Right-hand side plus neighbours of a row, summed in the kernels' order.
@@ -38,7 +40,7 @@ fn gather(level: &LevelTable, n_lanes: usize, row: usize, lane: usize, rhs: &[f3
 
 /// Gauss-Seidel on the rows of one colour, in place: `u += omega ((f + sum of neighbours) / diagonal - u)`.
 ///
-/// `field`: `[row][lane]`, dimensionless. GPU twin: `shaders/relax_cells.wgsl`.
+/// `field`: `[row][lane]`, dimensionless. GPU kernel: `shaders/relax_cells.wgsl`.
 pub fn relax_cells(
     rows: Range<usize>,
     n_lanes: usize,
@@ -56,7 +58,7 @@ pub fn relax_cells(
     }
 }
 
-/// A Jacobi sweep (Algorithm 3 of the paper) from `u_in` to `u_out`, both `[row][lane]`. GPU twin:
+/// A Jacobi sweep (K. Smith, Algorithm 3) from `u_in` to `u_out`, both `[row][lane]`. GPU kernel:
 /// `shaders/jacobi_cells.wgsl`.
 pub fn jacobi_cells(
     rows: Range<usize>,
@@ -73,8 +75,8 @@ pub fn jacobi_cells(
     }
 }
 
-/// Inner sum of Eq. 2 for each row. It is added to `changes` (`[row]`), or stored there for the `first` batch.
-/// GPU twin: `shaders/change_norms.wgsl`.
+/// Sum of the squared changes (absolute changes for [`DeltaNorm::Literal`]) of each row over the lanes. It is added to
+/// `changes` (`[row]`), or stored there for the `first` batch. GPU kernel: `shaders/change_norms.wgsl`.
 pub fn change_norms(
     n_lanes: usize,
     norm: DeltaNorm,
@@ -98,7 +100,7 @@ pub fn change_norms(
 }
 
 /// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: the red rows and their zero row.
-/// GPU twin: `shaders/residual.wgsl`.
+/// GPU kernel: `shaders/residual.wgsl`.
 pub fn residual(
     n_rows: usize,
     n_lanes: usize,
@@ -117,7 +119,7 @@ pub fn residual(
 }
 
 /// Restriction: the coarse right-hand side, `[coarse row][lane]`, from the red residuals around each coarse cell.
-/// GPU twin: `shaders/restrict_residual.wgsl`.
+/// GPU kernel: `shaders/restrict_residual.wgsl`.
 pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f32], coarse_rhs: &mut [f32]) {
     for (row, around) in around.iter().enumerate() {
         for lane in 0..n_lanes {
@@ -132,7 +134,7 @@ pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f
 }
 
 /// Prolongation from `coarse` to the black rows of `field` listed in `entries`, with `n_sources` coarse rows each.
-/// GPU twin: `shaders/prolong_correction.wgsl`.
+/// GPU kernel: `shaders/prolong_correction.wgsl`.
 pub fn prolong_correction(
     n_lanes: usize,
     mode: Prolong,
@@ -158,7 +160,7 @@ pub fn prolong_correction(
 }
 
 /// Weights of `vertices` for the columns `first_column..first_column + n_lanes`. `block`: `[vertex][lane]`.
-/// GPU twin: `shaders/sample_weights.wgsl`.
+/// GPU kernel: `shaders/sample_weights.wgsl`.
 pub fn sample_weights(
     vertices: Range<usize>,
     n_lanes: usize,
@@ -184,7 +186,7 @@ pub fn sample_weights(
     }
 }
 
-/// Deformed positions, `[n_vertices]`, object units, for a posed cage. GPU twin: `shaders/deform_vertices.wgsl`.
+/// Deformed positions, `[n_vertices]`, object units, for a posed cage. GPU kernel: `shaders/deform_vertices.wgsl`.
 pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [Vec3]) {
     for (number, bundle) in positions.chunks_mut(BUNDLE).enumerate() {
         let (slice, lane) = (number / SLICE, number % SLICE);
@@ -200,7 +202,7 @@ pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [
     }
 }
 
-/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU twin:
+/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU kernel:
 /// `shaders/vertex_normals.wgsl`.
 pub fn vertex_normals(table: &NormalTable, positions: &[Vec3], normals: &mut [Vec3]) {
     for (vertex, normal) in normals.iter_mut().enumerate() {

@@ -11,7 +11,7 @@ pub const VERTEX_RUN: usize = 512;
 /// Limit on threads per processor. More threads would only take memory.
 const MAX_PER_PROCESSOR: usize = 4;
 
-/// A fixed number of threads.
+/// A fixed number of threads that share pieces of work.
 #[derive(Debug)]
 pub struct Team {
     #[cfg(feature = "parallel")]
@@ -28,7 +28,8 @@ impl Team {
         {
             let processors = std::thread::available_parallelism().map_or(1, usize::from);
             let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
-            // A single thread also needs a pool: otherwise rayon would run work that it spawns on all processors.
+            // A single thread also needs a pool: otherwise rayon would distribute the tasks that the work spawns over
+            // all processors.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok();
             let n_threads = if pool.is_some() { wanted } else { 1 };
             Self { pool, n_threads }
@@ -64,7 +65,7 @@ impl Team {
         vec![member(0)]
     }
 
-    /// Runs `work` so that the work it spawns stays on the team.
+    /// Runs `work` on the team's threads, including all tasks that `work` spawns.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         #[cfg(feature = "parallel")]
         if let Some(pool) = &self.pool {

@@ -1,10 +1,10 @@
 //! Transfers between a level and the next coarser one.
 //!
 //! Prolongation is trilinear, with zero in cells outside the cage, as the error is zero on the cage. Restriction is its
-//! transpose, scaled by 1/2: the coarse operator is `(2h)^2` times the Laplacian, and a coarse cell gathers the weight
-//! of eight fine ones, `4 / 8`. A red-black sweep that ends with black leaves no residual on black cells, and one that
-//! starts with red overwrites red cells. Restriction therefore reads only red cells, and prolongation writes only black
-//! ones.
+//! transpose, scaled by 1/2 = 4/8: the coarse operator is `(2h)^2` times the Laplacian, which is a factor of 4, and the
+//! transpose gathers the weight of eight fine cells. A red-black sweep that ends with black leaves no residual on black
+//! cells, and a sweep that starts with red overwrites red cells. Restriction therefore reads only red cells, and
+//! prolongation writes only black ones.
 
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
@@ -33,7 +33,7 @@ pub struct ProlongRow<const N: usize> {
 /// Restriction and prolongation between a level and the next coarser one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transfer {
-    /// For the coarse unknowns in order, red and then black: the fine cells whose residuals each gathers.
+    /// For each coarse unknown, red ones before black ones: the fine cells whose residuals it gathers.
     pub restrict_rows: [Vec<RestrictRow>; 2],
     /// Black cells with one odd coordinate, ascending.
     pub faces: Vec<ProlongRow<2>>,

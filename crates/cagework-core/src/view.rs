@@ -1,8 +1,8 @@
-//! A camera as picking and dragging need it: projection, rays, and the size of a pixel.
+//! What picking and dragging need of a camera: projection, rays, and the size of a pixel.
 
 use glam::{Vec2, Vec3};
 
-/// A camera.
+/// Projection and axes of a camera, for picking and dragging.
 pub trait View {
     /// Pixel of a point, and its depth along the view direction; `None` behind the eye.
     fn project(&self, point: Vec3) -> Option<(Vec2, f32)>;

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1.
+/// A matrix of weights in compressed sparse rows (CSR), dimensionless. The weights of a vertex for the controls sum to
+/// 1, except far outside the cage. Columns of [`Frames`](crate::frames::Frames) come after those of the controls.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     n_columns: u32,
@@ -23,7 +24,7 @@ pub enum WeightsError {
     /// The last row pointer differs from the number of indices or weights.
     #[error("{indices} column indices and {data} weights do not match the last row pointer, {last}")]
     Length {
-        /// Number of indices.
+        /// Number of column indices.
         indices: usize,
         /// Number of weights.
         data: usize,
@@ -33,25 +34,25 @@ pub enum WeightsError {
     /// A column index is not below the number of columns.
     #[error("row {row} names column {column}, but there are {n_columns} columns")]
     Column {
-        /// Index of the row.
+        /// Index of the row with the invalid column index.
         row: usize,
-        /// The invalid index.
+        /// The column index that does not exist.
         column: u32,
-        /// Number of columns.
+        /// Number of columns of the matrix.
         n_columns: u32,
     },
     /// A row has two weights in one column.
     #[error("row {row} names column {column} twice; sum them with matrix.sum_duplicates()")]
     Duplicate {
-        /// Index of the row.
+        /// Index of the row with two weights in one column.
         row: usize,
-        /// Index of the column.
+        /// Index of the column that the row names twice.
         column: u32,
     },
     /// A weight is not a finite number.
     #[error("row {row} has a weight that is not a finite number")]
     NotFinite {
-        /// Index of the row.
+        /// Index of the row with the weight that is not finite.
         row: usize,
     },
 }

@@ -13,7 +13,7 @@ pub fn grouped(n: usize) -> String {
     grouped
 }
 
-/// `1 edge`, `2 edges`.
+/// A count with its noun in the singular or plural: `1 edge`, `2 edges`.
 pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(n), if n == 1 { one } else { many })
 }

@@ -4,6 +4,9 @@ use std::collections::VecDeque;
 
 use crate::document::Key;
 
+/// Default size limit, bytes.
+const CACHE_BYTES: usize = 256 << 20;
+
 /// Results by the [`Key`] of the document they were computed from. Evicts the least recently used results above a limit
 /// in bytes.
 #[derive(Debug)]
@@ -18,6 +21,12 @@ struct Entry<T> {
     key: Key,
     bytes: usize,
     result: T,
+}
+
+impl<T> Default for Cache<T> {
+    fn default() -> Self {
+        Self::new(CACHE_BYTES)
+    }
 }
 
 impl<T> Cache<T> {
@@ -39,7 +48,7 @@ impl<T> Cache<T> {
         }
     }
 
-    /// Returns the result of a key, and marks it as most recently used.
+    /// Returns the result for a key, and marks it as most recently used.
     pub fn get(&mut self, key: Key) -> Option<&T> {
         let place = self.entries.iter().position(|entry| entry.key == key)?;
         let entry = self.entries.remove(place)?;
@@ -47,7 +56,7 @@ impl<T> Cache<T> {
         self.entries.back().map(|entry| &entry.result)
     }
 
-    /// Whether there is a result of a key.
+    /// Whether there is a result for a key.
     #[must_use]
     pub fn contains(&self, key: Key) -> bool {
         self.entries.iter().any(|entry| entry.key == key)

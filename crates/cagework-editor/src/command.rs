@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use cagework_core::{InnerElement, PolygonMesh};
 use cagework_io::{SECONDS_PER_POSE, check_times};
+use cagework_pose::blend::{PoseError, reblend};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::controls::{CageControls, InnerKind, RestCage};
 use crate::document::{NamedPose, Transition};
-use crate::edit::{PoseError, SelectMode, reblend};
+use crate::edit::SelectMode;
 use crate::editor::Editor;
 use crate::error::EditError;
 use crate::models::PartOptions;
@@ -28,7 +29,7 @@ const SHEET_SIZES: i32 = 16;
 pub enum RestEdit {
     /// Inserts a vertex at the middle of each selected edge.
     SplitEdge,
-    /// Merges the two ends of a selected edge.
+    /// Merges the two ends of the first selected edge.
     CollapseEdge,
     /// Extrudes selected faces outwards.
     ExtrudeFace,
@@ -43,9 +44,9 @@ pub enum RestEdit {
 #[serde(tag = "do", rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Command {
-    /// Moves the cage. `[n_controls]`, finite
+    /// Moves the cage's vertices and interior controls.
     SetPose {
-        /// Positions of cage vertices and interior controls, object units.
+        /// Positions of cage vertices, then of interior controls, object units. `[n_controls]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
     },
@@ -58,57 +59,61 @@ pub enum Command {
     },
     /// Moves the cage to a saved pose, with its pins.
     ApplyPose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
     },
     /// Gives a saved pose another name.
     RenamePose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
         /// New name of the pose.
         name: String,
     },
-    /// Deletes a saved pose. Later poses move forward by its lead.
+    /// Deletes a saved pose. The animation shows later poses earlier, by the time from the previous pose to the deleted
+    /// one.
     RemovePose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
     },
     /// Replaces a saved pose, with its pins, by the current pose.
     UpdatePose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
     },
-    /// Inserts a copy of a saved pose after it. Later poses move back by a second.
+    /// Copies a saved pose; the copy is the next pose in the list. The animation shows the copy one second after the
+    /// pose, and delays later poses by one second.
     DuplicatePose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
         /// Name of the copy.
         name: String,
     },
-    /// Moves a saved pose to another place in the list. The first pose has the first time afterwards, and so on.
+    /// Moves a saved pose to another place in the list. Each place of the list keeps its time: the pose that becomes
+    /// first gets the time of the previous first pose, and so on.
     MovePose {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
-        /// Its new index.
+        /// Index in this list to which the pose moves.
         to: usize,
     },
     /// Sets when the animation shows a saved pose. Other poses keep their times; the list is sorted by time.
     SetPoseTime {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
         /// Seconds since the start of the animation.
         seconds: f32,
     },
     /// Sets how the animation of the saved poses goes from one to the next, and how it ends.
     SetTransition {
-        /// The new settings.
+        /// Interpolation between the poses, and how the animation ends.
         transition: Transition,
     },
-    /// Changes the share of a saved pose in the blend, and keeps other changes of the pose since the last step.
+    /// Changes the share of a saved pose in the current pose. The new pose is computed from the pose of the last
+    /// history step, so edits of the pose since that step are dropped.
     Blend {
-        /// Index of the pose.
+        /// Index of the pose in the list of saved poses.
         index: usize,
-        /// Share, 0 to 1.
+        /// New share of the pose, 0 to 1.
         share: f32,
     },
     /// Sets poses that were transferred from another cage of the same models: the current pose, then each saved pose
@@ -119,61 +124,61 @@ pub enum Command {
         /// Positions of the controls of this cage, concatenated over the poses. `[n_poses, n_controls]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
-        /// Shares of the saved poses in the pose.
+        /// Shares of the saved poses in the current pose.
         shares: Vec<f32>,
     },
-    /// Sets the points that pulls leave in place.
+    /// Sets the surface points that pulls keep in place.
     SetPins {
         /// Points on the surfaces of the models.
         pins: Vec<SurfacePoint>,
     },
-    /// Replaces the cage by another cage or a draft, at rest.
+    /// Replaces the cage by another cage, or by a mesh that is not a valid cage yet. The new cage is at rest.
     ReplaceCage {
         /// Positions of the vertices of the new cage, then of its interior controls, and the cage's faces.
         #[cfg_attr(feature = "typescript", ts(type = "unknown"))]
         mesh: PolygonMesh,
-        /// Subdivision and interior controls; null keeps the current ones that fit.
+        /// Subdivision and interior controls; null keeps the current ones if they fit.
         controls: Option<CageControls>,
-        /// Notices of the generator.
+        /// Notices of the cage generator about the new cage.
         notices: Vec<String>,
     },
     /// Makes the current positions of the cage its rest position.
     MoveRest,
     /// Edits the selected elements of the cage, and selects the result.
     EditRest {
-        /// Kind of edit.
+        /// What to do with the selected elements.
         edit: RestEdit,
     },
-    /// Subdivides the cage before values are prescribed on its surface.
+    /// Sets how often the cage's surface is subdivided before boundary values are prescribed on it.
     Subdivide {
-        /// Steps, 0 to 3.
+        /// Number of subdivision steps, 0 to 3.
         steps: u32,
     },
     /// Sets the radius of interior points and lines.
     SetRadius {
-        /// Radius, object units; null for a fixed fraction of the cage's size.
+        /// Radius, object units; null for 1/32 of the cage's longest side.
         radius: Option<f32>,
     },
     /// Adds an interior control, and selects it.
     AddControl {
         /// A point, a polyline through `places`, or a sheet with corners at `places`.
         kind: InnerKind,
-        /// Positions, object units.
+        /// Positions of the corners of the new element, object units.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         places: Vec<Vec3>,
     },
-    /// Adds the largest rectangular sheet that fits in the cage, and selects it.
+    /// Adds a rectangular sheet and selects it. Tries smaller and smaller sheets until one fits in the cage.
     AddSheet {
-        /// Centre of the sheet.
+        /// Centre of the sheet, object units.
         #[cfg_attr(feature = "typescript", ts(type = "readonly [number, number, number]"))]
         center: Vec3,
-        /// Half axes of the largest size that is tried.
+        /// Half axes of the sheet before it is shrunk: the largest size that is tried is 4/5 of these axes.
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         axes: [Vec3; 2],
     },
     /// Replaces the interior controls.
     ReplaceControls {
-        /// Positions of the new controls.
+        /// Positions of the new controls, object units. `[n_inner]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
         /// Points, lines and faces; indices are relative to `positions`.
@@ -181,19 +186,19 @@ pub enum Command {
     },
     /// Removes a model from the cage.
     RemoveModel {
-        /// Id of the model.
+        /// Identifier of the model in the document.
         id: u32,
     },
-    /// Sets visibility and parts of a model.
+    /// Sets whether a model is visible, and which of its parts are rigid or stay in place.
     SetParts {
-        /// Id of the model.
+        /// Identifier of the model in the document.
         id: u32,
-        /// Visibility and parts.
+        /// Visibility, and names of the parts that are rigid or stay in place.
         options: PartOptions,
     },
-    /// Sets how much of each vertex of a model stays in place.
+    /// Sets how strongly each vertex of a model stays in place, as the user painted it.
     SetPainted {
-        /// Id of the model.
+        /// Identifier of the model in the document.
         id: u32,
         /// Amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted model
         amounts: Vec<u8>,
@@ -214,7 +219,7 @@ impl Editor {
                 let pose = self.document().pose.clone();
                 let pins = Some(self.document().pins.clone());
                 let document = self.document_mut();
-                // The pose is the new saved pose with share 1.
+                // The pose equals the new saved pose, so the share of the new one is 1 and all other shares are 0.
                 document.shares = std::iter::repeat_n(0.0, document.poses.len()).chain([1.0]).collect();
                 Arc::make_mut(&mut document.poses).push(NamedPose {
                     name: name.into(),
@@ -353,7 +358,7 @@ impl Editor {
         poses.get(index).ok_or(missing)
     }
 
-    /// Reorders the saved poses. `order`: old indices, `leads`: in the new order. `[n_poses]` each
+    /// Reorders the saved poses. `order`: old index of each pose; `leads`: new lead of each pose. `[n_poses]` each
     fn arrange(&mut self, order: &[usize], leads: &[f32]) {
         let document = self.document_mut();
         let of = |(&k, &lead): (&usize, &f32)| NamedPose { lead, ..document.poses[k].clone() };
@@ -391,8 +396,8 @@ impl Editor {
         if self.document().cage.set.is_ok() { Ok(()) } else { Err(EditError::NoCage) }
     }
 
-    /// Changes the share of a saved pose. Starts from the pose and shares as of the last history step, because a slider
-    /// sends many shares, each of which replaces the previous one.
+    /// Changes the share of a saved pose. Starts from the pose of the last history step, because a slider sends many
+    /// shares, each of which replaces the previous one.
     fn blend(&mut self, index: usize, share: f32) -> Result<(), EditError> {
         self.pose(index)?;
         if !share.is_finite() {
@@ -506,12 +511,13 @@ impl Editor {
     }
 }
 
-/// Shares of a pose that is one of the saved poses. `[n_poses]`
+/// Shares of a pose that equals the saved pose `index`: 1 for this pose and 0 for all others. `[n_poses]`
 fn only(index: usize, n_poses: usize) -> Arc<[f32]> {
     (0..n_poses).map(|k| f32::from(u8::from(k == index))).collect()
 }
 
-/// Applies an edit to one item after another; `None` if there are none. The edit must keep the indices of later items.
+/// Applies an edit to one item after another; `None` if `items` is empty. The edit must keep the indices of later
+/// items.
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],

@@ -1,7 +1,7 @@
 //! The cage at rest, with its subdivision and its interior controls.
 //!
-//! Interior controls are the last of the cage's positions and belong to no face. Selection, gestures, poses, undo and
-//! projects treat them as they treat the cage's own vertices.
+//! Interior controls are the corners of points, lines and sheets inside the cage. They are the last of the cage's
+//! positions and belong to no face. Selection, gestures, poses, undo and projects treat them like the cage's vertices.
 
 use cagework_core::{Cage, CageError, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh};
 use glam::Vec3;
@@ -14,13 +14,13 @@ use crate::error::EditError;
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageControls {
-    /// Number of subdivision steps.
+    /// Number of subdivision steps from the cage to its smooth surface.
     pub smooth: u32,
-    /// Number of interior controls: the last of the cage's positions.
+    /// Number of interior controls, which are the last of the cage's positions.
     pub inner: usize,
     /// Points, lines and faces; indices are relative to the first interior control.
     pub elements: Vec<InnerElement>,
-    /// Radius of points and lines, object units; null for a share of the cage's size.
+    /// Radius of points and lines, object units; null for 1/32 of the cage's longest side.
     pub radius: Option<f32>,
 }
 
@@ -60,7 +60,7 @@ pub struct RestCage {
     pub notices: Vec<String>,
 }
 
-/// Compares mesh and controls.
+/// Compares only mesh and controls, from which the set is derived.
 impl PartialEq for RestCage {
     fn eq(&self, other: &Self) -> bool {
         self.mesh == other.mesh && self.controls == other.controls
@@ -86,7 +86,7 @@ impl RestCage {
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
-            // There are no controls yet, only a radius for future ones.
+            // Without controls, omit the radius, which applies to controls that may be added later.
             InnerControls::default()
         } else {
             InnerControls {
@@ -107,7 +107,8 @@ impl RestCage {
         Ok(Self { mesh, controls, set, notices: Vec::new() })
     }
 
-    /// Returns `cage` with those interior controls of this cage that fit into `cage`.
+    /// Returns `cage` with the subdivision and the interior controls of this cage. If they do not fit, keeps only the
+    /// subdivision, or neither, and adds a notice.
     ///
     /// # Errors
     /// If a position is not finite.
@@ -132,7 +133,7 @@ impl RestCage {
         Ok(Self { notices, ..made? })
     }
 
-    /// Positions of interior controls.
+    /// Positions of interior controls, object units. `[n_inner]`
     pub fn inner_positions(&self) -> &[Vec3] {
         &self.mesh.positions[self.n_cage()..]
     }
@@ -142,8 +143,8 @@ impl RestCage {
         self.mesh.positions.len().saturating_sub(self.controls.inner)
     }
 
-    /// Adds an element with corners at `places`. Corners of lines and faces within the radius of a control reuse that
-    /// control, so that bones share joints.
+    /// Adds an element with corners at `places`. Corners of lines and faces within [`Self::radius`] of a control reuse
+    /// that control, so that lines can meet in it.
     ///
     /// # Errors
     /// If the element does not fit into the cage.
@@ -166,10 +167,11 @@ impl RestCage {
         Self::new(mesh, controls)
     }
 
-    /// Removes interior controls and the elements that use them; polylines keep their other points.
+    /// Removes interior controls, and the points and sheets that use them. Polylines keep their other points if at
+    /// least two are left.
     ///
     /// # Errors
-    /// Never: a subset of controls that fit also fits.
+    /// Those of [`Self::new`]. They do not occur in practice, because a subset of controls that fit also fits.
     pub fn without(&self, vertices: &[u32]) -> Result<Self, EditError> {
         let (mut mesh, mut controls) = (self.mesh.clone(), self.controls.clone());
         let first = self.n_cage();
@@ -255,7 +257,7 @@ mod tests {
 
     #[test]
     fn bones_that_meet_share_a_control_and_points_do_not() {
-        // The default radius is 2 / 64 of the box's side of 2.
+        // The default radius is 1/32 of the box's side, 0.0625, which exceeds the gap of 0.05 between the two lines.
         let made = made().with(InnerKind::Line, &[at(-0.5), at(0.0)]).unwrap();
         let made = made.with(InnerKind::Line, &[at(0.05), at(0.5)]).unwrap();
         assert_eq!(made.controls.elements, [InnerElement::Line(vec![0, 1]), InnerElement::Line(vec![1, 2])]);
@@ -269,11 +271,11 @@ mod tests {
     fn deleting_controls_drops_unused_positions() {
         let made = made().with(InnerKind::Line, &[at(-0.5), at(0.0), at(0.5)]).unwrap();
         let made = made.with(InnerKind::Point, &[Vec3::new(0.0, 0.5, 0.0)]).unwrap();
-        // Without the middle point of the line, its ends stay connected.
+        // After the middle point of the line is removed, its ends stay connected.
         let shorter = made.without(&[9]).unwrap();
         assert_eq!(shorter.controls.elements, [InnerElement::Line(vec![0, 1]), InnerElement::Point(2)]);
         assert_eq!(shorter.inner_positions(), [at(-0.5), at(0.5), Vec3::new(0.0, 0.5, 0.0)]);
-        // Without one of its two ends, the line becomes a point, because a line needs two points.
+        // Without one of its two ends the line is removed, because a line needs two points. The separate point is left.
         let point = shorter.without(&[8]).unwrap();
         assert_eq!(
             (point.controls.elements.as_slice(), point.controls.inner),

@@ -13,7 +13,7 @@ use crate::surface::SurfacePoint;
 /// A saved pose of the cage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedPose {
-    /// Name of the pose.
+    /// Name of the pose, as lists show it.
     pub name: Arc<str>,
     /// Positions of the vertices and interior controls of the cage that the pose was saved for. `[n_controls]`
     pub positions: Arc<[Vec3]>,
@@ -31,7 +31,7 @@ pub struct Transition {
     pub interpolation: Interpolation,
     /// Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
     pub loops: bool,
-    /// Time that this return takes, seconds.
+    /// Time of the return from the last pose to the shape at the start, seconds.
     pub back: f32,
 }
 
@@ -57,7 +57,7 @@ pub struct Document {
     pub cage: Arc<RestCage>,
     /// Posed positions of cage vertices and interior controls; during reshaping, the new rest positions. `[n_controls]`
     pub pose: Arc<[Vec3]>,
-    /// Saved poses.
+    /// Saved poses, in their order in lists and in the animation.
     pub poses: Arc<Vec<NamedPose>>,
     /// Share of each saved pose in `pose`. `[n_poses]`
     pub shares: Arc<[f32]>,
@@ -67,13 +67,13 @@ pub struct Document {
     pub pins: Arc<[SurfacePoint]>,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<Arc<str>>,
-    /// Whether the cage is the one of the sample.
+    /// Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
     pub has_sample_cage: bool,
     /// Identifies the joined mesh of the models: documents with equal keys have equal meshes.
     pub(crate) mesh_key: u64,
     /// Identifies the cage at rest: documents with equal keys have equal cages.
     pub(crate) cage_key: u64,
-    /// Identifies the models with their options and painted amounts.
+    /// Identifies the models with their options and [painted amounts](crate::Member::painted).
     pub(crate) models_key: u64,
 }
 
@@ -105,18 +105,18 @@ impl Document {
         *self.pose != *self.cage.mesh.positions
     }
 
-    /// Whether a saved pose belongs to the cage.
+    /// Whether a saved pose has one position per vertex and interior control of the cage.
     #[must_use]
     pub fn fits(&self, pose: &NamedPose) -> bool {
         pose.positions.len() == self.cage.mesh.positions.len()
     }
 
-    /// Saved poses that belong to the cage.
+    /// Saved poses that [fit](Self::fits) the cage.
     pub fn fitting_poses(&self) -> impl Iterator<Item = &NamedPose> {
         self.poses.iter().filter(|pose| self.fits(pose))
     }
 
-    /// Times of the poses that belong to the cage, seconds. Ascending
+    /// Times of the poses that [fit](Self::fits) the cage, seconds, ascending.
     #[must_use]
     pub fn pose_seconds(&self) -> Vec<f32> {
         let mut at = 0.0;
@@ -126,18 +126,18 @@ impl Document {
         };
         let seconds: Vec<f32> = self.fitting_poses().enumerate().map(time).collect();
         if seconds.last().is_some_and(|&last| last > MAX_SECONDS) {
-            // The animation of a project, or one with many new poses, may be too long.
+            // Long gaps in a project file, or many added poses, exceed the limit: show one pose per second instead.
             return (1..=seconds.len()).map(|k| k as f32 * SECONDS_PER_POSE).collect();
         }
         seconds
     }
 
-    /// When the animation shows the poses that belong to the cage. The page plays it, and exports contain it.
+    /// Timeline of the poses that [fit](Self::fits) the cage. The page plays it, and exports contain it.
     #[must_use]
     pub fn timeline(&self) -> Timeline {
         let Transition { interpolation, loops, back } = self.transition;
         let seconds = self.pose_seconds();
-        // More than an hour of poses, one per second, exceeds the limit on times.
+        // With very many poses, even one per second exceeds `MAX_SECONDS`, and `Timeline::new` refuses the times.
         let timeline = Timeline::new(&seconds, loops.then_some(back));
         timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation)
     }
@@ -188,8 +188,8 @@ impl Document {
 /// Identifies the inputs of binds and checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Key {
-    /// The joined mesh of the models.
+    /// Identifies the joined mesh of the models.
     pub mesh: u64,
-    /// The cage at rest.
+    /// Identifies the cage at rest.
     pub cage: u64,
 }

@@ -5,17 +5,17 @@ use std::sync::Arc;
 use cagework_core::view::View;
 use cagework_core::{Bounds, PolygonMesh};
 use cagework_io::{Model, write_project};
+use cagework_pose::blend::{PoseError, blend};
 use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
 use crate::controls::RestCage;
 use crate::document::{Document, Key, NamedPose, Transition};
-use crate::edit::{
-    Constraint, Element, Gesture, GestureKind, Pivot, Pull, Selection, SharedPull, Topology, blend,
-};
+use crate::edit::{Constraint, Element, Gesture, GestureKind, Pull, Selection, SharedPull, Topology};
 use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
+use crate::options::{PROPORTIONAL, Tools};
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
@@ -29,7 +29,7 @@ pub struct Editor {
     /// The document as of the last history step, without changes since then.
     committed: Document,
     history: History,
-    /// Number of steps, undos and redos so far.
+    /// Number of openings, steps, undos and redos so far.
     steps: u64,
     /// The last number that was assigned as a key of models, a mesh or a cage.
     keys: u64,
@@ -43,14 +43,7 @@ pub struct Editor {
     pub selection: Selection,
     /// Vertices of the element under the pointer.
     pub hovered: Vec<u32>,
-    /// Element type that a click selects.
-    pub element: Element,
-    /// Centre of rotation and scaling.
-    pub pivot: Pivot,
-    /// Whether gestures also move the mirror images of the selected vertices.
-    pub is_mirrored: bool,
-    /// Radius of proportional editing, in diagonals of the cage; 0 turns it off.
-    pub radius: f32,
+    tools: Tools,
 }
 
 /// Contents that are opened together with models.
@@ -58,9 +51,9 @@ pub struct Editor {
 pub struct Contents {
     /// The cage, if there is one.
     pub cage: Option<RestCage>,
-    /// Saved poses.
+    /// Saved poses, in their order in lists and in the animation.
     pub poses: Vec<NamedPose>,
-    /// Share of each saved pose in the pose. `[n_poses]`, or shorter: missing shares are 0
+    /// Share of each saved pose in the current pose. `[n_poses]`, or shorter: missing shares are 0
     pub shares: Vec<f32>,
     /// How the animation of the saved poses goes from one to the next, and how it ends.
     pub transition: Transition,
@@ -77,10 +70,16 @@ impl Editor {
         Self { history: History::with_limit(bytes), ..Self::default() }
     }
 
-    /// The current document.
+    /// The current document, including changes since the last history step.
     #[must_use]
     pub fn document(&self) -> &Document {
         &self.document
+    }
+
+    /// Whether the pose is that of the last history step.
+    #[must_use]
+    pub fn is_pose_committed(&self) -> bool {
+        Arc::ptr_eq(&self.document.pose, &self.committed.pose)
     }
 
     /// The document as of the last history step, without changes since then.
@@ -95,10 +94,11 @@ impl Editor {
     /// Replaces models and contents, and clears the history.
     pub fn open(&mut self, models: impl IntoIterator<Item = NewModel>, contents: Contents) {
         let Contents { cage, poses, mut shares, transition, pins, sample } = contents;
-        let (pivot, radius, keys, steps) = (self.pivot, self.radius, self.keys, self.steps + 1);
+        let tools = Tools { element: Element::default(), symmetry: false, ..self.tools };
+        let (keys, steps) = (self.keys, self.steps + 1);
         let limit = self.history.limit();
         shares.resize(poses.len(), 0.0);
-        *self = Self { pivot, radius, keys, steps, ..Self::with_history_limit(limit) };
+        *self = Self { tools, keys, steps, ..Self::with_history_limit(limit) };
         let has_sample_cage = sample.is_some() && cage.is_some();
         let mut all = Models::default();
         all.add(models);
@@ -119,7 +119,8 @@ impl Editor {
         self.amend();
     }
 
-    /// Sets the pose of a project without adding a step to the history. Without a pose, all shares are 0.
+    /// Moves the cage to the pose in the settings of a project, without adding a step to the history. If the settings
+    /// contain no pose, the cage is at rest and all shares are 0.
     ///
     /// # Errors
     /// If the pose is damaged or belongs to another cage. The cage is at rest then.
@@ -144,8 +145,8 @@ impl Editor {
         first..self.document.models.next_id()
     }
 
-    /// Changes the painted amounts of a model, 0 to 255. The key of the models changes only at the next step, so that
-    /// the dabs of a stroke do not trigger updates of derived data.
+    /// Changes the [painted amounts](crate::Member::painted) of a model. The key of the models changes only at the next
+    /// step, so that the dabs of a stroke do not trigger updates of derived data.
     pub fn paint(&mut self, id: u32, change: impl FnOnce(&mut Vec<u8>)) {
         if let Some(painted) = self.document.models.painted_mut(id) {
             change(painted);
@@ -178,7 +179,7 @@ impl Editor {
         self.set_document(self.committed.clone());
     }
 
-    /// Undoes the last step; false if the history is empty. Keeps the visibility of models.
+    /// Undoes the last step; false if there is no step to undo. Keeps the visibility of models.
     pub fn undo(&mut self) -> bool {
         self.go(History::undo)
     }
@@ -205,12 +206,12 @@ impl Editor {
         went
     }
 
-    /// Clears the history.
+    /// Clears the history, so that earlier steps can be neither undone nor redone.
     pub fn clear_history(&mut self) {
         self.history = History::with_limit(self.history.limit());
     }
 
-    /// Replaces the document. Clears the selection if the cage differs.
+    /// Replaces the document and drops the gesture in progress. Clears the selection if the cage differs.
     pub(crate) fn set_document(&mut self, document: Document) {
         let has_other_cage = document.cage_key != self.document.cage_key;
         self.document = document;
@@ -220,7 +221,7 @@ impl Editor {
         }
     }
 
-    /// Replaces the cage at rest; sets the shares of all saved poses to 0.
+    /// Replaces the cage at rest, resets the pose to it, and sets the shares of all saved poses to 0.
     pub(crate) fn set_cage(&mut self, cage: RestCage) {
         self.document.cage_key = self.next_key();
         self.document.pose = cage.mesh.positions.as_slice().into();
@@ -229,7 +230,7 @@ impl Editor {
         self.follow_cage();
     }
 
-    /// Updates topology and symmetry for the current cage.
+    /// Recomputes topology and symmetry for the current cage. Clears the selection and drops the gesture in progress.
     fn follow_cage(&mut self) {
         let cage = &self.document.cage;
         self.topology = Topology::new(&cage.mesh.faces);
@@ -275,7 +276,7 @@ impl Editor {
         self.document.key()
     }
 
-    /// Identifies the models with their options and painted amounts.
+    /// Identifies the models with their options and [painted amounts](crate::Member::painted).
     #[must_use]
     pub fn models_key(&self) -> u64 {
         self.document.models_key
@@ -323,7 +324,7 @@ impl Editor {
             self.editing_rest = editing;
             self.gesture = None;
             if !editing {
-                self.element = Element::Vertex;
+                self.tools.element = Element::Vertex;
             }
             self.reset_pose();
         }
@@ -338,14 +339,14 @@ impl Editor {
         }
     }
 
-    /// Moves the cage. `[n_controls]`
+    /// Moves the controls to `positions`, `[n_controls]`, object units.
     ///
     /// # Errors
     /// If the number of positions is wrong, or one is not finite.
     pub fn set_pose(&mut self, positions: Vec<Vec3>) -> Result<(), EditError> {
         let (given, expected) = (positions.len(), self.document.pose.len());
         if given != expected {
-            return Err(crate::edit::PoseError { given, expected }.into());
+            return Err(PoseError { given, expected }.into());
         }
         if !positions.iter().all(|p| p.is_finite()) {
             return Err(EditError::NotFinite { what: "positions" });
@@ -356,7 +357,7 @@ impl Editor {
         Ok(())
     }
 
-    /// Moves the cage to a time of the animation of the saved poses.
+    /// Moves the cage to its pose at a time of the animation of the saved poses, seconds.
     pub fn play_at(&mut self, seconds: f32) {
         let poses: Vec<Vec<Vec3>> =
             self.document.fitting_poses().map(|pose| pose.positions.to_vec()).collect();
@@ -367,19 +368,20 @@ impl Editor {
         }
     }
 
-    /// Share of the movement that each vertex follows, for a gesture that starts at `positions`.
+    /// Share of the movement that each vertex makes in a gesture that starts at `positions`.
     #[must_use]
     pub fn pull(&self, positions: &[Vec3]) -> Pull {
         let rest = &self.document.cage.mesh.positions;
         let diagonal = Bounds::of(rest).map_or(0.0, |b| b.diagonal());
-        let symmetry = self.is_mirrored.then_some(&self.symmetry);
-        Pull::new(&self.selection, positions, rest, SharedPull { radius: self.radius * diagonal, symmetry })
+        let symmetry = self.tools.symmetry.then_some(&self.symmetry);
+        let radius = if self.tools.proportional_on { self.tools.proportional as f32 * diagonal } else { 0.0 };
+        Pull::new(&self.selection, positions, rest, SharedPull { radius, symmetry })
     }
 
     /// Starts a gesture; false if nothing is selected or another gesture is in progress.
     pub fn begin(&mut self, kind: GestureKind, pointer: Vec2, constraint: Constraint) -> bool {
         let pose = self.document.pose.to_vec();
-        let Some(pivot) = self.selection.pivot(&pose, &self.topology, self.pivot) else { return false };
+        let Some(pivot) = self.selection.pivot(&pose, &self.topology, self.tools.pivot) else { return false };
         if self.gesture.is_some() {
             return false;
         }
@@ -390,7 +392,7 @@ impl Editor {
         true
     }
 
-    /// The gesture in progress.
+    /// The gesture in progress, if there is one.
     #[must_use]
     pub fn gesture(&self) -> Option<&Gesture> {
         self.gesture.as_ref()
@@ -402,14 +404,23 @@ impl Editor {
             change(&mut gesture);
             let positions = gesture.positions(view);
             self.gesture = Some(gesture);
-            // If the pointer is on the horizon, positions are not finite and are rejected: the cage keeps its pose.
+            // `set_pose` rejects positions that are not finite: the cage then keeps its pose.
             let _ = self.set_pose(positions);
         }
     }
 
-    /// Sets the radius of proportional editing, and updates the gesture in progress.
-    pub fn set_radius(&mut self, radius: f32, view: &dyn View) {
-        self.radius = radius.max(0.0);
+    /// How clicks and gestures act on the cage.
+    #[must_use]
+    pub fn tools(&self) -> Tools {
+        self.tools
+    }
+
+    /// Changes how clicks and gestures act on the cage, and updates the gesture in progress. Radii outside the range of
+    /// [`PROPORTIONAL`] become its nearest end.
+    pub fn set_tools(&mut self, tools: Tools, view: &dyn View) {
+        let proportional =
+            PROPORTIONAL.slider.map_or(tools.proportional, |of| tools.proportional.clamp(of.min, of.max));
+        self.tools = Tools { proportional, ..tools };
         if let Some(gesture) = &self.gesture {
             let pull = self.pull(gesture.start());
             self.drag(view, |gesture| gesture.set_pull(pull));
@@ -426,7 +437,7 @@ impl Editor {
         keep && moved
     }
 
-    /// Moves the selection; false if nothing is selected.
+    /// Moves the selection by a vector, object units; false if nothing is selected or the vector is not finite.
     pub fn shift(&mut self, by: Vec3) -> bool {
         if self.selection.is_empty() || !by.is_finite() {
             return false;
@@ -436,7 +447,7 @@ impl Editor {
         self.set_pose(moved).is_ok()
     }
 
-    /// Writes a project file of the document and other settings, a JSON object.
+    /// Writes a project file with the document and `settings`, a JSON object with the caller's other settings.
     ///
     /// # Errors
     /// If no model is open, or the file would be too large.
@@ -449,7 +460,7 @@ impl Editor {
         Ok(write_project(&models, &cage.mesh, &poses, &settings)?)
     }
 
-    /// The view that panels show.
+    /// The part of the document that panels show.
     #[must_use]
     pub fn view(&self) -> DocumentView {
         let Document {
@@ -464,11 +475,12 @@ impl Editor {
             mesh_key,
             ..
         } = &self.document;
+        let unmatched = if self.tools.symmetry { self.symmetry.unmatched().len() } else { 0 };
         let mut seconds = self.document.pose_seconds().into_iter();
         let pose_view = |pose: &NamedPose| {
             let fits = self.document.fits(pose);
             let seconds = if fits { seconds.next().unwrap_or_default() } else { 0.0 };
-            PoseView { name: pose.name.to_string(), fits, seconds }
+            PoseView { name: pose.name.to_string(), fits, seconds, hash: hash_of(&pose.positions) }
         };
         let center = || self.selection.center(&self.document.pose).map(|c| c.to_array());
         DocumentView {
@@ -489,10 +501,18 @@ impl Editor {
                 last: self.selection.last(),
                 center: if self.gesture.is_some() { None } else { center() },
             },
+            tools: self.tools,
+            unmatched,
             steps: self.steps,
             undo: self.history.undo_label().map(str::to_owned),
             redo: self.history.redo_label().map(str::to_owned),
             forgotten: self.history.forgotten(),
         }
     }
+}
+
+/// Hash of the coordinates' bits: FNV-1a with 32-bit words instead of bytes.
+fn hash_of(positions: &[Vec3]) -> u32 {
+    let bits = positions.iter().flat_map(Vec3::to_array).map(f32::to_bits);
+    bits.fold(0x811c_9dc5, |hash, bits| (hash ^ bits).wrapping_mul(0x0100_0193))
 }

@@ -2,9 +2,9 @@
 
 use cagework_core::{CageError, ControlError};
 use cagework_io::{SelectError, TimelineError, WriteError};
+use cagework_pose::blend::PoseError;
 use thiserror::Error;
 
-use crate::edit::PoseError;
 use crate::rest_edit::RestEditError;
 
 /// Why a command cannot be applied.
@@ -19,24 +19,24 @@ pub enum EditError {
     /// There is no cage, or only a draft of one.
     #[error("there is no cage yet: make or open one first")]
     NoCage,
-    /// The command works on a selection.
+    /// The command needs a selection, but nothing suitable is selected.
     #[error("select {what} first")]
     NothingSelected {
         /// What must be selected, such as "a vertex".
         what: &'static str,
     },
     /// There is no saved pose with this number.
-    #[error("there is no pose number {number}: {count} are saved")]
+    #[error("pose {number} does not exist; saved poses: {count}")]
     NoSuchPose {
         /// Number of the pose, from 1.
         number: usize,
         /// Number of saved poses.
         count: usize,
     },
-    /// The number of painted amounts differs from the number of vertices.
+    /// [`Command::SetPainted`](crate::Command::SetPainted) does not have one amount per vertex of the model.
     #[error("{given} amounts for {expected} vertices")]
     Amounts {
-        /// Number of amounts.
+        /// Number of amounts that were given.
         given: usize,
         /// Number of vertices of the model.
         expected: usize,
@@ -59,7 +59,7 @@ pub enum EditError {
     /// The pose belongs to another cage.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// A pose cannot be at this time.
+    /// The animation cannot show a pose at this time.
     #[error(transparent)]
     Time(#[from] TimelineError),
     /// A name selects no part of the model.

@@ -12,7 +12,7 @@ pub const HISTORY_BYTES: usize = 256 << 20;
 struct Step {
     label: String,
     document: Document,
-    /// Size of the data that the neighbouring document does not share, bytes.
+    /// Size of the data in `document` that the document on the other side of the step does not share, bytes.
     bytes: usize,
 }
 
@@ -49,7 +49,7 @@ impl History {
         }
     }
 
-    /// Swaps `now` for the document before the last step.
+    /// Swaps `now` for the document before the last step; false if there is no step to undo.
     pub(crate) fn undo(&mut self, now: &mut Document) -> bool {
         let Some(mut step) = self.done.pop_back() else { return false };
         std::mem::swap(now, &mut step.document);
@@ -57,7 +57,7 @@ impl History {
         true
     }
 
-    /// Swaps `now` for the document after the step that was undone last.
+    /// Swaps `now` for the document after the step that was undone last; false if there is no such step.
     pub(crate) fn redo(&mut self, now: &mut Document) -> bool {
         let Some(mut step) = self.undone.pop() else { return false };
         std::mem::swap(now, &mut step.document);

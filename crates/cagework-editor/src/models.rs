@@ -4,10 +4,12 @@
 //! models that a document has ever contained, so that a point keeps its triangle when other models are added or
 //! removed.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::TriMesh;
+use cagework_core::splats::Splats;
 use cagework_io::{Model, UpAxis};
 use cagework_pose::Parts;
 use glam::{DVec3, Vec3};
@@ -15,7 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EditError;
 
-/// Largest number of a first triangle that is accepted from a project; leaves room for later models.
+/// Largest number that is accepted from a project for the first triangle of a model. The limit leaves room for the
+/// triangles of models that are opened later.
 const MAX_FIRST: u32 = u32::MAX / 2;
 /// Name that stands for a whole model in a list of part names.
 const WHOLE: &str = "all";
@@ -42,12 +45,11 @@ impl Default for PartOptions {
 /// Settings of a model in a project.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemberSettings {
     /// Number by which surface points refer to the model's first triangle.
     first_triangle: u32,
     options: PartOptions,
-    /// Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
+    /// [`Member::painted`] as runs of (amount, number of vertices); empty for an unpainted model.
     painted: Vec<(u8, u32)>,
 }
 
@@ -58,19 +60,23 @@ pub struct Member {
     pub id: u32,
     /// The model as read from its file.
     pub model: Arc<Model>,
-    /// Visibility and parts.
+    /// Visibility, and the parts that keep their shape or stay in place.
     pub options: PartOptions,
-    /// Painted amounts, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, or empty for an unpainted
-    /// model
+    /// How strongly the user fixed each vertex with the brush, 0 (moves with the cage) to 255 (stays in place).
+    /// `[n_vertices]`, or empty for an unpainted model
     pub painted: Arc<Vec<u8>>,
     first_triangle: u32,
+    /// Splats that show a point cloud.
+    points: Option<Arc<Splats>>,
+    /// Mesh that stands for a capture of splats, or a point cloud.
+    stand_in: Option<Arc<TriMesh>>,
     /// Range of vertices in the joined mesh.
     pub vertices: Range<usize>,
     /// Range of triangles in the joined mesh.
     pub triangles: Range<usize>,
 }
 
-/// Compares file, options and painted amounts.
+/// Compares name and geometry of the file, the number of the first triangle, the options, and [`Member::painted`].
 impl PartialEq for Member {
     fn eq(&self, other: &Self) -> bool {
         let is_same_file = Arc::ptr_eq(&self.model, &other.model)
@@ -118,15 +124,24 @@ impl Models {
         if self.next_id == 0 {
             self.origin = model.origin();
         }
-        // Triangle numbers are unique, also if the project's settings collide.
+        // Triangle numbers stay unique even if those in the project's settings collide.
         let stored = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST);
         let first_triangle = stored.max(self.next_triangle);
-        self.next_triangle = first_triangle + model.triangles.len() as u32;
+        let splats = model.drawn_splats();
+        let stand_in = splats.as_deref().map(|splats| Arc::new(splats.stand_in()));
+        let points = match splats {
+            Some(Cow::Owned(points)) => Some(Arc::new(points)),
+            _ => None,
+        };
+        let n_triangles = stand_in.as_ref().map_or(model.triangles.len(), |mesh| mesh.triangles.len());
+        self.next_triangle = first_triangle + n_triangles as u32;
         let mut member = Member {
             id: self.next_id,
             options: PartOptions::default(),
             painted: Arc::default(),
             first_triangle,
+            points,
+            stand_in,
             vertices: 0..0,
             triangles: 0..0,
             model: Arc::new(model),
@@ -140,7 +155,7 @@ impl Models {
                 stays: kept(&options.stays),
             };
             let n: u64 = painted.iter().map(|&(_, n)| u64::from(n)).sum();
-            if n == member.model.positions.len() as u64 {
+            if n == member.positions().len() as u64 {
                 let runs = painted.iter().flat_map(|&(amount, n)| std::iter::repeat_n(amount, n as usize));
                 member.painted = Arc::new(runs.collect());
             }
@@ -165,10 +180,9 @@ impl Models {
     fn join(&mut self) {
         let mut mesh = TriMesh::default();
         for member in Arc::make_mut(&mut self.members) {
-            let Model { positions, triangles, .. } = &*member.model;
             let (v, t) = (mesh.positions.len(), mesh.triangles.len());
-            mesh.positions.extend(positions);
-            mesh.triangles.extend(triangles.iter().map(|corners| corners.map(|c| v as u32 + c)));
+            mesh.positions.extend(member.positions());
+            mesh.triangles.extend(member.triangles().iter().map(|corners| corners.map(|c| v as u32 + c)));
             member.vertices = v..mesh.positions.len();
             member.triangles = t..mesh.triangles.len();
         }
@@ -184,6 +198,12 @@ impl Models {
     #[must_use]
     pub fn len(&self) -> usize {
         self.members.len()
+    }
+
+    /// The splats that show the first model, if it is a capture or a point cloud.
+    #[must_use]
+    pub fn splats(&self) -> Option<&Splats> {
+        self.iter().next().and_then(|member| member.model.splats().or(member.points.as_deref()))
     }
 
     /// Whether no model is open.
@@ -258,12 +278,12 @@ impl Models {
         is_other
     }
 
-    /// Sets the painted amounts of a model, 0 to 255. `[n_vertices]`, or empty for an unpainted model.
+    /// Sets [`Member::painted`] of a model. Amounts that are all 0 count as unpainted.
     ///
     /// # Errors
     /// If there is no such model, or it has another number of vertices. Nothing changes then.
     pub fn set_painted(&mut self, id: u32, amounts: Vec<u8>) -> Result<(), EditError> {
-        let expected = self.get(id)?.model.positions.len();
+        let expected = self.get(id)?.positions().len();
         if !amounts.is_empty() && amounts.len() != expected {
             return Err(EditError::Amounts { given: amounts.len(), expected });
         }
@@ -321,7 +341,8 @@ impl Models {
         })
     }
 
-    /// Corners of a triangle by its number; `None` if its model was removed.
+    /// Corners, as vertices of the joined mesh, of the triangle with this triangle number (see the module's
+    /// documentation). `None` if its model was removed.
     #[must_use]
     pub fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
         let place = |member: &Member| {
@@ -331,7 +352,7 @@ impl Models {
         self.iter().find_map(place)
     }
 
-    /// Number of a triangle of the joined mesh.
+    /// Converts the index of a triangle in the joined mesh to the number by which surface points refer to it.
     #[must_use]
     pub fn number_of(&self, triangle: u32) -> u32 {
         let of = |member: &&Member| member.triangles.contains(&(triangle as usize));
@@ -372,7 +393,7 @@ impl Models {
     pub fn parts(&self) -> Parts {
         let mut all = Parts::default();
         for member in self.iter() {
-            // `set_options` rejects names that select nothing.
+            // `parts` does not fail, because `push` and `set_options` accept only names of existing parts.
             let own = member.parts().unwrap_or_default();
             if !own.stays.is_empty() {
                 all.stays.resize(self.mesh.positions.len(), 0.0);
@@ -418,6 +439,18 @@ impl Models {
 }
 
 impl Member {
+    /// Vertices at rest: of the model, or of the mesh that stands for splats. `[n_vertices]`
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        self.stand_in.as_ref().map_or(&self.model.positions, |mesh| &mesh.positions)
+    }
+
+    /// Triangles of [`Self::positions`]. `[n_triangles]`
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        self.stand_in.as_ref().map_or(&self.model.triangles, |mesh| &mesh.triangles)
+    }
+
     fn selects(&self, name: &str) -> bool {
         name == WHOLE || self.model.select(name).is_ok()
     }
@@ -427,6 +460,10 @@ impl Member {
     /// # Errors
     /// If a name selects no part.
     pub fn parts(&self) -> Result<Parts, EditError> {
+        if self.stand_in.is_some() {
+            // Captures and point clouds have no parts.
+            return Ok(Parts::default());
+        }
         let of_parts = |names: &[String]| -> Vec<String> {
             names.iter().filter(|name| *name != WHOLE).cloned().collect()
         };

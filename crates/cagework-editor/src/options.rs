@@ -1,6 +1,33 @@
-//! Ranges of the numbers with which the user edits.
+//! Editing tools, and the ranges of their radii.
 
 use cagework_core::options::{Number, Slider};
+use serde::{Deserialize, Serialize};
+
+use crate::edit::{Element, Pivot};
+
+/// How clicks and gestures act on the cage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Tools {
+    /// Element type that a click selects.
+    pub element: Element,
+    /// Whether gestures also move the mirror images of the selected vertices.
+    pub symmetry: bool,
+    /// Centre of rotation and scaling.
+    pub pivot: Pivot,
+    /// Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
+    pub proportional: f64,
+    /// Whether vertices near the selection follow it.
+    pub proportional_on: bool,
+}
+
+impl Default for Tools {
+    fn default() -> Self {
+        let (element, pivot) = (Element::default(), Pivot::default());
+        Self { element, symmetry: false, pivot, proportional: 0.2, proportional_on: false }
+    }
+}
 
 /// Radius of proportional editing.
 pub const PROPORTIONAL: Number = Number {
@@ -20,3 +47,43 @@ pub const BRUSH: Number = Number {
     is_allowed: |radius| radius.is_finite() && radius > 0.0,
     slider: Some(Slider { min: 0.01, max: 0.3, step: 0.01 }),
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::edit::tests::{Flat, cube};
+    use crate::{Command, Contents, Editor};
+
+    #[test]
+    fn tools_of_the_person_stay_when_a_model_opens_and_those_of_the_model_are_reset() {
+        let mut editor = Editor::default();
+        let (element, pivot) = (Element::Face, Pivot::Last);
+        let tools = Tools { element, symmetry: true, pivot, proportional: 7.0, proportional_on: true };
+        editor.set_tools(tools, &Flat);
+        let view = editor.view();
+        assert_eq!((view.tools.proportional, view.unmatched), (1.0, 0), "the largest radius of PROPORTIONAL");
+        editor.open([], Contents::default());
+        let kept = Tools { element: Element::Vertex, symmetry: false, proportional: 1.0, ..tools };
+        assert_eq!(editor.tools(), kept);
+    }
+
+    #[test]
+    fn vertices_without_a_mirror_image_are_counted_while_editing_is_symmetric() {
+        let mut mesh = cube();
+        mesh.positions[1].y = 0.25;
+        let mut editor = Editor::default();
+        editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
+        assert_eq!(editor.view().unmatched, 0);
+        editor.set_tools(Tools { symmetry: true, ..Tools::default() }, &Flat);
+        assert_eq!(editor.view().unmatched, 2, "vertices 0 and 1 were images of each other");
+    }
+
+    #[test]
+    fn faces_are_selected_only_while_the_cage_is_reshaped() {
+        let mut editor = Editor::default();
+        editor.set_editing_rest(true);
+        editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &Flat);
+        editor.set_editing_rest(false);
+        assert_eq!(editor.tools().element, Element::Vertex);
+    }
+}

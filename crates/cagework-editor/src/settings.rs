@@ -7,9 +7,8 @@ use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
 use cagework_io::{MAX_SECONDS, SECONDS_PER_POSE, decode_pose, encode_pose};
 use glam::Vec3;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::controls::{CageControls, RestCage};
 use crate::document::{Document, NamedPose, Transition};
@@ -18,39 +17,39 @@ use crate::surface::SurfacePoint;
 
 /// Settings of a document in a project.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+#[serde(default)]
 pub struct DocumentSettings {
     /// Identifier of the built-in sample that the cage belongs to.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
-    /// Subdivision and interior controls; the controls are the last positions of the cage.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Subdivision and interior controls. The last positions of the project's cage mesh are those of the controls.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub controls: Option<CageControls>,
     /// The pose in the axes of the model's file: [`cagework_io::encode_pose`] in URL-safe base 64. Null at rest.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
     /// Surface points that pulls keep in place.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
-    /// Surface points that pulls keep in place, of each saved pose.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// For each saved pose, the surface points that pulls keep in place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_pins: Vec<Vec<SurfacePoint>>,
-    /// Share of each saved pose in the pose, 0 to 1.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Share of each saved pose in the current pose, 0 to 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_shares: Vec<f32>,
     /// Time from the previous pose to each saved pose, seconds. If empty, one second each.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_leads: Vec<f32>,
     /// How the animation of the saved poses goes from one to the next, and how it ends.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<Transition>,
-    /// Visibility, parts and painted amounts of each model.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Visibility, rigid parts and fixed areas of each model.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<MemberSettings>,
 }
 
 impl DocumentSettings {
-    /// Settings of a document.
+    /// Collects the settings of a document, as a project stores them.
     #[must_use]
     pub fn of(document: &Document) -> Self {
         let Document { cage, poses, shares, transition, pins, sample, has_sample_cage, models, .. } =
@@ -80,29 +79,16 @@ impl DocumentSettings {
     /// Reads the settings of a project; skips fields that cannot be read.
     #[must_use]
     pub fn read(text: &str) -> Self {
-        let given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
-        Self {
-            sample: field(&given, "sample"),
-            controls: field(&given, "controls"),
-            pose: field(&given, "pose"),
-            pins: field(&given, "pins").unwrap_or_default(),
-            pose_pins: field(&given, "pose_pins").unwrap_or_default(),
-            pose_shares: field::<Vec<f32>>(&given, "pose_shares")
-                .unwrap_or_default()
-                .into_iter()
-                .map(|share| share.clamp(0.0, 1.0))
-                .collect(),
-            pose_leads: field::<Vec<f32>>(&given, "pose_leads")
-                .unwrap_or_default()
-                .into_iter()
-                .map(|lead| lead.clamp(0.0, MAX_SECONDS))
-                .collect(),
-            transition: field::<Transition>(&given, "transition").map(Transition::within_limits),
-            models: field(&given, "models").unwrap_or_default(),
-        }
+        let mut given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
+        given.retain(|name, value| serde_json::from_value::<Self>(json!({ name: value })).is_ok());
+        let mut settings: Self = serde_json::from_value(given.into()).unwrap_or_default();
+        settings.pose_shares.iter_mut().for_each(|share| *share = share.clamp(0.0, 1.0));
+        settings.pose_leads.iter_mut().for_each(|lead| *lead = lead.clamp(0.0, MAX_SECONDS));
+        settings.transition = settings.transition.map(Transition::within_limits);
+        settings
     }
 
-    /// Merges these settings into `others`, a JSON object, and replaces fields of the same name.
+    /// Adds these settings to `others`, a JSON object, and replaces fields of the same name. Returns JSON text.
     #[must_use]
     pub fn beside(&self, others: &str) -> String {
         let mut all: Map<String, Value> = serde_json::from_str(others).unwrap_or_default();
@@ -147,7 +133,7 @@ impl DocumentSettings {
         poses.into_iter().enumerate().map(named).collect()
     }
 
-    /// The pose; `None` at rest. `[n_controls]`
+    /// Decodes the stored pose; `None` if the cage is at rest. `[n_controls]`
     ///
     /// # Errors
     /// A message for the user if the pose is damaged or belongs to another cage.
@@ -162,14 +148,8 @@ impl DocumentSettings {
     }
 }
 
-fn field<T: DeserializeOwned>(given: &Map<String, Value>, key: &str) -> Option<T> {
-    serde_json::from_value(given.get(key)?.clone()).ok()
-}
-
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]

@@ -9,14 +9,14 @@ use crate::models::Models;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SurfacePoint {
-    /// Number of the triangle; see [`Models`].
+    /// Number of the triangle, unique among all models that the document has ever contained.
     pub triangle: u32,
     /// Barycentric coordinates in the triangle.
     pub bary: [f32; 3],
 }
 
 impl SurfacePoint {
-    /// Position for `positions` of all vertices, `[n_vertices]`; `None` if the model was removed.
+    /// Position of the point when the vertices are at `positions`, `[n_vertices]`; `None` if the model was removed.
     #[must_use]
     pub fn at(&self, models: &Models, positions: &[Vec3]) -> Option<Vec3> {
         let corners = models.corners(self.triangle)?;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::document::Transition;
+use crate::options::Tools;
 use crate::surface::SurfacePoint;
 
 /// The part of a document that panels show. Meshes are read separately when their keys change.
@@ -10,19 +11,19 @@ use crate::surface::SurfacePoint;
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct DocumentView {
-    /// Changes with the models, their options and painted amounts.
+    /// Key that changes whenever the models, their options or the areas that the user fixed with the brush change.
     pub models: u64,
-    /// Changes with the models' joined mesh.
+    /// Key that changes whenever the models' joined mesh changes.
     pub mesh: u64,
-    /// Changes with the cage at rest.
+    /// Key that changes whenever the cage at rest changes.
     pub cage: u64,
-    /// Saved poses.
+    /// Names and times of the saved poses, in the order of the list.
     pub poses: Vec<PoseView>,
-    /// Share of each saved pose in the pose.
+    /// Share of each saved pose in the current pose.
     pub shares: Vec<f32>,
     /// How the animation of the saved poses goes from one to the next, and how it ends.
     pub transition: Transition,
-    /// Length of this animation, seconds.
+    /// Length of the animation of the saved poses, seconds.
     pub animation_seconds: f32,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
@@ -32,11 +33,15 @@ pub struct DocumentView {
     pub editing_rest: bool,
     /// Identifier of the built-in sample that is open.
     pub sample: Option<String>,
-    /// Whether the cage is the one of the sample.
+    /// Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
     pub sample_cage: bool,
-    /// The selection.
+    /// Number, last vertex and centre of the selected vertices.
     pub selected: SelectionView,
-    /// Changes with each step, undo and redo.
+    /// How clicks and gestures act on the cage.
+    pub tools: Tools,
+    /// Number of vertices without a mirror image, in symmetric editing; otherwise 0.
+    pub unmatched: usize,
+    /// Number of openings, steps, undos and redos so far.
     pub steps: u64,
     /// Label of the step that undo reverts.
     pub undo: Option<String>,
@@ -46,19 +51,21 @@ pub struct DocumentView {
     pub forgotten: usize,
 }
 
-/// A saved pose.
+/// A saved pose, as panels show it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct PoseView {
-    /// Name of the pose.
+    /// Name of the pose, as lists show it.
     pub name: String,
-    /// Whether the pose belongs to the current cage rather than a replaced one.
+    /// Whether the pose has one position per vertex and interior control of the current cage.
     pub fits: bool,
-    /// Time in the animation, seconds; 0 if the pose belongs to a replaced cage.
+    /// Time in the animation, seconds; 0 if `fits` is false.
     pub seconds: f32,
+    /// Hash of the positions, by which the page finds the pose's picture.
+    pub hash: u32,
 }
 
-/// The selection.
+/// The selected vertices, as panels show them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SelectionView {

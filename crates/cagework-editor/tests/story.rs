@@ -14,7 +14,7 @@ use cagework_io::{Interpolation, Model, read_project};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use glam::{DVec3, Vec3};
 
-/// A box of quads as an OBJ file.
+/// A model of a box of quads, read from OBJ text.
 fn block(name: &str, min: Vec3, max: Vec3) -> NewModel {
     let mesh = subdivided_box(Bounds { min, max }, 0.0, [3; 3]);
     let mut text = String::new();
@@ -106,12 +106,12 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let rest = &editor.document().cage.mesh.positions;
     let [left, up] = [0, 1].map(|k| editor.document().poses[k].positions.clone());
     for (k, p) in editor.document().pose.iter().enumerate() {
-        // Formula of a blend: rest + sum of share × offset.
+        // A blend is the rest position plus the sum of share × (pose - rest).
         let expected = rest[k] + 0.5 * (left[k] - rest[k]) + 0.25 * (up[k] - rest[k]);
         assert!(p.distance(expected) < 1e-5, "{p} {expected}");
     }
     step(&mut editor, &mut documents, Command::SetPoseTime { index: 1, seconds: 0.25 });
-    // The second pose now comes first, with its share of the blend.
+    // At 0.25 s the second pose precedes the first. Its share of the blend moves with it.
     assert_eq!(
         (times(&editor), editor.view().shares),
         (vec![("up".into(), 0.25), ("left".into(), 1.0)], vec![0.25, 0.5])
@@ -151,7 +151,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     editor.set_editing_rest(false);
     step(&mut editor, &mut documents, Command::RemoveModel { id: hat });
 
-    // Undo all steps, then redo them: every document must be equal.
+    // Undo all steps, then redo them. After each step the document must equal the recorded one.
     for k in (0..documents.len() - 1).rev() {
         assert!(editor.undo());
         assert_eq!(*editor.document(), documents[k], "undo to {k}");
@@ -172,7 +172,7 @@ fn times(editor: &Editor) -> Vec<(String, f32)> {
     editor.view().poses.into_iter().map(|pose| (pose.name, pose.seconds)).collect()
 }
 
-/// What plays is what is exported: the vertices of the exported clip are those of the model under the played cage.
+/// The vertices of the exported clip equal those of the model deformed by the cage that the editor plays.
 #[test]
 fn exported_animation_is_the_one_that_plays() {
     let mut editor = Editor::default();
@@ -208,7 +208,7 @@ fn exported_animation_is_the_one_that_plays() {
             let posed = player.at(Some(0), seconds, &[]);
             let exported = skin_vertices(&player.skin, &posed.palette, &posed.targets);
             let played = deformed(&editor.document().pose);
-            // The GLB may repeat vertices of the OBJ.
+            // Look for each exported vertex among all played ones, because the GLB may repeat vertices of the OBJ.
             for a in &exported {
                 let is_there = played.iter().any(|b| a.distance(*b) < 1e-3);
                 assert!(is_there, "{interpolation} at {seconds} s: {a}");
@@ -217,7 +217,7 @@ fn exported_animation_is_the_one_that_plays() {
     }
 }
 
-/// A document is the same after it was saved as a project and opened again.
+/// Asserts that a document is the same after it was saved as a project and opened again.
 fn assert_survives_saving(editor: &Editor, k: usize) {
     let (document, reopened) = (editor.document(), saved_and_opened(editor));
     assert_eq!(reopened.models.settings(), document.models.settings(), "{k}");
@@ -328,8 +328,8 @@ fn invalid_commands_change_nothing_and_return_errors() {
     for (command, sentence) in [
         (Command::SetPose { positions: vec![Vec3::ZERO; 3] }, "belongs to another cage"),
         (Command::SetPose { positions: nan }, "finite"),
-        (Command::ApplyPose { index: 4 }, "no pose number 5: 0 are saved"),
-        (Command::Blend { index: 0, share: 0.5 }, "no pose number 1"),
+        (Command::ApplyPose { index: 4 }, "pose 5 does not exist; saved poses: 0"),
+        (Command::Blend { index: 0, share: 0.5 }, "pose 1 does not exist"),
         (Command::RemoveModel { id: 9 }, "no such model"),
         (Command::SetPainted { id: 0, amounts: vec![1, 2] }, "2 amounts for 56 vertices"),
         (Command::EditRest { edit: RestEdit::SplitEdge }, "select an edge"),
@@ -363,8 +363,8 @@ fn history_is_bounded_by_bytes_and_counts_dropped_steps() {
         editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
         assert!(editor.commit(format!("cage {k}")));
     }
-    // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first step
-    // replaced no cage, so the four steps take 78 kB.
+    // A step that replaces a cage of 98 vertices takes 25 kB for the cage and 1 kB for its pose. The first of the four
+    // steps replaced no cage, so the history takes 3 * 26 = 78 kB.
     assert_eq!(editor.view().forgotten, 0);
     for k in 5..=9 {
         let mesh = subdivided_box(bounds, 0.1 * k as f32, [4; 3]);

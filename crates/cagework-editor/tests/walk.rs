@@ -1,7 +1,8 @@
 //! Random commands, undo and redo: documents are restored exactly. Damaged commands and projects are refused or
 //! applied, and leave a valid document. Nothing panics.
 //!
-//! `PROPTEST_CASES=100000 PROPTEST_RNG_SEED=5 cargo test -p cagework-editor --test walk` runs other and more sessions.
+//! `PROPTEST_CASES=100000 PROPTEST_RNG_SEED=5 cargo test -p cagework-editor --test walk` runs more sessions, from
+//! another seed.
 
 use cagework_core::{Bounds, subdivided_box};
 use cagework_editor::edit::SelectMode;
@@ -134,7 +135,7 @@ fn undo_and_redo_are_inverse(editor: &mut Editor) {
     assert!(!editor.redo());
 }
 
-/// Checks that the parts of a document fit each other, and makes its view.
+/// Checks that the parts of a document fit each other, and that its view and its timeline agree.
 fn is_valid(editor: &Editor) -> Result<(), TestCaseError> {
     let document = editor.document();
     prop_assert_eq!(document.pose.len(), document.cage.mesh.positions.len());
@@ -149,7 +150,7 @@ fn is_valid(editor: &Editor) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// A test runner that is deterministic unless the environment sets the number of cases or the seed.
+/// A test runner with this number of cases and a fixed seed, unless the environment sets either of them.
 fn runner(cases: u32) -> TestRunner {
     let is_set = |name: &str| std::env::var_os(name).is_some();
     let mut config = Config { failure_persistence: None, ..Config::default() };
@@ -189,7 +190,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
                     Act::Commit => {
                         let was_committed = editor.commit("step");
                         steps.set(steps.get() + usize::from(was_committed));
-                        // Undo restores a committed document exactly.
+                        // Undo and redo together restore a committed document exactly.
                         if was_committed {
                             let now = editor.document().clone();
                             prop_assert!(editor.undo() && editor.redo());

@@ -18,16 +18,17 @@ use crate::plan::Plan;
 use crate::sample::Sampler;
 use crate::stream::Stream;
 
-/// Approximate number of decades between the first delta and tau, for the progress bar.
+/// Approximate number of decades by which delta falls from the first sweep until it reaches [`BindOptions::tau`], for
+/// the progress bar.
 const JACOBI_DECADES: f32 = 4.0;
 
 /// Typical number of V-cycles per batch, for the progress bar.
 const USUAL_CYCLES: f32 = 5.0;
 
-/// What error messages call the allocated buffers.
+/// Name of the allocated buffers in error messages.
 const ALLOCATION_NAME: &str = "the fields of a bind";
 
-/// What the GPU's solve leaves besides the sampled weights.
+/// Statistics of a solve on the GPU.
 struct Outcome {
     report: SolveReport,
     iterations: u32,
@@ -37,8 +38,8 @@ struct Outcome {
     allocated: u64,
 }
 
-/// [`cagework_core::bind()`] on the GPU: same grid, stencils and assembly; weights agree to 1e-4. The weights
-/// are also left on the GPU.
+/// [`cagework_core::bind()`] on the GPU, with the same grid, stencils and assembly. The weights differ from those of
+/// the CPU by less than 1e-4. Also returns the weights as GPU buffers for deformation.
 ///
 /// `options.memory_limit` applies to the GPU's buffers and to the CPU's arrays separately.
 ///
@@ -56,10 +57,11 @@ pub async fn bind_gpu<'a>(
     Ok((binding, weights))
 }
 
-/// Like [`bind_gpu`], without leaving the weights on the GPU.
+/// Like [`bind_gpu`], without uploading the weights for deformation.
 ///
-/// # Errors Those of a bind; [`crate::PlanError`] if the bind does not fit into memory; [`GpuError::Solver`] for
-/// conjugate gradients; errors of the GPU.
+/// # Errors
+/// [`GpuError::Bind`] as [`cagework_core::bind()`]; [`GpuError::Plan`] if the bind does not fit into memory;
+/// [`GpuError::Solver`] for conjugate gradients; other variants for errors of the GPU.
 pub async fn bind_on<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,
@@ -83,7 +85,7 @@ pub async fn bind_on<'a>(
     Ok(prepared.finish(solved, &watch)?)
 }
 
-/// Solves all columns. Returns the input of [`PreparedBind::finish`].
+/// Solves for all columns and samples the weights. Returns the input of [`PreparedBind::finish`].
 async fn solve_and_sample(
     prepared: &PreparedBind<'_>,
     options: &BindOptions,

@@ -12,23 +12,24 @@ const MIN_BYTES: u64 = 16;
 
 /// Allocates the buffers and textures of one object and detects failures.
 ///
-/// Errors of the GPU arrive late, after all submitted frames. So everything is created and filled without
-/// waiting, and [`Self::settle`] checks once for all errors since [`Self::new`]. Waiting for each buffer
-/// delayed opening a page on a software GPU by 2 s.
+/// The GPU reports an error only after it has executed all previously submitted work. Buffers are therefore created and
+/// filled without waiting, and [`Self::settle`] checks once for all errors since [`Self::new`]. Waiting for each buffer
+/// would delay opening a page on a software GPU by 2 s.
 #[derive(Debug)]
 #[must_use = "allocation errors are reported by settle"]
 pub struct Allocator<'a> {
     context: &'a GpuContext,
     what: &'static str,
     allocated: u64,
-    /// Error scopes, which must be popped in the reverse of the order in which they were pushed.
+    /// Scope for out-of-memory errors, pushed last and therefore popped first.
     memory: wgpu::ErrorScopeGuard,
+    /// Scope for validation errors.
     refused: wgpu::ErrorScopeGuard,
 }
 
 impl<'a> Allocator<'a> {
-    /// Begins an allocation. `what`: name of the object in error messages. Until [`Self::settle`], nothing may be
-    /// awaited, because the error scopes belong to the device.
+    /// Begins an allocation. `what`: name of the object in error messages. Await nothing until [`Self::settle`]: error
+    /// scopes are a stack of the device, on which other tasks would meanwhile push and pop scopes of their own.
     pub fn new(context: &'a GpuContext, what: &'static str) -> Self {
         let refused = context.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = context.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -54,7 +55,7 @@ impl<'a> Allocator<'a> {
         Ok(self.allocated)
     }
 
-    /// Adds memory that was allocated elsewhere to the total, bytes.
+    /// Adds `bytes` of memory that were allocated elsewhere to the total.
     pub(crate) fn count(&mut self, bytes: u64) {
         self.allocated += bytes;
     }
@@ -122,7 +123,7 @@ pub struct Readback {
 }
 
 impl Readback {
-    /// Waits for `submission`, which copies results into this buffer, and passes the first `bytes` to `take`.
+    /// Waits for `submission`, which copies results into this buffer, and passes the first `bytes` bytes to `take`.
     pub(crate) async fn read<T>(
         &self,
         context: &GpuContext,

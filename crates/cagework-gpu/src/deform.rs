@@ -1,5 +1,5 @@
-//! Deforms the mesh: weights stay on the GPU, only the cage's pose is uploaded, and positions and normals are
-//! written to the vertex buffers for drawing.
+//! Deforms the mesh. The weights are uploaded once; a frame uploads only the cage's pose, and kernels write positions
+//! and normals to the vertex buffers for drawing.
 
 use bytemuck::Pod;
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, SLICE, SlicedWeights};
@@ -16,10 +16,11 @@ use crate::layout::Work;
 use crate::pipelines::Launch;
 use crate::skin::Skinner;
 
-/// Stride of dispatch parameters, bytes: the baseline's alignment of dynamic offsets.
+/// Stride of dispatch parameters, bytes: WebGPU's baseline alignment of dynamic offsets.
 const WORK_STRIDE: u64 = 256;
 
-/// Weights per upload, before rounding up to a slice: blocks a page's main thread for about 10 ms.
+/// Maximum number of weights per upload, before the rows are rounded up to whole slices of [`SlicedWeights`]. Such an
+/// upload blocks a page's main thread for 10 ms.
 const WEIGHTS_PER_UPLOAD: u32 = 1 << 19;
 
 /// Weights of a bind on the GPU.
@@ -43,14 +44,14 @@ struct WeightChunk {
 }
 
 impl GpuWeights {
-    /// Uploads weights. Columns: the controls, then `frames`.
+    /// Uploads weights. Their first columns belong to the controls, the remaining ones to `frames`.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub async fn new(context: &GpuContext, weights: &Weights, frames: &Frames) -> Result<Self, GpuError> {
         let n_vertices = weights.n_rows();
         let mut allocator = Allocator::new(context, "the weights");
-        // In the worst case each weight takes a place in every bundle of its slice.
+        // In the worst case each weight lengthens all bundles of its slice by an entry.
         let most = WEIGHTS_PER_UPLOAD
             .min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
         let (mut chunks, mut bytes, mut begin) = (Vec::new(), 0, 0);
@@ -100,7 +101,8 @@ pub struct Deformer {
     normals: wgpu::Buffer,
     /// Kernels with their dispatch sizes, in order of execution. The last kernel computes the normals.
     steps: Vec<Step>,
-    /// Moves parts that stay in place or are rigid, before the normals are computed; `None` if there are no such parts.
+    /// Replaces the deformed positions of fixed and rigid parts before the normals are computed; `None` if there are no
+    /// such parts.
     holder: Option<Holder>,
     frames: Frames,
     n_vertices: u32,
@@ -175,10 +177,10 @@ impl Deformer {
         self.steps.push((launch, offset as u32, groups));
     }
 
-    /// Uploads the cage's pose, `[n_cage]`, object units, for subsequent calls of [`Self::encode`].
+    /// Uploads the positions of the controls, `[n_controls]`, object units, for subsequent calls of [`Self::encode`].
     ///
     /// # Panics
-    /// If the number of positions differs from the number of cage vertices.
+    /// If the number of positions differs from the number of controls.
     pub fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
         let columns = self.frames.columns(cage_positions);
         assert_eq!(columns.len(), self.n_columns as usize, "one position per cage vertex");

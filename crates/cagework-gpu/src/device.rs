@@ -1,4 +1,4 @@
-//! Opens a GPU: selects the adapter, limits its use, and records faults.
+//! Opens a GPU: selects the adapter, requests its limits, and records device losses and errors.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -10,7 +10,8 @@ use crate::pipelines::Pipelines;
 /// Environment variable that selects an adapter by part of its name.
 pub const ADAPTER_VARIABLE: &str = "CAGEWORK_ADAPTER";
 
-/// Timeout for one slice of work, s. Slices are sized for 50 ms; slow software adapters under load take longer.
+/// Timeout of the wait for a submission, s. [`crate::stream`] sizes submissions for 50 ms; slow software adapters under
+/// load take longer.
 const WAIT_LIMIT_S: u64 = 120;
 
 /// Options for opening a GPU.
@@ -18,7 +19,7 @@ const WAIT_LIMIT_S: u64 = 120;
 pub struct ContextOptions {
     /// Part of the adapter's name. By default the environment's `CAGEWORK_ADAPTER`, or the fastest adapter.
     pub adapter: Option<String>,
-    /// Upper limit on storage bindings in plans, bytes. For tests.
+    /// Upper limit on the size of a storage binding in memory plans, bytes. For tests.
     pub max_binding_bytes: Option<u64>,
     /// Only draw, as in a browser without WebGPU. For tests; needs the feature `webgl`.
     pub draws_only: bool,
@@ -50,7 +51,7 @@ pub struct GpuContext {
 struct Fault {
     lost: OnceLock<String>,
     refused: OnceLock<String>,
-    /// Channels that report a device loss to those who wait for one.
+    /// Senders that report a device loss to the receivers of [`GpuContext::lost`].
     waiting: Mutex<Vec<oneshot::Sender<String>>>,
 }
 
@@ -141,7 +142,7 @@ impl GpuContext {
         })
     }
 
-    /// Creates a texture that passes draw on. `used`: what else it is used for.
+    /// Creates a texture that render passes draw on. `used`: further usages of the texture.
     pub(crate) fn target(
         &self,
         label: &str,
@@ -162,8 +163,8 @@ impl GpuContext {
         })
     }
 
-    /// Whether the device only draws. Then deformation runs on the CPU, and shaders read tables from
-    /// textures. Fixed when the device is opened.
+    /// Whether the device only draws. If so, deformation runs on the CPU, and shaders read tables from textures. Fixed
+    /// when the device is opened.
     #[must_use]
     pub fn draws_only(&self) -> bool {
         // The value is constant in each of the page's two builds, so the compiler drops the code of the other build.
@@ -250,13 +251,14 @@ pub fn instance() -> wgpu::Instance {
         // synchronise by themselves.
         descriptor.backend_options.gl.fence_behavior = wgpu::GlFenceBehavior::AutoFinish;
     } else {
-        // Without GLES, which lacks features that the kernels need and would list the same GPUs again.
+        // Leave out GLES, which lacks features that the kernels need and would list the same GPUs again.
         descriptor.backends = wgpu::Backends::PRIMARY;
     }
     wgpu::Instance::new(descriptor)
 }
 
-/// WebGPU's baseline limits, except for the sizes of buffers, which are the adapter's: memory plans adapt to them.
+/// Baseline limits of WebGPU, or of WebGL2 if `draws_only`. Limits on buffer sizes, to which memory plans adapt, and on
+/// sizes of WebGL2 textures are the adapter's.
 fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
     if draws_only {
         let baseline = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(offered.clone());

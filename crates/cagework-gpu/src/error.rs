@@ -1,4 +1,4 @@
-//! Errors of the GPU. In every case, the CPU can do the same work.
+//! Errors of operations on the GPU. Binding and deformation can then run on the CPU instead.
 
 use cagework_core::options::Solver;
 use cagework_core::{BindError, Cancelled};
@@ -17,7 +17,7 @@ pub enum GpuError {
         /// Reason given by the platform.
         reason: String,
     },
-    /// No GPU has the requested name.
+    /// No GPU has a name that contains the requested text.
     #[error("no GPU name contains {wanted:?}; available: {found}")]
     UnknownAdapter {
         /// Requested part of a name.
@@ -69,22 +69,22 @@ pub enum GpuError {
         /// What is inconsistent.
         reason: String,
     },
-    /// A software rasteriser would take minutes for this picture.
+    /// The overdraw of the picture exceeds the limit for software rasterisers.
     #[error(
         "the model's {triangles} triangles cover {pixels:.1e} pixels in total, counting overlaps; without a graphics card the limit is {limit:e}: use a smaller picture or a machine with a GPU"
     )]
     Layers {
-        /// Number of triangles.
+        /// Number of triangles of the model.
         triangles: usize,
         /// Sum of the pixels covered by each triangle.
         pixels: f64,
-        /// Maximum of `pixels`.
+        /// Largest allowed value of `pixels`.
         limit: f64,
     },
     /// A required object has not been set.
     #[error("no {missing} has been set: load one first")]
     NotReady {
-        /// The missing object.
+        /// Name of the missing object, such as `model`.
         missing: &'static str,
     },
     /// The solver is not implemented on the GPU.

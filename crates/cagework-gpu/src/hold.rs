@@ -1,4 +1,5 @@
-//! Applies, on the GPU, parts that stay in place or are rigid: after the deformation, before the normals.
+//! Replaces the deformed positions of fixed and rigid parts of the mesh. Runs on the GPU after the deformation and
+//! before the computation of normals.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// The parts of one mesh that stay in place or are rigid, on the GPU.
+/// GPU data of the parts of one mesh that stay in place or are rigid.
 #[derive(Debug)]
 pub(crate) struct Holder {
     parts: Arc<BoundParts>,
@@ -52,7 +53,7 @@ impl Holder {
         Ok(Self { parts, motions, launch, groups })
     }
 
-    /// Uploads the motions of the pieces for a pose. `controls`: `[n_columns]`, object units.
+    /// Uploads the motions of the rigid pieces for a pose. `controls`: positions, `[n_controls]`, object units.
     pub(crate) fn pose(&self, context: &GpuContext, controls: &[Vec3]) {
         let motions = self.parts.motions(controls);
         if !motions.is_empty() {
@@ -60,7 +61,7 @@ impl Holder {
         }
     }
 
-    /// Records the kernel that applies the parts.
+    /// Records the kernel that replaces the positions of the parts' vertices.
     pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
         pass.set_pipeline(&self.launch.pipeline);
         pass.set_bind_group(0, &self.launch.bind_group, &[0]);

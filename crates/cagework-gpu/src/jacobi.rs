@@ -1,7 +1,8 @@
-//! Jacobi smoothing on the GPU: the paper's Algorithm 3 with Eq. 2 as stopping criterion.
+//! Jacobi sweeps on the GPU: Algorithm 3 of K. Smith's paper (`docs/method.md`, sources), with Eq. 2 as stopping rule.
 //!
-//! Unlike the paper, two fields are swapped instead of copied, and only delta is read back, once every
-//! [`SWEEPS_PER_CHECK`] sweeps. Eq. 2 couples all columns of a cell, so the fields of all batches are kept, and every
+//! Eq. 2 stops the sweeps when delta, the mean change of a cell's weights in a sweep, falls below tau. Unlike in the
+//! paper, two fields are swapped instead of copied, and only delta is read back, once every [`SWEEPS_PER_CHECK`]
+//! sweeps. Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, and every
 //! batch adds its changes to one shared buffer with a value per cell.
 
 use cagework_core::options::DeltaNorm;
@@ -19,7 +20,7 @@ use crate::pipelines::Launch;
 use crate::plan::Plan;
 use crate::stream::Stream;
 
-/// Number of sweeps between checks of delta. It does not depend on times, so that results are reproducible.
+/// Number of sweeps between checks of delta. It is not adapted to measured times, so that results are reproducible.
 pub const SWEEPS_PER_CHECK: u32 = 10;
 
 /// Fields of all batches, and the kernels bound to them.
@@ -86,7 +87,8 @@ impl Jacobi {
         })
     }
 
-    /// Sweeps until delta falls below tau. Calls `checked(stream, sweeps, delta)` after each check.
+    /// Sweeps until delta falls below the tau of `rule`, or stops falling because of rounding, or the maximum number of
+    /// iterations is reached. Calls `checked(stream, sweeps, delta)` after each check.
     ///
     /// # Errors
     /// If cancelled, or on errors of the GPU.

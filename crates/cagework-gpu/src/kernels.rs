@@ -21,7 +21,7 @@ pub struct Kernel {
     pub name: &'static str,
     /// Complete source of the shader in WGSL.
     pub wgsl: &'static str,
-    /// Invocations per workgroup. All kernels are one-dimensional.
+    /// Number of invocations per workgroup. All kernels are one-dimensional.
     pub workgroup: u32,
     /// Bindings, in order.
     pub bindings: &'static [Binding],
@@ -51,13 +51,13 @@ macro_rules! kernels {
 }
 
 kernels! {
-    /// Gauss-Seidel on one colour, in place.
+    /// Gauss-Seidel sweep over the rows of one colour, in place.
     RELAX_CELLS = "relax_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Jacobi smoothing: the paper's smoothing step.
+    /// Jacobi sweep: the smoothing step of K. Smith's paper (`docs/method.md`, sources).
     JACOBI_CELLS = "jacobi_cells" + ["work"], 64, 40, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
-    /// Sums the changes of each cell over columns: the inner sum of Eq. 2.
+    /// Sums the changes of each cell over columns: the inner sum of the paper's Eq. 2.
     CHANGE_NORMS = "change_norms" + ["work"], 64, 64, &[Uniform, Read, Read, ReadWrite];
-    /// Computes the residual of the red rows.
+    /// Computes the residual of the red rows, the first colour of the red-black ordering.
     RESIDUAL = "residual" + ["work"], 64, 44, &[Uniform, Read, Read, Read, Read, Read, ReadWrite];
     /// Restricts the residual to the coarse right-hand side.
     RESTRICT_RESIDUAL = "restrict_residual" + ["work"], 64, 69, &[Uniform, Read, Read, ReadWrite];
@@ -65,28 +65,28 @@ kernels! {
     PROLONG_CORRECTION = "prolong_correction" + ["work"], 64, 24, &[Uniform, Read, Read, ReadWrite];
     /// Computes partial sums of squares.
     SUM_SQUARES = "sum_squares" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Partial sums of roots: outer sum of Eq. 2.
+    /// Computes partial sums of square roots, for the outer sum of the paper's Eq. 2.
     SUM_ROOTS = "sum_roots" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
-    /// Adds partial sums up.
+    /// Adds up partial sums.
     REDUCE_SUM = "reduce_sum" + ["work", "reduce"], 256, 0, &[Uniform, Read, ReadWrite];
     /// Samples weights at mesh vertices.
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Computes deformed positions.
     DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Applies held and rigid parts to deformed positions.
+    /// Replaces the deformed positions of fixed vertices and rigid pieces.
     HOLD_PARTS = "hold_parts" + ["work"], 64, 16, &[Uniform, Read, Read, Read, ReadWrite];
     /// Computes skinned positions.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
     /// Adds the cage's displacement field to skinned positions.
     BEND_VERTICES = "bend_vertices" + ["work", "field"], 64, 12, &[Uniform, Read, ReadWrite];
     /// Deforms splats.
-    DEFORM_SPLATS = "deform_splats" + ["work", "field"], 64, 80, &[Uniform, Read, Read, ReadWrite];
-    /// Counts the splats of each block and bin of depth.
-    COUNT_SPLATS = "count_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, ReadWrite];
-    /// Computes the places of blocks and bins.
+    DEFORM_SPLATS = "deform_splats" + ["work", "field"], 64, 80, &[Uniform, Read, Read, ReadWrite, ReadWrite];
+    /// Counts the splats of each block by the value of a digit of their depth.
+    COUNT_SPLATS = "count_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, Read, ReadWrite];
+    /// Computes where the splats of each block and bin start in the sorted order.
     SCAN_SPLATS = "scan_splats" + ["work", "depths"], 128, 8192, &[Uniform, Read, ReadWrite];
-    /// Writes splats in the order of their bins.
-    SCATTER_SPLATS = "scatter_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, Read, ReadWrite, ReadWrite];
+    /// Writes splats in the order of their bins, with their colours as seen by the eye.
+    SCATTER_SPLATS = "scatter_splats" + ["work", "depths", "harmonics"], 64, 8192, &[Uniform, Read, Read, Read, Read, ReadWrite, Read, Read, ReadWrite];
     /// Computes normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];
 }

@@ -6,17 +6,17 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Work {
-    /// First item of the dispatch.
+    /// Index of the first item of the dispatch.
     pub first: u32,
     /// Number of items of the dispatch.
     pub count: u32,
-    /// Invocations per row of workgroups; further rows are along y.
+    /// Number of invocations per row of workgroups; further rows are along y.
     pub stride: u32,
-    /// Quads per row of a field: columns of the batch / 4.
+    /// Number of quads per row of a field: the number of the batch's columns / 4.
     pub n_quads: u32,
-    /// Offset of items: first row of a field, or first slot of a result.
+    /// Row of the field, or slot of the result, that belongs to item 0.
     pub first_row: u32,
-    /// First quad of the batch.
+    /// Number of quads in all batches before the current one. A quad is four columns.
     pub first_quad: u32,
     /// Variant of a kernel, see [`mode`].
     pub mode: u32,
@@ -34,4 +34,10 @@ pub mod mode {
     pub const CHANGE_FIRST: u32 = 2;
     /// Mode of `prolong_correction`: overwrite values by the mean of their coarse neighbours.
     pub const PROLONG_REPLACE: u32 = 1;
+    /// Mode of `deform_splats`: also compute rotations.
+    pub const WITH_TURNS: u32 = 1;
+    /// Mode of `count_splats` and `scatter_splats`: sort by the lower digit of the depth.
+    pub const LOWER_DIGIT: u32 = 0;
+    /// Mode of `count_splats` and `scatter_splats`: sort by the higher digit, after the sort by the lower digit.
+    pub const HIGHER_DIGIT: u32 = 1;
 }

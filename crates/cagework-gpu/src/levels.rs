@@ -54,7 +54,7 @@ impl GpuLevel {
         })
     }
 
-    /// Allocates a field of zeros.
+    /// Allocates a field of zeros for `n_quads` quads of columns.
     pub(crate) fn field(
         &self,
         allocator: &mut Allocator<'_>,
@@ -63,7 +63,7 @@ impl GpuLevel {
         allocator.storage("field", u64::from(self.n_rows) * u64::from(n_quads) * QUAD_BYTES)
     }
 
-    /// Allocates a right-hand side.
+    /// Allocates a right-hand side of zeros for `n_quads` quads of columns.
     pub(crate) fn rhs(&self, allocator: &mut Allocator<'_>, n_quads: u32) -> Result<wgpu::Buffer, GpuError> {
         allocator.storage("right-hand side", u64::from(self.n_rhs) * u64::from(n_quads) * QUAD_BYTES)
     }
@@ -88,8 +88,8 @@ impl GpuTransfer {
     }
 }
 
-/// Uploads the boundary values of columns `first_column..first_column + n_lanes` on level k: one row per cut
-/// cell on the finest level, the cells' rows on coarser ones. `values` is scratch space.
+/// Uploads the boundary values of columns `first_column..first_column + n_lanes` on level k. The finest level has one
+/// row per cut cell, coarser levels have one row per row of their fields. `values` is scratch space.
 pub(crate) fn upload_rhs(
     context: &GpuContext,
     hierarchy: &Hierarchy,

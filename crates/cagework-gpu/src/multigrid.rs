@@ -1,7 +1,7 @@
 //! Full multigrid with V(2,1) cycles, batch by batch: the algorithm of `cagework_core::solve::multigrid`.
 //!
-//! Each cycle reads back two numbers: squared norms of the coarse correction (delta of the stop rule) and of
-//! the residual.
+//! Each cycle reads back two numbers: the squared norm of the coarse correction, from which delta (the remaining error)
+//! is estimated, and the squared norm of the residual.
 
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, Convergence, OMEGA};
@@ -57,9 +57,9 @@ struct CoarseTransfer {
 /// Kernels for sums of squares on the finest level.
 #[derive(Debug)]
 enum Squares {
-    /// Sums the red residuals and the coarse correction.
+    /// Sums the squares of the red residuals and of the coarse correction.
     Levels { residual: Launch, correction: Launch, sum: Launch },
-    /// Sums the change from the values saved in `before`, if there is only one level.
+    /// Sums the squares of the changes from the values saved in `before`, if there is only one level.
     Single { before: wgpu::Buffer, changes: Launch, sum: Launch },
 }
 
@@ -86,8 +86,8 @@ impl Multigrid {
             );
             levels.push(LevelWork { level, field, rhs, relax, coarser: None });
         }
-        // All levels share this buffer for the residuals of red rows. Each level writes the row of zeros that follows
-        // its red rows.
+        // All levels share one buffer for the residuals of red rows, which has the size of the finest level's. Each
+        // level also writes the row of zeros that follows its red rows.
         let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
         let numbers = allocator.storage("numbers", 8)?;
         let squares = if levels.len() == 1 {
@@ -119,14 +119,14 @@ impl Multigrid {
         Ok(Self { n_quads, levels, squares, numbers, readback, scratch: Vec::new() })
     }
 
-    /// Field of the finest level.
+    /// Field of the finest level, which contains the solution of the latest batch.
     #[must_use]
     pub fn field(&self) -> &wgpu::Buffer {
         &self.levels[0].field
     }
 
-    /// Solves the batch that starts at `first_column`. The report can be `stalled`. Calls `cycle_done(stream,
-    /// cycle, delta)` after each cycle.
+    /// Solves the batch that starts at `first_column`. In the report, `stalled` is true if conjugate gradients should
+    /// continue the solve. Calls `cycle_done(stream, cycle, delta)` after each cycle.
     ///
     /// # Errors
     /// If cancelled, or on errors of the GPU.
@@ -282,12 +282,13 @@ impl CoarseTransfer {
     }
 }
 
-/// Workgroups for reducing `count` values.
+/// Number of workgroups that reduce `count` values.
 pub(crate) fn n_groups(count: u32) -> u32 {
     count.div_ceil(REDUCE_VALUES as u32)
 }
 
-/// Sums `count` values with the kernel `partial` (squares or roots) and stores the sum in `slot`.
+/// Sums the squares or roots of `count` values with the kernels `partial` and `sum`. Stores the result in element
+/// `slot` of the buffer that `sum` writes.
 pub(crate) async fn sum_into(
     stream: &mut Stream<'_>,
     partial: &Launch,

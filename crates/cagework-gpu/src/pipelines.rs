@@ -26,7 +26,8 @@ pub struct Launch {
 }
 
 impl Launch {
-    /// Workgroups for `count` invocations, and invocations per row of workgroups, as the number per axis is limited.
+    /// Number of workgroups along x and y for `count` invocations, and number of invocations per row of workgroups.
+    /// There are several rows if `count` exceeds the limit on workgroups per axis.
     pub(crate) fn groups(&self, count: u32) -> ([u32; 2], u32) {
         /// Baseline limit on workgroups per axis.
         const MAX_GROUPS: u32 = 65_535;
@@ -38,7 +39,7 @@ impl Launch {
 }
 
 impl Pipelines {
-    /// Creates all pipelines.
+    /// Creates the pipelines of all kernels now, instead of on first use.
     pub(crate) fn make_all(&self, device: &wgpu::Device) {
         for (slot, kernel) in self.0.iter().zip(ALL) {
             slot.get_or_init(|| Pipeline::new(device, kernel));

@@ -6,16 +6,16 @@ use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::stencil::REDUCE_VALUES;
 use thiserror::Error;
 
-/// Bytes of four columns of a row.
+/// Bytes of a quad: the values of a row in four columns.
 const QUAD_BYTES: u64 = 16;
 
-/// Maximum columns of a batch. Larger batches are not faster, and the sampled block is read back at once.
+/// Maximum number of columns of a batch. Larger batches are not faster, but enlarge the block that is read back.
 pub const MAX_LANES: u64 = 128;
 
 /// Batch size and memory of a bind on the GPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Columns per batch, a multiple of 4.
+    /// Number of columns per batch, a multiple of 4.
     pub n_lanes: u32,
     /// Number of batches.
     pub n_batches: u32,
@@ -27,7 +27,7 @@ pub struct Plan {
     pub field_bytes: u64,
 }
 
-/// Error of planning a bind.
+/// Why a bind does not fit into the GPU's memory.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
     /// An array exceeds the binding limit.
@@ -37,9 +37,9 @@ pub enum PlanError {
     Binding {
         /// Name of the array.
         what: &'static str,
-        /// Size in bytes.
+        /// Size of the array, bytes.
         needed: u64,
-        /// Limit in bytes.
+        /// Largest size of a buffer that the GPU can bind, bytes.
         limit: u64,
     },
     /// The total exceeds the memory limit.
@@ -48,20 +48,21 @@ pub enum PlanError {
         needed >> 20, limit >> 20
     )]
     Memory {
-        /// Memory with the smallest batches, bytes.
+        /// Memory that a bind with the smallest batches needs, bytes.
         needed: u64,
-        /// Limit in bytes.
+        /// Limit on the GPU memory of a bind, bytes.
         limit: u64,
     },
 }
 
-/// Quantities that determine the plan.
+/// Sizes of tables and arrays, from which the plan is computed.
 struct Sizes {
     /// Names and bytes of the largest tables.
     tables: Vec<(&'static str, u64)>,
-    /// Total rows of all arrays of a batch. Jacobi keeps the arrays of all batches, multigrid those of one batch.
+    /// Total number of rows of all arrays of a batch. Jacobi keeps the arrays of all batches, multigrid those of one
+    /// batch.
     rows: u64,
-    /// Rows of the largest array.
+    /// Number of rows of the largest array.
     largest_rows: u64,
     /// Memory independent of the number of columns, bytes.
     other_bytes: u64,
@@ -123,7 +124,7 @@ impl Plan {
         self.table_bytes + self.field_bytes
     }
 
-    /// Quads (of four columns) per batch.
+    /// Number of quads (of four columns) per batch.
     #[must_use]
     pub fn n_quads(&self) -> u32 {
         self.n_lanes / 4
@@ -145,8 +146,8 @@ impl Sizes {
             .sum();
         let rows = match solver {
             Solver::Jacobi => 2 * n_rows + n_cut,
-            // Count field, red residuals and right-hand side of the finest level, and two fields per coarse level. A
-            // single level also keeps the previous field.
+            // With a single level: the field, the previous field, and the right-hand side. With more levels: the field,
+            // the red residuals and the right-hand side of the finest level, and two fields per coarse level.
             _ if coarse_rows == 0 => 2 * n_rows + n_cut,
             _ => n_rows + red_rows + n_cut + 2 * coarse_rows,
         };

@@ -42,15 +42,17 @@ pub struct Session {
     controls: Option<ControlSet>,
     pose: Vec<Vec3>,
     bound: Option<SessionBind>,
-    /// Parts of the model that are held in place or rigid.
+    /// Parts of the model that stay in place or are rigid.
     parts: Parts,
     /// Skinning of the model while a clip plays.
     playing: Option<Skinner>,
-    /// Whether the cage moved since the last deformation.
+    /// Whether the mesh follows the cage although a clip plays.
+    interrupted: bool,
+    /// Whether pose, skin or parts changed since the last recorded deformation.
     moved: bool,
 }
 
-/// Weights on the CPU and GPU.
+/// Weights of a bind, on the CPU and on the GPU.
 #[derive(Debug)]
 struct SessionBind {
     kind: Coordinates,
@@ -77,6 +79,7 @@ impl Session {
             bound: None,
             parts: Parts::default(),
             playing: None,
+            interrupted: false,
             moved: false,
         }
     }
@@ -109,7 +112,7 @@ impl Session {
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
         self.update_bounds();
-        // The scene may ask for a wireframe since before the model was set.
+        // The scene may have requested a wireframe before there was a model.
         self.write_scene();
         Ok(())
     }
@@ -128,7 +131,7 @@ impl Session {
         Ok(())
     }
 
-    /// The cage in its rest pose.
+    /// The cage in its rest pose; `None` before a cage is set.
     #[must_use]
     pub fn cage(&self) -> Option<&Cage> {
         self.controls.as_ref().map(ControlSet::cage)
@@ -156,7 +159,7 @@ impl Session {
         Ok(binding.report)
     }
 
-    /// Uses weights of harmonic coordinates that were computed elsewhere.
+    /// Replaces the weights by weights of harmonic coordinates that were computed elsewhere, such as in a worker.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if sizes do not match them;
@@ -215,7 +218,7 @@ impl Session {
         self.bound.as_ref().map(|b| b.weights.as_ref())
     }
 
-    /// Meaning of the columns after those of the controls, if bound.
+    /// Frames that define the columns of the weights after those of the controls; `None` before a bind.
     #[must_use]
     pub fn frames(&self) -> Option<&Frames> {
         self.bound.as_ref().map(|b| b.frames.as_ref())
@@ -235,7 +238,7 @@ impl Session {
         }
     }
 
-    /// Sets which splats are floaters: outside the cage.
+    /// Sets the indices of the floaters, which are the splats outside the cage.
     pub fn set_floaters(&mut self, floaters: &[u32]) {
         self.renderer.set_floaters(&self.context, floaters);
     }
@@ -264,7 +267,7 @@ impl Session {
     /// Sets the scene to draw.
     pub fn set_scene(&mut self, scene: SceneOptions) {
         let is_other = |a: &SceneOptions, b: &SceneOptions| {
-            (a.mesh, a.weights_to_one) != (b.mesh, b.weights_to_one)
+            (a.mesh, a.view.weights_to_one) != (b.mesh, b.view.weights_to_one)
                 || a.greyed.as_ref().map(Arc::as_ptr) != b.greyed.as_ref().map(Arc::as_ptr)
         };
         let other_values = is_other(&scene, &self.scene);
@@ -275,7 +278,7 @@ impl Session {
         }
     }
 
-    /// The current scene.
+    /// Options of the scene that frames show.
     #[must_use]
     pub fn scene(&self) -> &SceneOptions {
         &self.scene
@@ -317,7 +320,7 @@ impl Session {
     pub fn value_range(&self) -> Option<[f32; 2]> {
         let weights = self.weights()?;
         match self.scene.mesh {
-            MeshStyle::Weights { .. } if self.scene.weights_to_one => Some([0.0, 1.0]),
+            MeshStyle::Weights { .. } if self.scene.view.weights_to_one => Some([0.0, 1.0]),
             MeshStyle::Weights { column } => {
                 Some([0.0, weights.column(column).fold(colormap::MIN_WEIGHT_RANGE, f32::max)])
             }
@@ -332,7 +335,7 @@ impl Session {
         &self.camera
     }
 
-    /// The camera, mutable.
+    /// Mutable access to the camera, to change the view.
     pub fn camera_mut(&mut self) -> &mut Camera {
         &mut self.camera
     }
@@ -355,6 +358,12 @@ impl Session {
         }
     }
 
+    /// Puts the floor below `bounds` and sets the camera's depth range to contain them, until a model or cage is set.
+    pub fn set_floor(&mut self, bounds: Bounds) {
+        self.camera.set_scene(bounds);
+        self.renderer.set_bounds(bounds);
+    }
+
     fn update_bounds(&mut self) {
         if let Some(bounds) = self.bounds() {
             self.camera.set_scene(bounds);
@@ -365,7 +374,8 @@ impl Session {
     }
 
     /// Draws a frame into `target`, a view of `format` and `size` (pixels), with `scale` pixels per CSS
-    /// pixel. Deforms the mesh if the cage moved. Submits without waiting. Formats: see [`crate::render`].
+    /// pixel. First deforms the mesh if pose, skin or parts changed. Submits without waiting. Formats: see
+    /// [`crate::render`].
     ///
     /// # Errors
     /// [`GpuError::DeviceLost`], [`GpuError::Refused`]: errors since the last call.
@@ -400,7 +410,7 @@ impl Session {
 
     fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
         if let Some(bound) = self.bound.as_ref().filter(|_| self.moved) {
-            match &self.playing {
+            match self.playing.as_ref().filter(|_| !self.interrupted) {
                 Some(skinner) => bound.mover.encode_skinned(&self.context, encoder, skinner),
                 None => {
                     let positions = || self.deformed(&self.pose).unwrap_or_default();
@@ -423,7 +433,7 @@ impl Session {
             Some(bound) => {
                 let by_processor = || self.deformed(&self.pose).unwrap_or_default();
                 let mut positions = bound.mover.read_positions(&self.context, by_processor).await?;
-                // Drop the copies of vertices, which follow the vertices.
+                // Drop the copies of vertices, which are stored after the vertices.
                 positions.truncate(model.positions.len());
                 Ok(positions)
             }

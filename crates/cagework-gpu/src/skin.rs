@@ -11,7 +11,7 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// Skins one model repeatedly; on the CPU if the device only draws.
+/// Skins one model repeatedly. Runs on the CPU if the device only draws ([`GpuContext::draws_only`]).
 #[derive(Debug)]
 pub struct Skinner {
     skin: Skin,
@@ -31,7 +31,7 @@ struct SkinKernels {
     groups: [u32; 2],
 }
 
-/// A skin in the layout of the kernel. Floats are stored as bits.
+/// A skin in the layout of the kernel `skin_vertices`. In integer tables, floats are stored as their bits.
 #[derive(Debug)]
 pub struct SkinTables {
     /// Rest positions, with 1 as fourth component. `[n_vertices]`
@@ -59,8 +59,8 @@ impl SkinTables {
     }
 }
 
-/// A displacement field in the layout of the kernel: the lattice, then values. Floats are stored as bits. The table has
-/// 2 + n_nodes rows.
+/// A displacement field as a table for kernels: origin and cell of the lattice, number of nodes along each axis, then
+/// the value of each node. Floats are stored as bits. `[2 + n_nodes, 4]`
 #[must_use]
 pub fn field_table(field: &Field) -> Vec<[u32; 4]> {
     let lattice = &field.lattice;
@@ -135,7 +135,7 @@ impl Skinner {
         }
     }
 
-    /// Positions, computed on the CPU.
+    /// Skinned and bent positions of all vertices, computed on the CPU.
     pub(crate) fn positions(&self) -> Vec<Vec3> {
         let mut positions = skin_vertices(&self.skin, &self.palette, &self.targets);
         if let Some(field) = &self.field {

@@ -1,9 +1,9 @@
 //! Submits work in short slices: the page stays responsive, drivers' watchdogs do not fire, and progress and
 //! cancellation work.
 //!
-//! Dispatches are recorded until their estimated cost reaches the budget, then submitted. A larger dispatch
-//! is split by items. The budget is adapted to measured times. At most two slices are pending. Splitting does
-//! not change results: items are independent, and reductions are not split.
+//! Dispatches are recorded until their estimated cost reaches the budget. They are then submitted as one slice. A
+//! dispatch above the budget is split by items. The budget is adapted to measured times. At most two slices are
+//! pending. Splitting does not change results: items are independent, and reductions are not split.
 
 use std::collections::VecDeque;
 
@@ -21,26 +21,28 @@ use crate::pipelines::Launch;
 /// Target time of a slice, ms: three frames at 60 Hz; watchdogs of drivers allow 2 s.
 const SLICE_MS: f64 = 50.0;
 
-/// Maximum number of slices that are submitted but not finished: one runs, one is queued. More delay cancellation, and
-/// crashed iOS 26.
+/// Maximum number of slices that are submitted but not finished: one runs, one is queued. More slices delay
+/// cancellation, and caused crashes on iOS 26.
 const MAX_PENDING_SLICES: usize = 2;
 
-/// Initial budget, memory accesses: 10 to 100 ms on a software adapter with two threads, below 1 ms on a GPU.
+/// Initial budget of a slice, memory accesses. The slice takes 10 to 100 ms on a software adapter with two threads, and
+/// less than 1 ms on a GPU.
 const INITIAL_BUDGET: u64 = 1 << 25;
 
-/// Range of the budget, memory accesses: limits the overhead per slice, and the wait for a readback.
+/// Range of the budget, memory accesses. The lower limit bounds the overhead of submissions, the upper one the wait for
+/// a readback.
 const BUDGET_RANGE: [u64; 2] = [1 << 20, 1 << 36];
 
-/// Stride of dispatch parameters, bytes: the baseline's alignment of dynamic offsets.
+/// Stride of dispatch parameters, bytes: WebGPU's baseline alignment of dynamic offsets.
 const WORK_STRIDE: u64 = 256;
 
 /// Maximum number of dispatches in a slice.
 const MAX_WORKS: u64 = 1024;
 
-/// Maximum workgroups per axis, the baseline's limit.
+/// Maximum number of workgroups per axis: WebGPU's baseline limit.
 const MAX_GROUPS: u32 = 65_535;
 
-/// A recorded command.
+/// A command that is recorded but not submitted.
 #[derive(Debug)]
 enum Command {
     Dispatch { launch: Launch, offset: u32, groups: [u32; 2] },
@@ -48,7 +50,7 @@ enum Command {
     Copy { from: wgpu::Buffer, to: wgpu::Buffer, bytes: u64 },
 }
 
-/// A submitted slice.
+/// A slice that is submitted but not finished.
 #[derive(Debug)]
 struct PendingSlice {
     submission: wgpu::SubmissionIndex,
@@ -57,7 +59,7 @@ struct PendingSlice {
     submitted_ms: f64,
 }
 
-/// Progress of the solve.
+/// Progress of the solve, reported with each slice.
 #[derive(Clone, Copy, Debug, Default)]
 struct Status {
     fraction: f32,
@@ -80,7 +82,7 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// An empty stream.
+    /// Creates a stream without recorded commands.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
@@ -109,7 +111,7 @@ impl<'a> Stream<'a> {
         self.context
     }
 
-    /// The watcher's clock, ms.
+    /// Time on the clock of the bind's [`Watch`], ms.
     #[must_use]
     pub fn now_ms(&self) -> f64 {
         self.watch.now_ms()
@@ -171,17 +173,17 @@ impl<'a> Stream<'a> {
         self.submit_if_full().await
     }
 
-    /// Records clearing a buffer.
+    /// Records a command that fills a buffer with zeros.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.commands.push(Command::Clear(buffer.clone()));
     }
 
-    /// Records copying the first `bytes` of a buffer.
+    /// Records a command that copies the first `bytes` bytes of `from` to `to`.
     pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64) {
         self.commands.push(Command::Copy { from: from.clone(), to: to.clone(), bytes });
     }
 
-    /// Submits all commands and passes the first `bytes` of `from` to `take`.
+    /// Submits all commands, waits for them, and passes the first `bytes` bytes of `from` to `take`.
     ///
     /// # Errors
     /// If cancelled, or on errors of the GPU.

@@ -5,17 +5,18 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::plan::PlanError;
 
-/// Entries per texture row: WebGL2's minimum texture width, and two to the power of `ROW_SHIFT` in `shaders/rows.wgsl`.
+/// Number of entries per texture row: WebGL2's minimum texture width, and two to the power of `ROW_SHIFT` in
+/// `shaders/rows.wgsl`.
 pub const ENTRIES_PER_ROW: u32 = 1 << 11;
 
 /// Type of a table's entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
-    /// `vec4f`.
+    /// Four floats: `vec4f` in WGSL.
     Point,
-    /// `f32`.
+    /// One float: `f32` in WGSL.
     Value,
-    /// `vec2u`.
+    /// Two unsigned integers: `vec2u` in WGSL.
     Pair,
 }
 
@@ -38,7 +39,7 @@ impl Entry {
         }
     }
 
-    /// Binding type of a table.
+    /// Binding type with which shaders read a table of such entries.
     pub(crate) fn binding(self, context: &GpuContext) -> wgpu::BindingType {
         if !context.draws_only() {
             return wgpu::BindingType::Buffer {
@@ -92,7 +93,8 @@ impl Table {
         Ok(Self::unchecked(context, what, entry, count))
     }
 
-    /// A table of `count` zeros that is smaller than every limit. Lack of memory is reported by the next frame.
+    /// A table of `count` zeros without a check of the device's limits, for small tables. Lack of memory is reported by
+    /// the next frame.
     pub(crate) fn unchecked(context: &GpuContext, what: &'static str, entry: Entry, count: usize) -> Self {
         if !context.draws_only() {
             return Self::Buffer(context.device.create_buffer(&wgpu::BufferDescriptor {
@@ -121,7 +123,7 @@ impl Table {
         Self::Texture { texture, view, entry_bytes: entry.bytes() }
     }
 
-    /// Overwrites the first entries. `bytes`: of whole entries.
+    /// Overwrites the first entries. `bytes` contains whole entries.
     pub(crate) fn write(&self, context: &GpuContext, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -146,7 +148,7 @@ impl Table {
         }
     }
 
-    /// Resource for bind groups.
+    /// The table as a resource of a bind group.
     pub(crate) fn resource(&self) -> wgpu::BindingResource<'_> {
         match self {
             Self::Buffer(buffer) => buffer.as_entire_binding(),
@@ -154,7 +156,7 @@ impl Table {
         }
     }
 
-    /// Allocated bytes.
+    /// Allocated GPU memory, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         match self {
             Self::Buffer(buffer) => buffer.size(),
@@ -165,7 +167,7 @@ impl Table {
     }
 }
 
-/// Writes `size` entries, starting at row `y`.
+/// Writes `width * height` entries into a texture, starting at row `y`.
 fn write_rows(
     context: &GpuContext,
     texture: &wgpu::Texture,

@@ -14,7 +14,7 @@ use glam::Vec3;
 use pollster::block_on;
 use support::{assert_close, cage, egg, flat, gpu, gpu_with, with_prepared};
 
-/// Tolerance for weights: both solvers stop at tau, a tenth of this.
+/// Tolerance for weights: a hundred times the tau at which both solvers stop.
 const WEIGHT_TOLERANCE: f32 = 1e-4;
 
 /// Tolerance for positions, as a fraction of the cage diagonal.
@@ -75,7 +75,7 @@ fn weights_equal_the_cpus() {
 #[test]
 fn delta_and_residual_equal_the_cpus() {
     let (context, cage, positions) = (gpu(), cage([3, 2, 2]), points());
-    // Values of the first cycle are far above rounding errors.
+    // Compare only the first cycle of multigrid, whose delta and residual are far above rounding errors.
     let options = options(Method::Embedded, Solver::Multigrid);
     let cpu = bind(&positions, &cage, &options, &Silent).unwrap().report;
     let gpu = on_gpu(&context, &positions, &cage, &options).report;
@@ -84,7 +84,7 @@ fn delta_and_residual_equal_the_cpus() {
     {
         assert!((gpu / cpu - 1.0).abs() < 1e-3, "{gpu} {cpu}");
     }
-    // Jacobi's deltas after the same number of sweeps, for both variants of Eq. 2.
+    // Compare Jacobi's deltas after the same number of sweeps, for both norms of delta.
     for delta_norm in [DeltaNorm::Euclidean, DeltaNorm::Literal] {
         let options =
             BindOptions { delta_norm, max_iterations: 40, ..self::options(Method::Classic, Solver::Jacobi) };
@@ -105,7 +105,7 @@ fn several_batches_give_the_same_weights() {
     for solver in [Solver::Multigrid, Solver::Jacobi] {
         let options = options(Method::Embedded, solver);
         let one = on_gpu(&whole, &positions, &cage, &options);
-        // Values of at most 21^3 cells and 8 columns take 300 kB.
+        // Limit bindings to the field of 8 columns (300 kB for 21^3 cells), so that the bind needs several batches.
         let rows = one.report.levels[0] + 2;
         let limit = rows * 4 * 8 + 100;
         let split = gpu_with(&ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() });
@@ -181,7 +181,7 @@ fn cancel_stops_the_solve() {
         assert!(matches!(error, GpuError::Bind(BindError::Cancelled(_))), "{error}");
         assert_eq!(reports.load(Ordering::Relaxed), 1, "no reports after cancelling");
     }
-    // The context can be used again.
+    // The context can still be used after a cancelled bind.
     on_gpu(&context, &positions, &cage, &options(Method::Embedded, Solver::Multigrid));
 }
 
@@ -226,7 +226,7 @@ fn deformed_mesh_equals_the_cpus() {
         .collect();
     let expected = deform_bound(&binding.weights, &binding.frames, &posed);
     let normals = vertex_normals(&expected, &mesh.triangles);
-    // The weights are in one buffer, then in chunks of a few slices.
+    // Without a limit on bindings, the weights are in one buffer; with the limit, in chunks of a few slices.
     for max_binding_bytes in [None, Some(64 << 10)] {
         let context = gpu_with(&ContextOptions { max_binding_bytes, ..ContextOptions::default() });
         block_on(async {

@@ -1,4 +1,5 @@
-//! Compares draw shaders with the draw table and Rust's layouts. Needs no GPU: naga parses them, as in wgpu.
+//! Compares the draw shaders with the draw table and with Rust's layouts. The tests need no GPU: they parse the shaders
+//! with naga, as wgpu does.
 
 use std::mem::{offset_of, size_of};
 
@@ -12,8 +13,9 @@ use cagework_gpu::table::Entry;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, ImageClass, Literal, Scalar, ScalarKind, ShaderStage, TypeInner};
 
-/// Baseline WebGPU's limits per stage.
+/// Limit on storage buffers per shader stage in WebGPU's baseline.
 const MAX_STORAGE_BUFFERS: usize = 8;
+/// Limit on the size of a uniform binding in WebGPU's baseline, bytes.
 const MAX_UNIFORM_BYTES: usize = 65_536;
 
 fn parse(shader: &DrawShader) -> naga::Module {
@@ -178,7 +180,7 @@ fn constants_equal_those_of_rust() {
     assert_eq!(constant(&shaders::MESH, "NEGATIVE_THRESHOLD") as f32, colormap::NEGATIVE_THRESHOLD);
 }
 
-/// The shader contains the stops of the colour map.
+/// The WGSL source contains each stop of [`colormap::STOPS`].
 #[test]
 fn colour_map_is_the_same_in_wgsl() {
     let text: String = shaders::MESH.wgsl.split_whitespace().collect();

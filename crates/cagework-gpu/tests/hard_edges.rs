@@ -1,4 +1,5 @@
-//! Hard edges: shared vertices with copies are drawn like split vertices.
+//! Hard edges: a model whose faces share vertices, with a copy of a vertex for each further normal, is drawn like a
+//! model with separate vertices for each face.
 
 mod support;
 
@@ -13,7 +14,7 @@ use pollster::block_on;
 
 const SIZE: [u32; 2] = [160, 120];
 
-/// Rounding of sums of eight f32 products near 1.
+/// Tolerance for rounding of sums of eight f32 products near 1.
 const ROUNDING: f32 = 1e-6;
 
 /// Vertices and faces of a cube.
@@ -58,7 +59,7 @@ fn shared() -> DrawModel {
     DrawModel::plain(positions, triangles(faces.len()).into_iter().map(|t| t.map(of)).collect())
 }
 
-/// Pictures at rest and posed, and posed positions.
+/// Draws a model. Returns its pictures at rest and posed, and its posed positions.
 fn drawn(model: DrawModel) -> ([Vec<u8>; 2], Vec<Vec3>) {
     let mut session = Session::new(support::gpu());
     let cage = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.2, [1; 3]);

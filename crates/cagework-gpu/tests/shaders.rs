@@ -1,4 +1,5 @@
-//! Compares kernels with the kernel table and Rust's layouts. Needs no GPU: naga parses them, as in wgpu.
+//! Compares the kernels with the kernel table and with Rust's layouts. The tests need no GPU: they parse the kernels
+//! with naga, as wgpu does.
 
 use std::mem::{offset_of, size_of};
 
@@ -10,11 +11,11 @@ use cagework_gpu::splats::{BINS, Depths};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
 
-/// Baseline WebGPU's limits per stage.
+/// Limits of baseline WebGPU: storage buffers of a shader stage, and invocations of a workgroup.
 const MAX_STORAGE_BUFFERS: usize = 8;
 const MAX_INVOCATIONS: u32 = 256;
 
-/// Maximum lines of a shader file.
+/// Maximum number of lines of a shader file.
 const MAX_LINES: usize = 120;
 
 fn parse(kernel: &Kernel) -> naga::Module {
@@ -79,11 +80,13 @@ fn structs_mirror_their_wgsl() {
         same!(kernel, Work, first, count, stride, n_quads, first_row, first_quad, mode, n_sources, omega);
     }
     for kernel in [&kernels::COUNT_SPLATS, &kernels::SCAN_SPLATS, &kernels::SCATTER_SPLATS] {
-        same!(kernel, Depths, axis, offset, n_splats, per_block, n_blocks, hides);
+        same!(
+            kernel, Depths, axis, offset, viewer, n_splats, per_block, n_blocks, hides, degree, unit, unused
+        );
     }
 }
 
-/// Names and offsets of the members of a WGSL struct, and its size.
+/// Names and byte offsets of the members of a WGSL struct, and the size of the struct in bytes.
 fn members(kernel: &Kernel, name: &str) -> (Vec<(String, usize)>, usize) {
     let module = parse(kernel);
     let found = module.types.iter().find_map(|(_, t)| match &t.inner {
@@ -127,6 +130,8 @@ fn constants_equal_those_of_rust() {
     same(&kernels::SUM_SQUARES, "REDUCE_LANES", stencil::REDUCE_LANES as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);
     same(&kernels::COUNT_SPLATS, "BINS", f64::from(BINS));
+    same(&kernels::DEFORM_SPLATS, "WITH_TURNS", f64::from(mode::WITH_TURNS));
+    same(&kernels::COUNT_SPLATS, "LOWER_DIGIT", f64::from(mode::LOWER_DIGIT));
     let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_CENTRE", centre);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_EDGE", f64::from(cagework_core::transfer::RESTRICT_EDGE));
@@ -141,7 +146,8 @@ fn every_shader_file_is_used_and_short() {
         assert!(text.lines().count() <= MAX_LINES, "{name} has more than {MAX_LINES} lines");
         assert!(text.starts_with("// "), "{name} has no description in its first line");
         let used = ALL.iter().any(|k| k.wgsl.contains(&text)) || DRAWN.iter().any(|d| d.wgsl.contains(&text));
-        // The textures of WebGL2 are only used with the feature, which tests of the workspace enable.
+        // Shaders that read textures instead of storage buffers are built only with the feature `webgl`, which tests of
+        // the whole workspace enable.
         #[cfg(feature = "webgl")]
         let used = used || DRAWN.iter().any(|d| d.wgsl_textures.contains(&text));
         #[cfg(not(feature = "webgl"))]

@@ -1,16 +1,18 @@
-//! Writes one exported GLB of each kind into a directory, for the Khronos validator (`tests/validate.mjs`).
+//! Writes one exported GLB of each kind into a directory, for the Khronos validator (`tests/validate.mjs`), and a capture
+//! in each format into its folder `captures`, for `tests/three-splats.mjs`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use cagework_core::options::Choice;
 use cagework_core::skin::skin_vertices;
-use cagework_io::{Interpolation, Model, Timeline};
+use cagework_core::splats::{Splats, n_harmonics};
+use cagework_io::{CompactOptions, Compression, Interpolation, Model, ModelFormat, Timeline, compact};
 use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
-use glam::Vec3;
+use glam::{DVec3, Quat, Vec3};
 use serde_json::json;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -89,10 +91,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             let extra = model.extra_points()?;
             let by = model.positions.iter().chain(&extra).map(|&p| twist(p).as_dvec3() - p.as_dvec3());
             let by: Vec<_> = by.collect();
-            let still = vec![glam::DVec3::ZERO; by.len()];
+            let still = vec![DVec3::ZERO; by.len()];
             let options = cagework_io::ReshapeOptions::default();
             let (reshaped, _) = model.write_reshaped(&by, &[], &[], &options)?;
-            if let Some(player) = model.player_of(&reshaped).ok().filter(|p| !p.clips().is_empty()) {
+            let played = |glb: &[u8], name: &str| -> Result<(), Box<dyn Error>> {
+                let Some(player) = model.player_of(glb).ok().filter(|p| !p.clips().is_empty()) else {
+                    return Ok(());
+                };
                 let frames: Vec<_> = (0..10)
                     .map(|k| {
                         let seconds = 0.099 * k as f32;
@@ -102,8 +107,22 @@ fn main() -> Result<(), Box<dyn Error>> {
                         json!({ "seconds": seconds, "positions": positions, "origin": model.origin().to_array() })
                     })
                     .collect();
-                let name = format!("{stem}-reshaped.played.json");
-                std::fs::write(directory.join(name), serde_json::to_vec(&frames)?)?;
+                Ok(std::fs::write(
+                    directory.join(format!("{name}.played.json")),
+                    serde_json::to_vec(&frames)?,
+                )?)
+            };
+            played(&reshaped, &format!("{stem}-reshaped"))?;
+            let grounded = cagework_io::ReshapeOptions { ground: true, ..options.clone() };
+            let (stands, _) = model.write_reshaped(&by, &[], &[], &grounded)?;
+            played(&stands, &format!("{stem}-stands"))?;
+            std::fs::write(directory.join(format!("{stem}-stands.glb")), stands)?;
+            for (word, compress) in Compression::ALL {
+                let small =
+                    compact(reshaped.clone(), CompactOptions { quantize: true, compress: *compress })?;
+                let name = format!("{stem}-quantized-{word}");
+                played(&small, &name)?;
+                std::fs::write(directory.join(format!("{name}.glb")), small)?;
             }
             std::fs::write(directory.join(format!("{stem}-reshaped.glb")), reshaped)?;
             let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;
@@ -115,5 +134,43 @@ fn main() -> Result<(), Box<dyn Error>> {
         let project = cagework_io::write_project(&[&model], &cage, &cage_poses, "{}")?;
         std::fs::write(directory.join(format!("{stem}-project.glb")), project)?;
     }
+    write_captures(&directory.join("captures"))
+}
+
+/// Writes a capture in each format, and the splats as they are read back.
+fn write_captures(directory: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(directory)?;
+    let splats = capture();
+    let model = Model::of_splats("capture", splats.clone(), DVec3::ZERO)?;
+    for format in [ModelFormat::Ply, ModelFormat::Splat, ModelFormat::Spz, ModelFormat::Gltf] {
+        let bytes = model.write_splats(format, &splats)?;
+        let name = format!("capture.{}", format.export_extension());
+        let again = Model::read(&name, &bytes, &mut |_| None)?;
+        let read = again.splats().ok_or("the export has no splats")?;
+        let centers: Vec<f32> = read.positions.iter().flat_map(Vec3::to_array).collect();
+        let covariances = read.rest_pose().covariances.concat();
+        let shown = json!({ "centers": centers, "covariances": covariances, "degree": read.degree });
+        std::fs::write(directory.join(format!("{name}.json")), serde_json::to_vec(&shown)?)?;
+        std::fs::write(directory.join(name), bytes)?;
+    }
     Ok(())
+}
+
+/// Splats of different shapes, with spherical harmonics of degree 3.
+fn capture() -> Splats {
+    let n = 60;
+    let wave = |k: usize, by: f32| (by * (k as f32 + 1.0)).sin();
+    let places = |by: f32| -> Vec<Vec3> {
+        (0..n).map(|k| Vec3::new(wave(k, by), wave(k, 1.3 * by), wave(k, 1.7 * by))).collect()
+    };
+    let turn = |axis: &Vec3| Quat::from_axis_angle(axis.normalize_or(Vec3::X), 3.0 * axis.x);
+    Splats {
+        positions: places(0.7),
+        scales: places(1.1).iter().map(|s| 0.02 + 0.05 * s.abs()).collect(),
+        rotations: places(1.9).iter().map(turn).collect(),
+        opacities: (0..n).map(|k| 0.5 + 0.4 * wave(k, 0.9)).collect(),
+        colors: places(2.3).iter().map(|c| 0.5 + 0.4 * c).collect(),
+        degree: 3,
+        harmonics: (0..n * n_harmonics(3)).map(|k| 0.1 * Vec3::splat(wave(k, 0.31))).collect(),
+    }
 }

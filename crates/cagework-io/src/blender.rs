@@ -8,10 +8,10 @@ use crate::up::UpAxis;
 /// Largest number of points of a Blender lattice along an axis.
 const MAX_POINTS: u32 = 64;
 
-/// Writes a field as a Python script for Blender: a lattice object "Cagework" at the field's place, with the deformed points
-/// as `co_deform`. Objects with a Lattice modifier that names it are deformed as by the field. The lattice has at most 64
-/// points along an axis; the field is read at these. Blender's axes are those of a Z-up file. `origin`: added to all
-/// positions, Y up.
+/// Writes a field as a Python script for Blender. The script creates a lattice object "Cagework" that covers the box of
+/// the field, with the deformed points as `co_deform`; a Lattice modifier that refers to this object applies the
+/// field's deformation. The field is sampled at no more than 64 points along each axis. Positions are converted to
+/// Blender's Z-up axes. `origin`: added to all positions before the conversion, Y up.
 #[must_use]
 pub fn write_field_blender(field: &Field, origin: DVec3) -> Vec<u8> {
     let lattice = &field.lattice;
@@ -21,7 +21,8 @@ pub fn write_field_blender(field: &Field, origin: DVec3) -> Vec<u8> {
     let [center, extent] = [lattice.origin + 0.5 * size, size].map(in_blender);
     let (extent, center) = (extent.abs(), center + UpAxis::Z.vector_turned_back(origin));
     let mut points = String::new();
-    // Blender's z is y, and its y is -z. Its points are numbered with x fastest, and lie from -0.5 to 0.5.
+    // Blender's z axis is the field's y axis, and its y axis is the field's -z axis. A Blender lattice numbers its
+    // points with x fastest, and their coordinates are from -0.5 to 0.5.
     for y in 0..n.y {
         for z in (0..n.z).rev() {
             for x in 0..n.x {

@@ -1,7 +1,9 @@
 //! Numbers of elements in a document: scenes, nodes, meshes and so on.
 
+use serde::{Deserialize, Serialize};
+
 /// Numbers of elements in a document. OBJ: `o` and `g` lines count as nodes, `usemtl` names as materials.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Number of scenes.
     pub scenes: usize,

@@ -25,30 +25,30 @@ pub enum WriteError {
     /// The model has no triangles, which a GLB export needs.
     #[error("the model has no faces, but a GLB needs triangles: export an OBJ instead")]
     NoFaces,
-    /// A splat does not fit into the format.
+    /// A number of a splat exceeds the largest value that the format can store.
     #[error(
         "splat {splat} has {what} {value}, more than the limit of {limit}: scale the capture, or write another format"
     )]
     Splat {
         /// Index of the splat, from 0.
         splat: usize,
-        /// Name of the number.
+        /// Name of the number, with its article: "the position".
         what: &'static str,
-        /// The number.
+        /// The number that does not fit.
         value: String,
-        /// The largest number that can be written.
+        /// Largest value that the format can store.
         limit: &'static str,
     },
     /// The format stores splats, but the model has none.
     #[error("the model has no splats, but a {} stores nothing else: export {}", format.to_uppercase(), others)]
     NoSplats {
-        /// Extension of the format.
+        /// Extension of the requested format, lower case, without the dot.
         format: &'static str,
-        /// Formats that store faces.
+        /// Formats that can be exported instead, as text: "OBJ, PLY, OFF or 3MF".
         others: String,
     },
-    /// The timeline is that of another number of poses.
-    #[error("the timeline has {expected} poses, but {given} were given: make one for these poses")]
+    /// The number of poses given differs from the number of poses in the timeline.
+    #[error("the timeline has {expected} poses, but {given} were given: make a timeline for these poses")]
     Poses {
         /// Number of poses given.
         given: usize,
@@ -59,7 +59,7 @@ pub enum WriteError {
     #[error("the model is not a glTF, so it has no rig: export it without the rig options")]
     NoRig,
     /// No clip has this index.
-    #[error("the model has no clip {0}: clips count from 0")]
+    #[error("the model has no clip {0}: clips are counted from 0")]
     NoClip(usize),
     /// The export exceeds the GLB limit of 4 GiB.
     #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: export an OBJ instead")]

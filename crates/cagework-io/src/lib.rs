@@ -1,4 +1,5 @@
-//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF), Gaussian splats (3DGS PLY, .splat, SPZ, GLB), weights (NPZ) and projects, as bytes.
+//! Reads and writes models (OBJ, glTF/GLB, PLY, STL, OFF, 3MF), Gaussian splats (3DGS PLY, .splat, SPZ, GLB), weights (NPZ)
+//! and projects, as bytes.
 //!
 //! The crate uses no file system and no clock, so it compiles for `wasm32-unknown-unknown`. A [`Model`] keeps the
 //! document it was read from, and an export is that document with new vertex positions: materials, texture coordinates,
@@ -34,6 +35,7 @@ mod siblings;
 mod splats;
 mod stl;
 mod textures;
+mod threemf;
 mod timeline;
 mod up;
 
@@ -41,12 +43,16 @@ pub use blender::write_field_blender;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
 pub use gltf::{
-    Clip, GltfError, JointPoint, Joints, PROJECT_EXTENSION, Player, Posed, ReshapeOptions, ReshapeReport,
-    write_mesh_glb,
+    Clip, Feet, GltfError, Ground, JointPoint, Joints, PROJECT_EXTENSION, Player, ReshapeOptions,
+    ReshapeReport, RigPose, Skeleton, Vrm, write_mesh_glb,
 };
+#[cfg(feature = "compress")]
+pub use gltf::{CompactOptions, Compression, compact};
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
-pub use model::{FormatError, FormatFacts, Model, ModelFormat, PoseState, ReadError};
+pub use model::{
+    FormatError, FormatFacts, Model, ModelFormat, PoseState, ReadError, RestoreError, Store, StoredArrays,
+};
 pub use npz::{NpzError, SavedWeights, read_weights_npz, write_field_npz, write_weights_npz, write_zip};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use origin::origin_near;
@@ -66,7 +72,7 @@ pub use timeline::{
 };
 pub use up::{UpAxis, lies_on_back};
 
-/// The example of the README.
+/// Compiles the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

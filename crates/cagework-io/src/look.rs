@@ -5,10 +5,13 @@
 
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
+
 /// A model's triangles for drawing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
-    /// Vertices for drawing, which the corners of triangles refer to. `[n_corners]`
+    /// Vertices for drawing. Each corner of a triangle refers to one of them.
     pub vertices: Vec<LookVertex>,
     /// Duplicates of OBJ vertices at hard edges. Each entry is the model vertex whose position the duplicate takes.
     /// Duplicate `k` has index `n_vertices + k`. Empty for glTF, which stores split vertices.
@@ -21,8 +24,9 @@ pub struct Look {
     pub images: Vec<LookImage>,
 }
 
-/// A triangle corner.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A vertex for drawing. A glTF has one per model vertex; in an OBJ, triangle corners with equal members share one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LookVertex {
     /// Model vertex whose position the corner takes, or a duplicate in [`Look::copies`]. Corners on both sides of a UV
     /// seam share one source, so recomputed normals stay smooth there; corners across a hard edge have different
@@ -35,7 +39,7 @@ pub struct LookVertex {
 }
 
 /// Triangles of one material.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LookGroup {
     /// Range of [`Look::triangles`].
     pub triangles: Range<u32>,
@@ -45,14 +49,14 @@ pub struct LookGroup {
     pub image: Option<u32>,
     /// Wrap mode along u and v.
     pub wrap: [LookWrap; 2],
-    /// Alpha mode.
+    /// How alpha is used: ignored, for discarding fragments, or for blending.
     pub alpha: LookAlpha,
     /// Whether back faces are drawn.
     pub double_sided: bool,
 }
 
 /// Alpha mode of a material (glTF 2.0, section 3.9.4).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LookAlpha {
     /// Alpha is ignored.
     #[default]
@@ -67,7 +71,7 @@ pub enum LookAlpha {
 }
 
 /// Wrap mode of a texture outside [0, 1].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LookWrap {
     /// Repeats the image.
     #[default]
@@ -83,7 +87,8 @@ pub enum LookWrap {
 pub struct LookImage {
     /// Name in the file, for messages.
     pub name: String,
-    /// Encoded PNG, JPEG, WebP or KTX2; empty if the image overlaps others in the file.
+    /// Encoded PNG, JPEG, WebP or KTX2; empty if image views overlap so much that copies of all of them would exceed
+    /// the size of the file's buffers.
     pub bytes: Vec<u8>,
     /// Media type, detected from the bytes.
     pub mime: String,

@@ -10,13 +10,32 @@ use thiserror::Error;
     limit.div_ceil(MIB)
 )]
 pub struct MemoryError {
-    /// Bytes needed.
+    /// Estimate of the memory that is needed, bytes.
     pub needed: u64,
     /// Limit in bytes.
     pub limit: u64,
 }
 
 const MIB: u64 = 1 << 20;
+
+/// Size to which any file may unpack, bytes.
+const MAX_UNPACKED: u64 = 64 * MIB;
+/// Contents above [`MAX_UNPACKED`] may have at most this many times the size of the compressed file. Compression
+/// typically shrinks the XML of models to 1/10 of its size, and splats to 1/2.
+const MAX_RATIO: u64 = 100;
+
+/// Checks the size of the contents of a compressed file, so that a small file does not take much memory.
+///
+/// # Errors
+/// A sentence, if the contents are above both limits.
+pub(crate) fn check_unpacked(unpacked: u64, file: u64) -> Result<(), String> {
+    if unpacked <= MAX_UNPACKED.max(file.saturating_mul(MAX_RATIO)) {
+        return Ok(());
+    }
+    Err(format!(
+        "its {file} bytes unpack to {unpacked}, more than the limit of 64 MiB or {MAX_RATIO} times its size: save it again"
+    ))
+}
 
 impl MemoryError {
     /// Checks that memory suffices. `needed`, `limit`: bytes.

@@ -3,16 +3,18 @@
 mod cage;
 mod format;
 mod read;
+mod stored;
 mod write;
 
 pub use cage::PoseState;
 pub use format::{FormatError, FormatFacts, ModelFormat};
+pub use stored::{RestoreError, Store, StoredArrays};
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use cagework_core::splats::Splats;
-use cagework_core::{PolygonMesh, TriMesh};
+use cagework_core::{Bounds, PolygonMesh, TriMesh};
 use glam::{DVec3, Quat, Vec3};
 use thiserror::Error;
 
@@ -42,7 +44,7 @@ pub enum ReadError {
     NoFaces {
         /// Name given by the caller.
         name: String,
-        /// Number of vertices.
+        /// Number of vertices in the file.
         vertices: usize,
     },
     /// Error in an OBJ file.
@@ -53,7 +55,7 @@ pub enum ReadError {
         /// What is wrong in the file.
         source: ObjError,
     },
-    /// Error in a PLY, STL or OFF file.
+    /// Error in a PLY, STL, OFF or 3MF file.
     #[error("{}: {source}", shown(name))]
     Polygons {
         /// Name given by the caller.
@@ -93,16 +95,17 @@ pub struct Model {
     pub counts: Counts,
     /// Warnings for the user, one sentence each.
     pub notices: Vec<String>,
-    /// Up axis of the file.
+    /// Up axis of the file, from which `positions` were converted to Y up.
     pub(crate) up: UpAxis,
     /// Origin of `positions`, in the file's axes.
     pub(crate) origin: DVec3,
     bytes: u64,
     format: ModelFormat,
-    /// Of PLY, STL and OFF files: the encoding of numbers, and whether vertices have normals.
+    /// For PLY, STL and OFF files: the encoding of numbers, and whether vertices have normals. The writers of these
+    /// formats use both.
     encoding: Encoding,
     has_normals: bool,
-    /// Without faces for a capture.
+    /// The document that the model was read from; for a capture, an OBJ document without faces.
     pub(crate) document: Document,
     pub(crate) capture: Option<Arc<Capture>>,
 }
@@ -158,7 +161,20 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        Self::read_from(name, bytes.into(), resolve, memory_limit, true)
+        Self::read_from(name, bytes.into(), resolve, memory_limit, (true, false))
+    }
+
+    /// Like [`Self::read_within`], also for a glTF of clips without triangles, which has no vertices.
+    ///
+    /// # Errors
+    /// As [`Self::read_within`].
+    pub fn read_with_clips<'a>(
+        name: &str,
+        bytes: impl Into<Cow<'a, [u8]>>,
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Result<Self, ReadError> {
+        Self::read_from(name, bytes.into(), resolve, memory_limit, (true, true))
     }
 
     /// A model from a generated mesh whose positions are relative to `origin`; same result as reading the
@@ -168,14 +184,14 @@ impl Model {
     /// [`ReadError`] if the mesh has no vertices.
     pub fn of_mesh(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Self, ReadError> {
         let text = obj::write_cage_obj(mesh, DVec3::ZERO);
-        let model = Self::read_from(name, text.into(), &mut |_| None, u64::MAX, false)?;
+        let model = Self::read_from(name, text.into(), &mut |_| None, u64::MAX, (false, false))?;
         Ok(Self { origin, ..model })
     }
 
     /// A capture of splats, whose positions are relative to `origin`.
     ///
     /// # Errors
-    /// [`ReadError`] if there are no splats, or a number is not finite.
+    /// [`ReadError`] if `splats` is empty, or a number is not finite.
     ///
     /// # Panics
     /// If the arrays have different numbers of splats.
@@ -189,6 +205,7 @@ impl Model {
             resolve: &mut |_| None,
             memory_limit: u64::MAX,
             near: false,
+            clips_alone: false,
         };
         source.new_capture(splats, origin)
     }
@@ -198,10 +215,10 @@ impl Model {
         bytes: Cow<'_, [u8]>,
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
-        near: bool,
+        (near, clips_alone): (bool, bool),
     ) -> Result<Self, ReadError> {
         let format = ModelFormat::of_file(name, &bytes)?;
-        (format.facts().read)(Source { name, bytes, resolve, memory_limit, near })
+        (format.facts().read)(Source { name, bytes, resolve, memory_limit, near, clips_alone })
     }
 
     /// Approximate memory of the model and its document, bytes.
@@ -224,8 +241,8 @@ impl Model {
     /// Additional memory for `n_poses` morph targets on top of [`Self::bytes_to_write`], bytes.
     #[must_use]
     pub fn bytes_of_poses(&self, n_poses: usize) -> u64 {
-        /// Position and normal displacement of a vertex, in memory and in the output, twice each. 103 bytes
-        /// were measured.
+        /// Position and normal displacement of a vertex, in memory and in the output, twice each. A measurement gave
+        /// 103 bytes; the estimate adds a quarter.
         const POSED_VERTEX_BYTES: u64 = 130;
         POSED_VERTEX_BYTES.saturating_mul(n_poses as u64 * self.positions.len() as u64)
     }
@@ -275,6 +292,30 @@ impl Model {
     #[must_use]
     pub fn splats(&self) -> Option<&Splats> {
         self.capture.as_ref().map(|capture| &capture.splats)
+    }
+
+    /// Splats that show a file without faces: those of a capture, or one per point. `None` for a file with faces.
+    #[must_use]
+    pub fn drawn_splats(&self) -> Option<Cow<'_, Splats>> {
+        match &self.capture {
+            Some(capture) => Some(Cow::Borrowed(&capture.splats)),
+            None if self.n_faces() == 0 => {
+                Some(Cow::Owned(Splats::of_points(&self.positions, self.point_colors())))
+            }
+            None => None,
+        }
+    }
+
+    /// Colours of vertices, sRGB. A vertex without a colour gets one that depends on its position, so that the shape is
+    /// visible.
+    fn point_colors(&self) -> Vec<Vec3> {
+        let bounds = Bounds::of(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+        let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
+        let color = |(k, &p): (u32, &Vec3)| match &self.document {
+            Document::Obj(document) if document.colors.contains_key(&k) => Vec3::from(document.colors[&k]),
+            _ => 0.3 + 0.6 * (p - bounds.min) / size,
+        };
+        (0..).zip(&self.positions).map(color).collect()
     }
 
     /// Rest positions in the file's axes, relative to the origin.

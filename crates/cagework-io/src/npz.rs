@@ -1,7 +1,7 @@
 //! Weights as NumPy `.npz`, in the layout of `scipy.sparse.save_npz`.
 //!
-//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32) and `data` (float32) hold the
-//! columns of the controls. Optional arrays:
+//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32) and `data` (float32) hold a matrix with a
+//! row per bound point and a column per control: the cage's vertices, then controls inside the cage. Optional arrays:
 //!
 //! - vertices outside the cage: `outside_vertex` (int32), `outside_distance` (float32, object units),
 //!   `outside_share` (float32);
@@ -70,11 +70,13 @@ impl From<ZipError> for NpzError {
 pub struct SavedWeights {
     /// One row per model vertex, then one per extra point.
     pub weights: Weights,
-    /// Meaning of the columns that follow those of cage and inner controls: offsets of vertices, moved by the controls.
+    /// Frames of the last columns of the weights, after those of the cage and the inner controls. These columns carry
+    /// the part of each position that the weights of the controls do not reproduce.
     pub frames: Frames,
     /// Points outside the cage, by row of the weights.
     pub outside: Vec<OutsideVertex>,
-    /// Rig points that were bound with the model, object units.
+    /// Points of the rig that were bound with the model ([`Model::extra_points`](crate::Model::extra_points)), object
+    /// units.
     pub extra_points: Vec<Vec3>,
     /// Rest positions of the controls inside the cage, object units. Their columns follow those of the
     /// cage's vertices.
@@ -101,7 +103,8 @@ impl SavedWeights {
     }
 }
 
-/// Writes weights as an `.npz` file. The last rows belong to `extra_points`, the last columns to `inner_controls`.
+/// Writes weights as an `.npz` file. The last rows belong to `extra_points`. The columns of `inner_controls` follow
+/// those of the cage and precede those of `frames`.
 #[must_use]
 pub fn write_weights_npz(
     weights: &Weights,
@@ -152,10 +155,13 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
     zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
 }
 
-/// Writes a field as an `.npz` file: `origin` (float64, `[3]`) of the first node, `spacing` (float64) of the nodes, `u`
-/// (float32, `[nx, ny, nz, 3]`), the displacements, `F` (float32, `[nx, ny, nz, 3, 3]`), the deformation gradients (`F
-/// @ d` maps a small vector), and `bound` (bool, `[nx, ny, nz]`), whether a node is inside the cage or at most two
-/// cells from the cage. `origin`: added to the position of the first node.
+/// Writes a field as an `.npz` file with these arrays:
+///
+/// - `origin` (float64, `[3]`): position of the first node, to which the argument `origin` was added;
+/// - `spacing` (float64): distance between adjacent nodes;
+/// - `u` (float32, `[nx, ny, nz, 3]`): displacements;
+/// - `F` (float32, `[nx, ny, nz, 3, 3]`): deformation gradients, `F @ d` maps a small vector `d`;
+/// - `bound` (bool, `[nx, ny, nz]`): whether a node is inside the cage or at most two cells from the cage.
 #[must_use]
 pub fn write_field_npz(field: &Field, origin: DVec3) -> Vec<u8> {
     let lattice = &field.lattice;

@@ -99,7 +99,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         read.end_face(odd)?;
         colored += usize::from(words.next().is_some());
     }
-    // Channels are in 0 to 255 or in 0 to 1.
+    // Colour channels are from 0 to 255 if any is above 1, otherwise from 0 to 1.
     if read.colors.as_flattened().iter().any(|&share| share > 1.0) {
         read.colors.as_flattened_mut().iter_mut().for_each(|share| *share /= 255.0);
     }

@@ -11,7 +11,8 @@ use glam::{DVec3, Vec3};
 /// Limit on |coordinate| / extent. Beyond it, rounding to f32 (2⁻²⁴ of the coordinate) exceeds 1e-6 of the extent.
 const MAX_COORDINATE_TO_EXTENT: f32 = 16.0;
 
-/// An origin near the model, object units, exact in f32. It is zero along each axis on which no coordinate is too far.
+/// An origin near the model, object units, exact in f32. Along an axis on which the model's centre is at most 16 times
+/// the model's extent away from zero, the origin is zero.
 #[must_use]
 pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
@@ -48,7 +49,7 @@ pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
     })
 }
 
-/// Text of a coordinate, with the digits of f32 near the world's origin and of f64 far from it.
+/// Text of a coordinate: with the digits of f32 if the origin is zero, otherwise with those of f64.
 pub(crate) struct Coordinate {
     origin: f64,
     from_origin: f32,

@@ -1,15 +1,15 @@
-//! Kinds of named parts.
+//! Kinds of the parts of a model that are selected by name.
 
-/// Kind of a named part.
+/// What the name of a part of a model refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PartKind {
-    /// A material.
+    /// A material: the vertices of the faces that use it.
     Material,
     /// A glTF node with its descendants.
     Node,
     /// A glTF joint: the vertices on which it has the largest weight. Other programs call this a vertex group.
     Joint,
-    /// An `o` or `g` line of an OBJ.
+    /// An object or group of an OBJ, which an `o` or `g` line begins.
     Group,
 }
 

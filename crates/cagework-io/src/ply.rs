@@ -21,15 +21,35 @@ const NO_VERTEX: u32 = u32::MAX;
 /// Names of the property that lists the vertices of a face. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// An element of a file. Properties that its kind does not have are empty.
+/// A vertex, or a face to be written. Members of properties that the element does not have are zero or empty.
 #[derive(Default)]
 struct Element {
     place: [f64; 3],
     normal: [f32; 3],
     color: [u8; 3],
     corners: Vec<u32>,
+}
+
+/// A face or triangle strip as read, which takes less memory than an [`Element`].
+#[derive(Default)]
+struct Face {
+    corners: Vec<u32>,
     /// The first corner that is not a valid index, as written.
     odd: Option<f64>,
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !CORNERS.contains(&name) {
+            return PropertyAccessResult::Ignored;
+        }
+        let set = corners(&property).map(|(corners, odd)| *self = Self { corners, odd });
+        set.map_or(PropertyAccessResult::UnsupportedType, |()| PropertyAccessResult::Set)
+    }
 }
 
 impl PropertyAccess for Element {
@@ -43,8 +63,6 @@ impl PropertyAccess for Element {
             place(&property).map(|x| self.place[k] = x)
         } else if let Some(k) = of(COLOR) {
             color(&property).map(|x| self.color[k] = x)
-        } else if CORNERS.contains(&name) {
-            corners(&property).map(|(list, odd)| (self.corners, self.odd) = (list, odd))
         } else {
             return PropertyAccessResult::Ignored;
         };
@@ -70,7 +88,7 @@ impl PropertyAccess for Element {
     }
 }
 
-/// Parses a coordinate.
+/// Coordinate from a property of any numeric type; `None` for a list.
 fn place(property: &Property) -> Option<f64> {
     match property {
         Property::Double(x) => Some(*x),
@@ -80,7 +98,8 @@ fn place(property: &Property) -> Option<f64> {
     }
 }
 
-/// Reads corners from a list of any numeric type. Invalid indices become [`NO_VERTEX`]; also returns the first one.
+/// Reads corners from a list of any numeric type. Values that are not valid indices become [`NO_VERTEX`]; the first
+/// such value is also returned.
 fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     let of = |numbers: &mut dyn Iterator<Item = f64>| {
         let whole = |x: f64| x >= 0.0 && x < f64::from(NO_VERTEX) && x.fract() == 0.0;
@@ -112,18 +131,13 @@ fn color(property: &Property) -> Option<u8> {
 }
 
 /// Triangles of strips, separated by [`NO_VERTEX`]. Every second triangle of a strip has the opposite orientation.
-fn unstrip(strips: &[Element]) -> Vec<Element> {
-    let strips = strips.iter().flat_map(|strip| strip.corners.split(|&v| v == NO_VERTEX));
-    let triangles = strips.flat_map(|strip| strip.windows(3).enumerate()).map(|(k, of)| {
-        let [a, b, c] = [of[0], of[1 + k % 2], of[2 - k % 2]];
-        Element { corners: vec![a, b, c], ..Element::default() }
-    });
+fn unstrip(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let strips = corners.split(|&v| v == NO_VERTEX);
+    let triangles = strips.flat_map(|strip| strip.windows(3).enumerate());
     // Triangles with a repeated corner only join the parts of a strip.
     triangles
-        .filter(|t| {
-            t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2] && t.corners[2] != t.corners[0]
-        })
-        .collect()
+        .map(|(k, of)| [of[0], of[1 + k % 2], of[2 - k % 2]])
+        .filter(|&[a, b, c]| a != b && b != c && c != a)
 }
 
 /// Whether the first line is `ply`.
@@ -141,13 +155,13 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let bytes = &*readable(bytes);
     let mut reader = Reader::new(bytes);
     let header = parser.read_header(&mut reader).map_err(wrong)?;
-    let n_bytes = bytes.len() as u64;
+    let n_bytes = original.len() as u64;
     let count = |name: &str| header.elements.get(name).map_or(0, |e| e.count as u64);
     let mut claimed = 0_u64;
     for element in header.elements.values() {
-        // Every element takes at least one byte, and a face at least four (its corner count and three corners), so the
-        // file size limits the sum of all counts. The limit also covers binary elements without properties, which take
-        // no bytes: a huge count of them would stall the reader.
+        // An element with properties takes at least one byte, and a face at least four (its corner count and three
+        // corners), so the file size limits the sum of all counts. Binary elements without properties take no bytes.
+        // The limit applies to them as well, because a huge count of them would stall the reader.
         let least = if element.name == "face" { 4 } else { 1 };
         claimed = claimed.saturating_add(least * element.count as u64);
         if claimed > n_bytes {
@@ -159,7 +173,8 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
     let corners = if count("face") + count("tristrips") > 0 { n_bytes } else { 0 };
     let elements = others * size_of::<Element>() as u64;
-    Polygons::check_memory(2 * n_bytes + elements, count("vertex"), corners / 2, memory_limit)?;
+    let held = n_bytes + bytes.len() as u64 + elements;
+    Polygons::check_memory(held, count("vertex"), corners / 2, memory_limit)?;
 
     let mut read = Polygons {
         face_starts: vec![0],
@@ -174,9 +189,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         read.notices.push(format!("{line} is not a statement of a PLY header: ignored"));
     }
     let mut left_out = Vec::new();
-    let mut faces: Vec<Element> = Vec::new();
+    // Faces may precede their vertices.
+    let (mut faces, mut strips) = (Vec::new(), Vec::new());
     for (name, element) in &header.elements {
-        let elements = parser.read_payload_for_element(&mut reader, element, &header).map_err(wrong)?;
         let has = |names: &[&str]| names.iter().all(|&n| element.properties.contains_key(n));
         let known: Vec<&str> = [&POSITION[..], &NORMAL, &COLOR].concat();
         match name.as_str() {
@@ -184,6 +199,8 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
                 if !has(&POSITION) {
                     return Err(PolygonsError::Syntax("its vertices have no x, y or z".into()));
                 }
+                let elements =
+                    parser.read_payload_for_element(&mut reader, element, &header).map_err(wrong)?;
                 let places: Vec<DVec3> = elements.iter().map(|e| DVec3::from_array(e.place)).collect();
                 read.place(&places, near);
                 read.has_normals = has(&NORMAL);
@@ -192,17 +209,35 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
                 }
                 left_out.extend(element.properties.keys().filter(|k| !known.contains(&k.as_str())).cloned());
             }
-            "face" | "tristrips" => {
+            kind => {
+                let all = Parser::<Face>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(wrong)?;
+                match kind {
+                    "face" => faces = all,
+                    "tristrips" => strips = all,
+                    _ => {
+                        left_out.push(name.clone());
+                        continue;
+                    }
+                }
                 left_out
                     .extend(element.properties.keys().filter(|k| !CORNERS.contains(&k.as_str())).cloned());
-                faces.extend(if name == "face" { elements } else { unstrip(&elements) });
             }
-            _ => left_out.push(name.clone()),
         }
     }
+    let n_triangles: usize = strips.iter().map(|strip| unstrip(&strip.corners).count()).sum();
+    let n_corners = faces.iter().map(|face| face.corners.len()).sum::<usize>() + 3 * n_triangles;
+    Polygons::check_memory(held, count("vertex"), n_corners as u64, memory_limit)?;
+    read.corners.reserve_exact(n_corners);
+    read.face_starts.reserve_exact(faces.len() + n_triangles);
     for face in faces {
         read.corners.extend(&face.corners);
         read.end_face(face.odd)?;
+    }
+    for triangle in strips.iter().flat_map(|strip| unstrip(&strip.corners)) {
+        read.corners.extend(triangle);
+        read.end_face(None)?;
     }
     if !left_out.is_empty() {
         let names = shown_start(&left_out.join(", "), MAX_NAME_CHARS);

@@ -1,5 +1,5 @@
-//! Rewrites PLY files for the strict parser: non-ASCII comments, CR line ends, empty lines, property names
-//! with special characters, unknown header lines and, in text files, numbers such as `.5`, `1.` and `nan`.
+//! Rewrites PLY files for the parser `ply-rs-bw`, which rejects non-ASCII comments, CR line ends, empty lines, property
+//! names with special characters, unknown header lines and, in text files, numbers such as `.5`, `1.` and `nan`.
 
 use std::borrow::Cow;
 
@@ -120,7 +120,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
             out.extend(before.join(&b' '));
             out.push(b' ');
             out.extend(name.iter().map(|b| if is_plain(b) { *b } else { b'_' }));
-            // The line number keeps names distinct whose odd characters were replaced.
+            // Append the line number, so that names whose special characters were replaced stay distinct.
             out.extend(format!("-{number}").into_bytes());
         } else {
             out.extend(line.iter().map(|&b| if b.is_ascii() { b } else { b'?' }));

@@ -21,7 +21,7 @@ pub enum PointFileError {
     #[error("not a text file: its bytes are not UTF-8")]
     Encoding,
     /// A line after the first point does not contain three numbers x, y and z.
-    #[error("line {line} has no three numbers x, y and z")]
+    #[error("line {line} does not have three numbers x, y and z")]
     Line {
         /// Line number, from 1.
         line: usize,
@@ -74,10 +74,11 @@ impl PointFile {
     /// header. Lines before the first point, lines that begin with `#` and empty lines are kept.
     ///
     /// # Errors
-    /// [`PointFileError`]
+    /// [`PointFileError`] if the text or the array is invalid, a coordinate is not finite, there are no points, or the
+    /// memory limit is exceeded.
     pub fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PointFileError> {
         let is_array = bytes.starts_with(b"\x93NUMPY");
-        // A point takes at least 12 bytes in an array, and a line in a text.
+        // A point takes at least 12 bytes of an array, or one line of a text.
         let lines = || 1 + bytes.iter().filter(|&&b| b == b'\n').count();
         let points = if is_array { bytes.len() / 12 } else { lines() };
         let needed = MEMORY_PER_BYTE * bytes.len() as u64 + MEMORY_PER_POINT * points as u64;
@@ -207,7 +208,7 @@ mod tests {
         assert!(fault(b"1 2 3\nnan 0 0\n").contains("point 2 is not finite"));
         assert!(fault(b"\xff\xfe1").contains("UTF-8"));
         assert!(fault(b"\x93NUMPY\x01\x00").contains(".npy"));
-        // 6 bytes per line, but 300 per point.
+        // Each line has 6 bytes, but its point takes 300 bytes of memory.
         let many = "1 2 3\n".repeat(10_000);
         let message = PointFile::read(many.as_bytes(), 1 << 20).unwrap_err().to_string();
         assert!(message.contains("about 4 MiB of memory, more than the limit of 1 MiB"), "{message}");

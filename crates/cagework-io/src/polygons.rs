@@ -1,4 +1,4 @@
-//! Polygon meshes as read from and written to PLY, STL and OFF files.
+//! Polygon meshes as read from and written to PLY, STL, OFF and 3MF files.
 
 use cagework_core::deform::vertex_normals;
 use cagework_core::words::counted;
@@ -7,19 +7,20 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
-use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
+use crate::obj::{Corner, Group, Line, Material, NONE, ObjDocument, shown_token};
 use crate::origin::{origin_near, relative};
 
 /// Memory of the table for welding coincident vertices, bytes per vertex.
 const WELD_BYTES: u64 = 36;
 
-/// Error of reading a PLY, STL or OFF file.
+/// Error of reading a PLY, STL, OFF or 3MF file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PolygonsError {
-    /// A syntax error.
+    /// The file does not follow the syntax of its format.
     #[error("the file is damaged: {0}")]
     Syntax(String),
     /// A count is too large for the size of the file.
@@ -27,7 +28,7 @@ pub enum PolygonsError {
         "its header counts {count} of '{name}', too many for a file of {bytes} bytes: it is damaged or cut off"
     )]
     Count {
-        /// Name of the element.
+        /// Kind of the counted elements, such as "vertex" or "face".
         name: String,
         /// Declared number of elements.
         count: u64,
@@ -53,13 +54,26 @@ pub enum PolygonsError {
         /// Number of vertices.
         vertices: usize,
     },
+    /// The build of a 3MF shows more objects, vertices or triangles than the limit.
+    #[error("its build shows {count} {what}, more than the limit of {limit}: split the model")]
+    TooMany {
+        /// Number in the build. An object counts once per placement.
+        count: u64,
+        /// What is counted, such as "vertices".
+        what: &'static str,
+        /// Largest number that is accepted.
+        limit: u64,
+    },
+    /// The build of a 3MF is empty.
+    #[error("its build is empty: put an object on the plate and save the file again")]
+    NoItems,
     /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
 }
 
 /// How a file encodes numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Encoding {
     Text,
     #[default]
@@ -67,14 +81,15 @@ pub(crate) enum Encoding {
     BigEndian,
 }
 
-/// A polygon mesh as read from a PLY, STL or OFF file.
+/// A polygon mesh as read from a PLY, STL, OFF or 3MF file.
 #[derive(Debug, Default)]
 pub(crate) struct Polygons {
     pub(crate) positions: Vec<Vec3>,
     /// Origin of `positions`: zero unless they are far from the world origin.
     pub(crate) origin: DVec3,
-    /// Vertex indices of all faces, concatenated, and the start of each face. `[n_faces + 1]`
+    /// Vertex indices of all faces, concatenated.
     pub(crate) corners: Vec<u32>,
+    /// Start of each face in `corners`, then the length of `corners`. `[n_faces + 1]`
     pub(crate) face_starts: Vec<u32>,
     /// Number of faces with fewer than three corners, which are ignored.
     pub(crate) n_left_out: usize,
@@ -82,6 +97,13 @@ pub(crate) struct Polygons {
     pub(crate) colors: Vec<[f32; 3]>,
     /// Named ranges of faces, such as STL solids.
     pub(crate) groups: Vec<Group>,
+    /// Material of each face, an index into `materials`, or [`NONE`]; empty if no face has one.
+    pub(crate) face_materials: Vec<u32>,
+    /// Names and looks of the materials.
+    pub(crate) materials: Vec<String>,
+    pub(crate) looks: HashMap<String, Material>,
+    /// Memory of a file that the document keeps, bytes.
+    pub(crate) bytes_of_file: u64,
     pub(crate) has_normals: bool,
     pub(crate) encoding: Encoding,
     pub(crate) notices: Vec<String>,
@@ -136,7 +158,7 @@ impl Polygons {
     /// Converts the mesh to an OBJ document without texture coordinates and normals.
     ///
     /// # Errors
-    /// If there is no vertex, or one is not finite.
+    /// If the polygons have no vertices, or a vertex is not finite.
     pub(crate) fn document(&mut self) -> Result<ObjDocument, PolygonsError> {
         if self.positions.is_empty() {
             return Err(PolygonsError::Empty);
@@ -150,8 +172,17 @@ impl Polygons {
                 .push(format!("{} with fewer than three corners: ignored", counted(n, "face", "faces")));
         }
         let mut document = ObjDocument {
-            corners: self.corners.iter().map(|&v| Corner { v, vt: NONE, vn: NONE }).collect(),
-            face_materials: vec![NONE; self.face_starts.len() - 1],
+            corners: std::mem::take(&mut self.corners)
+                .into_iter()
+                .map(|v| Corner { v, vt: NONE, vn: NONE })
+                .collect(),
+            face_materials: if self.face_materials.is_empty() {
+                vec![NONE; self.face_starts.len() - 1]
+            } else {
+                std::mem::take(&mut self.face_materials)
+            },
+            materials: std::mem::take(&mut self.materials),
+            looks: std::mem::take(&mut self.looks),
             face_starts: std::mem::take(&mut self.face_starts),
             groups: std::mem::take(&mut self.groups),
             colors: (0..).zip(self.colors.iter().copied()).collect::<HashMap<_, _>>(),
@@ -200,7 +231,8 @@ pub(crate) fn fault(line: usize, problem: &str) -> PolygonsError {
     PolygonsError::Syntax(format!("line {line}: {problem}"))
 }
 
-/// Parses the first N words. Non-finite numbers are accepted here and rejected with their vertex.
+/// Parses the first N words. Non-finite numbers are accepted here; [`Polygons::document`] rejects them with the index
+/// of their vertex.
 ///
 /// # Errors
 /// If a number is missing or invalid.

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Bytes before the displacements: number of vertices and largest displacement.
 const HEADER_BYTES: usize = 8;
 
-/// Bytes per vertex.
+/// Bytes of a vertex: displacements along three axes, 16 bits each.
 const VERTEX_BYTES: usize = 6;
 
 /// Error of decoding a pose.
@@ -15,7 +15,7 @@ pub enum PoseCodeError {
     /// The length is wrong.
     #[error("the pose is cut off or damaged: it has {given} bytes instead of {expected}")]
     Length {
-        /// Number of bytes.
+        /// Number of bytes that were given.
         given: usize,
         /// Expected number of bytes.
         expected: usize,
@@ -33,7 +33,8 @@ pub enum PoseCodeError {
 }
 
 /// Encodes a pose, little-endian: number of vertices (u32), largest absolute offset along an axis (f32, object units),
-/// then three i16 per vertex in units of largest / 32,767. 8 + 6 n bytes. `rest`, `pose`: `[n_cage]`, object units.
+/// then three i16 per vertex in units of largest / 32,767. The result has 8 + 6 n_cage bytes. `rest`, `pose`:
+/// `[n_cage]`, object units.
 ///
 /// # Panics
 /// If the lengths differ.

@@ -6,7 +6,10 @@
 //! stored as its original file, and the visible mesh is built from this file. Further models of the same cage are
 //! stored as files and are not visible. Weights are not stored; they are recomputed from the settings.
 
+use std::borrow::Cow;
+
 use cagework_core::PolygonMesh;
+use cagework_core::splats::Splats;
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use thiserror::Error;
@@ -16,6 +19,7 @@ use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
 use crate::model::{Document, Model, ModelFormat, ReadError};
 use crate::origin::translation;
 use crate::shown::shown;
+use crate::splats::SplatsToWrite;
 
 /// Format version of projects with one model near the origin, with several models, and with models far from the origin.
 /// Readers that know only the first version reject the other two.
@@ -50,7 +54,7 @@ pub enum ProjectError {
     Version {
         /// Name given by the caller.
         name: String,
-        /// Version of the project.
+        /// Format version of the project.
         found: u64,
     },
     /// A part of the project is missing or invalid.
@@ -58,7 +62,7 @@ pub enum ProjectError {
     Damaged {
         /// Name given by the caller.
         name: String,
-        /// What is wrong.
+        /// The problem, as a clause: "its origin is not three numbers".
         what: &'static str,
     },
 }
@@ -69,7 +73,7 @@ pub enum ProjectError {
 /// positions, `[n_cage]` each.
 ///
 /// # Errors
-/// [`WriteError`] if there is no model, a document cannot be written or the file would be too large.
+/// [`WriteError`] if `models` is empty, a document cannot be written or the file would be too large.
 pub fn write_project(
     models: &[&Model],
     cage: &PolygonMesh,
@@ -82,15 +86,29 @@ pub fn write_project(
     // A model in another format is stored beside a GLB built from it, which viewers can show.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
-        Document::Obj(_) if model.splats().is_some() => {
-            let glb = model.write(ModelFormat::Gltf, &model.positions)?;
-            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(model.origin))?.document;
+        Document::Obj(_) if model.n_faces() == 0 => {
+            let glb = match model.drawn_splats() {
+                // The GLB of a point cloud has a splat for each point.
+                Some(Cow::Owned(points)) => {
+                    let positions = model.positions_in_file().into_owned();
+                    let splats = Splats { positions, ..points };
+                    gltf::write_splats(&SplatsToWrite {
+                        splats: &splats,
+                        origin: model.origin,
+                        changed: None,
+                    })?
+                }
+                _ => model.write(ModelFormat::Gltf, &model.positions)?,
+            };
+            built =
+                gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, (Some(model.origin), false))?.document;
             (&built, Some(file_of(model)?))
         }
         Document::Obj(document) => {
             let (glb, _) =
                 gltf::build_from_obj(&model.name, document, &model.positions_in_file(), model.origin)?;
-            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(model.origin))?.document;
+            built =
+                gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, (Some(model.origin), false))?.document;
             (&built, Some(file_of(model)?))
         }
     };
@@ -100,8 +118,6 @@ pub fn write_project(
     let up = model.up();
     let cage = &up.mesh_turned_back(cage);
     let node = add_cage(&mut json, &mut pack, cage, model.origin);
-    let mut view =
-        |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
     let version = if more.is_empty() { VERSION } else { VERSION_MULTIPLE_MODELS };
     let version = if model.origin == DVec3::ZERO { version } else { VERSION_FAR_ORIGIN };
     let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
@@ -110,20 +126,20 @@ pub fn write_project(
         project["origin"] = json!(model.origin.to_array());
     }
     if let Some(source) = source {
-        project["source"] = view(&mut json, source);
+        project["source"] = view(&mut pack, &mut json, source);
     }
     for model in more {
-        let mut part = view(&mut json, file_of(model)?);
+        let mut part = view(&mut pack, &mut json, file_of(model)?);
         part["name"] = model.name.as_str().into();
         push(&mut project, "more", part);
     }
     project["cage"] = json!({
-        "positions": view(&mut json, position_bytes(&cage.positions)),
-        "faces": view(&mut json, face_bytes(&cage.faces)),
+        "positions": view(&mut pack, &mut json, position_bytes(&cage.positions)),
+        "faces": view(&mut pack, &mut json, face_bytes(&cage.faces)),
     });
     project["poses"] = json!([]);
     for (name, positions) in poses {
-        let mut pose = view(&mut json, position_bytes(&up.turned_back(positions)));
+        let mut pose = view(&mut pack, &mut json, position_bytes(&up.turned_back(positions)));
         pose["name"] = name.as_str().into();
         push(&mut project, "poses", pose);
     }
@@ -212,17 +228,24 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     Ok(Some(Project { models, cage: PolygonMesh { positions, faces }, poses, settings }))
 }
 
+/// Adds a buffer view with these bytes; returns the object that refers to it.
+fn view<'a>(pack: &mut Pack<'a>, json: &mut Value, bytes: impl Into<Cow<'a, [u8]>>) -> Value {
+    json!({ "bufferView": pack.push_view(json, bytes, None) })
+}
+
 /// The model as a self-contained file of its own format.
-fn file_of(model: &Model) -> Result<Vec<u8>, WriteError> {
+fn file_of(model: &Model) -> Result<Cow<'_, [u8]>, WriteError> {
     match (&model.document, model.format()) {
         (Document::Gltf(document), _) => {
             let (mut json, mut pack) = (document.json.clone(), Pack::of(document));
             gltf::embed_images(document, &mut json, &mut pack);
-            pack.finish(json)
+            Ok(pack.finish(json)?.into())
         }
-        (Document::Obj(document), ModelFormat::Obj) => Ok(document.bytes.clone()),
+        (Document::Obj(document), ModelFormat::Obj | ModelFormat::ThreeMf) => {
+            Ok(document.bytes.as_slice().into())
+        }
         // Documents of PLY, STL and OFF do not keep the bytes of their file: write it again.
-        (_, format) => model.write(format, &model.positions),
+        (_, format) => Ok(model.write(format, &model.positions)?.into()),
     }
 }
 
@@ -255,7 +278,8 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     }
     edges.sort_unstable();
     edges.dedup();
-    // Viewers show all meshes of a file without nodes, but only nodes once there is one.
+    // Viewers show all meshes of a file without nodes. If the cage got a node in such a file, they would show only the
+    // cage.
     if edges.is_empty() || json["nodes"].as_array().is_none_or(Vec::is_empty) {
         return None;
     }
@@ -279,7 +303,7 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: D
     Some(node)
 }
 
-/// Removes the node and the mesh of the cage, if they are still the last in their lists.
+/// Removes the node and the mesh of the cage if they are the last in their lists, so that no other index changes.
 fn drop_cage(json: &mut Value, node: Option<u64>) {
     let Some(node) = node else { return };
     let is_cage = |list: &Value, index: u64| {

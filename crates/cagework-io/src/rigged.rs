@@ -7,19 +7,21 @@ use thiserror::Error;
 
 use crate::error::WriteError;
 use crate::gltf::{
-    self, Clip, JointPoint, Player, PoseClip, PoseDisplacements, ReshapeOptions, ReshapeReport, Rig,
+    self, Clip, Ground, JointPoint, Player, PoseClip, PoseDisplacements, ReshapeOptions, ReshapeReport, Rig,
+    Skeleton, Vrm,
 };
 use crate::model::{Document, Model};
 use crate::origin::relative;
 use crate::shown::shown;
+use crate::siblings::Resolve;
 use crate::timeline::Timeline;
 
 // Limits on the frames of a clip that a generated cage encloses: on their number, and on the vertices of all frames.
 const MAX_CLIP_FRAMES: usize = 32;
 const MAX_FRAME_VERTICES: usize = 1 << 24;
 
-/// Sampling rate of baked clips, and limit on their number of frames. Each frame becomes a morph target, and game
-/// engines support only a limited number of them.
+/// Sampling rate of baked clips, and limit on their number of frames. Each frame becomes a morph target, of which game
+/// engines support only a limited number.
 const BAKED_FRAMES_PER_SECOND: f32 = 30.0;
 const MAX_BAKED_FRAMES: f32 = 60.0;
 /// Limit on the positions and normals of all baked frames, bytes.
@@ -39,7 +41,7 @@ impl Clip {
     /// Index of the first clip with this name. Unnamed clips have labels such as "clip 0".
     ///
     /// # Errors
-    /// [`UnknownClip`] if there is none.
+    /// [`UnknownClip`] if no clip has this name.
     pub fn named(clips: &[Self], name: &str) -> Result<usize, UnknownClip> {
         let own = clips.iter().position(|clip| clip.name.as_deref() == Some(name));
         let names: Vec<String> = clips.iter().enumerate().map(|(k, clip)| clip.label(k)).collect();
@@ -114,11 +116,20 @@ impl Model {
     /// Player for an export of this model, with vertices in this model's order.
     ///
     /// # Errors
-    /// [`WriteError`] if `export` is not an export of this model.
+    /// [`WriteError`] if this model is not a glTF, or `export` cannot be read.
     pub fn player_of(&self, export: &[u8]) -> Result<Player, WriteError> {
         let Document::Gltf(like) = &self.document else { return Err(WriteError::NoRig) };
-        let read = gltf::read("export.glb", export, &mut |_| None, u64::MAX, Some(self.origin))?;
+        let read = gltf::read("export.glb", export, &mut |_| None, u64::MAX, (Some(self.origin), false))?;
         Ok(Player::new(&read.document, like, self.origin)?)
+    }
+
+    /// VRM data of the file; `None` unless it is a VRM.
+    #[must_use]
+    pub fn vrm(&self) -> Option<Vrm> {
+        match &self.document {
+            Document::Gltf(document) => gltf::vrm(document),
+            Document::Obj(_) => None,
+        }
     }
 
     /// Animation clips of the file.
@@ -131,7 +142,8 @@ impl Model {
     }
 
     /// Exports a rigged model in its deformed shape, with skeleton, morph targets and animations fitted to
-    /// it. With `poses`, the shape stays at rest and each pose becomes an additional morph target.
+    /// it. Each of the `poses` becomes an additional morph target; give zeros for `by` with poses, so that the shape
+    /// stays at rest.
     ///
     /// `by`: displacements of the vertices, then of [`Self::extra_points`]. `outside`: indices of those
     /// points that are outside the cage.
@@ -148,30 +160,101 @@ impl Model {
         let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
         let rest = self.positions_in_file();
         let rig = Rig::new(document, &rest, self.origin)?;
-        let n = self.positions.len() + rig.bound().len();
-        let turned = |by: &[DVec3]| -> Result<Vec<DVec3>, WriteError> {
-            if by.len() != n {
-                return Err(WriteError::Count { given: by.len(), expected: n });
-            }
-            if let Some(vertex) = by.iter().position(|by| !by.is_finite()) {
-                return Err(WriteError::NotFinite { vertex });
-            }
-            Ok(by.iter().map(|&by| self.up.vector_turned_back(by)).collect())
-        };
-        let all_moved = |by: &[DVec3]| Ok(rig.held(&options.parts, &rest, rig.all_moved(turned(by)?)));
+        let all_moved = |by: &[DVec3]| Ok(rig.held(&options.parts, &rest, self.all_moved(&rig, by)?));
         let by: Vec<DVec3> = all_moved(by)?;
         let by_poses = poses.iter().map(|(_, by)| all_moved(by)).collect::<Result<Vec<_>, WriteError>>()?;
         let poses: Vec<PoseDisplacements<'_>> =
             poses.iter().zip(&by_poses).map(|((name, _), by)| PoseDisplacements { name, by }).collect();
-        let mut is_outside = vec![false; n];
+        let is_outside = self.all_outside(&rig, outside);
+        let up = self.up.vector_turned_back(DVec3::Y);
+        gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
+    }
+
+    /// How the joints move in [`Self::write_reshaped`], for other files with the same rig.
+    ///
+    /// # Errors
+    /// [`WriteError`] unless there is one finite displacement per point, or if the rig cannot be read.
+    pub fn skeleton(
+        &self,
+        by: &[DVec3],
+        outside: &[u32],
+        options: &ReshapeOptions,
+    ) -> Result<Skeleton, WriteError> {
+        let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
+        let rest = self.positions_in_file();
+        let rig = Rig::new(document, &rest, self.origin)?;
+        let by = rig.held(&options.parts, &rest, self.all_moved(&rig, by)?);
+        let is_outside = self.all_outside(&rig, outside);
+        let up = self.up.vector_turned_back(DVec3::Y);
+        gltf::skeleton(document, &rig, &self.triangles, (&by, &is_outside), (options, up))
+    }
+
+    /// Heights of the lowest vertices of a model that is written without its rig. `posed`: `[n_vertices]`.
+    #[must_use]
+    pub fn ground(&self, posed: &[Vec3]) -> Ground {
+        let low = |all: &[Vec3]| all.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
+        let origin = self.up.vector_turned(self.origin).y;
+        Ground::at_rest([low(&self.positions), low(posed)].map(|low| origin + low))
+    }
+
+    /// Lifts or lowers a model that is written without its rig: by the lift of [`ReshapeOptions::skeleton`] if that has
+    /// one, otherwise, with [`ReshapeOptions::ground`], so that the lowest point keeps its height. `posed`:
+    /// `[n_vertices]`.
+    pub fn stand(&self, posed: &mut [Vec3], options: &ReshapeOptions) {
+        let own = options.ground.then(|| self.ground(posed));
+        let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground());
+        let lift = shared.or(own.as_ref()).map_or(0.0, Ground::lift) as f32;
+        if lift != 0.0 {
+            posed.iter_mut().for_each(|p| p.y += lift);
+        }
+    }
+
+    /// Names of the joints that carry vertices.
+    #[must_use]
+    pub fn joints_with_vertices(&self) -> Skeleton {
+        match &self.document {
+            Document::Gltf(document) => gltf::joints_with_vertices(document),
+            Document::Obj(_) => Skeleton::default(),
+        }
+    }
+
+    /// Names of the joints that carry vertices in a file; none if it has no skin or cannot be read.
+    pub fn joints_with_vertices_in(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Skeleton {
+        // Files without skins are not parsed.
+        let length = bytes.get(12..16).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes) as usize;
+        let text = bytes.get(20..20 + length).filter(|_| bytes.starts_with(b"glTF")).unwrap_or(bytes);
+        let key = b"\"skins\"";
+        if !text.windows(key.len()).any(|word| word == key) {
+            return Skeleton::default();
+        }
+        gltf::joints_with_vertices_in(name, bytes, resolve, memory_limit)
+    }
+
+    /// Displacements of all points of the rig, in the file's axes.
+    fn all_moved(&self, rig: &Rig<'_>, by: &[DVec3]) -> Result<Vec<DVec3>, WriteError> {
+        let expected = self.positions.len() + rig.bound().len();
+        if by.len() != expected {
+            return Err(WriteError::Count { given: by.len(), expected });
+        }
+        if let Some(vertex) = by.iter().position(|by| !by.is_finite()) {
+            return Err(WriteError::NotFinite { vertex });
+        }
+        Ok(rig.all_moved(by.iter().map(|&by| self.up.vector_turned_back(by)).collect()))
+    }
+
+    fn all_outside(&self, rig: &Rig<'_>, outside: &[u32]) -> Vec<bool> {
+        let mut is_outside = vec![false; self.positions.len() + rig.bound().len()];
         for &point in outside {
             if let Some(is_outside) = is_outside.get_mut(point as usize) {
                 *is_outside = true;
             }
         }
-        let is_outside = rig.all_outside(is_outside);
-        let up = self.up.vector_turned_back(DVec3::Y);
-        gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
+        rig.all_outside(is_outside)
     }
 
     /// Vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
@@ -224,16 +307,26 @@ impl Model {
         (0..n).map(move |frame| self.shown_at(player, Some(clip), frame as f32 * step, &[]))
     }
 
+    /// Positions at times of a clip, seconds. `[n_times][n_vertices]`
+    ///
+    /// # Errors
+    /// [`WriteError`] if the model is not a glTF, or a part of the rig cannot be read.
+    pub fn frames_at(&self, clip: usize, seconds: &[f32]) -> Result<Vec<Vec<Vec3>>, WriteError> {
+        let player = self.player()?.ok_or(WriteError::NoRig)?;
+        Ok(seconds.iter().map(|&at| self.shown_at(&player, Some(clip), at, &[])).collect())
+    }
+
     /// Positions at equal time steps from the start of a clip to its end: the frames that
     /// [`Self::write_baked`] exports. `[n_frames][n_vertices]`
     ///
     /// # Errors
-    /// [`WriteError`] if there is no such clip, it cannot be played, or its frames exceed the memory limit.
+    /// [`WriteError`] if there is no such clip, the rig cannot be read, or positions and normals of the frames would
+    /// exceed 512 MiB.
     pub fn frames(&self, clip: usize) -> Result<Vec<Vec<Vec3>>, WriteError> {
         let player = self.player()?.ok_or(WriteError::NoRig)?;
         let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
         let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(1.0, MAX_BAKED_FRAMES) as usize + 1;
-        // 24 bytes for a position and a normal.
+        // The position and the normal of a vertex take 24 bytes.
         let needed = (n * self.positions.len() * 24) as u64;
         if needed > MAX_BAKED_BYTES {
             return Err(WriteError::Document(format!(
@@ -267,5 +360,22 @@ impl Model {
         let frames: Vec<(String, Vec<Vec3>)> = times.iter().zip(frames).map(named).collect();
         let timeline = &Timeline::at_keys(&times);
         self.glb(rest, &frames, PoseClip { name: clip, timeline, is_alone: true })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shape_on_the_ground_keeps_the_height_of_its_lowest_vertex() {
+        let text = b"v 0 1 0\nv 1 1 0\nv 0 3 0\nf 1 2 3\n";
+        let model = Model::read("a.obj", text, &mut |_| None).unwrap();
+        for (ground, lowest) in [(false, 1.5), (true, 1.0)] {
+            let mut posed: Vec<Vec3> = model.positions.iter().map(|p| 1.5 * *p).collect();
+            model.stand(&mut posed, &ReshapeOptions { ground, ..ReshapeOptions::default() });
+            assert_eq!(posed[0].y, lowest);
+            assert_eq!(posed[2] - posed[0], Vec3::new(0.0, 3.0, 0.0));
+        }
     }
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::GltfError;
+use crate::gltf::{GltfError, ReshapeOptions};
 use crate::model::{Document, Model};
 use crate::part_kind::PartKind;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
@@ -58,10 +58,11 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Model {
-    /// Deformed vertices, with `parts` held in place or rigid. Returns the exact rest positions if `posed`
-    /// equals `rest`; the weighted sums would add rounding.
+    /// Deformed vertices of a model that is written without its rig: with the parts of `options` held in place or rigid,
+    /// then lifted by [`Self::stand`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
+    /// weighted sums, which would add rounding.
     ///
-    /// `weights`, `frames`: of the model's vertices. `rest`, `posed`: `[n_controls]`, object units. Returns
+    /// `weights`, `frames`: those of the model's vertices. `rest`, `posed`: `[n_controls]`, object units. Returns
     /// `[n_vertices]`, object units.
     ///
     /// # Panics
@@ -71,17 +72,21 @@ impl Model {
         &self,
         (weights, frames): (&Weights, &Frames),
         (rest, posed): (&[Vec3], &[Vec3]),
-        parts: &Parts,
+        options: &ReshapeOptions,
     ) -> Vec<Vec3> {
-        if posed == rest {
-            return self.positions.clone();
-        }
-        let deformed = deform_bound(weights, frames, posed);
-        if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
+        let mut deformed = if posed == rest {
+            self.positions.clone()
+        } else {
+            let deformed = deform_bound(weights, frames, posed);
+            let parts = &options.parts;
+            if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
+        };
+        self.stand(&mut deformed, options);
+        deformed
     }
 
-    /// Vertices of the parts called `name`, ascending. `name` has a kind, as in `material:skin`,
-    /// `node:Buckle`, `joint:Head` or `group:eyes`, or is unique without one.
+    /// Vertices of the parts called `name`, ascending. `name` starts with a kind, as in `material:skin`, `node:Buckle`,
+    /// `joint:Head` or `group:eyes`, or is unique without a kind.
     ///
     /// # Errors
     /// [`SelectError`], listing the available names.
@@ -120,7 +125,8 @@ impl Model {
         names.into_iter().map(|(kind, name)| format!("{}:{name}", kind.word())).collect()
     }
 
-    /// Parts that stay in place, with amounts from 0 to 1, and parts that stay rigid, split into connected pieces.
+    /// Selects parts by name. `stay`: parts that stay in place, each with how much of it stays, 0 to 1. `rigid`: parts
+    /// whose connected pieces keep their shape.
     ///
     /// # Errors
     /// [`SelectError`] if a name selects nothing.

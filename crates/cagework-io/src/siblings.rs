@@ -12,7 +12,8 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 /// error is the reason as a predicate, such as "is a folder".
 pub type Resolve<'a> = dyn FnMut(&str) -> Option<Result<Vec<u8>, String>> + 'a;
 
-/// Limit on the files that one model refers to, bytes. It equals the limit on the model itself.
+/// Limit on the total size of the files that one model refers to, bytes. It equals the limit on the size of the model's
+/// own file.
 const MAX_BYTES: u64 = 2 << 30;
 
 /// An encoded image; its format is recognised by its content.

@@ -1,5 +1,5 @@
 //! Captures: files of Gaussian splats. A capture keeps its file, and an export in the same format changes only the
-//! splats that moved. One submodule per format; `gltf/splats.rs` has the one of glTF.
+//! splats that moved. Each format has a submodule, except glTF, which is in `gltf/splats.rs`.
 
 pub(crate) mod ply;
 pub(crate) mod records;
@@ -15,15 +15,20 @@ use crate::polygons::Polygons;
 
 /// Factor between the coefficient of band 0 and a colour: 1 / (2 sqrt(pi)).
 const BAND_0: f32 = 0.282_094_8;
-/// Largest standard deviation of a splat, object units: its square is finite in f32.
+/// Limit on the standard deviation of a splat, object units. With this limit, the square (the variance) is finite in
+/// f32.
 pub(crate) const MAX_SCALE: f32 = 1e15;
-/// Largest scale that is written as a logarithm: rounding must not lift it over the limit.
+/// Limit on the absolute value of a colour or a coefficient of spherical harmonics. The sums that rotate harmonics then
+/// stay finite.
+pub(crate) const MAX_COLOR: f32 = 1e15;
+/// Largest scale that is written as a logarithm. It is below [`MAX_SCALE`], because the exponential of the rounded
+/// logarithm can exceed the scale.
 const MAX_LOG_SCALE: f32 = 9.999e14;
 /// Smallest standard deviation that is written as a logarithm, object units.
 const MIN_SCALE: f32 = 1e-20;
-/// Opacities this close to 0 or 1 are written as this, because the logarithm of the odds is infinite at both.
+/// Smallest distance of a written opacity from 0 and from 1, because the logarithm of the odds is infinite at both.
 const MIN_ODDS: f32 = 1e-6;
-/// What to do about splats with invalid numbers.
+/// Advice to the user in messages about splats with invalid numbers.
 const FILTER: &str = "remove such splats with `splat-transform IN.ply --filter-nan OUT.ply`";
 
 /// Error of reading splats.
@@ -39,12 +44,12 @@ pub enum SplatError {
     Count {
         /// Declared number of splats.
         count: u64,
-        /// Bytes that they need.
+        /// Number of bytes that these splats need.
         needed: u64,
-        /// Bytes in the file.
+        /// Number of bytes in the file.
         found: u64,
     },
-    /// There are no splats.
+    /// The file has no splats.
     #[error("it has no splats")]
     Empty,
     /// A property is missing.
@@ -57,7 +62,7 @@ pub enum SplatError {
     Value {
         /// Index of the splat, from 0.
         splat: usize,
-        /// Name of the number.
+        /// Name of the number, with its article: "the scale".
         what: &'static str,
         /// The number as read.
         value: String,
@@ -75,7 +80,7 @@ pub enum SplatError {
 /// Splats of a model, and the file that they were read from.
 #[derive(Clone, Debug)]
 pub(crate) struct Capture {
-    /// In the axes of the model.
+    /// The splats, in the axes of the model.
     pub(crate) splats: Splats,
     /// The file as read; empty if the splats were not read from a file.
     pub(crate) file: Vec<u8>,
@@ -83,7 +88,7 @@ pub(crate) struct Capture {
     pub(crate) records: Records,
 }
 
-/// Data of a file that exports in the same format keep.
+/// What an export in the same format reuses of the capture's file.
 #[derive(Clone, Debug)]
 pub(crate) enum Records {
     Ply(ply::Table),
@@ -104,14 +109,14 @@ pub(crate) struct ReadSplats {
 /// Splats of a file while they are read.
 #[derive(Default)]
 pub(crate) struct RawSplats {
-    /// Without positions, and with rotations of any length.
+    /// All properties except the positions. Rotations may have any length.
     pub(crate) splats: Splats,
     /// Positions in the space of the file.
     pub(crate) positions: Vec<DVec3>,
 }
 
 impl RawSplats {
-    /// Room for `count` splats.
+    /// Reserves memory for `count` splats.
     ///
     /// # Errors
     /// [`MemoryError`] if splats and the `held` bytes need more than the limit.
@@ -122,10 +127,18 @@ impl RawSplats {
         // The positions are in memory three times: as read, in the splats and in the model.
         let each = Splats::bytes_per_splat(degree) + (size_of::<DVec3>() + size_of::<Vec3>()) as u64;
         MemoryError::check(held.saturating_add(count.saturating_mul(each)), limit)?;
-        Ok(Self {
-            splats: Splats { degree, ..Splats::default() },
-            positions: Vec::with_capacity(count as usize),
-        })
+        // Reserve the full capacity: a vector that doubles to grow would exceed the estimate.
+        let count = count as usize;
+        let splats = Splats {
+            degree,
+            positions: Vec::new(),
+            scales: Vec::with_capacity(count),
+            rotations: Vec::with_capacity(count),
+            opacities: Vec::with_capacity(count),
+            colors: Vec::with_capacity(count),
+            harmonics: Vec::with_capacity(count * cagework_core::splats::n_harmonics(degree)),
+        };
+        Ok(Self { splats, positions: Vec::with_capacity(count) })
     }
 
     /// Checks all numbers and normalises rotations. `near`: store positions relative to an origin near them.
@@ -155,7 +168,8 @@ impl RawSplats {
             if !rotation.is_finite() {
                 return wrong("the rotation", rotation.to_string(), FINITE);
             }
-            if largest == 0.0 {
+            // The reciprocal of a smaller number can overflow.
+            if largest < f32::MIN_POSITIVE {
                 n_unrotated += 1;
                 *rotation = Quat::IDENTITY;
             } else if !rotation.is_normalized() {
@@ -170,8 +184,12 @@ impl RawSplats {
                 *opacity = opacity.clamp(0.0, 1.0);
             }
             let harmonics = &splats.harmonics[splat * n_harmonics..][..n_harmonics];
-            if let Some(color) = [splats.colors[splat]].iter().chain(harmonics).find(|c| !c.is_finite()) {
-                return wrong("the colour", color.to_string(), FINITE);
+            if let Some(color) = [splats.colors[splat]]
+                .iter()
+                .chain(harmonics)
+                .find(|c| !c.abs().cmple(Vec3::splat(MAX_COLOR)).all())
+            {
+                return wrong("the colour", color.to_string(), "the limit is 1e15");
             }
         }
         let mut notices = Vec::new();
@@ -181,7 +199,7 @@ impl RawSplats {
             }
         };
         tell(n_negative, "a negative scale: its absolute value is used");
-        tell(n_unrotated, "a rotation of length 0: none is used");
+        tell(n_unrotated, "a rotation of length 0, which is ignored");
         tell(n_opacities, "an opacity outside 0 to 1: it is clamped");
         let mut placed = Polygons::default();
         placed.place(&positions, near);
@@ -190,7 +208,7 @@ impl RawSplats {
     }
 }
 
-/// Which splats differ in position, scale or rotation.
+/// For each splat, whether its position, scale or rotation differs between `before` and `after`.
 pub(crate) fn changed(before: &Splats, after: &Splats) -> Vec<bool> {
     let differs = |s: usize| {
         before.positions[s] != after.positions[s]
@@ -200,12 +218,12 @@ pub(crate) fn changed(before: &Splats, after: &Splats) -> Vec<bool> {
     (0..after.len()).map(differs).collect()
 }
 
-/// Splats to write: those of a file and which of them changed, or all.
+/// Splats to write into a copy of their file, or into a new file.
 pub(crate) struct SplatsToWrite<'a> {
-    /// In the axes of the file, relative to `origin`.
+    /// The splats, in the axes of the file, relative to `origin`.
     pub(crate) splats: &'a Splats,
     pub(crate) origin: DVec3,
-    /// One flag per splat. `None` to write a new file.
+    /// Whether each splat differs from the file, and must be written; `None` for a new file.
     pub(crate) changed: Option<&'a [bool]>,
 }
 
@@ -221,17 +239,17 @@ impl SplatsToWrite<'_> {
     }
 }
 
-/// Coefficients of band 0 of a colour.
+/// Converts a colour to its spherical harmonics of band 0.
 pub(crate) fn band_0(color: Vec3) -> Vec3 {
     (color - 0.5) / BAND_0
 }
 
-/// Colour of the coefficients of band 0.
+/// Converts spherical harmonics of band 0 to a colour.
 pub(crate) fn color_of(band_0: Vec3) -> Vec3 {
     BAND_0 * band_0 + 0.5
 }
 
-/// Opacity of the logarithm of its odds.
+/// Converts the logarithm of the odds of an opacity to the opacity.
 pub(crate) fn sigmoid(log_odds: f32) -> f32 {
     1.0 / (1.0 + (-log_odds).exp())
 }

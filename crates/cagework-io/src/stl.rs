@@ -38,7 +38,7 @@ fn is_text(bytes: &[u8]) -> bool {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let start = &bytes[..bytes.len().min(4096)];
     bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
-        // The header of a binary file can contain both words, but the file also contains zero bytes.
+        // The header of a binary file can contain `solid` and `facet`, but the file also contains zero bytes.
         && !start.contains(&0)
         && start.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
 }
@@ -181,7 +181,7 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
     Ok((corners, solids))
 }
 
-/// Names and first triangles of the solids of a text file.
+/// Names of the solids of a text file, each with the index of its first triangle.
 fn solids<'a>(shape: &Shape<'a>) -> Vec<(&'a str, usize)> {
     let Some(document) = shape.document else { return Vec::new() };
     // The triangles are in the order of the faces.

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::look::{Look, LookImage};
 
-/// Limit on the longer side of a drawn texture, pixels. Ten such textures fit into a phone's memory.
+/// Limit on the longer side of a drawn texture, pixels. [`MAX_DRAWN_PIXELS`] allows 16 textures of 2048 x 2048 pixels.
 const MAX_SIDE: u32 = 2048;
 /// Limit on an image, pixels (8192 x 8192): 256 MiB when decoded.
 const MAX_PIXELS: u64 = 1 << 26;
@@ -15,7 +15,7 @@ const MAX_TOTAL_PIXELS: u64 = 1 << 29;
 /// Limit on all drawn textures together, pixels: 256 MiB, and a third more on the GPU for mipmaps.
 const MAX_DRAWN_PIXELS: u64 = 1 << 26;
 
-/// Pixels that must be left for the textures of a further model.
+/// Smallest remaining part of [`MAX_DRAWN_PIXELS`] with which the textures of a further model are decoded.
 const MIN_DRAWN_PIXELS: u64 = 1 << 18;
 
 /// Why an image is not decoded.
@@ -45,7 +45,8 @@ pub struct TexturePlan {
 }
 
 impl TexturePlan {
-    /// A plan for models that are drawn together, beside others whose drawn textures have `used` pixels.
+    /// Plans the textures of models that are drawn together. `used`: pixels of the drawn textures of other models that
+    /// are already open.
     #[must_use]
     pub fn new(looks: &[&Look], used: u64) -> Self {
         let budget = MAX_DRAWN_PIXELS.saturating_sub(used);
@@ -93,7 +94,7 @@ fn pixels([width, height]: [u32; 2]) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Size of an image after scaling its longer side down to `side`.
+/// Size of an image after scaling its longer side down to `side`; smaller images keep their size.
 fn scaled(size: [u32; 2], side: u32) -> [u32; 2] {
     let longer = size[0].max(size[1]).max(side);
     size.map(|n| (u64::from(n) * u64::from(side)).div_ceil(u64::from(longer)) as u32)
@@ -220,7 +221,7 @@ mod tests {
         let many = plan(&[[8192, 8192]; 9]);
         assert_eq!(many.admitted[0], [[true; 8].as_slice(), &[false]].concat());
         assert!(many.notices[0].contains("536870912 pixels in total"), "{:?}", many.notices);
-        // 16 textures of 2048 x 2048 pixels reach the limit.
+        // 16 textures of 2048 x 2048 pixels reach the limit, so the sides of 17 textures are halved.
         assert_eq!([16, 17, 65].map(|n| plan(&vec![[2048, 2048]; n]).side), [2048, 1024, 512]);
     }
 
@@ -228,7 +229,7 @@ mod tests {
     fn models_share_one_limit() {
         let look = Look { images: vec![png(2048, 2048)], ..Look::default() };
         let side = |used| TexturePlan::new(&[&look], used).side;
-        // 15 textures of 2048 x 2048 pixels leave room for one more, 15.5 for a quarter of one.
+        // After 15 textures of 2048 x 2048 pixels there is room for one more, and after 15.5 for one of 1024 x 1024.
         assert_eq!([15 << 22, 31 << 21, (1 << 26) - (1 << 18)].map(side), [2048, 1024, 512]);
         let full = TexturePlan::new(&[&look], MAX_DRAWN_PIXELS);
         assert_eq!(full.admitted, [[false]]);

@@ -1,14 +1,14 @@
-//! Timelines: when a clip shows each pose of a model, and what it shows in between. The page plays what exports
-//! contain: both follow the same timeline.
+//! Timelines: when a clip shows each pose of a model, and what it shows in between. Exports and the preview of the web
+//! page use the same timeline.
 
 use cagework_core::choice;
 use thiserror::Error;
 
 use crate::error::WriteError;
 
-/// Latest time of a pose, seconds.
+/// Largest allowed time of a pose, seconds.
 pub const MAX_SECONDS: f32 = 3600.0;
-/// Shortest time between two poses, seconds.
+/// Smallest allowed time between a pose and the next one, seconds.
 pub const MIN_GAP: f32 = 1e-3;
 /// Time between two poses that have no times of their own, seconds.
 pub const SECONDS_PER_POSE: f32 = 1.0;
@@ -38,14 +38,14 @@ impl Interpolation {
     }
 }
 
-/// Factors of value and out-tangent at the earlier key, and of value and in-tangent at the later key. `u`: share of the
-/// time between the keys, `gap`: that time.
+/// Cubic Hermite basis: factors of value and out-tangent at the earlier key, and of value and in-tangent at the later
+/// key. `gap`: time between the keys, seconds; `u`: time since the earlier key, as a fraction of `gap`.
 pub(crate) fn hermite(u: f64, gap: f64) -> [f64; 4] {
     let (u2, u3) = (u * u, u * u * u);
     [2.0 * u3 - 3.0 * u2 + 1.0, gap * (u3 - 2.0 * u2 + u), 3.0 * u2 - 2.0 * u3, gap * (u3 - u2)]
 }
 
-/// Error of the times of poses.
+/// Error in the times of poses: a time is out of range, or the times do not ascend.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum TimelineError {
     /// A time is not a number of seconds within the limits.
@@ -53,19 +53,19 @@ pub enum TimelineError {
     OutOfRange {
         /// Number of the pose, from 1.
         number: usize,
-        /// Its time.
+        /// Time given for this pose, seconds.
         seconds: f32,
     },
-    /// A pose does not follow the previous one.
+    /// The time between a pose and the previous one is negative or too short.
     #[error(
         "the time of pose {number} is {seconds} s, but the previous pose is at {previous} s: each pose is at least {MIN_GAP} s later than the previous one"
     )]
     Order {
         /// Number of the pose, from 1.
         number: usize,
-        /// Its time.
+        /// Time given for this pose, seconds.
         seconds: f32,
-        /// Time of the previous pose.
+        /// Time of the previous pose, seconds.
         previous: f32,
     },
 }
@@ -73,9 +73,9 @@ pub enum TimelineError {
 /// When a clip shows each pose, and what it shows in between.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    /// Interpolation between two keys.
+    /// What the clip shows between two keys.
     pub interpolation: Interpolation,
-    /// Time of each key in seconds, and the pose that it shows; `None` is the shape at rest. Ascending
+    /// Time of each key in seconds, and the pose that it shows; `None` is the shape at rest. Times are ascending.
     keys: Vec<(f32, Option<usize>)>,
     n_poses: usize,
 }
@@ -89,11 +89,11 @@ impl Timeline {
         Self { interpolation: Interpolation::Linear, keys, n_poses }
     }
 
-    /// Each pose at its time. The clip starts at 0 s, at rest unless the first pose is there, and ends with the last pose,
-    /// or `seconds_back` after it with the shape at its start.
+    /// Shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at 0 s, and ends with the
+    /// last pose or, with `seconds_back`, this number of seconds later with the shape that it started with.
     ///
     /// # Errors
-    /// If a time is outside of the limits, or not later than the previous one.
+    /// If a time is outside the limits, or not later than the previous time.
     pub fn new(seconds: &[f32], seconds_back: Option<f32>) -> Result<Self, TimelineError> {
         check_times(seconds)?;
         let mut keys: Vec<_> = seconds.iter().enumerate().map(|(k, &at)| (at + 0.0, Some(k))).collect();
@@ -119,7 +119,7 @@ impl Timeline {
         Self { interpolation, ..self }
     }
 
-    /// Checks the number of poses.
+    /// Checks that `given`, a number of poses, equals the number of poses in the timeline.
     pub(crate) fn require(&self, given: usize) -> Result<(), WriteError> {
         let expected = self.n_poses;
         if given == expected { Ok(()) } else { Err(WriteError::Poses { given, expected }) }
@@ -131,7 +131,7 @@ impl Timeline {
         self.n_poses
     }
 
-    /// Time of the last key.
+    /// Time of the last key, seconds; 0 without keys.
     #[must_use]
     pub fn seconds(&self) -> f32 {
         self.keys.last().map_or(0.0, |key| key.0)
@@ -163,7 +163,7 @@ impl Timeline {
         (0..self.n_poses).map(|pose| at(pose) as f32).collect()
     }
 
-    /// Key times: input of the clip's samplers.
+    /// Times of the keys, the input of the clip's samplers.
     pub(crate) fn times(&self) -> Vec<f32> {
         self.keys.iter().map(|key| key.0).collect()
     }
@@ -194,7 +194,7 @@ impl Timeline {
             return 0.0;
         }
         let time = f64::from(self.keys[key + 1].0) - f64::from(self.keys[key - 1].0);
-        // Keys of a clip may coincide.
+        // Times of keys that were read from a clip can be equal, so the divisor has a lower limit.
         (self.share(key + 1, pose) - self.share(key - 1, pose)) / time.max(f64::from(MIN_GAP))
     }
 }
@@ -209,7 +209,7 @@ pub fn check_times(seconds: &[f32]) -> Result<(), TimelineError> {
         if !(0.0..=MAX_SECONDS).contains(&seconds) {
             return Err(TimelineError::OutOfRange { number, seconds });
         }
-        // Half of the gap, because times near the limit are rounded to 0.0002 s.
+        // The limit is half of `MIN_GAP`, because f32 times near `MAX_SECONDS` are rounded to multiples of 0.0002 s.
         if let Some(previous) = previous.filter(|previous| seconds - previous < 0.5 * MIN_GAP) {
             return Err(TimelineError::Order { number, seconds, previous });
         }
@@ -255,10 +255,10 @@ mod tests {
         near(&step.shares(0.39), &[1.0, 0.0, 0.0]);
         near(&step.shares(0.4), &[0.0, 1.0, 0.0]);
         near(&step.shares(1.2), &[0.0, 0.0, 1.0]);
-        // Without a pose at 0 s, the clip starts at rest, and a clip with a way back ends there.
+        // Without a pose at 0 s, the clip starts at rest and, with `seconds_back`, also ends at rest.
         let back = Timeline::new(&[0.5], Some(1.5)).unwrap();
         assert_eq!((back.times(), back.weights(&[])), (vec![0.0, 0.5, 2.0], vec![0.0, 1.0, 0.0]));
-        // It ends with the pose at its start, if there is one.
+        // With a pose at 0 s and `seconds_back`, the clip ends with this pose.
         near(&Timeline::new(&[0.0, 1.0], Some(1.0)).unwrap().shares(2.0), &[1.0, 0.0]);
     }
 

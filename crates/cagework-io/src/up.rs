@@ -14,7 +14,7 @@ choice! {
         Y = "y",
         /// Z is up, as in CAD programs and in some OBJ files.
         Z = "z",
-        /// -Y, as captures of Gaussian splats often have it.
+        /// -Y is up, as often in captures of Gaussian splats.
         YDown = "y_down",
     }
 }
@@ -77,16 +77,18 @@ impl UpAxis {
     }
 }
 
-/// Height over depth above which a model can lie on its back.
+/// Ratio of the extents along z and y above which a model can lie on its back.
 const LYING: f32 = 1.2;
-/// Distance from the lowest coordinate within which vertices are on a flat side, as a fraction of the extent along z.
+/// Distance from the lowest coordinate along an axis, as a fraction of the extent along z, within which a vertex counts
+/// as lying on the flat side.
 const FLAT: f32 = 0.01;
-/// Smallest fraction of the vertices on a flat side, and factor by which they outnumber those at the lowest y.
+/// Minimum number of vertices on the flat side: as a fraction of all vertices, and as a multiple of the number of
+/// vertices near the lowest y.
 const FEET: f32 = 0.005;
 const MORE_FEET: usize = 3;
 
-/// Whether a model with y up seems to lie on its back: it is longer along z than y, and stands on a flat side at the
-/// lowest z rather than at the lowest y. A hint, not a proof.
+/// Whether a model with y up seems to lie on its back: it is longer along z than along y, and stands on a flat side at
+/// the lowest z rather than at the lowest y. A hint, not a proof.
 #[must_use]
 pub fn lies_on_back(positions: &[Vec3]) -> bool {
     let Some(bounds) = Bounds::of(positions) else { return false };
@@ -119,7 +121,7 @@ mod tests {
         assert!(!lies_on_back(&[]) && !lies_on_back(&[Vec3::ONE]));
     }
 
-    /// A cone along z on feet stands, although it is longer than high.
+    /// An animal whose body is a cone along z stands on its feet, although it is longer than it is tall.
     #[test]
     fn animal_on_feet_stands() {
         let mut animal = cone();

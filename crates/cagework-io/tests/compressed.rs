@@ -4,7 +4,8 @@
 
 mod common;
 
-use cagework_io::{Model, ReshapeOptions};
+use cagework_cage::samples;
+use cagework_io::{CompactOptions, Compression, Model, ReshapeOptions, compact, write_mesh_glb};
 use common::{Builder, CUBE, CUBE_TRIANGLES, json_of, plain_cube, read, volume};
 use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder,
@@ -110,7 +111,7 @@ fn assert_plain(model: &Model, bytes: &[u8]) {
 fn draco_is_decoded_and_written_plain() {
     let bytes = draco(&draco_stream()).glb();
     let model = read("x.glb", &bytes).unwrap();
-    // Draco reorders vertices. The stream is not quantised.
+    // Draco reorders vertices, so compare sorted positions. They are equal, because the stream is not quantised.
     let sorted = |mut positions: Vec<Vec3>| {
         positions.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
         positions
@@ -122,7 +123,7 @@ fn draco_is_decoded_and_written_plain() {
     assert_plain(&model, &bytes);
 }
 
-/// The page decompresses files before reading them. An unmoved export must return the compressed file.
+/// The web page decompresses a file before the model is read. An unmoved export must return the compressed file.
 #[test]
 fn unmoved_export_is_the_compressed_file() {
     let plain = plain_cube();
@@ -132,7 +133,7 @@ fn unmoved_export_is_the_compressed_file() {
     assert!(model.write_glb(&model.positions).unwrap() == packed);
     let moved: Vec<Vec3> = model.positions.iter().map(|p| *p + Vec3::X).collect();
     assert!(model.write_glb(&moved).unwrap() != packed);
-    // A file that is not a GLB stores its streams in other files.
+    // `set_packed` ignores a file that is not a GLB, because its streams are in other files.
     model.set_packed(b"{}".to_vec());
     assert!(model.write_glb(&model.positions).unwrap() == plain.glb());
 }
@@ -244,4 +245,106 @@ fn damaged_streams_are_errors() {
         message.contains("could not be decoded: its stream is damaged or has an unsupported version"),
         "{message}"
     );
+}
+
+/// The humanoid sample, with skin and clip.
+fn humanoid() -> Vec<u8> {
+    let sample = samples::build("humanoid").unwrap();
+    write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap()
+}
+
+/// Positions in the middle of the first clip.
+fn playing(model: &Model) -> Vec<Vec3> {
+    let frames = model.frames(0).unwrap();
+    frames[frames.len() / 2].clone()
+}
+
+fn far_apart(a: &[Vec3], b: &[Vec3]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+#[test]
+fn compact_glb_is_smaller_and_reads_as_the_same_model() {
+    let glb = humanoid();
+    let model = read("a.glb", &glb).unwrap();
+    // The encoder may start a triangle at another corner, so rotate triangles to begin with their smallest index.
+    let first_corner = |t: &[u32; 3]| {
+        let mut t = *t;
+        let least = (0..3).min_by_key(|&k| t[k]).unwrap();
+        t.rotate_left(least);
+        t
+    };
+    let triangles = |model: &Model| model.triangles.iter().map(first_corner).collect::<Vec<_>>();
+    let size = model.positions.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+    // `step` is the largest rounding error of a coordinate at 16 bits: 2^-15 of the largest coordinate, `size`. Joint
+    // weights are rounded to steps of about 2^-16. A vertex has up to four of them, and its joints are less than
+    // 2 `size` apart, so that this moves the vertex by less than 4 * 2^-16 * 2 `size`, which is 4 `step`.
+    let step = size / 32768.0;
+    for (quantize, compress, share, at_rest, in_clip) in [
+        (false, Compression::Meshopt, 0.8, 0.0, 0.0),
+        (true, Compression::None, 0.7, 0.0, 4.0 * step),
+        (true, Compression::Meshopt, 0.4, 2.0 * step, 6.0 * step),
+    ] {
+        let small = compact(glb.clone(), CompactOptions { quantize, compress }).unwrap();
+        let what = format!("{quantize} {compress:?}: {} of {} bytes", small.len(), glb.len());
+        assert!((small.len() as f64) < share * glb.len() as f64, "{what}");
+        let found = read("b.glb", &small).unwrap();
+        assert_eq!(triangles(&found), triangles(&model), "{what}");
+        let off = far_apart(&found.positions, &model.positions);
+        assert!(off <= at_rest + 1e-6, "{what}: {off:e}");
+        let off = far_apart(&playing(&found), &playing(&model));
+        assert!(off <= in_clip + 1e-6, "{what}: {off:e}");
+        let json = json_of(&small);
+        let is_required = |name: &str| {
+            json["extensionsRequired"].as_array().is_some_and(|names| names.contains(&name.into()))
+        };
+        assert_eq!(is_required("KHR_mesh_quantization"), quantize, "{what}");
+        assert_eq!(is_required("EXT_meshopt_compression"), compress == Compression::Meshopt, "{what}");
+        // A file that is already compressed is returned unchanged.
+        if compress == Compression::Meshopt {
+            assert!(compact(small.clone(), CompactOptions { quantize, compress }).unwrap() == small);
+        }
+    }
+    assert!(compact(glb.clone(), CompactOptions::default()).unwrap() == glb);
+    let options = CompactOptions { quantize: true, compress: Compression::Meshopt };
+    for length in [0, 11, 40, glb.len() / 2] {
+        assert!(compact(glb[..length].to_vec(), options).is_err(), "{length} bytes");
+    }
+}
+
+/// Compaction must not damage accessors that share bytes, have implicit zeros or sparse values, or contain quantised
+/// positions.
+#[test]
+fn unusual_accessors_survive_compaction() {
+    let mut sparse = plain_cube();
+    let (place, value) = (sparse.view(&[3, 0]), sparse.view(&common::floats(&[1.5, 1.5, 0.0])));
+    sparse.json["accessors"][0]["sparse"] = json!({
+        "count": 1, "indices": { "bufferView": place, "componentType": common::U16 }, "values": { "bufferView": value },
+    });
+    let mut small = plain_cube();
+    small.bin.clear();
+    let inputs = [
+        common::rigged().glb(),
+        common::skinned().glb(),
+        common::quantized().glb(),
+        common::instanced().glb(),
+        common::textured_square().glb(),
+        sparse.glb(),
+    ];
+    for bytes in inputs {
+        let model = read("x.glb", &bytes).unwrap();
+        for quantize in [false, true] {
+            let options = CompactOptions { quantize, compress: Compression::Meshopt };
+            let found = read("x.glb", &compact(bytes.clone(), options).unwrap()).unwrap();
+            // Coordinates in mesh space are up to 4.2. Rounding moves them by at most 2^-15 of that along each of three
+            // axes, and the node scales this error by 2.
+            let rounding = 2.0 * 4.2 * 3.0_f32.sqrt() / 32768.0;
+            let off = far_apart(&found.positions, &model.positions);
+            assert!(off <= rounding, "{quantize}: {off:e}");
+            assert_eq!(found.counts, model.counts);
+        }
+    }
+    // An accessor that extends beyond the buffer is an error or is left unchanged. It must not cause a panic.
+    let _ = compact(small.glb(), CompactOptions { quantize: true, compress: Compression::Meshopt });
 }

@@ -21,7 +21,7 @@ fn corners() -> Vec<DVec3> {
     CUBE.map(corner).to_vec()
 }
 
-/// The cube in a text format, with decimals.
+/// A cube with the vertices [`corners`] in a text format, each coordinate with six decimals.
 fn file(format: ModelFormat) -> String {
     let near = read("x.obj", common::CUBE_OBJ.as_bytes()).unwrap();
     let line = |start: &str, p: &DVec3| format!("{start}{:.6} {:.6} {:.6}\n", p.x, p.y, p.z);

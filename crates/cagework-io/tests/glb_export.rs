@@ -12,7 +12,7 @@ use common::{
 use glam::Vec3;
 use serde_json::{Value, json};
 
-/// Rounding of an f32 transformed back and forth.
+/// Tolerance of f32 positions that are transformed back and forth.
 const ROUND_TRIP: f32 = 1e-6;
 
 fn deformed(model: &Model) -> Vec<Vec3> {
@@ -253,7 +253,7 @@ fn states_of_a_pose_are_the_keys_of_its_clip_or_its_morph_targets() {
     for (state, (_, expected)) in states.iter().zip(&poses) {
         assert!(relative_error(expected, &state.positions) < ROUND_TRIP, "{}", state.name);
     }
-    // Without the clip, the states are morph targets.
+    // If the file has no clip, each morph target is a state.
     let mut json = json_of(&glb);
     json.as_object_mut().unwrap().remove("animations");
     let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;

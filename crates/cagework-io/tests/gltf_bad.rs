@@ -1,4 +1,4 @@
-//! Damaged glTF files: each is an error with cause and location.
+//! Damaged glTF files: reading each of them returns an error that names the cause and the location.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
@@ -171,7 +171,7 @@ fn attribute_counts_must_match_the_vertices() {
     assert!(fault(&b.glb()).contains("1048576 elements for inverse bind matrices, but there are 2 joints"));
 }
 
-/// Memory for all nodes and primitives together is checked.
+/// The memory check covers all primitives of a mesh at all nodes that show it, and precedes allocation.
 #[test]
 fn memory_is_checked_before_allocation() {
     let mut b = plain_cube();
@@ -181,7 +181,7 @@ fn memory_is_checked_before_allocation() {
     let within = |b: &Builder, limit| Model::read_within("x.glb", b.glb(), &mut |_| None, limit);
     let message = within(&b, 128 << 20).unwrap_err().to_string();
     assert!(message.contains("MiB of memory, more than the limit of 128 MiB"), "{message}");
-    // Decoding this base64 would give another error, because it is damaged.
+    // The base64 is damaged, so decoding would give another error: memory is checked before decoding.
     let mut embedded = plain_cube().json;
     embedded["buffers"] =
         json!([{ "byteLength": 72, "uri": format!("data:;base64,{}", "!".repeat(4 << 20)) }]);
@@ -281,7 +281,7 @@ fn missing_buffer_file_is_an_error() {
     assert!(short.contains("buffer 0 is cut off: it has 10 of 100 bytes"), "{short}");
 }
 
-/// Found by fuzzing, with an empty list of scenes.
+/// Found by fuzzing: the list of scenes can be empty.
 #[test]
 fn empty_lists_are_treated_as_missing() {
     let mut b = skinned();
@@ -290,4 +290,75 @@ fn empty_lists_are_treated_as_missing() {
     let again = read("y.glb", &model.write_glb(&model.positions).unwrap()).unwrap();
     assert_eq!(again.positions, model.positions);
     assert!(fault_of(|b| b.json["nodes"] = json!([])).contains("scene 0 refers to node 0, but there are 0"));
+}
+
+/// In a small file, many nodes can show one mesh. The limits count its elements without data, its splats, and the texts
+/// that an export repeats once per node; they also count the values of channels that share one sampler.
+#[test]
+fn what_nodes_repeat_is_in_the_price() {
+    let document = |nodes: usize, mesh: &serde_json::Value| {
+        let zeros = |kind: &str| json!({ "componentType": 5126, "count": 1 << 20, "type": kind });
+        let accessors = json!([
+            zeros("VEC3"), zeros("VEC4"), zeros("SCALAR"),
+            { "componentType": 5126, "count": 3, "type": "VEC3" },
+        ]);
+        let json = json!({
+            "asset": { "version": "2.0" },
+            "scenes": [{ "nodes": (0..nodes).collect::<Vec<_>>() }],
+            "nodes": vec![json!({ "mesh": 0 }); nodes],
+            "meshes": [mesh],
+            "accessors": accessors,
+        });
+        glb(&json, None)
+    };
+    let mesh = |primitive: serde_json::Value| json!({ "primitives": [primitive] });
+    let found = fault(&document(3, &mesh(json!({ "attributes": { "POSITION": 0 } }))));
+    let all = "elements without data in the file, of all nodes: 3145728, more than the limit of 2097152";
+    assert!(found.contains(all), "{found}");
+    let splats = mesh(json!({
+        "mode": 0,
+        "extensions": { "KHR_gaussian_splatting": {} },
+        "attributes": {
+            "POSITION": 0,
+            "KHR_gaussian_splatting:SCALE": 0,
+            "KHR_gaussian_splatting:ROTATION": 1,
+            "KHR_gaussian_splatting:OPACITY": 2,
+            "KHR_gaussian_splatting:SH_DEGREE_0_COEF_0": 0,
+        },
+    }));
+    let found = fault(&document(3, &splats));
+    assert!(found.contains("splats of all nodes: 3145728, more than the limit of 1048576"), "{found}");
+    let splat =
+        json!({ "mode": 0, "extensions": { "KHR_gaussian_splatting": {} }, "attributes": { "POSITION": 3 } });
+    let found = fault(&document(33, &json!({ "primitives": vec![splat; 1 << 12] })));
+    assert!(found.contains("primitives of all nodes: 135168, more than the limit of 131072"), "{found}");
+    // 40 channels with the same 2^20 times and vectors.
+    let mut played = plain_cube();
+    let zeros = |kind: &str| json!({ "componentType": F32, "count": 1 << 20, "type": kind });
+    let [input, output] = [zeros("SCALAR"), zeros("VEC3")].map(|accessor| played.push("accessors", accessor));
+    let channel = json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } });
+    let samplers = json!([{ "input": input, "output": output }]);
+    played.push("animations", json!({ "samplers": samplers, "channels": vec![channel; 40] }));
+    let found = fault(&played.glb());
+    assert!(
+        found.contains("values of all channels of clips: 167772160, more than the limit of 134217728"),
+        "{found}"
+    );
+    let long = "n".repeat(1 << 20);
+    for (key, value) in [("name", json!(long)), ("extras", json!({ "targetNames": [long] }))] {
+        let mut named = mesh(json!({ "attributes": { "POSITION": 3 } }));
+        named[key] = value;
+        let found = Model::read_within("x.glb", document(100, &named), &mut |_| None, 1 << 26);
+        let found = found.unwrap_err().to_string();
+        assert!(found.contains("MiB of memory, more than the limit of 64 MiB"), "{key}: {found}");
+    }
+}
+
+#[test]
+fn json_of_too_many_values_is_refused_before_it_is_read() {
+    let extras = "0,".repeat(1 << 22);
+    let found = read("x.gltf", format!(r#"{{"asset":{{"version":"2.0"}},"extras":[{extras}0]}}"#).as_bytes());
+    let found = found.unwrap_err().to_string();
+    // One separator for each item of the array, and seven others.
+    assert!(found.contains("values in the JSON: 4194311, more than the limit of 4194304"), "{found}");
 }

@@ -12,7 +12,7 @@ use common::{
 use glam::Vec3;
 use serde_json::json;
 
-/// Rounding to f32, once or twice, of coordinates near 1.
+/// Tolerance for coordinates near 1 that are rounded to f32 once or twice.
 const ROUNDING: f32 = 1e-6;
 
 fn read_glb(b: &Builder) -> Model {
@@ -278,7 +278,9 @@ fn trailing_bytes_and_missing_bin_padding_are_tolerated() {
     json["meshes"] = json!([]);
     json["nodes"] = json!([]);
     json["scenes"] = json!([{}]);
-    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("no triangles"));
+    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("(points and lines"));
+    json["animations"] = json!([{ "channels": [], "samplers": [] }]);
+    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("refit --skeleton"));
 }
 
 #[test]
@@ -294,12 +296,12 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
     let expected: Vec<Vec3> =
         cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
-    // Blender cuts a quad along its other diagonal, using other coincident vertices.
+    // As Blender may do, cut a quad along its other diagonal, and refer to other ones of its coincident vertices.
     let mut indices: Vec<u32> = (0..36).collect();
     let place = |v: u32| corners[v as usize];
     let ends = [indices[0], indices[1], indices[2]].map(place);
     let other = (3..6).find(|&v| !ends.contains(&place(v))).unwrap();
-    // The first two triangles are the quad 0 2 3 1, cut from 0 to 3; now from 2 to 1.
+    // The first two triangles form the quad 0 2 3 1 of the cage, which is cut from 0 to 3. Cut it from 2 to 1.
     let at = |p: [f32; 3]| (6..36).find(|&v| place(v) == p).unwrap();
     let [a, b0, c] = ends;
     indices[..6].copy_from_slice(&[at(a), at(b0), other, at(b0), at(c), other]);

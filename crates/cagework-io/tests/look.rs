@@ -8,7 +8,7 @@ use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan};
 use common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 use serde_json::json;
 
-/// Rounding of an sRGB round trip.
+/// Tolerance of colours after conversion from sRGB. The expected values have four decimals.
 const COLOUR_TOLERANCE: f32 = 1e-4;
 
 fn look(builder: &Builder) -> Look {
@@ -296,7 +296,7 @@ fn smoothing_groups_share_no_normal() {
     let mut twice = lid.copies.clone();
     twice.sort_unstable();
     assert_eq!(twice, [2, 3, 6, 7], "the corners of face 3");
-    // Equal group numbers are one group, and normals override groups.
+    // Faces with equal group numbers belong to one group, although the `s` lines alternate. Normals override groups.
     let again = smoothed_cube(|_, _| 0, |face| ["s 1\n", "s 2\n"][face % 2]);
     assert_eq!(again.copies.len(), 6, "all faces around two opposite corners belong to one group");
     assert_eq!(smoothed_cube(|_, v| v, |_| "s off\n"), smooth);

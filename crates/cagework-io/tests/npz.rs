@@ -12,11 +12,11 @@ use glam::{DVec3, Vec3};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-/// Memory limit, bytes.
+/// Memory limit of the reader in these tests, bytes.
 const LIMIT: u64 = 1 << 20;
 
-/// Three rows, the second of them empty, and the last outside the cage. The columns are five controls and offsets:
-/// three columns that do not rotate, three of the cage, and six of bone ends.
+/// Three rows, the second of them empty, and the last outside the cage. The columns are five controls, then the offsets
+/// of [`Frames`]: three columns that do not rotate, three of the whole cage, and six of bone ends.
 fn sample() -> (Weights, Frames, Vec<OutsideVertex>) {
     let indices = vec![0, 6, 1, 2, 3, 16];
     let weights =
@@ -104,7 +104,8 @@ fn field_is_written_with_z_as_the_fastest_axis() {
     assert!(array("bound.npy", &format!("({nx}, {ny}, {nz})")).iter().all(|&b| b == 1));
 }
 
-/// The file with `change` applied to each array; deflated, as SciPy writes it.
+/// The file of [`sample`], deflated as by SciPy, with `change` applied to each array. Arrays for which `change` returns
+/// `None` are left out.
 fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
     let (weights, frames, outside) = sample();
     let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);
@@ -141,8 +142,8 @@ fn headers_equal_those_of_numpy() {
     let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut data = Vec::new();
     zip.by_name("indptr.npy").unwrap().read_to_end(&mut data).unwrap();
-    // The header has the format of numpy.lib.format, version 1.0: magic, version, header length, and a dict padded to
-    // 64 bytes with a newline.
+    // Format of numpy.lib.format, version 1.0: magic, version, length of the dict, and the dict, padded with spaces and
+    // a final newline so that the size of the header is a multiple of 64.
     let header = b"{'descr': '<i4', 'fortran_order': False, 'shape': (4,), }";
     assert_eq!(&data[..8], b"\x93NUMPY\x01\0");
     assert_eq!(u16::from_le_bytes([data[8], data[9]]), 118);

@@ -156,7 +156,7 @@ fn unsupported_formats_are_named_with_a_hint() {
     for (name, bytes, expected) in [
         ("a.obj", &b""[..], "empty"),
         ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
-        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY, STL or OFF"),
+        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY, STL, OFF or 3MF"),
         ("a.stl", b"solid x", "damaged: it has no text facets"),
         ("a.glb", b"glXF", "not a GLB"),
         ("a.ply", b"solid", "not a PLY"),
@@ -189,7 +189,7 @@ fn faces_with_fewer_than_three_corners_are_kept_unchanged() {
     let [plain, model] = [CUBE_OBJ, &with].map(|text| read("x.obj", text.as_bytes()).unwrap());
     assert_eq!((&model.triangles, model.n_faces()), (&plain.triangles, plain.n_faces()));
     assert!(model.notices[0].starts_with("2 lines, points, curves or faces with fewer than three corners"));
-    // Renumbered normals of later faces stay consistent.
+    // The export renumbers the normals of all faces as if the short faces were not in the file.
     let bent: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
     let [expected, out] =
         [&plain, &model].map(|model| String::from_utf8(model.write_obj(&bent).unwrap()).unwrap());
@@ -208,7 +208,7 @@ fn concave_polygon_keeps_its_area() {
 
 #[test]
 fn patched_file_at_rest_is_the_same_text() {
-    // The numbers in this file are written as Rust formats them.
+    // The first line ends in CRLF, and the text contains double blanks, a tab and comments. All of them must stay.
     let text = "# c\r\nmtllib a.mtl\no x\nv  0.5 0 0 0.1 0.2 0.3 # red\n\tv 1 0 0\nv 0 1 0\nvt 0.25 1\nusemtl m\ns 1\nf 1/1 2/1 3/1\nl 1 2\n";
     let model = read("x.obj", text.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), text);
@@ -235,7 +235,7 @@ fn patched_normals_rotate_with_the_surface() {
         .filter_map(|l| l.strip_prefix("vn "))
         .map(|l| Vec3::from_slice(&l.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f32>>()))
         .collect();
-    // Four corners shared each of the six `vn` lines.
+    // The source has six `vn` lines, each used by four vertices. The export has a line for each of these uses.
     assert_eq!(normals.len(), 24);
     let expected = [-Vec3::Z, Vec3::Z, Vec3::X, -Vec3::X, -Vec3::Y, Vec3::Y];
     for (k, n) in normals.iter().enumerate() {
@@ -262,7 +262,7 @@ fn smoothing_is_kept_in_obj_and_split_in_glb_exports() {
     let flat = smooth.replacen("f ", "s off\nf ", 1);
     let model = read("x.obj", flat.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), flat);
-    // Three flat faces meet at each of eight vertices.
+    // Three flat faces meet at each of the eight vertices, so a GLB with flat faces has 24 vertices.
     let vertices = |text: &str| {
         let model = read("x.obj", text.as_bytes()).unwrap();
         read("x.glb", &model.write_glb(&model.positions).unwrap()).unwrap().positions.len()

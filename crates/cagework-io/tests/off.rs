@@ -7,7 +7,7 @@ mod common;
 use cagework_io::{Model, ModelFormat};
 use common::{CUBE_OBJ, cube, read, twist};
 
-/// The cube of quads; `after` follows each vertex and each face.
+/// An OFF file of a cube whose faces are quads. `after`: text at the end of each vertex line and of each face line.
 fn off(header: &str, after: [&str; 2]) -> String {
     let vertices =
         cube().iter().map(|p| format!("{} {} {}{}\n", p.x, p.y, p.z, after[0])).collect::<String>();
@@ -23,7 +23,8 @@ fn quads() -> Model {
     read("cube.obj", CUBE_OBJ.as_bytes()).unwrap()
 }
 
-/// Headers of Geomview, CGAL, libigl and MeshLab, with colours in 0 to 255 and in 0 to 1, and without the keyword.
+/// Headers as Geomview, CGAL, libigl and MeshLab write them, and one without the keyword. Colours are from 0 to 255 or
+/// from 0 to 1.
 #[test]
 fn off_files_are_read_with_polygons_and_colours() {
     let faces = quads().cage_mesh().faces;

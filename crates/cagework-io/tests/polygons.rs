@@ -16,7 +16,7 @@ fn obj() -> Model {
     read("cube.obj", CUBE_OBJ.as_bytes()).unwrap()
 }
 
-/// The cube of quads as a PLY with colours, an unknown property and edges.
+/// A cube whose faces are quads, as a PLY with colours, an unknown property and edges.
 fn ply_text() -> String {
     let mut text = "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 8\nproperty double x\nproperty double y\n\
         property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n\
@@ -244,6 +244,15 @@ fn damaged_ply_and_stl_files_are_errors() {
     (0..2000).for_each(|k| idle += &format!("element a{k} 20000\n"));
     let message = fault("x.ply", (idle + "end_header\n").as_bytes());
     assert!(message.contains("its header counts 20000 of 'a"), "{message}");
+    // The reader rewrites the lines of this text, which become longer.
+    let empty =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 500\nproperty list uchar int vertex_indices\nend_header\n.5 0 0\n"
+            .to_owned()
+            + &"0\n".repeat(500);
+    let message = fault("x.ply", empty.as_bytes());
+    let expected = format!("its header counts 500 of 'face', too many for a file of {} bytes", empty.len());
+    assert!(message.contains(&expected), "{message}");
     let mut stl = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert!(!stl.starts_with(b"solid"), "other programs would read it as text");
     stl.truncate(300);
@@ -345,6 +354,12 @@ fn variants_of_text_ply_are_read() {
             + "10 0 1 2 3 -1 4 4 5 6 7\n";
     let model = read("x.ply", strips.as_bytes()).unwrap();
     assert_eq!(model.triangles, [[0, 1, 2], [1, 3, 2], [4, 6, 5], [5, 6, 7]]);
+    // 299,998 triangles of 300,000 corners take 42 MiB, at 48 bytes for each of their own corners.
+    let long = strips.replace("10 0 1 2 3 -1 4 4 5 6 7", &("300000".to_owned() + &" 0 1 2".repeat(100_000)));
+    let found =
+        Model::read_within("x.ply", long.as_bytes(), &mut |_| None, 30 << 20).unwrap_err().to_string();
+    assert!(found.contains("MiB of memory, more than the limit of 30 MiB"), "{found}");
+    assert_eq!(read("x.ply", long.as_bytes()).unwrap().triangles.len(), 299_998);
 }
 
 /// Colour channels can be 8-bit integers, 16-bit integers, or floats from 0 to 1.

@@ -86,7 +86,7 @@ fn several_models_keep_their_order() {
         assert_eq!(without_names(back.look()), without_names(model.look()), "{}", model.name);
     }
     assert_eq!((project.cage, project.poses), (cage.clone(), poses(&cage)));
-    // Older readers must reject projects with several models, or they would lose some.
+    // Older readers must reject projects with several models. They would read the first model and lose the others.
     assert_eq!(json_of(&once)["extensions"]["CAGEWORK_project"]["version"], json!(2));
     assert_eq!(json_of(&written(&models[0]))["extensions"]["CAGEWORK_project"]["version"], json!(1));
     let again: Vec<&Model> = project.models.iter().collect();
@@ -194,6 +194,31 @@ fn damaged_and_newer_projects_are_errors() {
     let damaged = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX);
     assert!(matches!(damaged, Err(ProjectError::Damaged { .. })), "{damaged:?}");
     assert!(read_project("x.glb", &bytes[..bytes.len() - 9], u64::MAX).is_err());
+}
+
+/// A point cloud in a project is stored as its file.
+#[test]
+fn point_clouds_survive_in_projects() {
+    let file = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 255 0 0\n1 2 3 0 255 0\n";
+    let model = read("a.ply", file).unwrap();
+    let project = reopened(&written(&model));
+    let again = &project.models[0];
+    assert_eq!(
+        (again.format(), &*again.name, &again.positions),
+        (ModelFormat::Ply, "a.ply", &model.positions)
+    );
+    let splats = again.drawn_splats().unwrap();
+    assert_eq!(splats.colors, [Vec3::X, Vec3::Y]);
+    assert!(splats.scales[0].x > 0.0 && splats.scales[0].x < 3.0);
+}
+
+/// A project stores a 3MF as the original file.
+#[test]
+fn archives_survive_in_projects() {
+    let model = read("a.3mf", &common::plate()).unwrap();
+    let project = reopened(&written(&model));
+    assert_eq!(project.models[0].write(ModelFormat::ThreeMf, &model.positions).unwrap(), common::plate());
 }
 
 /// A project of a capture keeps its splats and its up axis.

@@ -65,7 +65,7 @@ fn unavailable_file_causes_one_notice() {
 
 #[test]
 fn external_files_have_a_total_limit() {
-    // Three files exceed 2 GiB. Untouched zeros take no memory.
+    // Three files of this size exceed 2 GiB together. Zeros that are never written take no memory.
     const BYTES: usize = 800 << 20;
     let mut b = textured_square();
     b.json["images"] = json!([{ "uri": "a" }, { "uri": "b" }, { "uri": "c" }]);

@@ -20,7 +20,7 @@ fn read(name: &str, bytes: &[u8]) -> Result<Model, String> {
     Model::read_within(name, bytes, &mut |_| None, 1 << 28).map_err(|e| e.to_string())
 }
 
-/// Number `column` of splat `splat`, by formula.
+/// Value of property `column` of splat `splat`: a sine that depends on both indices. Logarithms of scales are 3 lower.
 fn number(splat: usize, column: usize) -> f32 {
     let wave = ((7 * splat + 3 * column) as f32).sin();
     if (19..22).contains(&column) { wave - 3.0 } else { wave }
@@ -62,7 +62,7 @@ fn ply_stores_logarithms_and_harmonics_by_channel() {
         let rotation = Quat::from_xyzw(number(s, 23), number(s, 24), number(s, 25), number(s, 22));
         assert!(splats.rotations[s].dot(rotation.normalize()) > 0.999_999);
         assert!((splats.opacities[s] - 1.0 / (1.0 + (-number(s, 18)).exp())).abs() <= 1e-6);
-        // The value of band 0 is 1 / (2 sqrt(pi)).
+        // The harmonic of band 0 has the constant value 1 / (2 sqrt(pi)).
         let color = 0.5 + vector([6, 7, 8]) * 0.5 / std::f32::consts::PI.sqrt();
         assert!(splats.colors[s].abs_diff_eq(color, 1e-6));
         for k in 0..3 {
@@ -91,7 +91,8 @@ fn text_and_big_endian_files_equal_the_binary_one() {
     }
 }
 
-/// Position, scale and rotation of a record, by the layout of the format: 3 floats, 3 floats, 4 bytes, 4 bytes.
+/// Position, scale, colour with opacity, and rotation, as the format lays them out: 3 floats, 3 floats, 4 bytes, 4
+/// bytes.
 #[test]
 fn splat_records_are_32_bytes() {
     let mut record = Vec::new();
@@ -113,52 +114,147 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
+/// A Zstandard frame with one block, uncompressed (RFC 8878, section 3.1).
+fn zstd_frame(bytes: &[u8]) -> Vec<u8> {
+    let block = ((bytes.len() as u32) << 3 | 1).to_le_bytes();
+    [&[0x28, 0xb5, 0x2f, 0xfd, 0xa0][..], &(bytes.len() as u32).to_le_bytes(), &block[..3], bytes].concat()
+}
+
+/// A Zstandard frame of `n` zeros: blocks of 128 KiB that repeat a byte, four bytes each.
+fn zstd_zeros(n: usize) -> Vec<u8> {
+    const BLOCK: usize = 1 << 17;
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
+    frame.extend((n as u32).to_le_bytes());
+    for start in (0..n).step_by(BLOCK) {
+        let size = BLOCK.min(n - start) as u32;
+        frame.extend(&(size << 3 | 1 << 1 | u32::from(start + BLOCK >= n)).to_le_bytes()[..3]);
+        frame.push(0);
+    }
+    frame
+}
+
+/// An SPZ of version 4 with extension records and `(size, frame)` of each stream.
+fn spz_4(count: u32, degree: u8, extensions: &[u8], streams: &[(usize, Vec<u8>)]) -> Vec<u8> {
+    let flags = if extensions.is_empty() { 0 } else { 2 };
+    let mut file = [&b"NGSP"[..], &4_u32.to_le_bytes(), &count.to_le_bytes()].concat();
+    file.extend([degree, 12, flags, streams.len() as u8]);
+    file.extend((32 + extensions.len() as u32).to_le_bytes());
+    file.extend([0; 12]);
+    file.extend(extensions);
+    for (size, frame) in streams {
+        file.extend((frame.len() as u64).to_le_bytes());
+        file.extend((*size as u64).to_le_bytes());
+    }
+    file.extend(streams.iter().flat_map(|(_, frame)| frame));
+    file
+}
+
+/// Arrays of the splat of [`spz`], apart from position and rotation.
+const ARRAYS: [&[u8]; 4] =
+    [&[51], &[128, 166, 128], &[160, 144, 128], &[128, 192, 64, 128, 192, 64, 128, 192, 64]];
+
+/// The splat of [`spz`], as version 4.
+fn spz_4_of_one(position: &[u8], rotation: &[u8], extensions: &[u8]) -> Vec<u8> {
+    let [opacity, color, scale, harmonics] = ARRAYS;
+    let streams = [position, opacity, color, scale, rotation, harmonics];
+    spz_4(1, 1, extensions, &streams.map(|bytes| (bytes.len(), zstd_frame(bytes))))
+}
+
 /// An SPZ of one splat of degree 1 with the bytes that the format's documentation prescribes.
 fn spz(version: u32, position: &[u8], rotation: &[u8]) -> Vec<u8> {
     let header = [&b"NGSP"[..], &version.to_le_bytes(), &1_u32.to_le_bytes(), &[1, 12, 0, 0]].concat();
-    gzip(
-        &[
-            &header[..],
-            position,
-            &[51],
-            &[128, 166, 128],
-            &[160, 144, 128],
-            rotation,
-            &[128, 192, 64].repeat(3),
-        ]
-        .concat(),
-    )
+    let [opacity, color, scale, harmonics] = ARRAYS;
+    gzip(&[&header[..], position, opacity, color, scale, rotation, harmonics].concat())
 }
 
 #[test]
 fn spz_versions_decode_by_their_documentation() {
-    // 1, -0.5 and 2 with 12 fractional bits.
+    // The position (1, -0.5, 2): as 24-bit integers with 12 fractional bits, and as 16-bit floats.
     let fixed = [[0, 16, 0], [0, 248, 255], [0, 32, 0]].concat();
     let halves = [0x3c00_u16, 0xb800, 0x4000].map(u16::to_le_bytes).concat();
-    // Half a turn about x; then a quarter: its largest part is w, index 3, and x is sqrt(1/2), 511 steps.
+    // Versions 1 and 2 have half a turn about x. Version 3 has a quarter turn: the largest component is w, index 3, and
+    // x is sqrt(1/2), stored as 511.
     let quarter = ((3_u32 << 30) | (511 << 20)).to_le_bytes();
     for (version, position, rotation, expected) in [
         (1, &halves, &[255, 127, 128][..], Quat::from_rotation_x(std::f32::consts::PI)),
         (2, &fixed, &[255, 127, 128], Quat::from_rotation_x(std::f32::consts::PI)),
         (3, &fixed, &quarter, Quat::from_rotation_x(std::f32::consts::FRAC_PI_2)),
+        (4, &fixed, &quarter, Quat::from_rotation_x(std::f32::consts::FRAC_PI_2)),
     ] {
-        let model = read("a.spz", &spz(version, position, rotation)).unwrap();
+        let file = if version == 4 {
+            spz_4_of_one(position, rotation, &[])
+        } else {
+            spz(version, position, rotation)
+        };
+        let model = read("a.spz", &file).unwrap();
         let splats = model.splats().unwrap();
         assert_eq!(place(&model), Vec3::new(1.0, -0.5, 2.0), "version {version}");
         assert!(splats.scales[0].abs_diff_eq(Vec3::new(1.0, (-1.0_f32).exp(), (-2.0_f32).exp()), 1e-6));
         assert!(splats.rotations[0].angle_between(expected) < 0.02, "{}", splats.rotations[0]);
-        // Byte 166 is 0.15 f + 0.5, and f is (colour - 0.5) 2 sqrt(pi).
+        // Byte 166 stores the coefficient f of band 0 as 255 (0.15 f + 0.5), and f is (colour - 0.5) 2 sqrt(pi).
         let green = 0.5 + (166.0 / 255.0 - 0.5) / 0.15 * 0.5 / std::f32::consts::PI.sqrt();
         assert!((splats.colors[0].y - green).abs() < 1e-5 && (splats.opacities[0] - 0.2).abs() < 1e-6);
         assert_eq!(splats.harmonics_of(0), [Vec3::new(0.0, 0.5, -0.5); 3]);
     }
 }
 
-/// Largest errors by quantization: positions and scales relative, rotations in radians, colours, harmonics.
+/// `splats/helix-4.spz` was written by splat-transform 2.7.1 (Niantic's library, with libzstd) from a PLY with the numbers
+/// below. All its streams are compressed.
+#[test]
+fn spz_4_of_another_program_has_the_numbers_of_its_source() {
+    let file = include_bytes!("splats/helix-4.spz");
+    let model = read("helix.spz", file).unwrap();
+    let splats = model.splats().unwrap();
+    assert_eq!((splats.len(), splats.degree), (240, 1));
+    // Half a turn about x, from the axes of a PLY to those of an SPZ.
+    let half = Quat::from_rotation_x(std::f32::consts::PI);
+    let mut source = Splats { degree: 1, ..Splats::default() };
+    for k in 0..240 {
+        let t = k as f32 / 10.0;
+        source.positions.push(Vec3::new(t.cos(), k as f32 / 120.0 - 1.0, t.sin()));
+        source.scales.push(Vec3::new(-4.0, -3.5, (k % 8) as f32 / 8.0 - 3.0).map(f32::exp));
+        source.rotations.push(Quat::from_xyzw(0.0, (t / 4.0).sin(), 0.0, (t / 4.0).cos()));
+        source.opacities.push(1.0 / (1.0 + (-2.0_f32).exp()));
+        source.colors.push(0.5 + Vec3::new((t / 2.0).cos(), 0.5, -0.5) * 0.5 / std::f32::consts::PI.sqrt());
+        let wave = |c: usize| 0.25 * (t + c as f32).sin();
+        source.harmonics.extend((0..3).map(|k| Vec3::new(wave(k), wave(3 + k), wave(6 + k))));
+    }
+    let source = source.rotated(half);
+    let [scale, angle, color, _] = tolerances(ModelFormat::Spz);
+    for s in 0..240 {
+        assert!((model.origin().as_vec3() + splats.positions[s]).distance(source.positions[s]) < 4e-4, "{s}");
+        assert!((splats.scales[s] / source.scales[s] - 1.0).abs().max_element() <= scale);
+        // splat-transform also turns the splat's own axes by half a turn about x, which maps the ellipsoid to itself.
+        let off = splats.rotations[s].angle_between(source.rotations[s] * half);
+        assert!(off <= angle, "{s}: {off}");
+        assert!((splats.colors[s] - source.colors[s]).abs().max_element() <= color);
+        assert!((splats.opacities[s] - source.opacities[s]).abs() <= 0.002);
+        // splat-transform stores harmonics of degree 1 in steps of 8/128.
+        for (a, b) in splats.harmonics_of(s).iter().zip(source.harmonics_of(s)) {
+            assert!((*a - *b).abs().max_element() <= 0.04, "{s}: {a} {b}");
+        }
+    }
+    assert_eq!(model.write(ModelFormat::Spz, &model.positions).unwrap(), file, "unchanged");
+    // An export of changed splats is a file of version 3 with the other arrays of the source.
+    let mut moved = splats.clone();
+    moved.positions[7].x += 0.25;
+    let again = read("a.spz", &model.write_splats(ModelFormat::Spz, &moved).unwrap()).unwrap();
+    let after = again.splats().unwrap();
+    assert_eq!(
+        (&after.colors, &after.opacities, &after.harmonics),
+        (&splats.colors, &splats.opacities, &splats.harmonics)
+    );
+    assert!((again.positions[7] - moved.positions[7]).length() < 1e-3);
+}
+
+/// Largest errors due to quantisation: relative error of positions and scales, then errors of rotations (radians),
+/// colours and harmonics.
 fn tolerances(format: ModelFormat) -> [f32; 4] {
     match format {
         ModelFormat::Splat => [1e-6, 0.02, 0.003, f32::INFINITY],
-        // Scales have steps of 1/16 of a logarithm, rotations of 0.7/511, colours 1/255/0.15 * 0.28, harmonics 1/128.
+        // Values are rounded to the nearest step, so errors are up to half a step. Steps are 1/16 for logarithms of
+        // scales, 0.28 / (255 * 0.15) for colours and 1/128 for harmonics. The components of a rotation have steps of
+        // 0.7 / 511.
         ModelFormat::Spz => [0.032, 0.004, 0.004, 0.004],
         _ => [1e-6, 1e-3, 1e-5, 1e-6],
     }
@@ -179,7 +275,7 @@ fn every_format_returns_what_every_other_wrote() {
             let bytes = model.write(to, &model.positions).unwrap();
             let again = read(&format!("b.{}", to.export_extension()), &bytes).unwrap();
             // PLY and .splat have y down, SPZ and glTF y up.
-            let is_turned = from.up_of_captures() != to.up_of_captures();
+            let is_turned = from.usual_up() != to.usual_up();
             let half = if is_turned { Quat::from_rotation_x(std::f32::consts::PI) } else { Quat::IDENTITY };
             let (a, b) = (&model.splats().unwrap().rotated(half), again.splats().unwrap());
             let [scale, angle, color, harmonic] = tolerances(to);
@@ -188,7 +284,7 @@ fn every_format_returns_what_every_other_wrote() {
                 assert!((b.scales[s] / a.scales[s] - 1.0).abs().max_element() <= scale, "{from:?} {to:?}");
                 assert!(a.rotations[s].angle_between(b.rotations[s]) <= angle, "{from:?} {to:?}");
                 let [a_color, b_color] = [a, b].map(|of| of.colors[s].extend(of.opacities[s]));
-                // Bytes hold 0 to 1.
+                // A .splat stores colours and opacities as bytes, so values are limited to the range from 0 to 1.
                 let limit = if to == ModelFormat::Splat {
                     a_color.clamp(Vec3::ZERO.extend(0.0), Vec3::ONE.extend(1.0))
                 } else {
@@ -203,7 +299,7 @@ fn every_format_returns_what_every_other_wrote() {
                     .iter()
                     .zip(b.harmonics.chunks(n_harmonics(b.degree).max(1)).nth(s).unwrap_or_default())
                 {
-                    // SPZ stores harmonics from -1 to 1.
+                    // SPZ stores harmonics from -1 to 127/128, about 0.992.
                     assert!(
                         (x.clamp(Vec3::NEG_ONE, Vec3::splat(0.992)) - *y).abs().max_element()
                             <= harmonic.max(0.008),
@@ -236,7 +332,7 @@ fn unchanged_splats_keep_their_bytes_and_changed_ones_the_rest() {
                     (3, 1..=2 | 9..=17 | 19..=21) => {
                         assert!((now - was).abs() < 1e-5, "{column}: {was} {now}");
                     }
-                    // The rotation is normalised.
+                    // The file's rotation is not normalised, but the exported one is.
                     (3, 22..=25) => {}
                     _ => assert_eq!(now.to_bits(), was.to_bits(), "{splat} {column}"),
                 }
@@ -323,14 +419,19 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         huge.contains("splat 2 has the scale") && huge.contains("the limit is 1e15: remove such splats"),
         "{huge}"
     );
-    assert!(with(10, f32::INFINITY).unwrap_err().contains("splat 2 has the colour"));
+    for color in [f32::INFINITY, f32::NAN, 1e38] {
+        assert!(with(10, color).unwrap_err().contains("splat 2 has the colour"));
+    }
     assert!(with(18, f32::NAN).unwrap_err().contains("the opacity NaN"));
     // Infinite odds are an opacity of 1, and a scale of exp(-200) is 0.
     assert_eq!(with(18, f32::INFINITY).unwrap().splats().unwrap().opacities[2], 1.0);
     assert_eq!(with(19, -200.0).unwrap().splats().unwrap().scales[2].x, 0.0);
-    let unrotated = read("a.ply", &ply(|s, c| (s == 2 && (22..26).contains(&c)).then_some(0.0))).unwrap();
-    assert_eq!(unrotated.splats().unwrap().rotations[2], Quat::IDENTITY);
-    assert_eq!(unrotated.notices, ["1 splat has a rotation of length 0: none is used"]);
+    for length in [0.0, 1e-41] {
+        let unrotated =
+            read("a.ply", &ply(|s, c| (s == 2 && (22..26).contains(&c)).then_some(length))).unwrap();
+        assert_eq!(unrotated.splats().unwrap().rotations[2], Quat::IDENTITY);
+        assert_eq!(unrotated.notices, ["1 splat has a rotation of length 0, which is ignored"]);
+    }
     let many = fault("a.ply", &ply(|_, _| None)[..900]);
     assert!(many.contains("its header counts 6 splats, which need 648 bytes"), "{many}");
     let claimed = String::from_utf8_lossy(&ply(|_, _| None)[..800]).replace("vertex 6", "vertex 50000000");
@@ -345,7 +446,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     let negative = read("a.splat", &negative).unwrap();
     assert_eq!(negative.splats().unwrap().scales[0].x, 2.0);
     assert_eq!(negative.notices[0], "1 splat has a negative scale: its absolute value is used");
-    // The first bytes of a glTF, and of a UTF-16 text.
+    // A .splat has no header, so its first bytes can equal those of a glTF or of a UTF-16 text.
     let braces = [&b"{\0\0\0"[..], &[0; 28]].concat();
     assert_eq!(read("a.splat", &braces).unwrap().format(), ModelFormat::Splat);
 
@@ -358,20 +459,76 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         fault("a.spz", &gzip(&body))
     };
     assert!(changed(0, b"XXXX").contains("not an SPZ"));
-    assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 3 are read"));
+    assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 4 are read"));
     assert!(changed(12, &[4]).contains("degree 4") && changed(13, &[60]).contains("60 fractional bits"));
     assert!(changed(8, &2_u32.to_le_bytes()).contains("its header counts 2 splats, which need 58 bytes"));
     assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
     assert!(changed(8, &[0; 4]).contains("it has no splats"));
-    assert!(fault("a.spz", b"NGSP\x04\0\0\0").contains("SPZ of version 4 (Zstandard)"));
     assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));
-    // 20 MB of zeros in 20 kB: the limit is checked before they are decompressed.
+    // 29 MB of zeros in a small file: the limit is checked before they are decompressed.
     let mut bomb = body[..16].to_vec();
     bomb[8..12].copy_from_slice(&1_000_000_u32.to_le_bytes());
     bomb.resize(16 + 29_000_000, 0);
     let bomb = gzip(&bomb);
     let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
     assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");
+    let mut bomb = body[..16].to_vec();
+    bomb[8..12].copy_from_slice(&2_400_000_u32.to_le_bytes());
+    bomb.resize(16 + 29 * 2_400_000, 0);
+    let unpacked = fault("a.spz", &gzip(&bomb));
+    assert!(
+        unpacked.contains("unpack to 69600000, more than the limit of 64 MiB or 100 times"),
+        "{unpacked}"
+    );
+
+    let good = spz_4_of_one(&[0; 9], &[0; 4], &[]);
+    let changed = |at: usize, to: &[u8]| {
+        let mut file = good.clone();
+        file[at..at + to.len()].copy_from_slice(to);
+        fault("a.spz", &file)
+    };
+    assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 4 are read"));
+    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
+    assert!(changed(8, &2_u32.to_le_bytes()).contains("its stream 0 holds 9 bytes, but its array has 18"));
+    let without_harmonics = ARRAYS[..3].iter().map(|bytes| (bytes.len(), zstd_frame(bytes)));
+    let mut streams: Vec<_> = without_harmonics.collect();
+    streams.insert(0, (9, zstd_frame(&[0; 9])));
+    streams.push((4, zstd_frame(&[0; 4])));
+    let missing = fault("a.spz", &spz_4(1, 1, &[], &streams));
+    assert!(missing.contains("its table has no stream for an array of 9 bytes"), "{missing}");
+    for start in [31, u32::MAX] {
+        let table = format!("its table of 6 streams at byte {start} is not in the file");
+        assert!(changed(16, &start.to_le_bytes()).contains(&table));
+    }
+    assert!(changed(32, &u64::MAX.to_le_bytes()).contains("its stream 0 has 18446744073709551615 bytes"));
+    assert!(changed(32 + 6 * 16, &[0]).contains("its Zstandard stream 0 cannot be decompressed to 9 bytes"));
+    assert!(fault("a.spz", &good[..31]).contains("its header has 31 bytes, not 32"));
+    assert!(fault("a.spz", &good[..good.len() - 1]).contains("its stream 5 has 21 bytes, but 20 are left"));
+    // Streams that decompress to more or fewer bytes than their table declares.
+    let with_positions = |zeros: usize| {
+        let [opacity, color, scale, _] = ARRAYS.map(|bytes| (bytes.len(), zstd_frame(bytes)));
+        let rotation = (4, zstd_frame(&[0; 4]));
+        fault("a.spz", &spz_4(1, 0, &[], &[(9, zstd_zeros(zeros)), opacity, color, scale, rotation]))
+    };
+    for zeros in [8, 10, 1 << 30] {
+        assert!(with_positions(zeros).contains("its Zstandard stream 0 cannot be decompressed to 9 bytes"));
+    }
+    // 20 MB of zeros in a small file: the limit is checked before they are decompressed.
+    let streams = [9, 1, 3, 3, 4].map(|size| (size * 1_000_000, zstd_zeros(size * 1_000_000)));
+    let mut bomb = spz_4(1_000_000, 0, &[], &streams);
+    assert!(fault("a.spz", &bomb).contains("counts 1000000 splats"), "{} bytes", bomb.len());
+    bomb.resize(9_000, 0);
+    let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
+    assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");
+    // An extension record declares the axes right, down and front (6), after a record of an unknown type.
+    let extensions = [1_u32, 4, 9, 0xadbe_0003, 4, 6].map(u32::to_le_bytes).concat();
+    let turned = read("a.spz", &spz_4_of_one(&[0; 9], &[0; 4], &extensions)).unwrap();
+    assert!(turned.notices[0].contains("SPZ_ADOBE_coordinate_system 6"), "{:?}", turned.notices);
+    let mut legacy = Vec::new();
+    GzDecoder::new(&spz(3, &[0; 9], &[0; 4])[..]).read_to_end(&mut legacy).unwrap();
+    legacy[14] = 2;
+    legacy.extend(&extensions);
+    assert_eq!(read("a.spz", &gzip(&legacy)).unwrap().notices, turned.notices);
 
     assert!(fault("a.sog", b"PK\x03\x04").contains("convert it with `splat-transform IN.sog OUT.ply`"));
     let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
@@ -393,6 +550,6 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     let cube = read("cube.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     assert_eq!(
         cube.write(ModelFormat::Spz, &cube.positions).unwrap_err().to_string(),
-        "the model has no splats, but a SPZ stores nothing else: export GLB, OBJ, PLY, STL or OFF"
+        "the model has no splats, but a SPZ stores nothing else: export GLB, OBJ, PLY, STL, OFF or 3MF"
     );
 }

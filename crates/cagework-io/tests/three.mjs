@@ -11,8 +11,9 @@ import { join } from "node:path";
 globalThis.self = globalThis;
 const { AnimationMixer, Vector3 } = await import("three");
 const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
+const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
 
-/** Over the model's size: three.js computes in doubles, the file has floats. */
+/** Largest difference as a fraction of the model's size. three.js computes in doubles, but the file stores floats. */
 const LIMIT = 5e-7;
 
 const directory = process.argv[2];
@@ -26,7 +27,7 @@ let compared = 0;
 for (const name of names) {
   const glb = readFileSync(join(directory, name.replace(/\.played\.json$/, ".glb")));
   const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength);
-  const gltf = await new GLTFLoader().parseAsync(bytes, "");
+  const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
   let mesh;
   gltf.scene.traverse((object) => {
     if (object.isMesh) mesh = object;

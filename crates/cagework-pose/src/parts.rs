@@ -1,6 +1,6 @@
 //! Parts of a model that the cage does not bend: vertices that stay in place and rigid pieces.
 //!
-//! Both are functions of displacements, so they can be applied after any deformation, to vertices and to morph targets.
+//! Both depend only on displacements, so they can be applied after any deformation, to vertices and to morph targets.
 
 mod bound;
 
@@ -13,17 +13,17 @@ use cagework_core::rotation::nearest_rotation;
 
 pub use bound::{BoundParts, PieceMotion, hold_parts};
 
-/// Multiple of the identity that is added to a piece's covariance, as a fraction of the covariance's trace. It fixes
-/// the rotation where the points do not determine one: a line of points does not rotate about itself.
+/// Multiple of the identity that is added to a piece's covariance, as a fraction of the covariance's trace. It
+/// determines the rotation where the points do not: a line of points does not rotate about itself.
 const IDENTITY_WEIGHT: f64 = 1e-9;
 
-/// Vertices that do not follow the cage.
+/// Vertices that the cage does not move freely: vertices that stay in place, wholly or in part, and rigid pieces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
     /// Share of each vertex's displacement that is suppressed, 0 to 1. `[n_vertices]`, or empty if all vertices follow
     /// the cage.
     pub stays: Vec<f32>,
-    /// Vertices of each rigid piece: a buckle, an eye, a tooth. [`pieces`] finds them in a selection.
+    /// Vertices of each rigid piece, such as a buckle, an eye or a tooth. [`pieces`] finds them in a selection.
     pub rigid: Vec<Vec<u32>>,
 }
 
@@ -79,13 +79,13 @@ impl Motion {
         [0, 1, 2].map(|axis| rows.col(axis).extend(at_origin[axis]).as_vec4())
     }
 
-    /// Displacement of a point.
+    /// Displacement of the point at `at`.
     #[must_use]
     pub fn by(&self, at: DVec3) -> DVec3 {
         self.turn * (at - self.centre) + self.shift
     }
 
-    /// The motion as an affine transform.
+    /// The rigid motion as a matrix that maps rest positions to moved positions.
     #[must_use]
     pub fn transform(&self) -> DMat4 {
         DMat4::from_mat3_translation(DMat3::IDENTITY + self.turn, self.by(DVec3::ZERO))
@@ -98,7 +98,7 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 }
 
 impl Parts {
-    /// Whether all vertices follow the cage.
+    /// Whether no vertex is constrained.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stays.is_empty() && self.rigid.is_empty()
@@ -155,14 +155,13 @@ pub struct HeldMotion {
 }
 
 impl HeldMotion {
-    /// Whether a vertex stays in place, wholly or in part, or belongs to a rigid piece: it does not move as the cage
-    /// does.
+    /// Whether a vertex is constrained: it stays in place, wholly or in part, or belongs to a rigid piece.
     #[must_use]
     pub fn is_held(&self, vertex: u32) -> bool {
         self.piece_of.contains_key(&vertex) || self.stays.get(vertex as usize).is_some_and(|&s| s > 0.0)
     }
 
-    /// Constrained displacement of a vertex (or of its state in a morph target) that is at `at` and that the cage would
+    /// Constrained displacement of a vertex at the position `at` (at rest or in a morph target) that the cage would
     /// move by `by`.
     #[must_use]
     pub fn by(&self, vertex: u32, at: DVec3, by: DVec3) -> DVec3 {
@@ -208,7 +207,7 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
     pieces
 }
 
-/// Root of a piece: find with path halving.
+/// Root of the piece that contains `place`, by union-find with path halving.
 fn top(above: &mut [u32], mut place: u32) -> u32 {
     while above[place as usize] != place {
         above[place as usize] = above[above[place as usize] as usize];
@@ -310,8 +309,8 @@ mod tests {
 
     #[test]
     fn pieces_are_connected_by_selected_triangles_and_equal_positions() {
-        // Two triangles that share a position (2 and 3), a separate third one, and an unselected triangle that joins
-        // them.
+        // Vertices 2 and 3 are at the same position, which connects the first two triangles. Vertex 7 is not selected,
+        // so the other two triangles connect nothing.
         let positions = [0, 1, 2, 2, 3, 4, 5, 6, 7].map(|x| Vec3::new(x as f32, (x * x) as f32, 0.0));
         let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [5, 6, 7]];
         let found = pieces(&positions, &triangles, &[0, 1, 2, 3, 4, 5, 6, 8]);

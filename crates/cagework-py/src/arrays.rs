@@ -31,10 +31,16 @@ impl Points<'_> {
     }
 }
 
-/// Converts a value to a C-contiguous array. A C-contiguous array is returned unchanged.
+/// Converts a value to a C-contiguous array in the byte order of the machine. Such an array is returned unchanged.
 fn c_contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let none = value.py().None();
-    Ok(value.py().import("numpy")?.call_method1("require", (value, none, "CA"))?.cast_into()?)
+    let array = value.py().import("numpy")?.call_method1("require", (value, none, "CA"))?;
+    let array: Bound<'py, PyUntypedArray> = array.cast_into()?;
+    if array.dtype().is_native_byteorder() != Some(false) {
+        return Ok(array);
+    }
+    let native = array.dtype().call_method1("newbyteorder", ("=",))?;
+    Ok(array.call_method1("astype", (native,))?.cast_into()?)
 }
 
 /// An `ArrayError` with the actual and the expected type and shape.
@@ -107,7 +113,7 @@ fn indices(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> PyR
 /// Reads indices `[n]`.
 ///
 /// # Errors
-/// `ArrayError`
+/// `ArrayError` if the array has another type or shape, or an index is negative or too large.
 pub(crate) fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
     let (array, expected) = (c_contiguous(value)?, "integers of shape [n]");
     match *array.shape() {
@@ -120,7 +126,7 @@ pub(crate) fn list(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
 /// Reads triangles `[n, 3]`.
 ///
 /// # Errors
-/// `ArrayError`
+/// `ArrayError` if the array has another type or shape, or an index is negative or too large.
 pub(crate) fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
     let (name, array, expected) = ("triangles", c_contiguous(value)?, "integers of shape [n, 3]");
     match *array.shape() {
@@ -132,7 +138,7 @@ pub(crate) fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
 /// Reads faces: an array `[n, k]`, or a list of arrays of any lengths.
 ///
 /// # Errors
-/// `ArrayError`
+/// `ArrayError` if the array has another type or shape, or an index is negative or too large.
 pub(crate) fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     let Ok(array) = value.cast::<PyUntypedArray>() else {
         return value.try_iter()?.map(|face| list("a face", &face?)).collect();
@@ -148,7 +154,7 @@ pub(crate) fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
 /// Converts points relative to an origin to an array `[n, 3]`: float32, or float64 if the origin is not zero.
 ///
 /// # Errors
-/// Never in practice.
+/// Never in practice, because every point has three numbers.
 pub(crate) fn array_of(py: Python<'_>, points: Vec<Vec3>, origin: DVec3) -> PyResult<Bound<'_, PyAny>> {
     if origin != DVec3::ZERO {
         return Ok(wide_array_of(py, points.iter().map(|p| origin + p.as_dvec3()))?.into_any());
@@ -161,7 +167,7 @@ pub(crate) fn array_of(py: Python<'_>, points: Vec<Vec3>, origin: DVec3) -> PyRe
 /// Converts points to a float64 array `[n, 3]`.
 ///
 /// # Errors
-/// Never in practice.
+/// Never in practice, because every point has three numbers.
 pub(crate) fn wide_array_of<'py>(
     py: Python<'py>,
     points: impl Iterator<Item = DVec3>,
@@ -174,15 +180,16 @@ pub(crate) fn wide_array_of<'py>(
 /// Converts triples of indices to an int32 array `[n, 3]`.
 ///
 /// # Errors
-/// Never in practice.
+/// Never in practice, because every triple has three indices.
 pub(crate) fn triples<'py>(py: Python<'py>, all: &[[u32; 3]]) -> PyResult<Bound<'py, PyArray2<i32>>> {
     PyArray1::from_iter(py, all.as_flattened().iter().map(|&i| i as i32)).reshape([all.len(), 3])
 }
 
-/// Converts weights to a `scipy.sparse.csr_array` without copying.
+/// Converts weights to a `scipy.sparse.csr_array` without copying, or to `cagework._sparse.csr_array` if SciPy is not
+/// installed.
 ///
 /// # Errors
-/// If SciPy is not installed.
+/// Never in practice, because `cagework._sparse` is part of this package.
 pub(crate) fn matrix_of(py: Python<'_>, weights: Weights) -> PyResult<Bound<'_, PyAny>> {
     let shape = (weights.n_rows(), weights.n_columns());
     let (indptr, indices, data) = weights.into_parts();
@@ -193,7 +200,8 @@ pub(crate) fn matrix_of(py: Python<'_>, weights: Weights) -> PyResult<Bound<'_, 
         if small { array.call_method1("view", ("int32",)) } else { array.call_method1("astype", ("int64",)) }
     };
     let parts = (PyArray1::from_vec(py, data), signed(indices)?, signed(indptr)?);
-    py.import("scipy.sparse")?.getattr("csr_array")?.call1((parts, shape))
+    let module = py.import("scipy.sparse").or_else(|_| py.import("cagework._sparse"))?;
+    module.getattr("csr_array")?.call1((parts, shape))
 }
 
 /// Reads weights from a sparse SciPy matrix.
@@ -223,7 +231,7 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
 /// the controls.
 ///
 /// # Errors
-/// Never in practice.
+/// Those of [`matrix_of`], if the weights have offset columns.
 pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
     let (py, Binding { weights, frames, outside, .. }) = (report.py(), binding);
     let points = PyDict::new(py);

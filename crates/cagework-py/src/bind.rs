@@ -1,7 +1,7 @@
 //! `bind`, `bind_many` and `deform`.
 
 use cagework_core::bind::{BindError, Binding, SolvedCage};
-use cagework_core::deform::deform_bound;
+use cagework_core::deform::deform_finite;
 use cagework_core::{BindOptions, bind as bind_points};
 use glam::Vec3;
 use pyo3::prelude::*;
@@ -25,7 +25,7 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
     Ok(all)
 }
 
-/// Binds points to a cage by harmonic coordinates: bind(points, cage, **options) -> (weights, report)
+/// Binds points to a cage by harmonic coordinates: bind(points, cage, *, progress=None, **options) -> (weights, report)
 ///
 /// points: [n_points, 3] float32 or float64, object units. A C-contiguous float32 array is not copied, so do not write to it while
 /// bind runs.
@@ -40,44 +40,59 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 /// delta_norm="euclidean" or "literal", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
 /// (bytes), outside="extend", "stay" or "refuse".
 ///
+/// progress: function that is called with the completed fraction, 0 to 1, every 50 ms; raise in it to cancel.
+///
 /// Raises BindError (for example if no point is inside, or the memory limit is exceeded), OptionError, ArrayError. Ctrl-C cancels.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> weights, report = cw.bind(mesh.vertices, cage, grid=24)
+/// >>> bool(np.allclose(weights @ cage.vertices, mesh.vertices, atol=1e-3))
+/// True
 #[pyfunction]
-#[pyo3(signature = (points, cage, **options))]
+#[pyo3(signature = (points, cage, *, progress = None, **options))]
 pub(crate) fn bind<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     cage: &Bound<'py, Cage>,
+    progress: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<WeightsAndReport<'py>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let points = arrays::points("points", points, None, cage.get().origin())?;
     let positions = points.as_slice();
     let options = BindOptions { held: size_of_val(positions) as u64, ..options };
-    let binding = work::run(py, |progress| bind_points(positions, controls, &options, progress))?;
+    let binding =
+        work::run_with(py, progress, |progress| bind_points(positions, controls, &options, progress))?;
     weights_and_report(py, binding.map_err(error::bind)?)
 }
 
-/// Binds several models to one cage with one solve: bind_many(models, cage, **options) -> list of (weights, report)
+/// Binds several models to one cage with one solve: bind_many(models, cage, *, progress=None, **options) -> list of (weights, report)
 ///
-/// models: list of points [n_points, 3], such as clothes, levels of detail or variants. Each result is identical to that of bind, and
-/// costs only the sampling; times in a report are those of its model. The fields of all columns are kept in memory and may
-/// take half of memory_limit. Options are those of bind.
+/// models: list of points [n_points, 3], such as clothes, levels of detail or variants. The fields are solved once for all models, and
+/// then sampled for each model; the times in a report do not include this solve. Each result is identical to that of bind. The fields
+/// of all columns are kept in memory and may take half of memory_limit. progress and options are those of bind.
 ///
 /// Raises BindError, OptionError, ArrayError. Ctrl-C cancels.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> body, vest = mesh.vertices, mesh.vertices[:50]
+/// >>> [weights.shape[0] for weights, _ in cw.bind_many([body, vest], cage, grid=24)] == [len(body), 50]
+/// True
 #[pyfunction]
-#[pyo3(signature = (models, cage, **options))]
+#[pyo3(signature = (models, cage, *, progress = None, **options))]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python list to an owned vector")]
 pub(crate) fn bind_many<'py>(
     py: Python<'py>,
     models: Vec<Bound<'py, PyAny>>,
     cage: &Bound<'py, Cage>,
+    progress: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Vec<WeightsAndReport<'py>>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let of = |points| arrays::points("points", points, None, cage.get().origin());
     let points: Vec<_> = models.iter().map(of).collect::<PyResult<_>>()?;
     let positions: Vec<_> = points.iter().map(arrays::Points::as_slice).collect();
-    let all = work::run(py, |progress| {
+    let all = work::run_with(py, progress, |progress| {
         let solved = SolvedCage::new(controls, &options, progress)?;
         let held = |of: &[Vec3]| size_of_val(of) as u64;
         positions
@@ -103,6 +118,11 @@ fn weights_and_report(py: Python<'_>, binding: Binding) -> PyResult<WeightsAndRe
 /// posed is so far from the origin that float32 would lose digits.
 ///
 /// Raises ArrayError.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> weights, report = cw.bind(mesh.vertices, cage, grid=24)
+/// >>> bool(np.allclose(cw.deform(weights, cage.vertices * [2, 1, 1], report), mesh.vertices * [2, 1, 1], atol=1e-3))
+/// True
 #[pyfunction]
 #[pyo3(signature = (weights, posed, report = None))]
 pub(crate) fn deform<'py>(
@@ -115,5 +135,6 @@ pub(crate) fn deform<'py>(
     let (posed, origin) = arrays::points_and_origin("posed", posed, Some(weights.n_columns()))?;
     let (weights, frames) = arrays::join_offsets(report, weights)?;
     let posed = posed.as_slice();
-    arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &frames, posed))?, origin)
+    let points = work::run(py, |_| deform_finite(&weights, &frames, posed))?;
+    arrays::array_of(py, points.map_err(|e| error::array(e.to_string()))?, origin)
 }

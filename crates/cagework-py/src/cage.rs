@@ -27,6 +27,11 @@ use crate::{arrays, error, files, work};
 /// the cage, which is zero unless the cage is far away.
 ///
 /// Raises CageError, which names the invalid face, edge or vertex, and ArrayError.
+///
+/// >>> vertices = [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
+/// >>> faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+/// >>> cw.Cage(vertices, faces)
+/// Cage(8 vertices, 6 faces)
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Cage {
     set: ControlSet,
@@ -52,7 +57,7 @@ impl Cage {
         Ok(Self { set, origin, vertices: vertices.unbind(), report })
     }
 
-    /// Origin to which the positions are relative: zero unless the cage is far away.
+    /// Origin to which the positions are relative: zero unless the cage is far away from the world's origin.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -67,7 +72,7 @@ impl Cage {
     }
 }
 
-/// Converts the number of subdivision steps. It is a float so that any number gets the error message of the core.
+/// Converts a number of subdivision steps. `smooth` is a float, so that any number gets the error message of the core.
 fn steps(smooth: f64) -> PyResult<u32> {
     SMOOTH.check(smooth).map_err(error::option)?;
     Ok(smooth as u32)
@@ -93,6 +98,11 @@ impl Cage {
     /// positions are equal.
     ///
     /// Raises OSError, ModelError if the file cannot be read as a model, CageError if it is not a valid cage.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> cage.save("cage.obj")
+    /// >>> bool(np.allclose(cw.Cage.load("cage.obj").vertices, cage.vertices, atol=1e-3))
+    /// True
     #[staticmethod]
     #[pyo3(signature = (path, smooth = 0.0))]
     fn load(py: Python<'_>, path: PathBuf, smooth: f64) -> PyResult<Self> {
@@ -106,6 +116,9 @@ impl Cage {
     /// units.
     ///
     /// Raises OSError, ArrayError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> cage.save("wide.obj", cage.vertices * [2, 1, 1])
     #[pyo3(signature = (path, vertices = None))]
     fn save(&self, path: &Bound<'_, PyAny>, vertices: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mut mesh = self.mesh();
@@ -135,7 +148,7 @@ impl Cage {
         arrays::triples(py, self.set.cage().triangles())
     }
 
-    /// Steps of Catmull-Clark subdivision.
+    /// Number of Catmull-Clark subdivision steps.
     #[getter]
     fn smooth(&self) -> u32 {
         self.set.smooth()
@@ -171,7 +184,7 @@ impl Cage {
     }
 }
 
-/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, **options) -> Cage
+/// Generates a cage that strictly encloses a model: generate_cage(vertices, triangles, *, progress=None, **options) -> Cage
 ///
 /// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] integers. The mesh may be open or overlap
 /// itself.
@@ -179,15 +192,20 @@ impl Cage {
 /// Options, as for `cagework cage`: target=80 (maximum number of vertices, 8 to 400), detail=0.028 (fraction of the
 /// longest side), quads=True, shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False,
 /// clearance=0.0 (fraction of the diagonal), voxels=0 (along the longest side; 0: derived from target), smooth=0 (steps
-/// of subdivision; the smooth surface encloses the model).
+/// of subdivision; the smooth surface encloses the model). progress: as for bind.
 ///
 /// Raises CageError if no cage can be generated, OptionError, ArrayError. Ctrl-C cancels.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> len(cage.vertices) <= 40
+/// True
 #[pyfunction]
-#[pyo3(signature = (vertices, triangles, **options))]
+#[pyo3(signature = (vertices, triangles, *, progress = None, **options))]
 pub(crate) fn generate_cage(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
     triangles: &Bound<'_, PyAny>,
+    progress: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Cage> {
     let options: CageOptions = self::options(options)?;
@@ -195,7 +213,8 @@ pub(crate) fn generate_cage(
     let (points, origin) = arrays::points_and_origin("vertices", vertices, None)?;
     let triangles = arrays::triangles(triangles)?;
     let positions = points.as_slice();
-    let generated = work::run(py, |progress| generate(positions, &triangles, &options, progress))?;
+    let generated =
+        work::run_with(py, progress, |progress| generate(positions, &triangles, &options, progress))?;
     let generated = generated.map_err(error::cage)?;
     Cage::of(py, (&generated.cage.to_polygon_mesh(), origin), options.smooth, Some(generated.report))
 }
@@ -210,6 +229,10 @@ pub(crate) fn generate_cage(
 /// message and fixes. A cage without errors can be bound.
 ///
 /// Raises ArrayError, OptionError.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> [problem["message"] for problem in cw.check_cage(cage, mesh.vertices) if problem["severity"] == "error"]
+/// []
 #[pyfunction]
 #[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
 pub(crate) fn check_cage<'py>(

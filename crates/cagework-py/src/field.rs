@@ -25,6 +25,11 @@ use crate::{arrays, error, files, work};
 /// posed: [n_cage, 3] float32 or float64, object units; options: those of bind except `outside`.
 ///
 /// Raises BindError, OptionError, ArrayError. Ctrl-C cancels.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+/// >>> bool(np.allclose(field.map([[0.1, 0.0, 0.0]]), [[0.2, 0.0, 0.0]], atol=1e-3))
+/// True
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Field {
     weights: Arc<FieldWeights>,
@@ -59,6 +64,11 @@ impl Field {
     /// The field of another pose of the same cage. Does not bind again.
     ///
     /// Raises ArrayError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool(np.allclose(field.pose(cage.vertices).map([[0.1, 0.0, 0.0]]), [[0.1, 0.0, 0.0]], atol=1e-3))
+    /// True
     fn pose(&self, py: Python<'_>, posed: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (cage, weights) = (self.cage.get(), self.weights.clone());
         let controls = cage.controls();
@@ -71,14 +81,24 @@ impl Field {
     /// Positions of points after the deformation: [n, 3] -> [n, 3], object units.
     ///
     /// Raises ArrayError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool(np.allclose(field.map(mesh.vertices), mesh.vertices * [2, 1, 1], atol=1e-3))
+    /// True
     fn map<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         self.each(py, points, |p| self.field.map(p))
     }
 
-    /// The points that `map` moves to the given ones: [n, 3] -> [n, 3], object units. NaN where there is none, for
+    /// The points that `map` moves to the given ones: [n, 3] -> [n, 3], object units. NaN where none is found, for
     /// example where the deformation folds.
     ///
     /// Raises ArrayError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool(np.allclose(field.inverse(mesh.vertices * [2, 1, 1]), mesh.vertices, atol=1e-3))
+    /// True
     fn inverse<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let inverse = InverseField::new(&self.field);
         self.each(py, points, |p| inverse.find(p).unwrap_or(Vec3::NAN))
@@ -88,6 +108,11 @@ impl Field {
     /// goes.
     ///
     /// Raises ArrayError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool(np.allclose(field.gradient([[0.1, 0.0, 0.0]]), [np.diag([2, 1, 1])], atol=1e-3))
+    /// True
     fn gradient<'py>(
         &self,
         py: Python<'py>,
@@ -103,6 +128,12 @@ impl Field {
     /// Writes the lattice as an .npz file, as `cagework deform --lattice` does.
     ///
     /// Raises OSError.
+    ///
+    /// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> field.save("field.npz")
+    /// >>> sorted(np.load("field.npz"))  # doctest: +ELLIPSIS
+    /// [...]
     #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
     fn save(&self, path: PathBuf) -> PyResult<()> {
         files::write(&path, &write_field_npz(&self.field, self.cage.get().origin()))

@@ -4,10 +4,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
-use cagework_io::Model;
+use cagework_io::{Clip, Model, Resolve};
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyList};
 
 use crate::{arrays, error, work};
 
@@ -39,17 +39,27 @@ impl Source {
     /// # Errors
     /// `OSError`, `ModelError`.
     pub(crate) fn read_within(&self, memory_limit: u64) -> PyResult<Model> {
+        self.read_for(false, memory_limit)
+    }
+
+    /// Like [`Self::read_within`]; with `clips`, also accepts a glTF of clips without triangles.
+    ///
+    /// # Errors
+    /// `OSError`, `ModelError`.
+    pub(crate) fn read_for(&self, clips: bool, memory_limit: u64) -> PyResult<Model> {
+        let read = |name: &str, bytes: &[u8], resolve: &mut Resolve<'_>| {
+            if clips {
+                Model::read_with_clips(name, bytes, resolve, memory_limit)
+            } else {
+                Model::read_within(name, bytes, resolve, memory_limit)
+            }
+        };
         let model = match self {
-            Self::Bytes(bytes) => Model::read_within("model", bytes, &mut |_| None, memory_limit),
+            Self::Bytes(bytes) => read("model", bytes, &mut |_| None),
             Self::File(path) => {
                 let bytes = std::fs::read(path).map_err(|e| named(path, &e))?;
                 let folder = path.parent().unwrap_or(Path::new(""));
-                Model::read_within(
-                    &path.to_string_lossy(),
-                    &bytes,
-                    &mut |name| beside(folder, name),
-                    memory_limit,
-                )
+                read(&path.to_string_lossy(), &bytes, &mut |name| beside(folder, name))
             }
         };
         model.map_err(error::model)
@@ -83,7 +93,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 /// Reads a model: read_model(model, states=False, clip=None) -> (vertices [n, 3], triangles [m, 3] int32)
 ///
 /// model: path of a file in any format of docs/formats.md, or its bytes. A file without faces can be read as well, such
-/// as the pose of a cage.
+/// as the pose of a cage. A list of models gives the vertices of all of them, for one cage around a body and its clothes.
 ///
 /// Vertices are in world space, object units, in the file's order, which reshape uses too. They are split at seams as
 /// in the file. They are float32, or float64 if float32 would lose digits, as for map coordinates.
@@ -92,6 +102,10 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 /// clip. A cage around all of them is generate_cage(*read_model(model, states=True)).
 ///
 /// Raises OSError, ModelError.
+///
+/// >>> vertices, triangles = cw.read_model("fox.glb")
+/// >>> vertices.shape[1], triangles.shape[1]
+/// (3, 3)
 #[pyfunction]
 #[pyo3(signature = (model, states = false, clip = None))]
 pub(crate) fn read_model<'py>(
@@ -100,15 +114,28 @@ pub(crate) fn read_model<'py>(
     states: bool,
     clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
-    let source = Source::of(model)?;
-    let ((positions, triangles), origin) = work::run(py, move |_| -> PyResult<_> {
-        let model = source.read()?;
-        let origin = model.origin();
-        if states {
-            Ok((model.states(clip.as_deref()).map_err(error::model)?, origin))
-        } else {
-            Ok(((model.positions, model.triangles), origin))
+    let sources: Vec<Source> = match model.cast::<PyList>() {
+        Ok(models) => models.iter().map(|model| Source::of(&model)).collect::<PyResult<_>>()?,
+        Err(_) => vec![Source::of(model)?],
+    };
+    let (positions, triangles, origin) = work::run(py, move |_| -> PyResult<_> {
+        let (mut positions, mut triangles, mut origin) = (Vec::new(), Vec::new(), None);
+        let is_alone = sources.len() == 1;
+        for source in &sources {
+            let mut model = source.read()?;
+            model.see_from(*origin.get_or_insert(model.origin()));
+            // In a list, a model that lacks the clip contributes no frames.
+            let clip = clip.as_deref().filter(|clip| is_alone || Clip::named(&model.clips(), clip).is_ok());
+            let (own, corners) = if states {
+                model.states(clip).map_err(error::model)?
+            } else {
+                (model.positions, model.triangles)
+            };
+            let first = positions.len() as u32;
+            positions.extend(own);
+            triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
         }
+        Ok((positions, triangles, origin.ok_or_else(|| error::model("the list of models is empty"))?))
     })??;
     Ok((arrays::array_of(py, positions, origin)?, arrays::triples(py, &triangles)?))
 }

@@ -26,9 +26,17 @@ const FRAMES: u32 = 30;
 /// targets; pins: [l] vertices that stay; report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by
 /// default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size; None for
 /// automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the rest shape;
-/// options: of the bind of the solver's samples.
+/// options: those of bind, for the points on and near the model at which the solver samples the weights.
 ///
 /// Raises PullError, BindError, OptionError, ArrayError. Ctrl-C cancels the bind.
+///
+/// >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+/// >>> weights, report = cw.bind(mesh.vertices, cage, grid=24)
+/// >>> top = int(mesh.vertices[:, 2].argmax())
+/// >>> to = mesh.vertices[top] + [0.2, 0.0, 0.0]
+/// >>> posed = cw.pull(mesh.vertices, mesh.faces, cage, weights, [top], [to], report=report, grid=24)
+/// >>> bool(np.allclose((weights @ posed)[top], to, atol=0.01))
+/// True
 #[pyfunction]
 #[pyo3(signature = (vertices, triangles, cage, weights, grabs, to, *, pins = None, report = None, start = None, reach = None, relax = 0.5, **options))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -47,7 +55,8 @@ pub(crate) fn pull<'py>(
     relax: f64,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    // The solver's samples are next to the model. Where the cage is close to the model, samples may be outside of it.
+    // Allow probes outside the cage: they are off the surface by up to 1/64 of the cage's longest side, so a tight cage
+    // may not enclose them.
     let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
     let (controls, origin) = (cage.get().controls(), cage.get().origin());
     let positions = arrays::points("vertices", vertices, None, origin)?.as_slice().to_vec();
@@ -82,7 +91,7 @@ pub(crate) fn pull<'py>(
             grips.collect::<Result<_, _>>().map_err(error::pull)
         };
         let from: Vec<DVec3> = start.iter().map(|p| p.as_dvec3()).collect();
-        let drag_options = DragOptions { reach, relax, symmetry: None };
+        let drag_options = DragOptions { reach, relax, ..DragOptions::default() };
         let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
         let mut drag = drag.map_err(error::pull)?;
         let to = drag.targets(&grabs, &to, &deform_bound(&weights, &frames, &start));

@@ -17,9 +17,13 @@ use crate::{arrays, error, files, work};
 /// Splats(path)
 ///
 /// Raises OSError, ModelError.
+///
+/// >>> splats = cw.Splats("plant.splat")
+/// >>> len(splats) == len(splats.positions)
+/// True
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Splats {
-    /// The file, which `save` changes.
+    /// The model that was read. `save` writes a copy of its file with the changed splats.
     model: Arc<Model>,
     splats: CoreSplats,
 }
@@ -86,7 +90,13 @@ impl Splats {
         PyArray1::from_vec(py, flat).reshape([self.splats.len(), 3, 3])
     }
 
-    /// The splats deformed by a field. Splats that it does not move keep all digits.
+    /// The splats deformed by a field. Splats that the field does not move keep all digits.
+    ///
+    /// >>> splats = cw.Splats("plant.splat")
+    /// >>> cage = cw.generate_cage(*splats.shells(), target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool(np.allclose(splats.deformed(field).positions, splats.positions * [2, 1, 1], atol=1e-3))
+    /// True
     fn deformed(&self, py: Python<'_>, field: &Bound<'_, Field>) -> PyResult<Self> {
         let (field, mut model) = (field.get(), (*self.model).clone());
         model.see_from(field.origin());
@@ -95,8 +105,15 @@ impl Splats {
         Ok(Self { model: Arc::new(model), splats })
     }
 
-    /// How much each splat would bend beyond what an ellipsoid can show: the distance of the ends of its longest axis from
-    /// where the deformation moves them, as a fraction of its half length of sqrt(3) standard deviations. [n] float32.
+    /// How much the field bends each splat, which an ellipsoid cannot show: [n] float32. At each end of its longest
+    /// axis, a linear deformation misses the place to which the field moves this end. The result is the larger of the
+    /// two distances, as a fraction of the undeformed half axis, which is sqrt(3) standard deviations long.
+    ///
+    /// >>> splats = cw.Splats("plant.splat")
+    /// >>> cage = cw.generate_cage(*splats.shells(), target=40)
+    /// >>> field = cw.Field(cage, cage.vertices * [2, 1, 1], cells=16)
+    /// >>> bool((splats.first_order_errors(field) < 1).all())
+    /// True
     fn first_order_errors<'py>(
         &self,
         py: Python<'py>,
@@ -107,16 +124,24 @@ impl Splats {
         Ok(PyArray1::from_vec(py, errors))
     }
 
-    /// Vertices and triangles of octahedra that `generate_cage` encloses: without haze, and without the largest splats.
+    /// Vertices and triangles of octahedra around the splats, for `generate_cage`. Transparent splats (haze) and the
+    /// largest splats (background) are left out.
+    ///
+    /// >>> splats = cw.Splats("plant.splat")
+    /// >>> cage = cw.generate_cage(*splats.shells(), target=40)
     fn shells<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
         let (vertices, triangles) = work::run(py, |_| self.splats.shells())?;
         Ok((arrays::array_of(py, vertices, self.model.origin())?, arrays::triples(py, &triangles)?))
     }
 
-    /// Writes the splats; the extension selects the format. In the format of the file, splats that did not change keep
-    /// their bytes.
+    /// Writes the splats; the extension selects the format. If it is the format from which the splats were read,
+    /// unchanged splats are copied from that file, except in a .glb and in an .spz of another version than 3, whose
+    /// splats are encoded again.
     ///
     /// Raises OSError, ModelError.
+    ///
+    /// >>> splats = cw.Splats("plant.splat")
+    /// >>> splats.save("plant.ply")
     #[expect(clippy::needless_pass_by_value, reason = "pyo3 converts a Python path to an owned one")]
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let format = ModelFormat::of_export(&path.to_string_lossy());

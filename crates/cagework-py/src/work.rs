@@ -1,28 +1,47 @@
-//! Runs work without the interpreter lock, cancellable by Ctrl-C.
+//! Runs work without the interpreter lock, cancellable by Ctrl-C and by a progress function.
 
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
 use cagework_core::{Progress, ProgressEvent};
-use pyo3::{PyResult, Python};
+use pyo3::{Bound, Py, PyAny, PyResult, Python};
 
-/// Time between two checks for Ctrl-C.
+/// Time between two checks for Ctrl-C, and between two calls of a progress function.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Runs `work` in another thread and releases the interpreter lock. The calling thread polls for signals, which Python
-/// delivers to its main thread only. If a signal handler raises, the work's progress tells it to stop.
+/// Like [`run_with`], without a progress function.
 ///
 /// # Errors
 /// The exception of a signal handler, usually `KeyboardInterrupt`.
-#[expect(clippy::redundant_closure_for_method_calls, reason = "the method itself is of one lifetime only")]
 pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T + Send) -> PyResult<T> {
-    let cancelled = AtomicBool::new(false);
-    let progress = |_: ProgressEvent| {
+    run_with(py, None, work)
+}
+
+/// Runs `work` in another thread and releases the interpreter lock. The calling thread polls for signals, which Python
+/// delivers to its main thread only, and calls `progress` with the completed fraction. If a signal handler or
+/// `progress` raises, the work is cancelled.
+///
+/// # Errors
+/// The exception of a signal handler, usually `KeyboardInterrupt`, or of `progress`.
+pub(crate) fn run_with<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&dyn Progress) -> T + Send,
+) -> PyResult<T> {
+    let (cancelled, fraction) = (AtomicBool::new(false), AtomicU32::new(0));
+    let report = |event: ProgressEvent| {
+        fraction.store(event.fraction.to_bits(), Ordering::Relaxed);
         if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let progress: Option<Py<PyAny>> = progress.map(|function| function.clone().unbind());
+    let poll = |py: Python<'_>| -> PyResult<()> {
+        py.check_signals()?;
+        let Some(progress) = &progress else { return Ok(()) };
+        progress.call1(py, (f32::from_bits(fraction.load(Ordering::Relaxed)),)).map(drop)
     };
     py.detach(|| {
         thread::scope(|scope| {
@@ -31,12 +50,12 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
                 // Dropping this value closes the channel, which tells the calling thread that the work has ended or
                 // panicked.
                 let _working = working;
-                work(&progress)
+                work(&report)
             });
             let mut raised = None;
             while matches!(ended.recv_timeout(POLL_INTERVAL), Err(RecvTimeoutError::Timeout)) {
                 if raised.is_none() {
-                    raised = Python::attach(|py| py.check_signals()).err();
+                    raised = Python::attach(poll).err();
                     cancelled.store(raised.is_some(), Ordering::Relaxed);
                 }
             }

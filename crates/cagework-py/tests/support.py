@@ -110,6 +110,17 @@ def rigged_glb(radius=0.3):
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
+def splat_records():
+    """200 splats, as in a .splat file: positions, scales, colours, quaternions."""
+    random = np.random.default_rng(5)
+    records = np.zeros(200, [("p", "<f4", 3), ("s", "<f4", 3), ("c", "u1", 4), ("q", "u1", 4)])
+    records["p"] = random.uniform(-0.8, 0.8, (200, 3))
+    records["s"] = random.uniform(0.01, 0.05, (200, 3))
+    records["c"] = random.integers(0, 256, (200, 4))
+    records["q"] = random.integers(0, 256, (200, 4))
+    return records
+
+
 def cage_of(mesh, **options):
     """A cage generated for a trimesh."""
     return cw.generate_cage(mesh.vertices, mesh.faces, **options)

@@ -38,7 +38,7 @@ def test_rows_sum_to_one_and_reproduce_the_rest_pose(model, cage, bound):
 
 
 def test_affine_map_of_the_cage_is_applied_to_the_model(model, cage, bound):
-    # Holds because rows sum to 1 and reproduce the rest positions.
+    # The weights commute with affine maps, because rows sum to 1 and reproduce the rest positions.
     turn = np.array([[0.5, -1.0, 0.2], [0.9, 0.4, 0.0], [0.0, 0.3, 1.5]])
     moved = bound[0] @ (cage.vertices @ turn.T + [3.0, -2.0, 1.0])
     np.testing.assert_allclose(moved, model.vertices @ turn.T + [3.0, -2.0, 1.0], atol=10 * TOLERANCE)
@@ -50,8 +50,8 @@ def test_deform_is_the_matrix_product_except_for_points_far_outside(cage, bound)
     np.testing.assert_allclose(cw.deform(weights, posed), weights @ posed, atol=TOLERANCE)
 
     cube = cw.Cage(*box())
-    # Inside a cube with the diagonal 3.46, and at distances of 0.1 and 1 from it: within 5 % of the diagonal, and
-    # beyond 15 %.
+    # The cube's diagonal is 3.46. One point is inside; the others are at distances of 0.1, within 5 % of the diagonal,
+    # and 1, beyond 15 %.
     weights, report = cw.bind(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.1], [0.0, 0.0, 2.0]]), cube, grid=8)
     assert report["outside_vertices"] == 2 and report["staying_vertices"] == 1
     assert report["outside"]["vertex"].tolist() == [1, 2] and report["outside"]["share"].tolist() == [1, 0]

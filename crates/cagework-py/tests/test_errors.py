@@ -40,6 +40,7 @@ def test_invalid_cage_gives_the_error_message_of_the_command(tmp_path):
         (lambda: cw.check_cage(CUBE, grid=1.5), cw.OptionError, "grid is 1.5; it must be"),
         (lambda: cw.bind(POINT, CUBE, gird=7), TypeError, 'no option "gird"; there are .*grid'),
         (lambda: cw.bind(POINT + 9, CUBE, grid=8), cw.BindError, "none of the model's 1 vertices is inside"),
+        (lambda: cw.deform(cw.bind(POINT, CUBE, grid=8)[0], np.full((8, 3), 1e308)), cw.ArrayError, "moves point 0 to .* end at"),
         (lambda: cw.bind(POINT * np.nan, CUBE, grid=8), cw.BindError, "mesh vertex 0 is not a finite number"),
         (lambda: cw.bind(POINT, CUBE, grid=512, memory_limit=1 << 20), cw.BindError, "more than the limit of 1 MiB"),
         (lambda: cw.generate_cage(np.zeros((0, 3)), [[0, 0, 0]]), cw.CageError, "model has no vertices"),

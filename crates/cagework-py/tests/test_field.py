@@ -40,6 +40,8 @@ def test_other_arrays_are_accepted(cage, points):
     field = cw.Field(cage, cage.vertices + SHIFT, cells=16)
     moved = field.map(points.astype(np.float32))
     assert np.allclose(np.from_dlpack(moved), points + SHIFT, atol=1e-5)
+    # Big-endian numbers, as meshio reads them from a VTK file.
+    assert (field.map(points.astype(">f8")) == field.map(points)).all()
     for module in ("torch", "jax.numpy"):
         try:
             other = __import__(module, fromlist=["asarray"])
@@ -48,7 +50,7 @@ def test_other_arrays_are_accepted(cage, points):
         assert np.allclose(field.map(other.asarray(points)), points + SHIFT, atol=1e-5)
 
 
-def test_tetrahedra_keep_their_orientation(cage):
+def test_tetrahedra_keep_their_orientation(cage, tmp_path):
     # A grid of 6 x 6 x 6 cubes, each cut into six tetrahedra around a diagonal.
     n = 7
     nodes = np.stack(np.meshgrid(*[np.linspace(-0.9, 0.9, n)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -58,12 +60,26 @@ def test_tetrahedra_keep_their_orientation(cage):
     paths = np.array([np.cumsum([np.zeros(3, int), *steps[list(order)]], axis=0) for order in orders])
     tetrahedra = (first[:, None] + paths[None]).reshape(-1, 4, 3) @ [n * n, n, 1]
 
-    def volumes(at):
+    def volumes(at, tetrahedra):
         a, b, c, d = (at[tetrahedra[:, k]] for k in range(4))
         return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)
 
-    moved = cw.Field(cage, bent(cage)).map(nodes)
-    assert (np.sign(volumes(moved)) == np.sign(volumes(nodes))).all()
+    field = cw.Field(cage, bent(cage))
+    rest = volumes(nodes, tetrahedra)
+    assert (np.sign(volumes(field.map(nodes), tetrahedra)) == np.sign(rest)).all()
+    try:
+        import meshio
+    except ImportError:
+        return
+    # The same with a mesh from a VTK file, whose arrays meshio reads as big-endian numbers, written
+    # to another file.
+    meshio.Mesh(nodes, [("tetra", tetrahedra)]).write(tmp_path / "rest.vtk")
+    mesh = meshio.read(tmp_path / "rest.vtk")
+    mesh.points = field.map(mesh.points)
+    mesh.write(tmp_path / "bent.vtk")
+    moved = meshio.read(tmp_path / "bent.vtk")
+    assert not np.allclose(moved.points, nodes, atol=0.1)
+    assert (np.sign(volumes(moved.points, moved.cells_dict["tetra"])) == np.sign(rest)).all()
 
 
 def test_saved_lattice_is_that_of_the_command(cage, tmp_path):

@@ -25,6 +25,8 @@ def rigged(tmp_path_factory):
         ({"joints": "turn"}, "--joints turn"),
         ({"joints": "stay", "keep_travel": True}, "--joints stay --keep-travel"),
         ({"mask": {"skin": 0.5}, "rigid": ["arm"]}, "--mask skin=0.5 --rigid arm"),
+        ({"ground": True, "quantize": True, "compress": "meshopt"}, "--ground --quantize --compress meshopt"),
+        ({"feet": "lock"}, "--feet lock"),
     ],
 )
 def test_rigged_model_is_identical_to_that_of_the_command(rigged, options, line):
@@ -91,3 +93,102 @@ def test_gltf_buffers_are_read_from_the_models_folder_only(rigged, tmp_path):
         else:
             with pytest.raises(cw.ModelError, match="leads out of the model's folder"):
                 cw.read_model(inside / "model.gltf")
+
+
+def document_of(glb):
+    (length,) = struct.unpack_from("<I", glb, 12)
+    return json.loads(glb[20 : 20 + length])
+
+
+def edited(glb, edit):
+    """A GLB whose JSON a function has changed."""
+    document = document_of(glb)
+    edit(document)
+    (length,) = struct.unpack_from("<I", glb, 12)
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    rest = glb[20 + length :]
+    return struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({}, ""),
+        ({"times": [0.5, 2.0], "interpolation": "cubic"}, "--times 0.5,2 --interpolation cubic"),
+        ({"static": True}, "--static"),
+    ],
+)
+def test_named_poses_are_identical_to_those_of_the_command(rigged, options, line):
+    folder, cage = rigged
+    cage.save(folder / "tall.obj", cage.vertices * [1.0, 1.0, 1.2])
+    command(folder, "bind model.glb --cage cage.obj -g 20 --weights w.npz")
+    named = "--pose pose.obj --name bent --pose tall.obj --name tall"
+    command(folder, f"deform model.glb --cage cage.obj --weights w.npz {named} {line} -o poses.glb")
+    poses = {name: cw.read_model(folder / file)[0] for name, file in [("bent", "pose.obj"), ("tall", "tall.obj")]}
+    data = cw.reshape(folder / "model.glb", cage, poses, grid=20, **options)
+    assert data == (folder / "poses.glb").read_bytes()
+    assert document_of(data)["meshes"][0]["extras"]["targetNames"][-2:] == ["bent", "tall"]
+
+
+def test_poses_become_expressions_of_a_vrm(rigged):
+    _, cage = rigged
+    vrm = {"specVersion": "1.0", "humanoid": {"humanBones": {"hips": {"node": 1}}}}
+    glb = edited(rigged_glb(), lambda document: document.update(extensions={"VRMC_vrm": vrm}, extensionsUsed=["VRMC_vrm"]))
+    data = cw.reshape(glb, cage, {"happy": bent(cage), "odd": bent(cage)}, expressions=True, grid=12)
+    document = document_of(data)
+    expressions = document["extensions"]["VRMC_vrm"]["expressions"]
+    assert list(expressions["preset"]) == ["happy"] and list(expressions["custom"]) == ["odd"]
+    assert len(document["animations"]) == 1
+    with pytest.raises(cw.OptionError, match="no VRM data"):
+        cw.reshape(rigged_glb(), cage, {"happy": bent(cage)}, expressions=True, grid=12)
+
+
+def test_clips_and_clothes_follow_the_skeleton_of_a_body(rigged, tmp_path):
+    folder, cage = rigged
+
+    def without_mesh(document):
+        for key in ("meshes", "skins", "materials"):
+            del document[key]
+        document["nodes"][0] = {}
+
+    (folder / "clip.glb").write_bytes(edited(rigged_glb(), without_mesh))
+    options = "--cage cage.obj --pose pose.obj -g 20 --skeleton model.glb -o out"
+    command(folder, f"refit clip.glb {options}")
+    posed, _ = cw.read_model(folder / "pose.obj")
+    data = cw.reshape(folder / "clip.glb", cage, posed, skeleton=folder / "model.glb", grid=20)
+    assert data == (folder / "out" / "clip.glb").read_bytes()
+    assert document_of(data)["nodes"][2] != document_of(rigged_glb())["nodes"][2]
+    with pytest.raises(cw.ModelError, match="no triangles"):
+        cw.reshape(folder / "clip.glb", cage, posed, grid=20)
+    with pytest.raises(cw.ModelError, match="has no skeleton"):
+        cw.reshape(folder / "clip.glb", cage, posed, skeleton=folder / "cage.obj", grid=20)
+
+
+def test_one_cage_encloses_several_models(rigged):
+    path = rigged[0] / "model.glb"
+    vertices, triangles = cw.read_model(path, states=True)
+    both, faces = cw.read_model([path, rigged_glb(radius=0.4)], states=True)
+    assert np.array_equal(both[: len(vertices)], vertices) and len(both) == 2 * len(vertices)
+    assert np.array_equal(faces[len(triangles) :], triangles + len(vertices))
+    with pytest.raises(cw.ModelError, match="list of models is empty"):
+        cw.read_model([])
+
+
+@pytest.mark.parametrize(
+    ("posed", "options", "message"),
+    [
+        ("dict", {"ground": True}, "ground and feet"),
+        ("dict", {"times": [1.0, 2.0]}, r"times: expected one number per pose \(1\), got 2"),
+        ("dict", {"times": [-1.0]}, "the time of pose 1 is -1 s"),
+        ("dict", {"skeleton": rigged_glb()}, "skeleton needs one pose"),
+        ("array", {"expressions": True}, "need a dict of poses"),
+        ("array", {"feet": "glue"}, "feet: .*free, lock"),
+        ("array", {"compress": "zip"}, "compress: .*none, meshopt"),
+        ("array", {"static": True, "feet": "lock"}, "needs a model with a skeleton"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(rigged, posed, options, message):
+    _, cage = rigged
+    with pytest.raises(cw.OptionError, match=message):
+        cw.reshape(rigged_glb(), cage, {"a": bent(cage)} if posed == "dict" else bent(cage), grid=12, **options)

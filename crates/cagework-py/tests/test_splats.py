@@ -4,10 +4,9 @@ from types import ModuleType, SimpleNamespace
 import cagework as cw
 import numpy as np
 import pytest
-from support import bent, box, command
+from support import bent, box, command, splat_records
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-RECORD = np.dtype([("p", "<f4", 3), ("s", "<f4", 3), ("c", "u1", 4), ("q", "u1", 4)])
 
 
 @pytest.fixture(scope="module")
@@ -17,12 +16,7 @@ def cage():
 
 @pytest.fixture
 def capture(tmp_path):
-    random = np.random.default_rng(5)
-    records = np.zeros(200, RECORD)
-    records["p"] = random.uniform(-0.8, 0.8, (200, 3))
-    records["s"] = random.uniform(0.01, 0.05, (200, 3))
-    records["c"] = random.integers(0, 256, (200, 4))
-    records["q"] = random.integers(0, 256, (200, 4))
+    records = splat_records()
     (tmp_path / "a.splat").write_bytes(records.tobytes())
     return tmp_path / "a.splat", records
 
@@ -73,7 +67,7 @@ def test_wrong_files_are_refused(tmp_path):
 
 
 def test_blender_script_makes_a_lattice_with_the_deformed_points(cage, tmp_path, monkeypatch):
-    """A stand-in for Blender records what the script sets. Blender's axes are x, -z, y."""
+    """Runs the script with a stand-in for bpy, which records what the script sets. Blender's x, y, z are x, -z, y of the model."""
     cage.save(tmp_path / "cage.obj")
     cage.save(tmp_path / "pose.obj", bent(cage))
     options = "--lattice-cells 12 --lattice lattice.py --lattice-format blender"
@@ -99,7 +93,7 @@ def test_blender_script_makes_a_lattice_with_the_deformed_points(cage, tmp_path,
 
 
 def test_batches_of_poses_are_products(cage):
-    """The lines of docs/python.md, with the packages that are installed."""
+    """The examples of docs/python.md that pose many times at once, in NumPy and, if installed, in PyTorch and JAX."""
     points = np.random.default_rng(3).uniform(-0.9, 0.9, (50, 3))
     weights, _ = cw.bind(points, cage)
     poses = np.stack([cage.vertices, bent(cage), cage.vertices @ QUARTER.T])

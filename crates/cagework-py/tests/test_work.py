@@ -8,6 +8,7 @@ import time
 
 import cagework as cw
 import numpy as np
+import pytest
 from support import box
 
 # A bind of 193 batches of columns, between which cancellation is polled.
@@ -60,5 +61,21 @@ def test_another_thread_runs_while_a_bind_does():
     ended.set()
     counting.join()
     during = [began, *(t for t in ticks if began < t < began + took), began + took]
-    # If the bind did not release the interpreter lock, the thread would not count during the whole bind.
+    # If the bind held the interpreter lock, the other thread could not count while the bind runs.
     assert max(np.diff(during)) < took / 2 and len(during) > 10
+
+
+def test_progress_reports_fractions_and_cancels_by_raising():
+    class Enough(Exception):
+        pass
+
+    fractions = []
+
+    def progress(fraction):
+        fractions.append(fraction)
+        if len(fractions) == 3:
+            raise Enough
+
+    with pytest.raises(Enough):
+        cw.bind(np.zeros((1, 3)), cw.Cage(*box(5)), grid=96, progress=progress)
+    assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] < 1

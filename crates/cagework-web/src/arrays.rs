@@ -10,6 +10,19 @@ pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
     flat.chunks_exact(3).map(Vec3::from_slice).collect()
 }
 
+/// Points of the flat array `posed`, `[n, 3]`: a pose of `n` controls.
+///
+/// # Errors
+/// If the array does not have `3 n` numbers.
+pub(crate) fn pose(posed: &[f32], n: usize) -> Answer<Vec<Vec3>> {
+    if posed.len() == 3 * n {
+        return Ok(points(posed));
+    }
+    let (given, needed) = (posed.len(), 3 * n);
+    let message = format!("posed has {given} numbers; it must have {needed}, three for each of {n} controls");
+    Err(Fault::new(ErrorName::Error, message))
+}
+
 /// Flat array `[n, 3]` from points.
 pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(Vec3::to_array).collect()
@@ -49,5 +62,12 @@ mod tests {
         assert_eq!(flat, [3, 0, 1, 2, 4, 0, 2, 3, 1]);
         assert_eq!(polygon_mesh(&[], &flat).unwrap().faces, faces);
         assert!(polygon_mesh(&[], &flat[..7]).is_err());
+    }
+
+    #[test]
+    fn a_pose_of_another_length_is_refused_with_both_lengths() {
+        assert_eq!(pose(&[0.0; 6], 2).unwrap(), [Vec3::ZERO; 2]);
+        let fault = pose(&[0.0; 6], 3).unwrap_err();
+        assert!(fault.message().starts_with("posed has 6 numbers; it must have 9"), "{}", fault.message());
     }
 }

@@ -4,6 +4,8 @@
 
 mod results;
 
+use std::cell::RefCell;
+
 use cagework_cage::check::repair_smooth;
 use cagework_cage::generate::{CageOptions, GeneratedCage, generate};
 use cagework_cage::samples;
@@ -13,16 +15,16 @@ use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, Coordinates, PolygonMesh};
+use cagework_editor::CageControls;
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
-use glam::Vec3;
+use cagework_io::{Model, ModelFormat};
+use glam::{DVec3, Vec3};
 use js_sys::Function;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, points, polygon_mesh};
 use crate::clock::Listener;
-use cagework_editor::CageControls;
-
 use crate::controls::{control_set, from_js};
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{JsBindOptions, READ_LIMIT, decode};
@@ -32,36 +34,25 @@ use crate::views::object;
 pub(crate) use results::Offsets;
 pub use results::{Bound, BuiltSample, Polygons};
 
-/// Number of model vertices that are bound along with the new cage's vertices. A bind fails without a point inside the
-/// cage.
+/// Number of model vertices that [`Binder::carry_poses`] binds along with the new cage's controls. The controls may all
+/// be outside the old cage, and a bind without a point inside the cage fails.
 const MODEL_SAMPLES: usize = 256;
 
 /// Binds models and slices, generates, checks and repairs cages, and builds samples.
 #[wasm_bindgen]
 pub struct Binder {
-    gpu: Option<GpuContext>,
+    /// The GPU of the last bind on a GPU.
+    gpu: RefCell<Option<GpuContext>>,
 }
 
 #[wasm_bindgen]
 impl Binder {
-    /// Creates a binder without a GPU; see `openGpu`.
+    /// Creates a binder. The first bind on a GPU opens the GPU.
     #[wasm_bindgen(constructor)]
     #[must_use]
     #[allow(clippy::new_without_default, reason = "constructed by JavaScript only")]
     pub fn new() -> Self {
-        Self { gpu: None }
-    }
-
-    /// Opens a GPU for later binds. Does nothing if a working GPU is already open, or in builds without WebGPU.
-    ///
-    /// # Errors
-    /// `NoAdapter`, `NoDevice`.
-    #[wasm_bindgen(js_name = openGpu)]
-    pub async fn open_gpu(&mut self) -> Result<(), JsValue> {
-        if cfg!(feature = "webgpu") && self.gpu.as_ref().is_none_or(|gpu| gpu.check().is_err()) {
-            self.gpu = Some(GpuContext::new(&ContextOptions::default()).await.map_err(Fault::from)?);
-        }
-        Ok(())
+        Self { gpu: RefCell::default() }
     }
 
     /// Harmonic coordinates of `positions`, `[n_points, 3]`. The last `extra_points` points are not vertices of the
@@ -71,8 +62,8 @@ impl Binder {
     /// for `Engine.setCage`. `progress` is called with each progress event; returning false cancels the bind.
     ///
     /// # Errors
-    /// The errors of a bind. If the arrays are not a valid cage. `Missing` if the options select the GPU and no GPU is
-    /// open.
+    /// If the arrays are not a valid cage, or the bind fails. `NoAdapter` or `NoDevice` if the options select the GPU
+    /// and no GPU can be opened.
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn bind(
         &self,
@@ -90,7 +81,7 @@ impl Binder {
         let at = points(&positions);
         drop(positions);
         let binding = self.run(&at, &set, request, progress).await?;
-        let report = object(&binding.report)?;
+        let report = object(&binding.report);
         Ok(Bound {
             weights: binding.weights,
             offsets: Offsets { frames: binding.frames, outside: binding.outside },
@@ -118,11 +109,11 @@ impl Binder {
         Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 
-    /// Coordinates at the cell centres of a slice, for `Engine.takeSlice`. `axis`: 0 to 2; `fraction`: position along
-    /// the axis, 0 to 1; other arguments as for `bind`.
+    /// Coordinates at the cell centres of a slice, for `Engine.takeSlice`; undefined if no centre is inside the cage.
+    /// `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; other arguments as for `bind`.
     ///
     /// # Errors
-    /// Those of a bind.
+    /// The errors of `bind`.
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     #[wasm_bindgen(js_name = bindSlice)]
     pub async fn bind_slice(
@@ -151,11 +142,12 @@ impl Binder {
         Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
-    /// Harmonic coordinates at the points of a lattice around a cage, for `Engine.takeLattice`, or with a number of
-    /// `cells` along the longest side of the cage for `FieldMap`. Other arguments as for `bind`.
+    /// Harmonic coordinates at the points of a lattice around a cage. With `cells`, the number of cells along the
+    /// longest side of the cage, the result is for `FieldMap`, otherwise for `Engine.takeLattice`. Other arguments as
+    /// for `bind`.
     ///
     /// # Errors
-    /// Those of a bind.
+    /// The errors of `bind`.
     #[wasm_bindgen(js_name = bindLattice)]
     pub async fn bind_lattice(
         &self,
@@ -206,7 +198,7 @@ impl Binder {
     /// where the old one extends beyond it.
     ///
     /// # Errors
-    /// If the arrays are not a valid cage. Those of a bind.
+    /// If the arrays are not a valid cage, or the bind fails.
     #[wasm_bindgen(js_name = carryPoses)]
     pub fn carry_poses(
         model: &[f32],
@@ -218,7 +210,8 @@ impl Binder {
     ) -> Result<Vec<f32>, JsValue> {
         let (mut at, set) = (points(new), control_set(old, old_corners, old_controls)?);
         let (n_new, n_old) = (at.len(), Controls::from(&set).n_controls());
-        // If the new cage surrounds the old one, none of its vertices is inside the old cage, but model vertices are.
+        // Bind model vertices too. If the new cage surrounds the old one, they are the only points inside the old cage,
+        // and a bind without a point inside fails.
         at.extend(points(model).into_iter().take(MODEL_SAMPLES));
         let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
         let poses = points(poses);
@@ -247,7 +240,7 @@ impl Binder {
     /// Repairs a cage. Arrays as for `checkCage`. The repaired cage has no interior controls.
     ///
     /// # Errors
-    /// If the repaired cage does not enclose the model.
+    /// If the arrays are not a polygon mesh, or the cage cannot be grown until it encloses the model.
     #[wasm_bindgen(js_name = repairCage)]
     pub fn repair_cage(
         #[wasm_bindgen(unchecked_param_type = "Repair")] kind: JsValue,
@@ -262,10 +255,20 @@ impl Binder {
         Ok(repaired.mesh.into())
     }
 
-    /// Identifiers of the samples.
+    /// Identifiers of the built-in samples, which `buildSample` takes.
     #[must_use]
     pub fn samples() -> Vec<String> {
         samples::all().iter().map(|sample| sample.id.to_owned()).collect()
+    }
+
+    /// The sample capture "knot", whose splats are computed by a formula, as an SPZ file.
+    ///
+    /// # Errors
+    /// If memory is exhausted.
+    #[wasm_bindgen(js_name = knotCapture)]
+    pub fn knot_capture() -> Result<Vec<u8>, JsValue> {
+        let model = Model::of_splats("knot", samples::knot(), DVec3::ZERO).map_err(Fault::from)?;
+        Ok(model.write(ModelFormat::Spz, &model.positions).map_err(Fault::from)?)
     }
 
     /// Builds the sample with this identifier.
@@ -294,8 +297,15 @@ fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(
 }
 
 impl Binder {
-    fn open(&self) -> Answer<&GpuContext> {
-        self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))
+    /// A working GPU: that of the last bind, or a new one.
+    async fn open(&self) -> Answer<GpuContext> {
+        let last = self.gpu.borrow().clone();
+        if let Some(gpu) = last.filter(|gpu| gpu.check().is_ok()) {
+            return Ok(gpu);
+        }
+        let gpu = GpuContext::new(&ContextOptions::default()).await?;
+        self.gpu.replace(Some(gpu.clone()));
+        Ok(gpu)
     }
 
     pub(crate) async fn run(
@@ -309,6 +319,6 @@ impl Binder {
         if request.is_on_cpu() {
             return Ok(cagework_core::bind(positions, set, &request.options, &listener)?);
         }
-        Ok(bind_on(positions, set, &request.options, &listener, self.open()?).await?)
+        Ok(bind_on(positions, set, &request.options, &listener, &self.open().await?).await?)
     }
 }

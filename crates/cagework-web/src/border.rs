@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 use cagework_cage::check::{Code, Repair, Severity};
-use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, Shape};
+use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, HULL_TARGET, Shape, Symmetry};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::options::{
     Backend, CellShape, Choice, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
@@ -13,39 +13,35 @@ use cagework_core::options::{
 use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
-use cagework_core::{BindOptions, Coordinates, Frames, InnerElement, Stage};
+use cagework_core::{Coordinates, Frames, InnerElement, Stage};
 use cagework_editor::edit::{Element, GestureKind, GestureView, Pivot, SelectMode};
 use cagework_editor::{
-    CageControls, Command, DocumentSettings, InnerKind, MemberSettings, PartOptions, PoseView, RestEdit,
-    SelectionView, SurfacePoint, Transition,
+    CageControls, Command, InnerKind, PartOptions, PoseView, RestEdit, SelectionView, SurfacePoint, Tools,
+    Transition,
 };
-use cagework_gpu::render::Theme;
-use cagework_io::{FormatFacts, Interpolation, Joints, ModelFormat, UpAxis};
-use serde::Serialize;
+use cagework_gpu::render::{GizmoMode, GizmoPart, Theme};
+use cagework_io::{Compression, Feet, FormatFacts, Interpolation, Joints, ModelFormat, UpAxis};
+use cagework_pose::pull::{DragOptions, Reach};
+use serde_json::Value;
 use ts_rs::{Config, TS};
 
 use crate::binder::Offsets;
 use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::opening::{CageContents, OpenContents, PoseContents};
-use crate::options::{
-    Colour, GizmoHandle, JsBindOptions, JsGizmo, JsPullOptions, JsRigOptions, JsSceneOptions, SliceShown,
-};
+use crate::options::{Colour, JsBindOptions, JsRigOptions, JsSceneOptions, SliceShown, fields};
 use crate::settings::{NUMBERS, Settings};
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Grip, Largest, Legend, MemberInfo, Mend,
+    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Largest, Legend, MemberInfo, Mend,
     ModelInfo, Problem, TargetView, View,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
-/// Page that lists the ranges of numeric options, between two comments.
+/// Document with a generated table of the ranges of numeric options, between two HTML comments.
 const LIMITS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/limits.md");
 const TABLE_START: &str = "<!-- Written by crates/cagework-web/src/border.rs -->";
 const TABLE_END: &str = "<!-- end -->";
-
-/// Default memory limit of a bind in the page, bytes: half of the 4 GiB that a browser tab can address.
-const PAGE_MEMORY: u64 = 2 << 30;
 
 /// Doc comment and TypeScript declaration of each listed type.
 macro_rules! declarations {
@@ -56,19 +52,9 @@ macro_rules! declarations {
     }};
 }
 
-/// Declaration of a TypeScript constant. `serde_json::to_string` prints an `f32` with its own digits; `json!` would
-/// widen it to `f64`.
-fn constant(name: &str, r#type: &str, value: &impl Serialize) -> String {
-    let mut json = serde_json::to_string(value).unwrap();
-    for (name, in_page) in [
-        ("\"threads\":0,", ""),
-        (",\"smooth\":0", ""),
-        ("\"target\"", "\"vertices\""),
-        ("\"clearance\"", "\"margin\""),
-    ] {
-        json = json.replace(name, in_page);
-    }
-    format!("export const {name}: {type} = {json};\n")
+/// Declaration of a TypeScript constant.
+fn constant(name: &str, r#type: &str, value: impl Into<Value>) -> String {
+    format!("export const {name}: {type} = {};\n", value.into())
 }
 
 #[test]
@@ -100,6 +86,7 @@ fn generated_types_are_up_to_date() {
         MeanMax,
         WeightStats,
         Shape,
+        Symmetry,
         CageOptions,
         BoundsView,
         InnerElement,
@@ -116,14 +103,13 @@ fn generated_types_are_up_to_date() {
         UpAxis,
         PartOptions,
         MemberInfo,
-        MemberSettings,
         ModelInfo,
         Interpolation,
         Transition,
-        DocumentSettings,
         Command,
         PoseView,
         SelectionView,
+        Tools,
         View,
         CageContents,
         PoseContents,
@@ -133,13 +119,15 @@ fn generated_types_are_up_to_date() {
         Colour,
         Coordinates,
         SliceShown,
-        JsGizmo,
+        GizmoMode,
         JsSceneOptions,
         CameraView,
         SurfacePoint,
-        Grip,
-        JsPullOptions,
+        Reach,
+        DragOptions,
         Joints,
+        Feet,
+        Compression,
         JsRigOptions,
         ClipView,
         TargetView,
@@ -151,21 +139,22 @@ fn generated_types_are_up_to_date() {
         SelectMode,
         GestureKind,
         GestureView,
-        GizmoHandle,
+        GizmoPart,
         RestEdit,
     ] {
         writeln!(text, "{docs}export {declaration}").unwrap();
         text = text.replace(" \n", "\n");
     }
-    let options = BindOptions { memory_limit: PAGE_MEMORY, ..BindOptions::default() };
-    text += &constant("BIND_DEFAULTS", "BindOptions", &JsBindOptions { backend: Backend::Gpu, options });
-    text += &constant("CAGE_DEFAULTS", "CageOptions", &CageOptions::default());
-    text += &constant("RIG_DEFAULTS", "RigOptions", &JsRigOptions::default());
-    text += &constant("SCENE_DEFAULTS", "SceneOptions", &JsSceneOptions::default());
+    text += &constant("BIND_DEFAULTS", "BindOptions", fields(&JsBindOptions::default()));
+    text += &constant("CAGE_DEFAULTS", "CageOptions", fields(&CageOptions::default()));
+    text += &constant("RIG_DEFAULTS", "RigOptions", fields(&JsRigOptions::default()));
+    text += &constant("VIEW_DEFAULTS", "View", fields(&View::default()));
+    text += &constant("SCENE_DEFAULTS", "SceneOptions", fields(&JsSceneOptions::default()));
     let kinds: Vec<&str> = Coordinates::ALL.iter().map(|(word, _)| *word).collect();
-    text += &constant("COORDINATES", "readonly Coordinates[]", &kinds);
+    text += &constant("COORDINATES", "readonly Coordinates[]", kinds);
     let all =
         |of: fn(&FormatFacts) -> &'static [&'static str]| ModelFormat::ALL.map(|f| of(f.facts())).concat();
+    let splats = ModelFormat::ALL.into_iter().filter(|format| format.holds_splats() && !format.holds_poses());
     let shapes = ModelFormat::ALL.into_iter().filter(|format| format.holds_faces() && !format.holds_poses());
     for (about, name, values) in [
         ("File extensions of models, preferred first.", "MODEL_ENDINGS", all(|facts| facts.endings)),
@@ -173,24 +162,30 @@ fn generated_types_are_up_to_date() {
         ("Extensions of models that refer to other files.", "NAMING_ENDINGS", all(|facts| facts.naming)),
         ("Extensions of these other files.", "COMPANION_ENDINGS", all(|facts| facts.companions)),
         ("Formats that store only a shape.", "SHAPE_FORMATS", shapes.map(ModelFormat::name).collect()),
+        (
+            "Formats that store splats and nothing else.",
+            "SPLAT_FORMATS",
+            splats.map(ModelFormat::name).collect(),
+        ),
     ] {
         writeln!(text, "/** {about} */\nexport const {name} = {values:?} as const;").unwrap();
     }
     text += "/** MIME types of exported models, by extension. */\nexport const EXPORT_TYPES: Readonly<Record<string, string>> = {";
     for facts in ModelFormat::ALL.map(ModelFormat::facts) {
         let Some(mime_type) = facts.mime_types.first() else { continue };
-        facts.endings.iter().for_each(|ending| write!(text, " {ending}: {mime_type:?},").unwrap());
+        facts.endings.iter().for_each(|ending| write!(text, " {ending:?}: {mime_type:?},").unwrap());
     }
     text += " };\n";
     text += "/** Sliders of options, by name. */\nexport const SLIDERS = {";
-    for (name, number) in NUMBERS {
+    for number in NUMBERS {
         let Some(slider) = number.slider else { continue };
-        write!(text, " {name}: {},", serde_json::to_string(&slider).unwrap()).unwrap();
+        write!(text, " {}: {},", number.name, serde_json::to_string(&slider).unwrap()).unwrap();
     }
     writeln!(text, " }} as const;\nexport const BOX_DIVISIONS = {BOX_DIVISIONS};").unwrap();
+    writeln!(text, "export const HULL_TARGET = {HULL_TARGET};").unwrap();
     let mut table = "| option | unit | meaning and range |\n|---|---|---|\n".to_owned();
-    for (name, number) in NUMBERS {
-        writeln!(table, "| {name} | {} | {} |", number.unit, number.about()).unwrap();
+    for number in NUMBERS {
+        writeln!(table, "| {} | {} | {} |", number.name, number.unit, number.about()).unwrap();
     }
     let limits = fs::read_to_string(LIMITS).unwrap();
     let (head, rest) = limits.split_once(TABLE_START).expect("docs/limits.md has the table's first mark");

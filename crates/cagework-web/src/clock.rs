@@ -19,8 +19,8 @@ extern "C" {
 }
 
 thread_local! {
-    /// The JavaScript callback. It is thread-local because [`Progress`] must be `Sync` and `Function` is not. One is
-    /// enough: each worker runs one job at a time on one thread.
+    /// The JavaScript callback. It is thread-local because [`Progress`] must be `Sync` and `Function` is not. One
+    /// callback is enough: each worker runs one job at a time on one thread.
     static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
 }
 
@@ -54,8 +54,7 @@ impl Progress for Listener {
     fn report(&self, event: ProgressEvent) -> ControlFlow<()> {
         let ProgressEvent { stage, fraction, iteration, delta } = event;
         let Some(listener) = LISTENER.with_borrow(Clone::clone) else { return ControlFlow::Continue(()) };
-        let event = Event { stage, fraction, iteration, delta };
-        let Ok(event) = object(&event) else { return ControlFlow::Continue(()) };
+        let event = object(&Event { stage, fraction, iteration, delta });
         match listener.call1(&JsValue::NULL, &event) {
             Ok(answer) if answer == JsValue::FALSE => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),

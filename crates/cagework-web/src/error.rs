@@ -21,7 +21,7 @@ use wasm_bindgen::JsValue;
 pub(crate) enum ErrorName {
     /// The job was cancelled, or its result is out of date.
     Cancelled,
-    /// The geometry of a file is compressed, and the decoder is in JavaScript.
+    /// The geometry of a file is compressed. JavaScript decompresses the file and reads it again.
     Compressed,
     /// A file cannot be read.
     Format,
@@ -39,7 +39,7 @@ pub(crate) enum ErrorName {
     NoDevice,
     /// The GPU device is lost.
     DeviceLost,
-    /// The GPU does not support a computation that the CPU may support.
+    /// A computation failed on the GPU: out of memory, refused, timed out or unsupported. The CPU may still perform it.
     Gpu,
     /// The GPU cannot draw into the canvas.
     Canvas,
@@ -49,7 +49,7 @@ pub(crate) enum ErrorName {
     Error,
 }
 
-/// An error that JavaScript receives.
+/// Name and message of an error. JavaScript receives it as an `Error`.
 #[derive(Debug)]
 pub(crate) struct Fault {
     name: ErrorName,
@@ -60,7 +60,6 @@ pub(crate) struct Fault {
 pub(crate) type Answer<T> = Result<T, Fault>;
 
 impl Fault {
-    /// Creates an error from a name and a message.
     pub(crate) fn new(name: ErrorName, message: impl Display) -> Self {
         Self { name, message: message.to_string() }
     }

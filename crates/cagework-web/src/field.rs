@@ -1,18 +1,19 @@
 //! The deformation as a field, for the npm package.
 
+use cagework_core::Controls;
 use cagework_core::field::{Field, FieldWeights, InverseField, Lattice};
-use cagework_core::{Controls, Frames, Weights};
 use glam::Vec3;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::arrays::{flat, points};
+use crate::arrays::{flat, points, pose};
 use crate::binder::Offsets;
 use crate::controls::control_set;
-use crate::error::{Answer, ErrorName, Fault};
+use crate::error::{ErrorName, Fault};
 use crate::options::decode;
 
-/// The field of a posed cage, for points that are not bound.
+/// The displacement field of a posed cage, on a lattice around the cage. It moves any points within the lattice, not
+/// only the vertices of a bound model.
 #[wasm_bindgen]
 pub struct FieldMap {
     weights: FieldWeights,
@@ -22,8 +23,8 @@ pub struct FieldMap {
 
 #[wasm_bindgen]
 impl FieldMap {
-    /// Creates the field of the rest pose from the weights that `Binder.bindLattice` returned for this cage and number of
-    /// cells.
+    /// Creates the field of the rest pose from the weights that `Binder.bindLattice` returned for this cage and number
+    /// of cells.
     ///
     /// # Errors
     /// If the arrays do not match.
@@ -40,9 +41,9 @@ impl FieldMap {
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<Self, JsValue> {
         let set = control_set(cage, corners, controls)?;
-        let Offsets { frames, .. } = decode(offsets)?;
         let controls = Controls::from(&set);
-        let weights = weights(controls.n_controls(), &frames, (indptr, indices, data))?;
+        let (weights, frames) =
+            decode::<Offsets>(offsets)?.bound(controls.n_controls(), indptr, indices, data)?;
         let lattice = Lattice::new(controls.surface(), cells);
         if weights.n_rows() != lattice.points().len() {
             let message = format!("the lattice of {cells} cells has {} points", lattice.points().len());
@@ -53,16 +54,12 @@ impl FieldMap {
         Ok(Self { weights, rest, field })
     }
 
-    /// Moves the controls, `[n_controls, 3]`.
+    /// Moves the controls to the positions `posed`, `[n_controls, 3]`, and updates the field.
     ///
     /// # Errors
     /// If the pose has another number of points.
     pub fn pose(&mut self, posed: &[f32]) -> Result<(), JsValue> {
-        if posed.len() != 3 * self.rest.len() {
-            let message = format!("posed has {} numbers; it must have {}", posed.len(), 3 * self.rest.len());
-            return Err(Fault::new(ErrorName::Error, message).into());
-        }
-        self.field = self.weights.pose(&self.rest, &points(posed));
+        self.field = self.weights.pose(&self.rest, &pose(posed, self.rest.len())?);
         Ok(())
     }
 
@@ -72,7 +69,7 @@ impl FieldMap {
         flat(&points(at).into_iter().map(|p| self.field.map(p)).collect::<Vec<_>>())
     }
 
-    /// The points that `map` moves to these; NaN where there is none. `[n, 3]`
+    /// The points that `map` moves to `at`; NaN if there is no such point. `[n, 3]`
     #[must_use]
     pub fn inverse(&self, at: &[f32]) -> Vec<f32> {
         let inverse = InverseField::new(&self.field);
@@ -86,35 +83,25 @@ impl FieldMap {
         points(at).into_iter().flat_map(|p| self.field.gradient(p).transpose().to_cols_array()).collect()
     }
 
-    /// Position of the first node, then the distance of the nodes, object units.
+    /// Position of the lattice's first node (three numbers), then the distance between adjacent nodes. Object units.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn frame(&self) -> Vec<f32> {
         self.field.lattice.origin.extend(self.field.lattice.cell).to_array().to_vec()
     }
 
-    /// Number of nodes along x, y and z.
+    /// Number of the lattice's nodes along x, y and z. `[3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn dims(&self) -> Vec<u32> {
         self.field.lattice.dims.to_array().to_vec()
     }
 
-    /// Displacements at the nodes with a fourth number, x fastest, as an RGBA texture stores them. `[nz, ny, nx, 4]`
+    /// Displacements at the nodes, as an RGBA texture stores them; x varies fastest. The fourth component is 1 at nodes
+    /// that have weights of the controls, and 0 at other nodes. `[nz, ny, nx, 4]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn displacements(&self) -> Vec<f32> {
         self.field.values.iter().flat_map(glam::Vec4::to_array).collect()
     }
-}
-
-fn weights(
-    n_controls: usize,
-    frames: &Frames,
-    (indptr, indices, data): (Vec<u32>, Vec<u32>, Vec<f32>),
-) -> Answer<Weights> {
-    if !frames.fits(n_controls) {
-        return Err(Fault::new(ErrorName::Error, "offsets do not belong to this cage"));
-    }
-    Ok(Weights::new((n_controls + frames.n_columns()) as u32, indptr, indices, data)?)
 }

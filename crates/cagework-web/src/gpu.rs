@@ -45,8 +45,8 @@ impl Gpu {
 /// GPU state of the engine; `None` while a lost device is being replaced, and after the replacement has failed.
 pub(crate) type SharedGpu = Rc<Mutex<Option<Gpu>>>;
 
-/// Uploads what the GPU lacks of the document: mesh, cage, cached weights, and parts that stay in place or are rigid.
-/// Compares document and GPU again after each upload, because the document may have changed meanwhile.
+/// Uploads the data of the document that the GPU lacks: mesh, cage, cached weights, and the fixed and rigid parts.
+/// Compares document and GPU again after each upload, because the document may have changed during the upload.
 ///
 /// # Errors
 /// If the GPU runs out of memory. The next change of the state retries the upload.

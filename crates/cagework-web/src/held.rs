@@ -6,12 +6,25 @@ use cagework_editor::edit::pick_surface;
 use cagework_gpu::Session;
 use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
+use serde::Deserialize;
 
+use crate::puller::ON_CAGE;
 use crate::state::State;
-use crate::views::Grip;
 
-/// Maximum distance of a surface point from the exact mirror image, as a fraction of the diagonal of model and cage.
+/// Maximum distance of a vertex from the mirror image of a surface point, as a fraction of the diagonal of model and
+/// cage. Points nearer than this to their image count as lying on the mirror plane.
 const MIRROR_TOLERANCE: f32 = 0.02;
+/// Maximum distance between a pin and the pointer that removes it, CSS pixels.
+const PIN_PX: f32 = 14.0;
+
+/// What a pull grabs.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum Grab {
+    Surface(SurfacePoint),
+    /// A vertex of the cage.
+    Vertex(u32),
+}
 
 impl State {
     /// Recomputes the posed models if the cage's pose has changed.
@@ -22,9 +35,9 @@ impl State {
         }
     }
 
-    /// Surface point under the pointer, on the posed models.
+    /// Surface point under the pointer, on the posed models. During playback `None`, because other surfaces are drawn.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
-        if self.held.posed.len() != self.models().positions().len() {
+        if self.playing.is_some() || self.held.posed.len() != self.models().positions().len() {
             return None;
         }
         let (triangle, bary) =
@@ -37,12 +50,42 @@ impl State {
         point.at(self.models(), &self.held.posed)
     }
 
-    /// Weights of a surface point, and the nearest vertex of the model.
+    /// All pins except the first one within [`PIN_PX`] of the pointer.
+    pub(crate) fn pins_beside(&self, at: Vec2) -> Vec<SurfacePoint> {
+        let mut pins = self.editor.document().pins.to_vec();
+        let is_there = |pin: &SurfacePoint| {
+            let place = self.place_of(*pin).and_then(|place| self.camera.project(place));
+            place.is_some_and(|place| place.position.distance(at) < PIN_PX)
+        };
+        pins.iter().position(is_there).map(|k| pins.remove(k));
+        pins
+    }
+
+    /// The pins after a click. A pin under the pointer is removed. If there is none and `may_pin` is set, a pin is
+    /// added at the surface point under the pointer. `None` if nothing changes.
+    pub(crate) fn pins_after(&self, at: Vec2, may_pin: bool) -> Option<Vec<SurfacePoint>> {
+        let mut pins = self.pins_beside(at);
+        if pins.len() == self.editor.document().pins.len() {
+            pins.push(self.surface_at(at).filter(|_| may_pin)?);
+        }
+        Some(pins)
+    }
+
+    /// Weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle, or
+    /// [`ON_CAGE`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
     pub(crate) fn grip_of(
         &self,
-        point: SurfacePoint,
+        grab: Grab,
         (weights, frames): (&Weights, &Frames),
-    ) -> Option<Grip> {
+    ) -> Option<(Vec<f64>, u32)> {
+        let point = match grab {
+            Grab::Surface(point) => point,
+            Grab::Vertex(vertex) => {
+                let mut row = vec![0.0; self.pose().len()];
+                *row.get_mut(vertex as usize)? = 1.0;
+                return Some((row, ON_CAGE));
+            }
+        };
         let corners = self.models().corners(point.triangle)?;
         let rows = frames.folded(&weights.with_rows(&corners));
         let mut row = vec![0.0; rows.n_columns()];
@@ -54,11 +97,11 @@ impl State {
                 .for_each(|(&c, &w)| row[c as usize] += f64::from(share) * f64::from(w));
         }
         let most = (0..3).max_by(|&a, &b| point.bary[a].total_cmp(&point.bary[b]))?;
-        Some(Grip { row, seed: corners[most] })
+        Some((row, corners[most]))
     }
 
-    /// Mirror image of a surface point at rest. `None` if the surface is not symmetric there, or the point lies on the
-    /// mirror plane.
+    /// The vertex nearest to the mirror image of a surface point, at rest. `None` if no vertex is near the image, or if
+    /// the point is near the mirror plane.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
         let models = self.models();
         let at = point.at(models, models.positions())?;

@@ -1,5 +1,5 @@
-//! Copies weights from the worker into wasm memory in chunks, so that the page stays responsive and JavaScript never holds
-//! all of them.
+//! Copies weights from the worker into wasm memory in chunks, so that the page stays responsive and JavaScript never
+//! holds all of them.
 
 use cagework_core::Weights;
 use js_sys::{Array, Float32Array, Function, Promise, Uint32Array};
@@ -25,7 +25,8 @@ pub(crate) async fn page_turn() {
     let _: Result<JsValue, JsValue> = JsFuture::from(promise).await;
 }
 
-/// Checked weights of a `Bound`. `rows(start, end)` returns, or promises, column indices and weights of this range.
+/// Fetches the weights of a `Bound` in chunks and checks them. `rows(start, end)` returns, or promises, the column
+/// indices and values of the weights `start` to `end - 1`, counted over all rows.
 pub(crate) async fn weights(n_columns: u32, indptr: &[u32], rows: &Function) -> Result<Weights, JsValue> {
     let n = indptr.last().copied().unwrap_or(0);
     let mut weights = Weights::with_room(n_columns, indptr.len(), n as usize);

@@ -16,7 +16,7 @@ pub(crate) struct JointDots {
     pub(crate) models: Vec<u32>,
     /// Positions of the joints at rest. `[n_joints]`
     pub(crate) at: Vec<Vec3>,
-    /// Weights, one row per joint.
+    /// Weights of the controls at the joints, one row per joint.
     weights: Weights,
     frames: Frames,
     /// Indices of joints outside the cage, ascending.

@@ -29,6 +29,7 @@ mod joints;
 pub mod loaded;
 mod opening;
 mod options;
+mod outlines;
 mod playing;
 mod problems;
 pub mod puller;
@@ -45,9 +46,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 /// TypeScript types that the `unchecked_*_type` attributes name; `border.rs` writes their declarations.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, Element, Gesture,
-  GizmoHandle, Grip, Legend, ModelFormat, ModelInfo, OpenContents, Pivot, Problem, Progress, PullOptions, Repair, RigOptions,
-  SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, UpAxis, View } from "../contract/generated";
+import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Command, Coordinates, DragOptions, Gesture,
+  GizmoPart, Legend, ModelFormat, ModelInfo, OpenContents, Problem, Progress, Repair, RigOptions,
+  SceneOptions, SelectMode, Settings, SurfacePoint, CameraView, Tools, UpAxis, View } from "../contract/generated";
 
 /** Column indices and weights from `start` to `end` of sparse rows. */
 export type WeightRows = (start: number, end: number) => Rows | Promise<Rows>;

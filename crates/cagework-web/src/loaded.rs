@@ -3,10 +3,12 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cagework_core::PolygonMesh;
+use cagework_core::{PolygonMesh, TriMesh};
 use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
-use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan, UpAxis, read_project, shown};
+use cagework_io::{
+    Look, LookAlpha, LookWrap, Model, RestoreError, Store, StoredArrays, TexturePlan, UpAxis, read_project,
+};
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -45,7 +47,7 @@ pub struct Loaded {
     cage: Option<PolygonMesh>,
     look: Look,
     textures: Vec<DrawTexture>,
-    /// Longest side of a decoded texture, pixels; larger textures are scaled down to it.
+    /// Upper limit of the longer side of decoded textures, pixels. Larger textures are scaled down to this limit.
     side: u32,
     poses: Vec<(String, Vec<Vec3>)>,
     settings: Option<String>,
@@ -67,8 +69,8 @@ impl Loaded {
     }
 
     /// Reads materials and textures of all models of the file; call it before [`Self::take_next`]. It is separate from
-    /// [`Self::read`] so that the page can handle events in between. `used`: pixels of the textures of the other models
-    /// that are drawn together with these.
+    /// [`Self::read`] so that the page can handle events in between. `used`: number of texture pixels of the other
+    /// models that are drawn together with these.
     pub fn prepare(&mut self, used: f64) {
         self.more.iter_mut().for_each(Self::read_look);
         self.read_look();
@@ -82,10 +84,10 @@ impl Loaded {
         }
     }
 
-    /// Sets the up axis of the file to y or z, and rotates model, cage and poses accordingly.
+    /// Sets the up axis of the file, and rotates model, cage and poses accordingly.
     ///
     /// # Errors
-    /// If `up` is neither of them.
+    /// If `up` is not an up axis.
     #[wasm_bindgen(js_name = setUp)]
     pub fn set_up(
         &mut self,
@@ -102,7 +104,7 @@ impl Loaded {
         self.model.origin().to_array().to_vec()
     }
 
-    /// Expresses the positions of a model or a cage relative to the origin of another file. `[3]`
+    /// Expresses the positions of a model or a cage relative to `origin`, the origin of another file. `[3]`
     ///
     /// # Errors
     /// If `origin` is not three numbers, or is too far from the model.
@@ -115,6 +117,32 @@ impl Loaded {
             return Ok(());
         }
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
+    }
+
+    /// The model as arrays, from which [`Self::restore`] recreates it in another instance of the module without reading
+    /// its file. Call it after [`Self::prepare`] and [`Self::take_next`]. The cage is not included.
+    #[must_use]
+    pub fn store(self) -> Vec<Uint8Array> {
+        let mut store = Store::default();
+        let names: Vec<&str> = self.poses.iter().map(|(name, _)| name.as_str()).collect();
+        store.push_json(&(&self.settings, self.number, names));
+        for (_, positions) in &self.poses {
+            store.push(positions);
+        }
+        self.look.store(&mut store);
+        self.model.store(&mut store);
+        store.into_arrays().into_iter().map(|bytes| Uint8Array::from(bytes.as_slice())).collect()
+    }
+
+    /// A model from the arrays of [`Self::store`].
+    ///
+    /// # Errors
+    /// If the arrays are not those of [`Self::store`].
+    pub fn restore(arrays: Vec<Uint8Array>) -> Result<Loaded, JsValue> {
+        let mut arrays = arrays.into_iter();
+        let mut next = || arrays.next().map(|array| array.to_vec());
+        Ok(Self::restored(&mut StoredArrays(&mut next))
+            .map_err(|error| Fault::new(ErrorName::Error, error.to_string()))?)
     }
 
     /// Keeps the compressed file that the model was decoded from, so that an undeformed model is exported in that form.
@@ -135,6 +163,16 @@ impl Loaded {
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         flat(&self.model.positions)
+    }
+
+    /// Vertices that a cage is checked against: of the model, or of the mesh that stands for splats. `[n_vertices, 3]`
+    #[wasm_bindgen(getter, js_name = checkedPositions)]
+    #[must_use]
+    pub fn checked_positions(&self) -> Vec<f32> {
+        match self.model.drawn_splats() {
+            Some(splats) => flat(&splats.stand_in().positions),
+            None => flat(&self.model.positions),
+        }
     }
 
     /// The cage of a project; undefined for other files.
@@ -161,7 +199,7 @@ impl Loaded {
         self.look.images.len()
     }
 
-    /// Longest side of a decoded texture, pixels; larger textures must be scaled down to it.
+    /// Upper limit of the longer side of decoded textures, pixels. Larger textures must be scaled down to this limit.
     #[wasm_bindgen(getter, js_name = textureSide)]
     #[must_use]
     pub fn texture_side(&self) -> u32 {
@@ -220,12 +258,9 @@ impl Loaded {
             Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
         let model = Model::read_within(name, bytes, &mut resolve, READ_LIMIT)?;
-        if model.splats().is_some() {
-            let how = "cagework deform CAPTURE --cage CAGE.obj --pose POSED.obj -o BENT.ply";
-            let message = format!("{} is a capture of Gaussian splats: bend it by `{how}`", shown(name));
-            return Err(Fault::new(ErrorName::Format, message));
+        if model.positions.is_empty() {
+            model.require_faces()?;
         }
-        model.require_faces()?;
         Ok(Self::new(model))
     }
 
@@ -235,8 +270,23 @@ impl Loaded {
         Self { model, cage: None, look, textures, side, poses, settings: None, number: 0, more }
     }
 
+    fn restored(from: &mut StoredArrays<'_>) -> Result<Self, RestoreError> {
+        let (settings, number, names): (Option<String>, usize, Vec<String>) = from.json()?;
+        let poses = names.into_iter().map(|name| Ok((name, from.numbers()?)));
+        let poses = poses.collect::<Result<_, RestoreError>>()?;
+        let look = Look::restore(from)?;
+        let mut loaded = Self { settings, number, poses, ..Self::new(Model::restore(from)?) };
+        loaded.set_look(look);
+        Ok(loaded)
+    }
+
     fn read_look(&mut self) {
-        self.look = self.model.look();
+        let look = self.model.look();
+        self.set_look(look);
+    }
+
+    fn set_look(&mut self, look: Look) {
+        self.look = look;
         self.textures = vec![DrawTexture::default(); self.look.images.len()];
         let wrap = |wrap: LookWrap| match wrap {
             LookWrap::Repeat => Wrap::Repeat,
@@ -250,7 +300,7 @@ impl Loaded {
         }
     }
 
-    /// Sets the longest side of textures, and drops the bytes of images that are not admitted.
+    /// Sets the upper limit of the longer side of textures, and drops the bytes of images that are not admitted.
     fn keep_images(&mut self, side: u32, admitted: &[bool]) {
         self.side = side;
         let images = self.look.images.iter_mut().zip(admitted);
@@ -285,6 +335,13 @@ impl Loaded {
 
     /// Takes the data for the renderer out of this file, without textures that were not decoded.
     pub(crate) fn draw_model(&mut self) -> DrawModel {
+        if let Some(splats) = self.model.drawn_splats() {
+            let TriMesh { positions, triangles } = splats.stand_in();
+            return DrawModel {
+                splats: Some(Arc::new(splats.into_owned())),
+                ..DrawModel::plain(positions, triangles)
+            };
+        }
         let look = std::mem::take(&mut self.look);
         let textures = std::mem::take(&mut self.textures);
         let decoded: Vec<bool> = textures.iter().map(|t| !t.rgba.is_empty()).collect();

@@ -13,7 +13,7 @@ use crate::loaded::Loaded;
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct OpenContents {
-    /// Identifier of the built-in sample; undefined for other models.
+    /// Identifier of the built-in sample; null for other models.
     sample: Option<String>,
     /// JSON of the page's settings in a project.
     settings: Option<String>,
@@ -29,7 +29,7 @@ pub(crate) struct CageContents {
     /// Positions of the cage's vertices and interior controls. `[n_controls, 3]`
     #[cfg_attr(test, ts(type = "Float32Array"))]
     positions: Vec<f32>,
-    /// For each face its corner count, then its vertex indices.
+    /// For each face, the number of its corners, then the vertex index of each corner.
     #[cfg_attr(test, ts(type = "Uint32Array"))]
     corners: Vec<u32>,
     #[cfg_attr(test, ts(optional = nullable))]
@@ -37,7 +37,7 @@ pub(crate) struct CageContents {
     notices: Vec<String>,
 }
 
-/// A named pose.
+/// A saved pose of the cage and the name that the list of poses shows.
 #[derive(Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) struct PoseContents {
@@ -71,7 +71,7 @@ impl OpenContents {
             shares: settings.pose_shares.clone(),
             transition: settings.transition.unwrap_or_default(),
             pins: settings.pins.clone(),
-            sample: settings.sample.clone().or(self.sample).filter(is_known),
+            sample: settings.sample.clone().filter(is_known).or(self.sample),
         };
         Ok((contents, settings))
     }

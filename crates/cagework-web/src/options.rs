@@ -2,26 +2,38 @@
 
 use cagework_core::options::{Backend, Solver};
 use cagework_core::{BindOptions, Coordinates};
-use cagework_gpu::render::Theme;
-use cagework_io::{Joints, ReshapeOptions, value_fault};
+use cagework_gpu::render::{GizmoMode, ViewOptions};
+use cagework_io::{CompactOptions, Joints, ReshapeOptions, value_fault};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Memory limit for reading a file, and for closed-form coordinates, bytes. The 4 GiB of a tab must also hold drawing
-/// and binding.
+/// Memory limit for reading a file, and for closed-form coordinates, bytes. It is a quarter of the 4 GiB that a tab can
+/// use, because drawing and binding need memory too.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
+/// Default memory limit of a bind in the page, bytes: half of the 4 GiB that a browser tab can address.
+const BIND_LIMIT: u64 = 2 << 30;
+
 /// Options of a bind, and the processor that it runs on.
-#[derive(Clone, Copy, Deserialize)]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[derive(Clone, Copy, Deserialize, Serialize)]
+#[serde(default)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "BindOptions"))]
 pub(crate) struct JsBindOptions {
     pub(crate) backend: Backend,
     #[serde(flatten)]
     pub(crate) options: BindOptions,
+}
+
+impl Default for JsBindOptions {
+    fn default() -> Self {
+        let options = BindOptions { memory_limit: BIND_LIMIT, ..BindOptions::default() };
+        Self { backend: Backend::Gpu, options }
+    }
 }
 
 impl JsBindOptions {
@@ -34,22 +46,20 @@ impl JsBindOptions {
     }
 }
 
-/// What the scene shows.
+/// Elements of the scene that are drawn, and their colours.
 #[derive(Clone, Deserialize, PartialEq, Eq)]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
 pub(crate) struct JsSceneOptions {
-    pub(crate) theme: Theme,
+    #[serde(flatten)]
+    pub(crate) options: ViewOptions,
     pub(crate) model: bool,
-    pub(crate) base_wireframe: bool,
     pub(crate) cage: bool,
-    pub(crate) floor: bool,
     pub(crate) original: bool,
     pub(crate) colour: Colour,
-    /// Whether the colour scale of weights ends at 1 rather than at the largest weight.
-    pub(crate) weights_to_one: bool,
     pub(crate) slice: SliceShown,
-    pub(crate) gizmo: JsGizmo,
+    /// What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
+    pub(crate) gizmo: Option<GizmoMode>,
     /// Whether dragging pulls the model's surface. The cage is then drawn faintly.
     pub(crate) pull: bool,
     /// Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
@@ -62,16 +72,13 @@ pub(crate) struct JsSceneOptions {
 impl Default for JsSceneOptions {
     fn default() -> Self {
         Self {
-            theme: Theme::Dark,
+            options: ViewOptions::default(),
             model: true,
-            base_wireframe: false,
             cage: true,
-            floor: true,
             original: false,
             colour: Colour::Material,
-            weights_to_one: false,
             slice: SliceShown::Off,
-            gizmo: JsGizmo::None,
+            gizmo: None,
             pull: true,
             compare: vec![Coordinates::Harmonic],
             problems: true,
@@ -83,7 +90,7 @@ impl Default for JsSceneOptions {
 /// Quantity that the colours of the model show.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
 pub(crate) enum Colour {
     Material,
     Clay,
@@ -91,77 +98,41 @@ pub(crate) enum Colour {
     Error,
 }
 
-/// Quantity that the slice shows.
+/// What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, derive(Serialize, ts_rs::TS))]
 pub(crate) enum SliceShown {
     Off,
     Kinds,
     Value,
 }
 
-/// Type of gizmo.
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "Gizmo"))]
-pub(crate) enum JsGizmo {
-    None,
-    Move,
-    Rotate,
-    Scale,
-}
-
-/// Handle of the gizmo: one axis, the plane normal to an axis, or all axes.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// How an export treats the rig of a model.
+#[derive(Clone, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) enum GizmoHandle {
-    X,
-    Y,
-    Z,
-    PlaneX,
-    PlaneY,
-    PlaneZ,
-    All,
-}
-
-/// Options for pulling the model's surface.
-#[derive(Clone, Copy, Deserialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[cfg_attr(test, ts(rename = "PullOptions"))]
-pub(crate) struct JsPullOptions {
-    /// Distance along the surface that a pull affects, as a fraction of the model's size; null for automatic.
-    pub(crate) reach: Option<f64>,
-    /// Whether a pull affects the whole model, without a limit of distance.
-    pub(crate) whole: bool,
-    /// Whether the mirror image of the grabbed point is pulled symmetrically.
-    pub(crate) mirrored: bool,
-}
-
-/// Options for exporting a rig.
-#[derive(Clone, Deserialize)]
-#[cfg_attr(test, derive(Default, serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "RigOptions"))]
 pub(crate) struct JsRigOptions {
-    joints: Joints,
-    /// Whether translations in clips keep their length; otherwise they scale with the height of the hips.
-    keep_travel: bool,
-    /// Names of parts that move rigidly, without changing their shape.
-    #[serde(default)]
-    rigid: Vec<String>,
+    #[serde(flatten)]
+    pub(crate) reshape: ReshapeOptions,
+    /// Options that reduce the size of the file.
+    #[serde(flatten)]
+    pub(crate) size: CompactOptions,
     /// Whether to export only the shape, without the rig.
     pub(crate) plain: bool,
     /// Whether the cage deforms the model after a clip has moved it.
     pub(crate) dynamic: bool,
 }
 
-impl JsRigOptions {
-    pub(crate) fn options(&self) -> ReshapeOptions {
-        let (joints, keep_travel, rigid) = (self.joints, self.keep_travel, self.rigid.clone());
-        ReshapeOptions { joints, keep_travel, rigid, ..ReshapeOptions::default() }
-    }
+/// Fields of options as JSON, without `threads` and `smooth`, which JavaScript does not set.
+pub(crate) fn fields(options: &impl Serialize) -> Map<String, Value> {
+    // Text keeps the digits of an `f32`; `serde_json::to_value` would widen it to `f64`.
+    let text = serde_json::to_string(options).unwrap_or_default();
+    let mut fields: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
+    // The page binds with one thread, and smoothing is a property of the cage.
+    fields.retain(|name, _| name != "threads" && name != "smooth");
+    fields
 }
 
 /// Decodes a JavaScript value to a Rust type.

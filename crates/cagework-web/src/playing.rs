@@ -1,13 +1,19 @@
 //! Playback of clips on all models.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use cagework_core::field::{Field, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
-use cagework_io::{Player, Posed};
+use cagework_io::{Player, RigPose};
 use glam::{Mat4, Vec3};
 
-use cagework_editor::Models;
+use cagework_editor::{Editor, Models};
+
+use crate::options::JsRigOptions;
+
+/// Preparation time of a playback above which changes of the pose are shown only when the gesture ends, ms.
+const SLOW_MS: f64 = 100.0;
 
 /// Clips with the same name, of all models that have one.
 pub(crate) struct SharedClip {
@@ -54,7 +60,7 @@ pub(crate) enum ModelMotion {
     Still(Vec<Vec3>),
 }
 
-/// One of the models of a playback.
+/// A model in a playback, and the source of its motion.
 struct PlayedModel {
     id: u32,
     part: ModelMotion,
@@ -62,8 +68,26 @@ struct PlayedModel {
     targets: Range<usize>,
 }
 
-/// Playback of all models.
+/// A time of a clip.
+#[derive(Clone, Default)]
+struct Moment {
+    /// Index of the clip; `None` for the rest pose.
+    clip: Option<usize>,
+    seconds: f32,
+    /// Weights of the morph targets that the clip does not animate. If empty, the models' files provide these weights.
+    targets: Vec<f32>,
+}
+
+/// A clip being played on all models: skinning data, current pose, and the cage's field.
 pub(crate) struct Playback {
+    pub(crate) options: JsRigOptions,
+    /// Pose of the cage and key of the models that this playback was prepared for.
+    prepared_for: (Arc<[Vec3]>, u64),
+    /// Time that the preparation took, ms.
+    pub(crate) prepared_ms: f64,
+    /// Whether the clip is paused. The cage is then shown and can be moved.
+    pub(crate) is_paused: bool,
+    shown: Moment,
     played: Vec<PlayedModel>,
     clips: Vec<SharedClip>,
     /// Vertices of all models with their joints and morph targets.
@@ -71,7 +95,7 @@ pub(crate) struct Playback {
     /// Rotation from the axes of the files to those of the scene.
     up: Mat4,
     /// Current joint matrices and target weights of each model.
-    posed: Vec<Posed>,
+    posed: Vec<RigPose>,
     /// Current weights of the morph targets of all models. `[n_targets]`
     targets: Vec<f32>,
     /// Displacement field of the cage, if it deforms the models after the clip moves them.
@@ -81,13 +105,15 @@ pub(crate) struct Playback {
 }
 
 impl Playback {
-    /// Creates a playback that shows the models at rest. `parts`: id and motion of each model.
+    /// Creates a playback that shows the models at rest. `parts`: id and motion of each model in the editor's pose.
     pub(crate) fn new(
+        editor: &Editor,
+        options: JsRigOptions,
         parts: Vec<(u32, ModelMotion)>,
-        clips: Vec<SharedClip>,
-        up: Mat4,
         field: Option<Field>,
     ) -> Self {
+        let models = &editor.document().models;
+        let (clips, up) = (SharedClip::all(models), models.up().turn());
         let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
         let (mut played, mut n_palette, mut n_targets) = (Vec::new(), 0, 0);
         for (id, part) in parts {
@@ -100,19 +126,57 @@ impl Playback {
             played.push(PlayedModel { id, part, targets: n_targets..n_targets + own });
             n_targets += own;
         }
-        let mut playing =
-            Self { played, clips, skin, up, posed: Vec::new(), targets: Vec::new(), field, is_new: true };
-        playing.show(None, 0.0, &[]);
+        let mut playing = Self {
+            options,
+            prepared_for: (Arc::clone(&editor.document().pose), editor.models_key()),
+            prepared_ms: 0.0,
+            is_paused: true,
+            shown: Moment::default(),
+            played,
+            clips,
+            skin,
+            up,
+            posed: Vec::new(),
+            targets: Vec::new(),
+            field,
+            is_new: true,
+        };
+        playing.update();
         playing
     }
 
-    /// Shows a time of a clip, in seconds; without a clip, the rest pose. `targets`: weights of the morph targets that
-    /// the clip does not animate; if empty, the weights of the files.
-    pub(crate) fn show(&mut self, clip: Option<usize>, seconds: f32, targets: &[f32]) {
+    /// Whether the pose of the cage or the options of models have changed since this playback was prepared.
+    pub(crate) fn is_stale(&self, editor: &Editor) -> bool {
+        let (pose, models) = &self.prepared_for;
+        !Arc::ptr_eq(pose, &editor.document().pose) || *models != editor.models_key()
+    }
+
+    /// Whether the playback is out of date and should be prepared again now. If the last preparation took longer than
+    /// [`SLOW_MS`], this is false until the pose is part of a history step.
+    pub(crate) fn needs_update(&self, editor: &Editor) -> bool {
+        self.is_stale(editor) && (self.prepared_ms <= SLOW_MS || editor.is_pose_committed())
+    }
+
+    /// Shows the same time of the same clip as another playback.
+    pub(crate) fn show_as(&mut self, other: &Self) {
+        (self.is_paused, self.shown) = (other.is_paused, other.shown.clone());
+        self.update();
+    }
+
+    /// Moves the models to their pose at `seconds` in the clip with the index `clip`, or to the rest pose without a
+    /// clip. `targets`: weights of the morph targets that the clip does not animate; if it is empty, the models' files
+    /// provide these weights.
+    pub(crate) fn show(&mut self, clip: Option<usize>, seconds: f32, targets: Vec<f32>) {
+        self.shown = Moment { clip, seconds, targets };
+        self.update();
+    }
+
+    fn update(&mut self) {
+        let Moment { clip, seconds, targets } = &self.shown;
         let clip = clip.and_then(|clip| self.clips.get(clip));
         let at = |one: &PlayedModel| {
             let own = targets.get(one.targets.clone()).unwrap_or_default();
-            posed(&one.part, clip.and_then(|clip| clip.of(one.id)), seconds, own)
+            posed(&one.part, clip.and_then(|clip| clip.of(one.id)), *seconds, own)
         };
         self.posed = self.played.iter().map(at).collect();
         self.targets = self.posed.iter().flat_map(|posed| &posed.targets).copied().collect();
@@ -146,11 +210,11 @@ impl Playback {
 }
 
 /// Joint matrices and target weights of one model at a time of one of its clips.
-fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
+fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
     match part {
         ModelMotion::Player(player) => player.at(clip, seconds, targets),
         ModelMotion::Still(_) => {
-            Posed { palette: vec![Mat4::IDENTITY], targets: Vec::new(), origins: Vec::new() }
+            RigPose { palette: vec![Mat4::IDENTITY], targets: Vec::new(), origins: Vec::new() }
         }
     }
 }

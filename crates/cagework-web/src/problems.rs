@@ -1,7 +1,7 @@
 //! Faults of a cage: their messages, fixes and marks for the page.
 
 use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Severity, check_smooth};
-use cagework_core::PolygonMesh;
+use cagework_core::{BindOptions, PolygonMesh};
 use cagework_gpu::render::Marks;
 use glam::Vec3;
 use wasm_bindgen::JsValue;
@@ -9,12 +9,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::views::{self, Mend};
 
-/// Grid resolution for which cages are checked, cells along the longest side. It is the default of a bind.
-const DEFAULT_GRID: u32 = 64;
-
-/// Finds the faults of a cage around a model, after `smooth` subdivision steps.
+/// Finds the faults of a cage around a model, after `smooth` subdivision steps, for the default grid of a bind.
 pub(crate) fn find(mesh: &PolygonMesh, model: &[Vec3], smooth: u32) -> CageCheck {
-    check_smooth(mesh, Some(model), Some(DEFAULT_GRID), smooth)
+    check_smooth(mesh, Some(model), Some(BindOptions::default().grid), smooth)
 }
 
 /// Converts a problem to the message and fix that the page shows.
@@ -43,13 +40,10 @@ pub struct Check {
 #[wasm_bindgen]
 impl Check {
     /// Messages and fixes of the faults.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(getter, unchecked_return_type = "readonly Problem[]")]
-    pub fn problems(&self) -> Result<JsValue, JsValue> {
-        let shown: Vec<_> = self.check.problems.iter().map(view).collect();
-        Ok(views::object(&shown)?)
+    #[must_use]
+    pub fn problems(&self) -> JsValue {
+        views::object(&self.check.problems.iter().map(view).collect::<Vec<_>>())
     }
 
     /// Indices of faulty cage vertices.
@@ -89,8 +83,8 @@ impl Check {
 }
 
 impl Check {
-    /// Places of the faults in the cage, or with `are_outside` those of model vertices outside the cage. Notes have no
-    /// marks.
+    /// Places of the faults in the cage, or with `are_outside` those of model vertices outside the cage. Faults of
+    /// severity `Note` are left out.
     fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
         let shown =
             move |p: &&Problem| p.severity != Severity::Note && (p.code == Code::ModelOutside) == are_outside;
@@ -114,14 +108,14 @@ impl Faults {
         let mut marks = Marks { mesh_vertices: self.outside.clone(), ..Marks::default() };
         marks.segments.extend(edges.iter().map(|e| e.map(at)));
         let faces = faces.iter().filter_map(|&f| mesh.faces.get(f as usize));
-        // A draft is drawn only as marks.
+        // A draft is not drawn as a cage: mark the edges of all its faces.
         let all = is_draft.then_some(&mesh.faces).into_iter().flatten();
         for face in faces.chain(all) {
             marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
         }
         marks.points.extend(vertices.iter().map(|&v| at(v)));
         if positions == mesh.positions {
-            // Positions of faults are known only for the rest cage.
+            // The positions were computed for the cage at rest, so mark them only while the cage is at rest.
             marks.points.extend(points.iter().copied().map(Vec3::from_array));
         }
         marks

@@ -2,9 +2,8 @@
 //! it.
 
 use cagework_core::progress::Silent;
-use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
-use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
-use cagework_pose::symmetry::Symmetry;
+use cagework_core::{BindOptions, ControlSet, TriMesh, bind};
+use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull};
 use glam::{DVec3, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -12,16 +11,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use crate::arrays::{flat, points};
 use crate::controls::control_set;
 use crate::error::Answer;
-use crate::options::{JsPullOptions, decode};
+use crate::options::decode;
 
-/// Value in `seeds` that marks a grip on a cage vertex.
-const ON_CAGE: u32 = u32::MAX;
+/// Value in the `seeds` of [`Puller::grab`] that marks a grip on a cage vertex.
+pub(crate) const ON_CAGE: u32 = u32::MAX;
 
 /// A prepared model with its cage, and the drag in progress.
 #[wasm_bindgen]
 pub struct Puller {
     pull: Pull,
-    symmetry: Symmetry,
     drag: Option<Drag>,
 }
 
@@ -49,18 +47,19 @@ impl Puller {
     /// the positions of the grabs, `[n_grabs, 3]`.
     ///
     /// # Errors
-    /// The errors of starting a drag.
+    /// If a grip does not fit the model or the cage, there are too many grips, an option is invalid, or the pose is
+    /// not finite.
     pub fn grab(
         &mut self,
         start: &[f32],
         rows: &[f64],
         seeds: &[u32],
         n_grabs: usize,
-        #[wasm_bindgen(unchecked_param_type = "PullOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "Partial<DragOptions>")] options: JsValue,
     ) -> Result<Vec<f32>, JsValue> {
-        let request = decode(options)?;
+        let options = decode(options)?;
         self.drag = None;
-        let drag = self.begin(start, rows, seeds, n_grabs, request)?;
+        let drag = self.begin(start, rows, seeds, n_grabs, options)?;
         let at: Vec<Vec3> = drag.start().iter().map(|p| p.as_vec3()).collect();
         self.drag = Some(drag);
         Ok(flat(&at))
@@ -89,22 +88,22 @@ impl Puller {
         flat(&drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>())
     }
 
-    /// Whether the solve has converged, so that more frames would not change the cage visibly.
+    /// Whether the last frame hardly moved the cage, so that no further frame is needed. True without a drag.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn settled(&self) -> bool {
         self.drag.as_ref().is_none_or(Drag::is_settled)
     }
 
-    /// Distance along the surface that the drag affects, as a fraction of the model's size; infinite for the whole
-    /// model.
+    /// Distance along the surface within which the drag moves the model, as a fraction of the model's size. Infinite if
+    /// the drag moves the whole model; 0 without a drag.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.drag.as_ref().map_or(0.0, Drag::reach)
     }
 
-    /// Largest distance of a grab or pin from its target, as a fraction of the model's size.
+    /// Largest distance of a grab or pin from its target, as a fraction of the model's size; 0 without a drag.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn error(&self) -> f64 {
@@ -117,7 +116,7 @@ impl Puller {
         let probes = Probes::new(mesh, set)?;
         let bound = bind(probes.points(), set, &BindOptions::default(), &Silent)?;
         let pull = Pull::new(mesh, set, probes, &bound.frames.folded(&bound.weights))?;
-        Ok(Self { pull, symmetry: Symmetry::new(Controls::from(set).rest()), drag: None })
+        Ok(Self { pull, drag: None })
     }
 
     fn begin(
@@ -126,7 +125,7 @@ impl Puller {
         rows: &[f64],
         seeds: &[u32],
         n_grabs: usize,
-        request: JsPullOptions,
+        options: DragOptions,
     ) -> Answer<Drag> {
         let rows = rows.chunks_exact(self.pull.n_cage().max(1));
         let grip = |(row, &seed): (&[f64], &u32)| {
@@ -139,15 +138,6 @@ impl Puller {
         let grips = rows.zip(seeds).map(grip).collect::<Result<Vec<_>, _>>()?;
         let (grabs, pins) = grips.split_at(n_grabs.min(grips.len()));
         let start: Vec<DVec3> = points(start).into_iter().map(Vec3::as_dvec3).collect();
-        let options = DragOptions {
-            reach: match request.reach {
-                _ if request.whole => Reach::Whole,
-                Some(reach) => Reach::Of(reach),
-                None => Reach::Automatic,
-            },
-            symmetry: request.mirrored.then_some(&self.symmetry),
-            ..DragOptions::default()
-        };
         Ok(Drag::new(&self.pull, &start, grabs, pins, options)?)
     }
 }
@@ -167,9 +157,9 @@ mod tests {
         let n = cage.n_vertices();
         let mut row = vec![0.0; n];
         row[3] = 1.0;
-        let request = JsPullOptions { reach: None, whole: false, mirrored: false };
+        let options = DragOptions::default();
         let start = flat(cage.positions());
-        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, request).unwrap());
+        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, options).unwrap());
         let to = cage.positions()[3] + 0.1 * Vec3::Y;
         let mut moved = Vec::new();
         for _ in 0..20 {
@@ -177,7 +167,7 @@ mod tests {
         }
         assert!(moved[3].distance(to) < 1e-2, "{} {to}", moved[3]);
         assert_eq!(puller.stays().len(), sample.mesh.positions.len());
-        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, request).err();
+        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, options).err();
         assert!(none.is_some(), "no vertex of the cage");
     }
 }

@@ -1,15 +1,14 @@
 //! Methods for the npm package that deform model files and apply weights without a GPU.
 
-use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::deform::{deform_finite, displacements};
 use cagework_core::{Controls, Frames, Weights};
-use cagework_io::{Model, ModelFormat, ReshapeOptions};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, compact};
 use cagework_pose::Parts;
-use glam::Vec3;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::arrays::{flat, points};
+use crate::arrays::{flat, pose};
 use crate::binder::{Binder, Offsets};
 use crate::controls::control_set;
 use crate::error::{Answer, ErrorName, Fault};
@@ -48,7 +47,7 @@ impl Binder {
     /// for `bind`.
     ///
     /// # Errors
-    /// The errors of a bind. If the pose does not have `n_controls` points, or the file cannot be written.
+    /// If the bind fails, the pose does not have `n_controls` points, or the deformed file cannot be written.
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn reshape(
         &self,
@@ -64,9 +63,10 @@ impl Binder {
         let (model, rig): (&Model, JsRigOptions) = (&loaded.model, decode(rig)?);
         let set = control_set(&cage, &corners, controls)?;
         let rest = Controls::from(&set).rest().to_vec();
-        let posed = pose("posed", &posed, rest.len())?;
+        let posed = pose(&posed, rest.len())?;
         let keeps_rig = model.is_rigged() && !rig.plain;
         let of_rig = of_model(model, &rig)?;
+        rig.size.require(model.format()).map_err(|e| Fault::new(ErrorName::Error, e))?;
         let extra = if keeps_rig { model.extra_points().map_err(Fault::from)? } else { Vec::new() };
         let at = [model.positions.as_slice(), &extra].concat();
         let mut request: JsBindOptions = decode(options)?;
@@ -79,16 +79,17 @@ impl Binder {
             let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
             let written = model.write_reshaped(&by, &outside, &[], &of_rig).map_err(Fault::from)?;
-            return Ok(written.0);
+            return Ok(compact(written.0, rig.size).map_err(Fault::from)?);
         }
-        let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig.parts);
-        Ok(model.write(model.format(), &deformed).map_err(Fault::from)?)
+        let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig);
+        let written = model.write(model.format(), &deformed).map_err(Fault::from)?;
+        Ok(compact(written, rig.size).map_err(Fault::from)?)
     }
 }
 
 /// Export options of a model. Splits the names of rigid parts into attachments of the skeleton and other parts.
 fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
-    let options = rig.options();
+    let options = rig.reshape.clone();
     let props = if rig.plain { Vec::new() } else { model.props()? };
     let (rigid, others): (Vec<_>, Vec<_>) = options.rigid.into_iter().partition(|name| props.contains(name));
     let parts = if others.is_empty() {
@@ -97,19 +98,6 @@ fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
         model.parts(&[], &others).map_err(|e| Fault::new(ErrorName::Error, e))?
     };
     Ok(ReshapeOptions { rigid, parts, ..options })
-}
-
-/// Points of the flat array called `name`, `[n, 3]`.
-///
-/// # Errors
-/// If the array does not have `3 n` numbers.
-fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
-    if flat.len() == 3 * n {
-        return Ok(points(flat));
-    }
-    let message =
-        format!("{name} has {} numbers; it must have {}, three for each of {n} controls", flat.len(), 3 * n);
-    Err(Fault::new(ErrorName::Error, message))
 }
 
 /// Weights for deforming points by many poses.
@@ -134,59 +122,18 @@ impl Deformer {
         data: Vec<f32>,
         #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<Self, JsValue> {
-        let Offsets { frames, .. } = decode(offsets)?;
-        Ok(Self::of(n_controls, indptr, indices, data, frames)?)
+        let n_controls = n_controls as usize;
+        let (weights, frames) = decode::<Offsets>(offsets)?.bound(n_controls, indptr, indices, data)?;
+        Ok(Self { n_controls, weights, frames })
     }
 
     /// Positions of the points, `[n_points, 3]`, in a pose of the controls, `[n_controls, 3]`.
     ///
     /// # Errors
-    /// If the pose does not have `n_controls` points.
+    /// If the pose does not have `n_controls` points, or moves a point beyond the range of 32-bit floats.
     pub fn deform(&self, posed: &[f32]) -> Result<Vec<f32>, JsValue> {
-        let posed = pose("posed", posed, self.n_controls)?;
-        Ok(flat(&deform_bound(&self.weights, &self.frames, &posed)))
-    }
-}
-
-impl Deformer {
-    fn of(
-        n_controls: u32,
-        indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
-        frames: Frames,
-    ) -> Answer<Self> {
-        if !frames.fits(n_controls as usize) {
-            let message =
-                format!("offsets has frames of more than {n_controls} controls, or joints without bones");
-            return Err(Fault::new(ErrorName::Error, message));
-        }
-        let weights = Weights::new(n_controls + frames.n_columns() as u32, indptr, indices, data)?;
-        Ok(Self { n_controls: n_controls as usize, weights, frames })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_pose_of_another_length_is_refused_with_both_lengths() {
-        assert_eq!(pose("posed", &[0.0; 6], 2).unwrap(), [Vec3::ZERO; 2]);
-        let fault = pose("posed", &[0.0; 6], 3).unwrap_err();
-        assert!(fault.message().starts_with("posed has 6 numbers; it must have 9"), "{}", fault.message());
-    }
-
-    #[test]
-    fn frames_that_name_no_column_are_refused() {
-        let of = |joints: Vec<u32>, column: u32| {
-            let plain = vec![[0.0; 4]; 3 * joints.len()];
-            let frames = Frames { joints, plain, whole: vec![[0.0; 3]; 3], ..Frames::default() };
-            Deformer::of(3, vec![0, 1], vec![column], vec![1.0], frames).map(drop)
-        };
-        // There are 12 columns: 3 of controls, 3 of axes, 3 of the whole cage and 3 of the joint.
-        assert!(of(vec![2], 11).is_ok());
-        assert!(of(vec![2], 12).is_err(), "a column");
-        assert!(of(vec![3], 2).is_err(), "a joint");
+        let posed = pose(posed, self.n_controls)?;
+        let points = deform_finite(&self.weights, &self.frames, &posed);
+        Ok(flat(&points.map_err(|e| Fault::new(ErrorName::Error, e))?))
     }
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use cagework_core::Weights;
 use cagework_core::field::bend_vertices;
 use cagework_editor::edit::Element;
-use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
+use cagework_gpu::render::{Gizmo, Marks, MeshStyle, SceneOptions, Selection, SliceView, ViewOptions};
 use cagework_io::Joints;
 use glam::{Quat, Vec3};
 
-use crate::options::{Colour, JsGizmo, SliceShown};
+use crate::options::{Colour, SliceShown};
 use crate::state::State;
 
 impl State {
@@ -32,22 +32,18 @@ impl State {
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
-            theme: self.view.theme,
+            view: self.view.options,
             backdrop: true,
             mesh: self.mesh_style(),
-            weights_to_one: self.view.weights_to_one,
             mesh_edges: false,
-            base_wireframe: self.view.base_wireframe,
             cage_lines: cage,
             handles: cage,
-            floor: self.view.floor,
             selection: self.shown_selection(),
             cage_faint: self.pulls() && self.is_nothing_chosen(),
             gizmo: self.gizmo().filter(|_| cage),
             slice: self.shown_slice(),
             marks: self.marks(),
             hidden: self.models().hidden(),
-            floaters_hidden: false,
             painted: self.painting.is_some(),
             greyed: self
                 .painting
@@ -60,14 +56,21 @@ impl State {
         }
     }
 
-    /// Whether the drawn model follows the cage: no clip is played, or the cage deforms the played model.
+    /// Whether the cage is drawn and can be moved: no clip is shown, the clip is paused, or the cage deforms the model
+    /// after the clip has moved it.
     pub(crate) fn has_cage_in_view(&self) -> bool {
-        self.playing.as_ref().is_none_or(|playing| playing.field.is_some())
+        self.playing.as_ref().is_none_or(|playing| playing.is_paused || playing.field.is_some())
     }
 
-    /// Whether dragging pulls the model's surface. Cage vertices behind the model are then not picked.
+    /// Whether dragging pulls the model's surface. Cage vertices without a front face are then not picked.
     pub(crate) fn pulls(&self) -> bool {
         self.view.pull && self.bound.is_some() && !self.editor.is_editing_rest()
+    }
+
+    /// Element type that a click selects: the chosen one, but a vertex in pull mode, unless the cage is being reshaped.
+    pub(crate) fn element(&self) -> Element {
+        let is_pull = self.view.pull && !self.editor.is_editing_rest();
+        if is_pull { Element::Vertex } else { self.editor.tools().element }
     }
 
     /// Whether no cage element is selected, hovered or dragged.
@@ -83,22 +86,24 @@ impl State {
             return self.scene(weights);
         }
         SceneOptions {
-            theme: self.view.theme,
+            view: ViewOptions { base_wireframe: false, floor: false, ..self.view.options },
             backdrop: false,
             mesh: self.mesh_style(),
-            weights_to_one: self.view.weights_to_one,
             hidden: self.models().hidden(),
             cage_lines: false,
             handles: false,
-            floor: false,
             ..SceneOptions::default()
         }
     }
 
     fn shown_selection(&self) -> Selection {
         let mut shown = Selection { vertices: self.editor.selection.vertices(), ..Selection::default() };
-        match self.editor.element {
-            Element::Vertex => shown.hovered_vertex = self.editor.hovered.first().copied(),
+        match self.element() {
+            Element::Vertex => {
+                if let [vertex] = self.editor.hovered[..] {
+                    shown.hovered_vertex = Some(vertex);
+                }
+            }
             Element::Edge => {
                 shown.edges = self.editor.selection.edges(self.editor.topology());
                 shown.hovered_edge = match self.editor.hovered[..] {
@@ -112,7 +117,7 @@ impl State {
                 shown.hovered_face = self.editor.topology().faces.iter().position(hovered).map(|f| f as u32);
             }
         }
-        if self.editor.is_mirrored {
+        if self.editor.tools().symmetry {
             shown.unmatched = self.editor.symmetry().unmatched();
         }
         shown
@@ -120,13 +125,9 @@ impl State {
 
     /// The gizmo, placed at the centre of rotation and scaling.
     pub(crate) fn gizmo(&self) -> Option<Gizmo> {
-        let mode = match self.view.gizmo {
-            JsGizmo::None => return None,
-            JsGizmo::Move => GizmoMode::Move,
-            JsGizmo::Rotate => GizmoMode::Rotate,
-            JsGizmo::Scale => GizmoMode::Scale,
-        };
-        let center = self.editor.selection.pivot(self.pose(), self.editor.topology(), self.editor.pivot)?;
+        let mode = self.view.gizmo?;
+        let center =
+            self.editor.selection.pivot(self.pose(), self.editor.topology(), self.editor.tools().pivot)?;
         Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
     }
 
@@ -136,7 +137,7 @@ impl State {
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
-    /// Marks of the cage's faults.
+    /// Marks of the cage's faults; none if the view hides faults.
     fn marks(&self) -> Marks {
         if !self.view.problems {
             return Marks::default();
@@ -148,7 +149,7 @@ impl State {
     fn joint_marks(&self) -> Marks {
         let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
         let (Some(mode), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };
-        let at = match &self.playing {
+        let at = match self.playing.as_ref().filter(|_| !self.view.original) {
             Some(playing) => {
                 let joints = dots.joints.iter().zip(&dots.models);
                 let mut at: Vec<Vec3> =

@@ -6,27 +6,25 @@ use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::enclosure::Enclosure;
-use cagework_core::field::FieldWeights;
+use cagework_core::field::{Field, FieldWeights};
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, ControlSet, Coordinates, Frames, PolygonMesh, Weights};
 use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, CameraPlace, DrawModel, GizmoPart};
-use cagework_io::UpAxis;
+use cagework_io::{Ground, UpAxis};
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 
 use crate::error::{Answer, ErrorName, Fault};
 use crate::joints::JointDots;
-use crate::options::JsSceneOptions;
+use crate::options::{JsRigOptions, JsSceneOptions};
 use crate::playing::Playback;
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState, View};
 
-/// Size limit of the cache of weights for undo and redo, bytes.
-const CACHE_BYTES: usize = 256 << 20;
-
 /// The editor's document, the camera, and derived data.
+#[derive(Default)]
 pub(crate) struct State {
     pub(crate) editor: Editor,
     /// Draw data of each model, by id.
@@ -38,18 +36,23 @@ pub(crate) struct State {
     pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
     /// Faults of the cage that the last check found.
     pub(crate) faults: Faults,
-    /// Subset of the vertices that is tested against the cage during reshaping; computed on first use.
+    /// The cage without interior controls, and a sample of the models' vertices that is tested against it while the
+    /// user reshapes the cage; computed on first use.
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
     /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
     /// Cached weights for documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,
-    /// Notices of the last export about the rig.
+    /// Notices from the last export: changes of the rig, and data that the file format loses.
     pub(crate) rig_notices: Vec<String>,
+    /// Lowest points of several models in the current pose, cached with the weights and options of their computation.
+    pub(crate) ground: Option<(Arc<BoundModels>, JsRigOptions, Ground)>,
     /// Playback of a clip, shown instead of the pose.
     pub(crate) playing: Option<Playback>,
-    /// Weights on a lattice around the cage, which deform a model that a clip moves.
+    /// Weights on a lattice around the cage. They deform splats, and models that a clip moves.
     pub(crate) lattice: Option<FieldWeights>,
+    /// Indices of the splats outside the cage.
+    pub(crate) floaters: Vec<u32>,
     /// Kinds of coordinates available for comparison.
     pub(crate) others: Vec<Coordinates>,
     pub(crate) active_part: Option<GizmoPart>,
@@ -59,7 +62,8 @@ pub(crate) struct State {
     pub(crate) draft: Vec<[Vec3; 2]>,
     pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
-    /// Place of the camera after it framed everything. If it is still there, it frames everything in a resized view.
+    /// Place of the camera after `frame_all`. If the camera is still there when the view is resized,
+    /// `frame_all` is called again.
     framed: Option<CameraPlace>,
     /// Size of the viewport, CSS pixels.
     pub(crate) size: Vec2,
@@ -67,8 +71,8 @@ pub(crate) struct State {
     pub(crate) covered: [f32; 4],
     /// Device pixels per CSS pixel.
     pub(crate) scale: f32,
-    /// Number of changes of mesh and cage so far. A job's result is valid only if the revision is still that of its
-    /// start.
+    /// Number of changes of the joined mesh and of the cage so far. The result of a job is valid only if the revision
+    /// has not changed since the job started.
     pub(crate) revision: u32,
     /// Keys of the document that the derived state belongs to.
     derived: DerivedKeys,
@@ -76,6 +80,8 @@ pub(crate) struct State {
     pub(crate) on_gpu: GpuKeys,
     /// Whether an upload is in progress. When it finishes, it compares document and GPU again.
     pub(crate) is_uploading: bool,
+    /// Whether a playback is being prepared for a new pose.
+    pub(crate) is_preparing: bool,
     /// Whether models are being added. Their upload may still fail, which removes them.
     pub(crate) is_adding: bool,
     pub(crate) is_moved: bool,
@@ -112,6 +118,8 @@ pub(crate) struct GpuKeys {
     pub(crate) mesh: Option<u64>,
     pub(crate) parts: Option<u64>,
     pub(crate) cage: Option<u64>,
+    /// Key of the cage for which floaters (splats outside the cage) were computed.
+    pub(crate) floaters: Option<u64>,
 }
 
 /// Grabs and pins, and the posed models for picking.
@@ -125,46 +133,9 @@ pub(crate) struct GrabState {
     pub(crate) stays: Option<Arc<Vec<f32>>>,
     /// Points of an interior control that is being placed.
     pub(crate) placed: Vec<Vec3>,
-    /// Vertices of the posed models, and the cage's pose that they were computed for. `[n_vertices]`
+    /// Vertices of the models in the pose `posed_for` of the cage. `[n_vertices]`
     pub(crate) posed: Vec<Vec3>,
     pub(crate) posed_for: Vec<Vec3>,
-}
-
-impl Default for State {
-    fn default() -> Self {
-        Self {
-            editor: Editor::default(),
-            draws: BTreeMap::new(),
-            n_rig: None,
-            painting: None,
-            faults: Faults::default(),
-            watched: None,
-            bound: None,
-            cache: Cache::new(CACHE_BYTES),
-            rig_notices: Vec::new(),
-            playing: None,
-            lattice: None,
-            others: Vec::new(),
-            active_part: None,
-            slice: None,
-            held: GrabState::default(),
-            draft: Vec::new(),
-            view: JsSceneOptions::default(),
-            camera: Camera::default(),
-            framed: None,
-            size: Vec2::default(),
-            covered: [0.0; 4],
-            scale: 0.0,
-            revision: 0,
-            derived: DerivedKeys::default(),
-            on_gpu: GpuKeys::default(),
-            is_uploading: false,
-            is_adding: false,
-            is_moved: false,
-            is_changed: false,
-            fault: None,
-        }
-    }
 }
 
 impl State {
@@ -211,6 +182,7 @@ impl State {
             self.watched = None;
             self.active_part = None;
             (self.slice, self.lattice, self.playing) = (None, None, None);
+            self.floaters.clear();
             self.held = GrabState::default();
             self.others.clear();
             self.faults = Faults::default();
@@ -227,11 +199,11 @@ impl State {
             self.show_painting();
             self.is_changed = true;
         }
-        if !Arc::ptr_eq(&pose, &pose_before) {
-            self.playing = None;
+        if key != before || models != models_before || !Arc::ptr_eq(&pose, &pose_before) {
+            self.ground = None;
         }
         if key != before || !Arc::ptr_eq(&pose, &pose_before) {
-            // Redraw, because the gizmo's position depends on the selection.
+            // Write the scene too: it contains the gizmo and the marks, whose positions depend on the pose.
             (self.is_moved, self.is_changed) = (true, true);
         }
     }
@@ -260,7 +232,8 @@ impl State {
         }
     }
 
-    /// Sets the camera's viewport: the whole view, or one of several pictures that are shown side by side.
+    /// Sets the camera's viewport: the whole view, or one of several pictures that are shown side by side. If the
+    /// viewport changes and the camera is still where `frame_all` placed it, calls `frame_all` again.
     pub(crate) fn place_viewport(&mut self) {
         let is_framed = self.framed == Some(self.camera.place());
         let is_other = self.camera.set_free_part(Vec2::new(self.part_width(), self.size.y), self.covered);
@@ -312,7 +285,7 @@ impl State {
         self.framed = Some(camera.place());
     }
 
-    /// Recomputes the grey shading of the model in paint mode.
+    /// Recomputes how much each vertex stays in place, which is drawn as paint, for the model in paint mode.
     pub(crate) fn show_painting(&mut self) {
         let Some((id, _)) = self.painting else { return };
         let mut stays = vec![0.0; self.models().positions().len()];
@@ -336,10 +309,15 @@ impl State {
 
     /// Document and bind state for the page's panels.
     pub(crate) fn document_view(&self) -> View {
-        View { document: self.editor.view(), bound: self.bound.is_some() }
+        View {
+            document: self.editor.view(),
+            bound: self.bound.is_some(),
+            lattice: self.lattice.is_some(),
+            floaters: self.floaters.len(),
+        }
     }
 
-    /// Takes `bound` as the weights of the current document.
+    /// Uses `bound` as the weights of the current document, and ends the playback of a clip.
     pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
         self.bound = Some(bound);
         self.playing = None;
@@ -357,12 +335,18 @@ impl State {
         self.set().is_some() && self.on_gpu.cage == Some(key.cage) && self.on_gpu.mesh == Some(key.mesh)
     }
 
+    /// Options of a playback that should be prepared again for the current pose.
+    pub(crate) fn stale_clip(&self) -> Option<JsRigOptions> {
+        let playing = self.playing.as_ref().filter(|playing| playing.needs_update(&self.editor))?;
+        Some(playing.options.clone())
+    }
+
     /// Whether the GPU lacks data of the current document.
     pub(crate) fn needs_upload(&self) -> bool {
         self.next_upload().is_some()
     }
 
-    /// The next data to upload. An upload may drop data that comes later in this order.
+    /// The next data to upload, in the order mesh, cage, weights, parts. An upload may drop data later in this order.
     pub(crate) fn next_upload(&self) -> Option<Upload> {
         if self.models().is_empty() {
             return None;
@@ -393,7 +377,7 @@ impl State {
         self.on_gpu = GpuKeys { mesh: Some(self.editor.key().mesh), cage, ..GpuKeys::default() };
     }
 
-    /// Writes cage, camera and scene to the GPU sessions if these have changed.
+    /// Writes the camera to the GPU sessions, and also playback, splats, pose and scene if they have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
@@ -404,6 +388,8 @@ impl State {
             Some(_) => {}
             None => main.stop_playing(),
         }
+        main.interrupt_playing(self.view.original);
+        self.write_splats(main);
         for session in std::iter::once(main).chain(others) {
             *session.camera_mut() = self.camera;
             if self.is_moved && self.is_on_gpu() {
@@ -423,9 +409,29 @@ impl State {
         self.is_moved &= !self.is_on_gpu() && self.set().is_some();
         self.is_changed = false;
     }
+
+    /// Writes to the GPU which splats are outside the cage, and the field that deforms the splats.
+    fn write_splats(&mut self, main: &mut Session) {
+        if !self.is_moved || !self.is_on_gpu() || self.models().splats().is_none() {
+            return;
+        }
+        let cage = self.editor.key().cage;
+        if self.on_gpu.floaters != Some(cage) && self.lattice.is_some() {
+            main.set_floaters(&self.floaters);
+            self.on_gpu.floaters = Some(cage);
+        }
+        main.set_field(if self.view.original { None } else { self.field() }, self.pose());
+    }
+
+    /// The field that deforms the splats of a capture; `None` at rest and without a lattice.
+    pub(crate) fn field(&self) -> Option<Field> {
+        let is_posed = !self.editor.is_editing_rest() && self.editor.document().is_posed();
+        let lattice = self.lattice.as_ref().filter(|_| is_posed)?;
+        Some(lattice.pose(&self.rest().positions, self.pose()))
+    }
 }
 
-/// Pictures shown side by side: width of each, CSS pixels, and index of the last.
+/// Layout of the pictures shown side by side: width of each, CSS pixels, and index of the last.
 pub(crate) struct Pointers {
     width: f32,
     last: f32,
@@ -446,7 +452,7 @@ pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
     }
 }
 
-/// Data that is uploaded in one step.
+/// What one upload transfers to the GPU.
 #[derive(Clone, Copy)]
 pub(crate) enum Upload {
     Mesh,
@@ -458,10 +464,14 @@ pub(crate) enum Upload {
 #[cfg(test)]
 mod tests {
     use cagework_core::subdivided_box;
-    use cagework_editor::{Command, Contents};
+    use cagework_editor::edit::Element;
+    use cagework_editor::{Command, Contents, Tools};
     use cagework_io::Model;
 
     use super::*;
+    use crate::held::Grab;
+    use crate::playing::ModelMotion;
+    use crate::puller::ON_CAGE;
 
     /// A state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
     fn uploaded() -> State {
@@ -553,6 +563,70 @@ mod tests {
         state.editor.add_models([(Model::read("b.obj", text, &mut |_| None).unwrap(), None)]);
         state.follow_document();
         assert_eq!((upload_all(&mut state).as_str(), state.bound.is_some()), ("mp", false));
+    }
+
+    #[test]
+    fn pulling_picks_vertices_whatever_element_was_chosen_for_reshaping() {
+        let mut state = uploaded();
+        state.editor.set_editing_rest(true);
+        state.editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &state.camera);
+        assert_eq!(state.element(), Element::Face);
+        state.editor.set_editing_rest(false);
+        state.editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &state.camera);
+        assert_eq!(state.element(), Element::Vertex);
+        state.view.pull = false;
+        assert_eq!(state.element(), Element::Face);
+    }
+
+    #[test]
+    fn a_paused_clip_is_prepared_again_for_a_new_pose() {
+        let mut state = uploaded();
+        bind(&mut state);
+        let play = |state: &mut State, prepared_ms| {
+            let still = ModelMotion::Still(state.models().positions().to_vec());
+            let mut playing = Playback::new(&state.editor, JsRigOptions::default(), vec![(0, still)], None);
+            playing.prepared_ms = prepared_ms;
+            state.playing = Some(playing);
+        };
+        let pose = |state: &mut State| {
+            let moved = state.pose().iter().map(|p| *p + Vec3::X).collect();
+            state.editor.set_pose(moved).unwrap();
+            state.follow_document();
+        };
+        play(&mut state, 1.0);
+        assert!(state.stale_clip().is_none());
+        pose(&mut state);
+        assert!(state.stale_clip().is_some(), "during a drag");
+        play(&mut state, 1000.0);
+        pose(&mut state);
+        assert!(state.playing.as_ref().is_some_and(|playing| playing.is_stale(&state.editor)));
+        assert!(state.stale_clip().is_none(), "too slow for a drag");
+        assert!(state.editor.commit("pose"));
+        assert!(state.stale_clip().is_some(), "at its end");
+        take_box(&mut state, 0.3);
+        state.follow_document();
+        assert!(state.playing.is_none(), "of another cage");
+    }
+
+    #[test]
+    fn a_click_sets_a_pin_or_removes_it_and_a_grab_includes_the_other_pins() {
+        let mut state = uploaded();
+        state.camera.set_viewport(Vec2::splat(100.0));
+        state.frame_all();
+        state.held.posed = state.models().positions().to_vec();
+        let inside = Vec3::splat(0.2);
+        let at = state.camera.project(inside).unwrap().position;
+        assert_eq!(state.pins_after(at, false), None);
+        let pins = state.pins_after(at, true).unwrap();
+        let place = state.place_of(pins[0]).unwrap();
+        assert!(state.camera.project(place).unwrap().position.distance(at) < 0.1, "{place}");
+        state.editor.apply(Command::SetPins { pins: pins.clone() }).unwrap();
+        assert_eq!((state.pins_beside(at), state.pins_after(at, true)), (vec![], Some(vec![])));
+        assert_eq!(state.pins_beside(at + Vec2::new(15.0, 0.0)), pins);
+        let bound = (&Weights::with_room(8, 0, 0), &Frames::default());
+        let (row, seed) = state.grip_of(Grab::Vertex(1), bound).unwrap();
+        assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], ON_CAGE));
+        assert!(state.grip_of(Grab::Vertex(8), bound).is_none());
     }
 
     #[test]

@@ -10,7 +10,8 @@ use web_sys::HtmlCanvasElement;
 use crate::clock::now_ms;
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Maximum number of unfinished frames. With 1, the GPU idles between frames; with more than 2, a slow GPU lags.
+/// Maximum number of unfinished frames. With 1, the GPU idles between frames; with more than 2, the picture of a slow
+/// GPU lags behind the pointer.
 const MAX_IN_FLIGHT: u32 = 2;
 
 /// Frame time above which a GPU counts as slow, ms. A slow GPU gets one frame at a time, because queued frames delay
@@ -20,8 +21,8 @@ const SLOW_MS: f64 = 50.0;
 /// Divisor of width and height of a frame at reduced resolution, which then has a quarter of the pixels.
 const ROUGH_DIVISOR: u32 = 2;
 
-/// Assumed time of a full-resolution frame over that of a reduced one. On a slow GPU, reduced frames must take less
-/// than [`SLOW_MS`] over this ratio before it counts as fast again.
+/// Assumed ratio of the time of a full-resolution frame to the time of a reduced one. A slow GPU counts as fast again
+/// once a reduced frame takes at most [`SLOW_MS`] divided by this ratio.
 const SHARP_COST_RATIO: f64 = 2.0;
 
 /// Side of the offscreen texture that is drawn to compile pipelines, pixels.
@@ -38,7 +39,7 @@ pub(crate) struct Surface {
     /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves
     /// into such a view: a clear of 0.2 gives 51 instead of 124.
     parts: Vec<wgpu::Texture>,
-    /// Draws the parts if the canvas does not support copies.
+    /// Draws `parts` into a canvas that does not support copies.
     painter: Option<PartPainter>,
     /// Number of submitted frames that the GPU has not finished.
     in_flight: Arc<AtomicU32>,
@@ -70,7 +71,7 @@ impl Surface {
     /// Opens a GPU that can draw into the canvas.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`; `Canvas` if the GPU cannot draw into the canvas.
+    /// `NoAdapter` or `NoDevice` if no GPU can be opened; `Canvas` if the GPU cannot draw into the canvas.
     pub(crate) async fn open(canvas: HtmlCanvasElement) -> Answer<(Self, GpuContext)> {
         let size = [canvas.width().max(1), canvas.height().max(1)];
         let instance = device::instance();
@@ -181,7 +182,8 @@ impl Surface {
         Ok(if is_rough { FrameOutcome::Roughly } else { FrameOutcome::Sharply })
     }
 
-    /// Copies the sessions' textures to the canvas. Columns between them stay transparent and act as dividers.
+    /// Copies the sessions' textures to the canvas, side by side. If their number does not divide the width, columns
+    /// between them stay empty.
     fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
         let between = (self.parts.len() as u32 - 1).max(1);
         let left = |k: u32, part: &wgpu::Texture| k * (self.config.width - part.width()) / between;

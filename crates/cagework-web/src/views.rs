@@ -2,6 +2,7 @@
 
 use cagework_cage::check::{Code, Repair, Severity};
 use cagework_core::cage::CageNotice;
+use cagework_core::splats::Splats;
 use cagework_core::{Bounds, ControlSet};
 use cagework_editor::edit::Topology;
 use cagework_editor::{CageControls, DocumentView, Member, Models, PartOptions, RestCage};
@@ -44,16 +45,6 @@ pub(crate) struct CameraView {
     pub(crate) parallel: bool,
 }
 
-/// Weights of a surface point, and the nearest vertex of the model.
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct Grip {
-    /// Weights of the cage's vertices at the point. `[n_cage]`
-    pub(crate) row: Vec<f64>,
-    /// Index of the nearest vertex of the model.
-    pub(crate) seed: u32,
-}
-
 /// Document and bind state that panels show.
 #[derive(Default, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -62,9 +53,13 @@ pub(crate) struct View {
     pub(crate) document: DocumentView,
     /// Whether the models are bound to the current cage.
     pub(crate) bound: bool,
+    /// Whether weights on a lattice around the cage are available.
+    pub(crate) lattice: bool,
+    /// Number of splats outside the cage; 0 before the lattice is available.
+    pub(crate) floaters: usize,
 }
 
-/// Properties of the models in the cage, taken together.
+/// Combined properties of all models in the cage.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -78,6 +73,10 @@ pub(crate) struct ModelInfo {
     faces: usize,
     materials: usize,
     textures: usize,
+    /// Number of splats of a capture, otherwise 0.
+    splats: usize,
+    /// Number of points of a point cloud, otherwise 0.
+    points: usize,
     skins: usize,
     joints: usize,
     clips: Vec<ClipView>,
@@ -87,9 +86,12 @@ pub(crate) struct ModelInfo {
     props: Vec<String>,
     /// Whether a model has a rig that an export keeps.
     rigged: bool,
+    /// Whether a model is a VRM.
+    vrm: bool,
     bounds: BoundsView,
-    /// Whether the models seem to lie on their back, because the file's up axis is z.
-    lies: bool,
+    /// Another up axis that the file probably has: z if the models seem to lie on their back, y down if captures in the
+    /// file's format have y down by convention.
+    suggested_up: Option<UpAxis>,
     notices: Vec<String>,
     /// Properties of each model.
     members: Vec<MemberInfo>,
@@ -109,6 +111,8 @@ impl ModelInfo {
             format: first.format(),
             up: first.up(),
             vertices: sum(|model| model.positions.len()),
+            splats: first.splats().map_or(0, Splats::len),
+            points: if first.n_faces() == 0 && first.splats().is_none() { first.positions.len() } else { 0 },
             triangles: sum(|model| model.triangles.len()),
             faces: sum(Model::n_faces),
             materials: sum(|model| model.counts.materials),
@@ -120,15 +124,27 @@ impl ModelInfo {
             // Errors of a rig are reported when the rig is used.
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
+            vrm: all().any(|model| model.vrm().is_some()),
             bounds: BoundsView::of(Bounds::of(models.positions())),
-            lies: lies_on_back(models.positions()),
+            suggested_up: suggested_up(models, first),
             notices: all().flat_map(|model| model.notices.clone()).chain(models.origin_notice()).collect(),
             members: models.iter().map(MemberInfo::of).collect(),
         })
     }
 }
 
-/// One of the models in a cage.
+fn suggested_up(models: &Models, first: &Model) -> Option<UpAxis> {
+    let up = if first.splats().is_some() || first.format() == ModelFormat::ThreeMf {
+        first.format().usual_up()
+    } else if lies_on_back(models.positions()) {
+        UpAxis::Z
+    } else {
+        UpAxis::Y
+    };
+    (first.up() == UpAxis::Y && up != UpAxis::Y).then_some(up)
+}
+
+/// Properties and options of one of the models in the cage.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct MemberInfo {
@@ -163,7 +179,7 @@ impl MemberInfo {
     }
 }
 
-/// An animation clip.
+/// Name and duration of an animation clip, for the list of clips.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ClipView {
@@ -304,8 +320,13 @@ pub(crate) enum ColorMap {
     Kinds,
 }
 
-/// Converts a value to a plain JavaScript object. `None` becomes null.
-pub(crate) fn object(value: &impl Serialize) -> Answer<JsValue> {
-    let serializer = serde_wasm_bindgen::Serializer::json_compatible();
-    Ok(value.serialize(&serializer)?)
+/// Converts a value to a plain JavaScript object. `None` becomes null. A whole number of 2^53 or more, which JavaScript
+/// cannot represent, makes the object undefined.
+pub(crate) fn object(value: &impl Serialize) -> JsValue {
+    value.serialize(&serde_wasm_bindgen::Serializer::json_compatible()).unwrap_or(JsValue::UNDEFINED)
+}
+
+/// Like [`object`], but `None` becomes undefined.
+pub(crate) fn optional(value: Option<impl Serialize>) -> JsValue {
+    value.map_or(JsValue::UNDEFINED, |value| object(&value))
 }

@@ -1,5 +1,5 @@
-//! Checks the dependencies of crates (`cargo tree`) against the arrows of ARCHITECTURE.md, and that modules do not use
-//! each other in circles. Every crate of the workspace must have a rule in [`RULES`].
+//! Checks that dependencies of crates (`cargo tree`) follow [`RULES`], the arrows of the diagram in ARCHITECTURE.md,
+//! and that modules do not use each other in circles. Every crate of the workspace must have a rule.
 
 mod modules;
 
@@ -7,12 +7,12 @@ use std::collections::BTreeSet;
 
 use crate::command::output;
 
-/// Allowed and forbidden dependencies of one of our crates, direct or indirect.
+/// Allowed and forbidden dependencies of a crate of this workspace, direct or indirect.
 struct Rule {
     name: &'static str,
-    /// Crates of this workspace that it may depend on.
+    /// Crates of this workspace that the crate may depend on.
     may_use: &'static [&'static str],
-    /// Third-party crates that it must not depend on.
+    /// Third-party crates that the crate must not depend on.
     must_not_use: &'static [&'static str],
 }
 
@@ -41,7 +41,7 @@ const RULES: &[Rule] = &[
     Rule {
         name: "cagework-editor",
         may_use: &["cagework-core", "cagework-io", "cagework-pose"],
-        // For the same reason as in cagework-io, wasm-bindgen is allowed.
+        // wasm-bindgen is allowed: on wasm32, cagework-io depends on it through zip.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
     Rule {
@@ -114,7 +114,7 @@ pub(crate) fn check() -> Result<(), String> {
     modules::check()
 }
 
-/// Names of the packages in a dependency tree, without development dependencies.
+/// Names of the packages in a dependency tree, without development and build dependencies.
 fn tree(args: &[&str]) -> Result<BTreeSet<String>, String> {
     let fixed = ["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let text = output("cargo", &[&fixed[..], args].concat())?;

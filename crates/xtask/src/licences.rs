@@ -1,4 +1,4 @@
-//! Lists the licences of everything compiled into the page, the command, the Python package and the npm package.
+//! Lists the licences of everything compiled into the page, the command, the Python packages and the npm package.
 //!
 //! `cargo tree` lists the crates, their sources in the registry contain the licence files, and Vite writes the licences
 //! of the npm packages that it bundles. No other tool and no network is needed.
@@ -12,7 +12,7 @@ use crate::command::{output, root};
 
 /// First lines of the file of notices.
 const HEAD: &str = include_str!("licences.txt");
-/// Name of the file of notices.
+/// Name of the file of notices that [`write()`] creates in each folder.
 const NOTICES: &str = "licences.txt";
 /// Name of the file with the licences of Rust's standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
@@ -21,7 +21,7 @@ const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
 /// Beginnings of the names of files that contain licences or required notices, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
-/// A third-party package.
+/// A third-party package, and the licence texts in its folder.
 #[derive(Clone, Debug)]
 struct Part {
     /// Name and version.
@@ -40,7 +40,8 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, of_web(folder, &OF_NPM)?)
 }
 
-/// Packages compiled into both wasm files, and the npm packages in Vite's lists, which are deleted.
+/// Packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`. Deletes the
+/// lists.
 fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
@@ -78,6 +79,15 @@ pub(crate) fn of_package(dist: &Path, folder: &Path) -> Result<(), String> {
     write(folder, of_web(dist, &OF_NPM[..1])?)
 }
 
+/// Writes the notices of the notebook widget into `folder`. The folder `files` contains Vite's lists of the npm
+/// packages that the widget bundles.
+///
+/// # Errors
+/// Names the package whose licence is not known.
+pub(crate) fn of_widget(files: &Path, folder: &Path) -> Result<(), String> {
+    write(folder, of_web(files, &OF_NPM)?)
+}
+
 fn host() -> Result<String, String> {
     let about = output("rustc", &["-vV"])?;
     about
@@ -110,7 +120,7 @@ fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>
     let mut parts = Vec::new();
     for found in metadata["packages"].as_array().into_iter().flatten() {
         let name = format!("{} v{}", word(found, "name"), word(found, "version"));
-        // Our packages have no source. In the tree, ` (*)` marks repeated packages.
+        // In the metadata, our packages have no `source`. In the tree, ` (*)` marks repeated packages.
         let is_ours = found["source"].is_null();
         if is_ours || !tree.lines().any(|line| line.trim_end_matches(" (*)") == name) {
             continue;
@@ -164,7 +174,7 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
         }
         if licences.insert(part.name.clone(), part.licence).is_none() {
             for text in part.texts {
-                // Some texts have the line ends of Windows.
+                // Some texts have CRLF line endings.
                 let text = text.replace("\r\n", "\n").trim().to_owned();
                 owners.entry(text).or_default().push(part.name.clone());
             }
@@ -181,7 +191,7 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
     Ok(format!("{HEAD}{list}{texts}"))
 }
 
-/// Text of the licence of a package that contains none. Apache 2.0 has a fixed text; MIT has a line for the authors.
+/// Licence text for a package without a licence file. Apache 2.0 has a fixed text; MIT has a line for the authors.
 fn standard_text(part: &Part) -> Result<String, String> {
     let Part { name, licence, authors, .. } = part;
     if licence.contains("Apache-2.0") {

@@ -24,10 +24,14 @@ const USAGE: &str = "usage: cargo xtask TASK
   check          format, lints, documentation, dependency arrows, import circles, phrases in prose, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
+  check-and-build  `check` during the build of the tests, with the compiler that `.ci/run` sets
   check-scripts  the part of `check` that is about TypeScript
-  test-beside    the part of `test` that runs beside the Rust tests: the Python package, TypeScript, the page's build
+  test-beside    the part of `test` that runs beside the Rust tests: TypeScript, Firefox, the packages, the page's build
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
+  blender        the Blender extension: built, and tested in Blender as a Python package (needs Python 3.11)
+  notebooks      the notebook widget in JupyterLab, and the example notebooks (600 MB to download)
+  notebook-wheel the notebook widget's wheel, into target/notebook
   wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
   npm            the npm package only: packed, installed into a blank project and tested there, in Node and in a browser
   npm-pack       the npm package, packed into target/npm
@@ -50,9 +54,13 @@ fn main() -> ExitCode {
         ["test"] => tasks::test(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
+        ["check-and-build"] => tasks::check_and_build(),
         ["test-beside"] => tasks::test_beside(),
         ["check-scripts"] => tasks::check_scripts(),
         ["python"] => python::test(),
+        ["blender"] => python::test_blender(),
+        ["notebooks"] => python::test_notebooks(),
+        ["notebook-wheel"] => python::notebook_wheel().map(|wheel| println!("{wheel}")),
         ["wheel", rest @ ..] => python::wheel(rest),
         ["npm"] => package::test(),
         ["npm-pack"] => package::pack().map(drop),

@@ -1,4 +1,4 @@
-//! Installs programs of npm from the lock file, and runs them from node_modules.
+//! Installs the npm packages of the lock file, and runs programs from node_modules.
 
 use crate::command::{root, run};
 
@@ -20,7 +20,7 @@ pub(crate) fn install() -> Result<(), String> {
     run("npm", &["install", "--no-save", "--no-audit", "--no-fund"], &[])
 }
 
-/// Runs an installed program.
+/// Runs a program from node_modules. `args`: the name of the program, then its arguments.
 ///
 /// # Errors
 /// When the program fails.

@@ -13,7 +13,11 @@ const PACKAGE: &str = "web/package";
 /// Folder for the licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
 /// Folders whose tests and pages are copied into the blank project.
-const COPIED: [&str; 2] = ["web/package/examples", "web/package/test"];
+const COPIED: [(&str, &str); 3] = [
+    ("web/package/examples", ""),
+    ("web/package/examples/stackblitz", "stackblitz"),
+    ("web/package/test", ""),
+];
 
 /// Tests the package. Needs the wasm of a page build, and the command built by `cargo test` for comparisons.
 ///
@@ -69,18 +73,19 @@ fn blank_project(tarball: &str) -> Result<String, String> {
     std::fs::write(folder.join("package.json"), "{ \"private\": true, \"type\": \"module\" }\n")
         .map_err(|e| format!("cannot write package.json: {e}"))?;
     let project = path(&folder)?;
-    // The locked version, which npm finds in its cache without a network.
+    // Install the locked version of three.js, because npm has it in its cache and needs no network for it.
     let lock = read(&root().join("package-lock.json"))?;
     let lock: Value = serde_json::from_str(&lock).map_err(|e| format!("package-lock.json: {e}"))?;
     let three = lock["packages"]["node_modules/three"]["version"].as_str().ok_or("no three.js is locked")?;
     let three = format!("three@{three}");
     let quiet = ["--prefer-offline", "--no-audit", "--no-fund", "--ignore-scripts"];
     run("npm", &[&["install", "--prefix", &project], &quiet[..], &[tarball, &three]].concat(), &[])?;
-    for from in COPIED {
-        let from = root().join(from);
+    for (from, to) in COPIED {
+        let (from, to) = (root().join(from), folder.join(to));
+        std::fs::create_dir_all(&to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;
         let entries = from.read_dir().map_err(|e| format!("cannot read {}: {e}", from.display()))?;
-        for entry in entries.flatten() {
-            copy(&entry.path(), &folder.join(entry.file_name()))?;
+        for file in entries.flatten().filter(|entry| entry.path().is_file()) {
+            copy(&file.path(), &to.join(file.file_name()))?;
         }
     }
     Ok(project)

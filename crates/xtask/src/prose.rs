@@ -17,7 +17,7 @@ const PHRASES: &[(&str, &str)] = &[
     ("who waits", "name the caller, or the mechanism: polling, cancellation"),
 ];
 
-/// Files that are checked. In Markdown every line is; in the others, comments.
+/// Extensions of the files that are checked. In Markdown files every line is checked, in other files the comments.
 const EXTENSIONS: [&str; 6] = ["rs", "ts", "tsx", "wgsl", "py", "md"];
 
 /// Reports each line of a comment or document that contains one of [`PHRASES`].

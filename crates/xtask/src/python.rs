@@ -1,10 +1,11 @@
 //! The Python package: builds its wheel, installs it into a blank environment, and tests it there.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::command::{root, run};
 use crate::licences;
-use crate::wasm::target_folder;
+use crate::npm;
+use crate::wasm::{self, target_folder};
 
 const PACKAGE: &str = "crates/cagework-py";
 /// Folder for the licences of everything compiled into the wheel; ignored by git.
@@ -23,7 +24,90 @@ pub(crate) fn test() -> Result<(), String> {
     let from = ["--no-index", "--no-deps", "--find-links", &wheels, "cagework"];
     run(&python, &[&INSTALL[..], &from].concat(), &[])?;
     let command = path(target_folder()?.join("debug/cagework"))?;
-    run(&python, &["-m", "pytest", PACKAGE], &[("CAGEWORK_COMMAND", &command)])
+    run(&python, &["-m", "pytest", &format!("{PACKAGE}/tests")], &[("CAGEWORK_COMMAND", &command)])?;
+    // The types are also checked by mypy, which one of the tests above runs.
+    npm::install()?;
+    npm::exec(&["pyright", "--pythonpath", &python, &format!("{PACKAGE}/tests/typed.py")])
+}
+
+/// Folder of the Blender extension.
+const BLENDER: &str = "crates/cagework-py/blender";
+/// Blender as a Python package. Each version of Blender needs a particular version of Python; 4.5 needs Python 3.11.
+const BPY: &str = "bpy==4.5.*";
+
+/// Tests the Blender extension, in an environment with Blender as a Python package (400 MB to download).
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn test_blender() -> Result<(), String> {
+    let wheel = only_file(&build(&environment()?, &["--release", "--auditwheel", "skip"])?)?;
+    let python = blank("blender")?;
+    // The wheel's dependencies are not installed, because Blender has NumPy and no SciPy.
+    run(&python, &[&INSTALL[..], &[BPY, "pytest"]].concat(), &[])?;
+    run(&python, &[&INSTALL[..], &["--no-deps", &wheel]].concat(), &[])?;
+    let out = target_folder()?.join("blender-extension");
+    empty(&out)?;
+    let out = path(out)?;
+    run(&python, &[&format!("{BLENDER}/build.py"), &wheel, &out], &[])?;
+    run(&python, &["-m", "pytest", "-q", BLENDER], &[("CAGEWORK_EXTENSION", &only_file(&out)?)])
+}
+
+/// Folder of the notebook widget, the Python package cagework-notebook.
+const NOTEBOOK: &str = "crates/cagework-py/notebook";
+/// Folder in [`NOTEBOOK`] for the widget's script and wasm; ignored by git.
+const FILES: &str = "crates/cagework-py/notebook/cagework_notebook/files";
+/// Example notebooks.
+const EXAMPLES: &str = "crates/cagework-py/notebooks";
+/// Packages of the notebooks and of their tests.
+const LAB: [&str; 10] = [
+    "jupyterlab==4.*",
+    "nbclient",
+    "pytest",
+    "anywidget",
+    "scipy",
+    "trimesh",
+    "meshio",
+    "rtree",
+    "matplotlib",
+    "distributed",
+];
+
+/// Tests the notebook widget in JupyterLab and executes the example notebooks, in an environment with JupyterLab.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn test_notebooks() -> Result<(), String> {
+    let widget = notebook_wheel()?;
+    let wheel =
+        only_file(&build(&environment()?, &["--profile", "dev", "--auditwheel", "skip", "--quiet"])?)?;
+    let python = blank("notebooks")?;
+    run(&python, &[&INSTALL[..], &LAB].concat(), &[])?;
+    run(&python, &[&INSTALL[..], &["--no-deps", &wheel, &widget]].concat(), &[])?;
+    run(&python, &["-m", "pytest", "-q", EXAMPLES], &[])?;
+    let playwright = ["playwright", "test", "--config", "web/notebook/playwright.config.ts"];
+    run("npx", &[&["--no-install"], &playwright[..]].concat(), &[("NOTEBOOK_PYTHON", &python)])
+}
+
+/// Builds the wheel of the notebook widget, which works on all systems; returns its path.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn notebook_wheel() -> Result<String, String> {
+    npm::install()?;
+    wasm::ensure()?;
+    npm::exec(&["vite", "build", "--config", "web/notebook/vite.config.ts", "--logLevel", "warn"])?;
+    let files = root().join(FILES);
+    let notices = files.join("licences");
+    empty(&notices)?;
+    licences::of_widget(&files, &notices)?;
+    our_licences(&notices)?;
+    let out = target_folder()?.join("notebook");
+    empty(&out)?;
+    let out = path(out)?;
+    let python = blank("notebook-build")?;
+    let pip = ["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"];
+    run(&python, &[&pip[..], &["--wheel-dir", &out, &format!("./{NOTEBOOK}")]].concat(), &[])?;
+    only_file(&out)
 }
 
 /// Builds the release wheel for distribution, into `target/wheels`. `args` are passed to maturin.
@@ -36,35 +120,54 @@ pub(crate) fn wheel(args: &[&str]) -> Result<(), String> {
 
 /// Makes a virtual environment with the tools that build and test the package; returns its interpreter.
 fn environment() -> Result<String, String> {
-    let folder = target_folder()?.join("python");
-    run("python3", &["-m", "venv", "--clear", &path(folder.clone())?], &[])?;
-    let python = path(folder.join(if cfg!(windows) { "Scripts/python" } else { "bin/python" }))?;
+    let python = blank("python")?;
     let needed = path(root().join(PACKAGE).join("requirements.txt"))?;
     let pinned = ["--require-hashes", "--only-binary", ":all:", "--requirement", &needed];
     run(&python, &[&INSTALL[..], &pinned].concat(), &[])?;
     Ok(python)
 }
 
-/// Builds the wheel into an emptied folder; returns the folder.
+/// Makes an empty virtual environment in the target folder; returns its interpreter.
+fn blank(name: &str) -> Result<String, String> {
+    let folder = target_folder()?.join(name);
+    run("python3", &["-m", "venv", "--clear", &path(folder.clone())?], &[])?;
+    path(folder.join(if cfg!(windows) { "Scripts/python" } else { "bin/python" }))
+}
+
+/// Builds the wheel of [`PACKAGE`] into an emptied folder; returns the folder. `args` are passed to maturin.
 fn build(python: &str, args: &[&str]) -> Result<String, String> {
     let wheels = target_folder()?.join("wheels");
     let notices = root().join(NOTICES);
-    for folder in [&wheels, &notices] {
-        if folder.exists() {
-            std::fs::remove_dir_all(folder)
-                .map_err(|e| format!("cannot remove {}: {e}", folder.display()))?;
-        }
-        std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))?;
-    }
+    empty(&wheels)?;
+    empty(&notices)?;
     licences::of_wheel(&notices)?;
-    for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
-        std::fs::copy(root().join(ours), notices.join(ours))
-            .map_err(|e| format!("cannot copy {ours}: {e}"))?;
-    }
+    our_licences(&notices)?;
     let (manifest, wheels) = (path(root().join(PACKAGE).join("Cargo.toml"))?, path(wheels)?);
     let fixed = ["-m", "maturin", "build", "--locked", "--manifest-path", &manifest, "--out", &wheels];
     run(python, &[&fixed[..], args].concat(), &[])?;
     Ok(wheels)
+}
+
+fn our_licences(to: &Path) -> Result<(), String> {
+    for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        std::fs::copy(root().join(ours), to.join(ours)).map_err(|e| format!("cannot copy {ours}: {e}"))?;
+    }
+    Ok(())
+}
+
+/// Makes a folder, or removes its contents.
+fn empty(folder: &Path) -> Result<(), String> {
+    if folder.exists() {
+        std::fs::remove_dir_all(folder).map_err(|e| format!("cannot remove {}: {e}", folder.display()))?;
+    }
+    std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))
+}
+
+/// Path of the only file in a folder.
+fn only_file(folder: &str) -> Result<String, String> {
+    let fault = || format!("there is no file in {folder}");
+    let entry = std::fs::read_dir(folder).map_err(|e| format!("{folder}: {e}"))?.next().ok_or_else(fault)?;
+    path(entry.map_err(|e| format!("{folder}: {e}"))?.path())
 }
 
 fn path(path: PathBuf) -> Result<String, String> {

@@ -23,32 +23,46 @@ pub(crate) fn build() -> Result<(), String> {
 /// no tests but need criterion, which takes half a minute to build; xtask has other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
-/// Runs all tests.
+/// Runs all tests: of Rust, Python and TypeScript, and of the page in browsers.
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
-    run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
-    let rust = [&["test", "--locked"], &TESTED[..]].concat();
-    run("cargo", &[&rust[..], &["--no-run"]].concat(), &[])?;
-    // Two tasks at once, because most Rust tests leave one of two cores idle.
+    build_tests()?;
+    // Run two tasks in parallel, because most Rust tests leave one of two cores idle.
     beside("test-beside", || {
-        run("cargo", &rust, &[])?;
+        run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
+        run("cargo", &[&["test", "--locked"], &TESTED[..]].concat(), &[])?;
         // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
         fuzz(&["--minutes", "0.1", "--seed", "1"])?;
         validate_exports()
     })?;
-    site::test_built_page(&[])?;
-    site::test_firefox()?;
-    package::test()
+    site::test_built_page(&[])
+}
+
+fn build_tests() -> Result<(), String> {
+    run("cargo", &[&["test", "--locked", "--no-run"], &TESTED[..]].concat(), &[])
+}
+
+/// Checks what [`check()`] checks, except the benches, while it builds the tests. `.ci/run` sets clippy as the compiler
+/// and makes warnings errors; clippy on its own would check all dependencies in addition to building them.
+pub(crate) fn check_and_build() -> Result<(), String> {
+    npm::install()?;
+    run("cargo", &["fmt", "--all", "--check"], &[])?;
+    beside("check-scripts", || {
+        build_tests()?;
+        check_files()
+    })
 }
 
 /// The part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
 pub(crate) fn test_beside() -> Result<(), String> {
     python::test()?;
     site::test_scripts()?;
-    site::build()
+    site::build()?;
+    site::test_firefox()?;
+    package::test()
 }
 
-/// Runs every reader of files on damaged files. The readers are built with overflow checks and debug assertions.
+/// Runs all file readers on damaged files. The readers are built with overflow checks and debug assertions.
 pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
     // Built with the features of `cargo test`, so that no dependency is built again.
     run(
@@ -65,7 +79,8 @@ pub(crate) fn check() -> Result<(), String> {
     beside("check-scripts", check_rust)
 }
 
-/// The TypeScript part of [`check`]. It builds the wasm, whose last crates are compiled one at a time.
+/// The TypeScript part of [`check`]. Runs in parallel with the Rust part, because it first builds the wasm, whose last
+/// crates are compiled one at a time on one core.
 pub(crate) fn check_scripts() -> Result<(), String> {
     site::check_types()?;
     exec(&["biome", "ci", "--error-on-warnings"])
@@ -77,6 +92,11 @@ fn check_rust() -> Result<(), String> {
     let fuzz = ["clippy", "--workspace", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
     run("cargo", &fuzz, &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
+    check_files()
+}
+
+/// Checks dependencies, prose, versions and packaging, without compiling anything.
+fn check_files() -> Result<(), String> {
     arrows::check()?;
     prose::check()?;
     deny::check()?;
@@ -102,7 +122,8 @@ fn one_version() -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that exported GLBs pass the Khronos glTF validator, and play in three.js as in Cagework.
+/// Checks that exported GLBs pass the Khronos glTF validator and play in three.js as in Cagework, and that three.js
+/// reads captures.
 fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
@@ -116,10 +137,11 @@ fn validate_exports() -> Result<(), String> {
     let export = wasm::target_folder()?.join("debug/examples/export_samples");
     run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
     run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])?;
-    run("node", &["crates/cagework-io/tests/three.mjs", folder], &[])
+    run("node", &["crates/cagework-io/tests/three.mjs", folder], &[])?;
+    run("node", &["crates/cagework-io/tests/three-splats.mjs", &format!("{folder}/captures")], &[])
 }
 
-/// Runs a task of this program in parallel with `work`, and shows its output when both have ended.
+/// Runs a task of this program in parallel with `work`. Shows the task's output when task and `work` have ended.
 ///
 /// # Errors
 /// Returns the error of `work`, which also stops the task. Otherwise fails if the task fails.
@@ -136,7 +158,7 @@ fn beside(task: &str, work: impl FnOnce() -> Result<(), String>) -> Result<(), S
         .map_err(fault)?;
     let outcome = work();
     if outcome.is_err() {
-        // Fails if the task has already ended. Processes that it has started continue.
+        // `kill` fails if the task has already ended. Processes that the task has started continue to run.
         child.kill().ok();
     }
     let status = child.wait().map_err(fault)?;

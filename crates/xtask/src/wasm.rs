@@ -7,7 +7,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 use crate::command::{output, root, run};
 
-/// Cargo profile of the wasm.
+/// Cargo profile with which the wasm is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Profile {
     /// Quick to build; used for development.
@@ -35,8 +35,8 @@ struct Artifact {
     name: &'static str,
 }
 
-/// Both builds, in build order. Cargo keeps the artifact of the last one only, so that the build of browsers with
-/// WebGPU, which developers use most, comes last.
+/// Both builds, in build order. Cargo keeps only the artifact of the last build, and must link the other one again. The
+/// build for browsers with WebGPU comes last, because developers repeat it most often.
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],
@@ -46,8 +46,8 @@ const ARTIFACTS: [Artifact; 2] = [
     Artifact { features: &[], package: "web/package/src/pkg", name: "cagework" },
 ];
 
-/// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 support 128-bit vectors. The vectorizer must be named:
-/// otherwise all loops of the kernels stay scalar at any optimization level, and a bind takes 1.6 times as long.
+/// Flags of rustc for wasm. All browsers with WebGPU or WebGL2 support 128-bit vectors. The vectorizer must be added to
+/// LLVM's passes by name: otherwise all loops stay scalar at any optimization level, and a bind takes 1.6 times as long.
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// Files and folders that the packages are built from.
@@ -67,8 +67,9 @@ const SOURCES: [&str; 10] = [
 /// File in each package that contains the name of its profile.
 const PROFILE: &str = "profile.txt";
 
-/// Builds the release packages, unless both are newer than all sources. Cargo keeps only the artifact of the last
-/// build: building both packages again would link both again, which takes five minutes on two cores.
+/// Builds both JavaScript packages with [`Profile::Web`], unless both are newer than all sources. Cargo keeps only the
+/// artifact of the last build, so building up-to-date packages again would link both, which takes five minutes on two
+/// cores.
 ///
 /// # Errors
 /// When a step fails.
@@ -135,7 +136,7 @@ fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), Str
         .map_err(|e| format!("cannot write in {}: {e}", package.display()))
 }
 
-/// Cargo's target folder.
+/// Absolute path of Cargo's target folder.
 pub(crate) fn target_folder() -> Result<std::path::PathBuf, String> {
     let metadata = output("cargo", &["metadata", "--format-version", "1", "--no-deps", "--locked"])?;
     let key = "\"target_directory\":\"";

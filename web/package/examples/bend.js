@@ -1,6 +1,9 @@
 import { Data3DTexture, FloatType, LinearFilter, Vector3 } from "three";
 
-/** Bends a material of three.js by `field.texture()`: the vertex shader samples the displacements. Returns the texture. */
+/**
+ * Makes the vertex shader of a three.js material displace vertices by `field.texture()`. Returns the texture with the
+ * displacements.
+ */
 export function bend(material, { data, size, origin, spacing }) {
   const texture = new Data3DTexture(data, ...size);
   const filters = { type: FloatType, minFilter: LinearFilter, magFilter: LinearFilter, needsUpdate: true };

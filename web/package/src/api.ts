@@ -8,9 +8,9 @@ import { createPool } from "./pool";
 import type { Package } from "./session/artifact";
 import { type Client, named } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
-import type { Api, Cage, CallOptions, File, Named, Weights } from "./types";
+import type { Api, Cage, CallOptions, File, NameOption, Weights } from "./types";
 
-/** The initialised module on this thread, and a way to open workers. */
+/** The wasm module, initialised on the calling thread, and a way to open workers. */
 export interface Runtime {
   readonly pkg: Package;
   openClient(): Client;
@@ -28,8 +28,8 @@ export function createApi(open: () => Promise<Runtime>): Api {
     return createPool(openClient, most);
   });
   /**
-   * Runs a job in a worker. Rejects at once if `signal` aborts, even while the job is queued or the module loads, or if
-   * `onProgress` throws an error.
+   * Runs a job in a worker. Rejects immediately if `signal` aborts or `onProgress` throws an error, even while the job
+   * is queued or the module loads.
    */
   const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: CallOptions) =>
     new Promise<Jobs[K]["output"]>((resolve, reject) => {
@@ -124,7 +124,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       };
     },
     async reshape(model, cage, posed, options = {}) {
-      const { dynamic: _, ...rigs } = RIG_DEFAULTS;
+      const { dynamic: _, expressions: __, ...rigs } = RIG_DEFAULTS;
       requireKnown(options, CALL_OPTIONS, { name: null }, BIND_ON_CPU, rigs);
       const arrays = cageOf(cage);
       const input = {
@@ -160,7 +160,7 @@ function once<T>(open: () => Promise<T>): () => Promise<T> {
 
 const BIND_ON_CPU: BindOptions = { ...BIND_DEFAULTS, backend: "cpu" };
 
-/** Adds default options. The classic method defaults to the Jacobi solver, as in the `cagework` command. */
+/** Fills in missing options. The default solver of the classic method is Jacobi, as in the `cagework` command. */
 function bindOptions(given: Partial<BindOptions>): BindOptions {
   const solver = given.method === "classic" ? "jacobi" : BIND_ON_CPU.solver;
   return optionsOf({ ...BIND_ON_CPU, solver }, given);
@@ -174,7 +174,7 @@ function cageOf({ positions, corners, controls }: Cage): CageArrays {
   };
 }
 
-function fileOf(model: File, { name = "model.glb" }: Named): NamedFile {
+function fileOf(model: File, { name = "model.glb" }: NameOption): NamedFile {
   const isBytes = model instanceof Uint8Array || model instanceof ArrayBuffer;
   if (!isBytes && !(model instanceof Blob)) {
     throw named("Error", "model must be the bytes of a file: a Uint8Array, an ArrayBuffer or a Blob");

@@ -51,7 +51,7 @@ export function originOf(name: string, given: ArrayLike<number>): Float64Array {
   throw wrong(`${name} is ${Array.from(given).join(", ")}; it must be three finite numbers`);
 }
 
-/** Checks that a pose has as many points as the cage and that they are finite, and converts it to 32-bit floats. */
+/** Checks that a pose has as many points as the cage and that all are finite. Converts it to 32-bit floats. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);
   if (posed.length !== cage.length) {
@@ -63,7 +63,8 @@ export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Arr
 }
 
 /**
- * `defaults` with the values of given options of the same name. Checks the types of values; Rust checks their ranges.
+ * Returns `defaults`, with values replaced by those of given options of the same name. Checks the types of the values;
+ * Rust checks their ranges.
  */
 export function optionsOf<T extends object>(defaults: T, given: object): T {
   const known = Object.entries(given).filter(([name, value]) => name in defaults && value !== undefined);

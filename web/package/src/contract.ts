@@ -2,7 +2,7 @@
  * The contract between JavaScript and Rust: types only.
  *
  * Errors: every rejected promise and every throw from Rust is an `Error` whose `name` is an `ErrorName` and whose
- * `message` is a sentence for the user, its first letter in lower case. After an error the state is as before the call.
+ * `message` is a sentence for the user, its first letter in lower case. A call that fails leaves the state unchanged.
  *
  * Coordinates: x, y are CSS pixels from the canvas's top left corner. Arrays of points are `[n, 3]` flattened.
  */

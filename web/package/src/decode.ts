@@ -11,7 +11,7 @@ import { fetchPart } from "./session/parts";
 
 const GLB = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
-/** Largest rounding error of a sum of four 32-bit weights. */
+/** Deviation from 1 up to which the sum of a vertex's weights is attributed to rounding and is not corrected. */
 const ROUNDED = 1e-6;
 
 /** Decompresses a GLB or glTF to a plain GLB. */
@@ -27,7 +27,8 @@ export async function decompress(
   });
   try {
     const document = await readDocument(io, renamed(bytes), sibling);
-    // Merge the buffers, because a GLB has only one and meshopt's fallback data is in a second one.
+    // Merge the buffers, because a GLB has only one. Files with meshopt compression have a second one for fallback
+    // data.
     await document.transform(dequantize(), unpartition());
     normaliseWeights(document);
     for (const extension of document.getRoot().listExtensionsUsed()) {
@@ -44,8 +45,8 @@ export async function decompress(
 }
 
 /**
- * Restores what quantisation changed: scales each vertex's weights to sum to 1, and sets the joints of zero weights to
- * 0.
+ * Repairs weights of skins that were quantised: scales each vertex's weights to sum to 1. Also sets the joint indices
+ * of zero weights to 0, as the glTF specification recommends.
  */
 function normaliseWeights(document: Document): void {
   for (const primitive of document

@@ -8,6 +8,7 @@ import { CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
 import { attachPointer } from "./element/pointer";
 import { openView, type Ready, sceneOf, type View } from "./element/view";
 import { named } from "./session/client";
+import type { Bound, Cage, File, NameOption } from "./types";
 
 /** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a hardly visible difference. */
 const MOST_SHARP = 2;
@@ -24,6 +25,17 @@ const STYLE = `
     pointer-events: none; text-align: center; text-wrap: balance; }
 `;
 
+/**
+ * A model's file, and optionally a cage for it and the result of `bind`. Without `cage`, the element uses the cage of a
+ * project file or generates one. Without `bound`, it binds the model.
+ */
+export interface Source extends NameOption {
+  readonly file: File;
+  readonly cage?: Cage | undefined;
+  /** Result of `bind` for the model and `cage`. */
+  readonly bound?: Bound | undefined;
+}
+
 // Servers have no HTMLElement. They can import this module, but it defines no element there.
 const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 
@@ -31,11 +43,13 @@ export class CageDeformer extends Base {
   static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
 
   #view: Promise<View> | undefined;
-  /** The view that `#view` resolves with; undefined until then. */
+  /** The view that `#view` has resolved with; undefined while the view opens. */
   #shown: View | undefined;
   /** Number of calls of `#open` and `#close`. A result that belongs to an earlier call is ignored. */
   #asked = 0;
   #bound: Promise<Ready> | undefined;
+  /** The argument of `show`, until `src` changes. */
+  #source: Source | undefined;
   #canvas: HTMLCanvasElement | undefined;
   #said: HTMLElement | undefined;
   /** Cancels the drag in progress. */
@@ -60,8 +74,24 @@ export class CageDeformer extends Base {
 
   attributeChangedCallback(name: string, before: string | null, now: string | null): void {
     if (before === now) return;
-    if (name === "theme") this.#shown?.engine.setScene(sceneOf(now));
-    else if (this.isConnected && this.shadowRoot) this.#open();
+    if (name === "theme") {
+      this.#shown?.engine.setScene(sceneOf(now));
+      return;
+    }
+    if (name === "src") this.#source = undefined;
+    this.#reopen();
+  }
+
+  /** Shows a model from memory instead of `src`. The events `ready` and `error` report the result. */
+  show(source: Source): void {
+    if (source.bound && !source.cage)
+      throw named("Missing", "bound was given without the cage it belongs to");
+    this.#source = source;
+    this.#reopen();
+  }
+
+  #reopen(): void {
+    if (this.isConnected && this.shadowRoot) this.#open();
     // The element is not connected yet, or is being moved: `connectedCallback` will open the model.
     else this.#bound = undefined;
   }
@@ -89,12 +119,17 @@ export class CageDeformer extends Base {
     engine.setCagePositions(posed === null ? rest : poseOf(posed, rest));
   }
 
+  /** Origin of `pose`, `[3]`, object units. Not zero for models far from the world's origin, as in map coordinates. */
+  get origin(): Float64Array | null {
+    return this.#shown?.engine.origin() ?? null;
+  }
+
   /**
-   * Returns the posed model as a GLB, with its rig, clips, morph targets and materials. Of a project with several
-   * models, returns the first. Waits until the model is bound.
+   * Returns the posed model as a GLB, with its rig, clips, morph targets and materials. For a project with several
+   * models, returns the first model. Waits until the model is bound.
    */
   async export(): Promise<Uint8Array<ArrayBuffer>> {
-    if (!this.#bound) throw named("Missing", "there is nothing to export: the element has no src");
+    if (!this.#bound) throw named("Missing", "there is nothing to export: the element has no model");
     await this.#bound;
     const engine = this.#shown?.engine;
     if (!engine) throw named("Missing", "the element was closed before it could export");
@@ -129,15 +164,15 @@ export class CageDeformer extends Base {
 
   #open(): void {
     this.#asked += 1;
-    const { src } = this;
+    const source = this.#source ?? this.src;
     this.#bound = undefined;
-    if (src === null) {
+    if (source === null) {
       this.#close();
       this.#say("");
       return;
     }
     const asked = this.#asked;
-    const opening = this.#show(src, asked);
+    const opening = this.#show(source, asked);
     this.#bound = opening;
     opening.then(
       (ready) => {
@@ -151,18 +186,19 @@ export class CageDeformer extends Base {
     );
   }
 
-  async #show(src: string, asked: number): Promise<Ready> {
+  async #show(source: Source | string, asked: number): Promise<Ready> {
     this.#say("Opening");
     const number = (name: string, usual: number) => Number(this.getAttribute(name) ?? usual);
-    const address = new URL(src, this.baseURI);
-    const [view, file] = await Promise.all([this.#opened(), download(address)]);
+    const given = typeof source === "string" ? download(new URL(source, this.baseURI)) : source;
+    const [view, { name = "model.glb", file, cage, bound }] = await Promise.all([this.#opened(), given]);
     if (asked !== this.#asked) throw named("Cancelled", "another file was opened");
-    const name = decodeURIComponent(address.pathname.split("/").at(-1) ?? "") || "model.glb";
     const wanted = {
       name,
-      file,
-      vertices: number("vertices", CAGE_DEFAULTS.vertices),
+      file: file instanceof Blob ? file : new Blob([file as BlobPart]),
+      vertices: number("vertices", CAGE_DEFAULTS.target),
       grid: number("grid", GRID),
+      cage,
+      bound,
     };
     return view.open(wanted, (what, fraction) => {
       if (asked === this.#asked) this.#say(fraction > 0 ? `${what}: ${Math.round(100 * fraction)} %` : what);
@@ -218,9 +254,10 @@ export class CageDeformer extends Base {
   }
 }
 
-async function download(address: URL): Promise<Blob> {
+async function download(address: URL): Promise<Source> {
   const response = await fetch(address);
-  if (response.ok) return response.blob();
+  const name = decodeURIComponent(address.pathname.split("/").at(-1) ?? "") || undefined;
+  if (response.ok) return { name, file: await response.blob() };
   throw named("Unreadable", `${address.href} could not be downloaded (${response.status})`);
 }
 

@@ -1,10 +1,10 @@
 /** Estimates the time left from the fraction done. */
 
-/** Weight of a new speed measurement in the moving average, which follows changes of speed between stages. */
+/** Weight of a new measurement in the exponential moving average of the speed, which varies between stages. */
 const SMOOTHING = 0.25;
 /** Fraction done below which no time is estimated, because the speed varies too much at first. */
 const FIRST_SHARE = 0.04;
-/** Time since the start before which no time left is estimated, ms. */
+/** Duration after the start during which the time left is not estimated, ms. */
 const FIRST_MS = 250;
 
 export interface Eta {

@@ -29,8 +29,8 @@ export const generateCage: Api["generateCage"] = api.generateCage;
 /** Positions of the points in a pose of the cage, `[n_points, 3]`. Runs on the calling thread. */
 export const deform: Api["deform"] = api.deform;
 /**
- * The deformation of the space in and around a posed cage, for points that are not bound. The lattice is bound in a worker;
- * the methods of the result run on the calling thread.
+ * The deformation of the space in and around a posed cage, for points that are not bound. The lattice is bound in a
+ * worker; the methods of the result run on the calling thread.
  */
 export const field: Api["field"] = api.field;
 /**

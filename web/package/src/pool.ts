@@ -4,7 +4,7 @@ import type { Client } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
 
 export interface Pool {
-  /** Runs a job. Aborting the signal terminates the worker, or removes the job from the queue. */
+  /** Runs a job. Aborting `signal` terminates the job's worker; a queued job is rejected when its turn comes. */
   run<K extends JobKind>(
     job: K,
     input: Jobs[K]["input"],

@@ -14,7 +14,7 @@ import type { Reading } from "./contract/work";
 
 /** Options of all functions that run in a worker. */
 export interface CallOptions {
-  /** Cancels the call at once; the promise is rejected with the signal's reason. */
+  /** Aborting the signal cancels the call at once; the promise is rejected with the signal's reason. */
   readonly signal?: AbortSignal | undefined;
   readonly onProgress?: ((progress: Progress | Reading) => void) | undefined;
 }
@@ -41,7 +41,7 @@ export interface ModelMesh extends Mesh {
   readonly origin: Float64Array;
 }
 
-/** A closed mesh of polygons. */
+/** A cage: a closed mesh of polygons around a model, and optional controls inside. */
 export interface Cage extends WithOrigin {
   /** Vertices `[n_cage, 3]`, object units. A pose is another array of this length. */
   readonly positions: ArrayLike<number>;
@@ -51,7 +51,7 @@ export interface Cage extends WithOrigin {
   readonly controls?: CageControls | undefined;
 }
 
-/** A generated cage. */
+/** A cage that `generateCage` returns. */
 export interface GeneratedCage extends Cage {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
@@ -59,13 +59,16 @@ export interface GeneratedCage extends Cage {
   readonly problems: readonly Problem[];
 }
 
-/** Weights as compressed sparse rows: one row per point, one column per control. Each row sums to 1. */
+/**
+ * Weights as compressed sparse rows: one row per point; one column per control, then the columns of `offsets`. For
+ * points inside the cage, the weights of the controls sum to 1.
+ */
 export interface Weights {
-  /** `[n_points + 1]` */
+  /** Index of each row's first entry in `indices` and `data`. `[n_points + 1]` */
   readonly indptr: Uint32Array;
-  /** `[n_nonzeros]` */
+  /** Column of each entry. `[n_nonzeros]` */
   readonly indices: Uint32Array;
-  /** `[n_nonzeros]`, dimensionless. */
+  /** Weight of each entry, dimensionless. `[n_nonzeros]` */
   readonly data: Float32Array;
   /** Meaning of the columns from `controls` on, and the points outside the cage. */
   readonly offsets: Offsets;
@@ -81,16 +84,16 @@ export interface Bound {
 
 /** The bytes of a file. */
 export type File = Uint8Array | ArrayBuffer | Blob;
-export interface Named {
+export interface NameOption {
   /** Name of the file, whose extension determines the format. Default "model.glb". */
   readonly name?: string | undefined;
 }
 
 /**
- * `states`: append the vertices of each morph target and, with the name of a `clip`, of its frames, for a cage that
- * encloses them all.
+ * `states`: append the vertices of each morph target and, if `clip` names a clip, of the clip's frames. A cage
+ * generated around all of them encloses the moving model.
  */
-export interface ReadCallOptions extends CallOptions, Named {
+export interface ReadCallOptions extends CallOptions, NameOption {
   readonly states?: boolean | undefined;
   readonly clip?: string | undefined;
 }
@@ -99,23 +102,23 @@ export type BindCallOptions = CallOptions & Partial<BindOptions>;
 export type CageCallOptions = CallOptions & Partial<CageOptions>;
 /** `plain`: export the shape without its rig. */
 export type ReshapeCallOptions = CallOptions &
-  Named &
+  NameOption &
   Partial<BindOptions> &
-  Partial<Omit<RigOptions, "dynamic">>;
+  Partial<Omit<RigOptions, "dynamic" | "expressions">>;
 
 /** The deformation of the space in and around a cage, for points that are not bound. */
 export interface Field {
-  /** Moves the cage. Nothing is bound again. */
+  /** Sets the pose of the cage, without binding the lattice again. */
   pose(posed: ArrayLike<number>): void;
   /** Positions of points after the deformation, `[n, 3]`. */
   map(points: ArrayLike<number>): Float32Array;
-  /** The points that `map` moves to these, `[n, 3]`; NaN where there is none. */
+  /** The points that `map` moves to the given positions, `[n, 3]`; NaN for positions that no point moves to. */
   inverse(points: ArrayLike<number>): Float32Array;
   /** Deformation gradients at points, `[n, 3, 3]`, by rows. */
   gradient(points: ArrayLike<number>): Float32Array;
   /**
-   * Displacements at the nodes of the lattice, for a 3-D texture of shaders: `[nz, ny, nx, 4]`; the fourth number has no
-   * meaning there. `origin` is the position of the first node and `spacing` the distance of nodes.
+   * Displacements at the nodes of the lattice, for a 3-D texture of shaders: `[nz, ny, nx, 4]`, x, y, z and a number
+   * that shaders ignore. `origin` is the position of the first node and `spacing` the distance between adjacent nodes.
    */
   texture(): {
     readonly data: Float32Array;
@@ -125,7 +128,7 @@ export interface Field {
   };
 }
 
-/** Options of `field`. `cells`: of the lattice along the longest side of the cage, 8 to 256, default 64. */
+/** Options of `field`. `cells`: number of lattice cells along the cage's longest side, 8 to 256, default 64. */
 export type FieldCallOptions = BindCallOptions & { readonly cells?: number | undefined };
 
 /** The functions that index.ts exports and documents. */

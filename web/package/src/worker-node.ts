@@ -11,7 +11,7 @@ Object.assign(globalThis, {
   postMessage(message: unknown, { transfer }: { transfer: TransferListItem[] }) {
     parentPort?.postMessage(message, transfer);
   },
-  // A panic of the module calls reportError. It then traps, and the job reports the trap as its error.
+  // A panic of the wasm module calls reportError and then traps. The trap becomes the error of the job.
   reportError: (error: unknown) => console.error(error),
 });
 serve(pkg);

@@ -7,9 +7,9 @@ import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
 import type { CageDeformer } from "../src/element";
 import type { Bound } from "../src/types";
 
-/** Screenshots for visual inspection. */
+/** Folder of the screenshots that the tests save for visual inspection. */
 const SCREENS = join(import.meta.dirname, "../../../target/screens");
-/** Rounding of 32-bit sums, over the model's size. */
+/** Tolerance for the rounding of 32-bit sums, as a fraction of the model's size. */
 const ROUNDING = 1e-6;
 
 /** The globals of three.html that the tests use. */
@@ -113,7 +113,27 @@ for (const [how, address] of [
   });
 }
 
-/** Waits until the element is bound; fails with its message otherwise. */
+test("the StackBlitz example moves a geometry with its cage", async ({ visit }) => {
+  const page = await visit("webgl", "bundled/stackblitz/index.html");
+  await page.waitForFunction(() => "deformer" in globalThis);
+  const shift = await page.evaluate(async () => {
+    const { deformer, mesh } = globalThis as unknown as {
+      deformer: { pose: Float32Array; update(): Promise<void> };
+      mesh: { geometry: { attributes: { position: { array: Float32Array } } } };
+    };
+    const { array } = mesh.geometry.attributes.position;
+    const rest = array.slice();
+    deformer.pose.set(deformer.pose.map((x, k) => (k % 3 === 1 ? x + 0.5 : x)));
+    await deformer.update();
+    return Array.from(array, (x, k) => x - (rest[k] ?? 0));
+  });
+  // Translating the cage translates the geometry, which is smaller than 4 object units.
+  const errors = shift.map((x, k) => Math.abs(x - (k % 3 === 1 ? 0.5 : 0)));
+  expect(Math.max(...errors)).toBeLessThan(4 * ROUNDING);
+  await page.screenshot({ path: join(SCREENS, "npm-stackblitz.png") });
+});
+
+/** Waits until the element has bound its model. If the element shows an error instead, fails with its message. */
 async function ready(page: Page): Promise<void> {
   const element = page.locator("cage-deformer");
   await expect(element.locator("p")).not.toHaveText(/^(Opening|Making|Binding)/);
@@ -220,7 +240,7 @@ test("an element opens compressed files, reports unreadable ones and frees its m
     return [pose?.join(), element.pose?.join()];
   });
   expect(kept).toBe(pose);
-  // An element without src shows nothing. One that is removed while it opens a model frees its memory and worker.
+  // An element without src shows nothing. An element that is removed while it opens a model frees memory and worker.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.src = null;

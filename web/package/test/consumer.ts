@@ -2,9 +2,10 @@
 
 import { type Bound, bind, deform, generateCage, reshape } from "@cagework/core";
 import type { CageDeformer } from "@cagework/core/element";
+import { CageDeformer as Follower, type Geometry } from "@cagework/core/three";
 
 export async function follow(glb: ArrayBuffer, positions: number[], triangles: Uint16Array): Promise<number> {
-  const cage = await generateCage({ positions, triangles }, { vertices: 60, quads: false });
+  const cage = await generateCage({ positions, triangles }, { target: 60, quads: false });
   const { weights, report }: Bound = await bind(positions, cage, {
     grid: 32,
     signal: AbortSignal.timeout(1000),
@@ -18,4 +19,13 @@ export async function follow(glb: ArrayBuffer, positions: number[], triangles: U
 
 export function poseOf(element: CageDeformer): Float32Array | null {
   return document.querySelector("cage-deformer")?.pose ?? element.pose;
+}
+
+export async function widen(geometries: Geometry[], signal: AbortSignal): Promise<number> {
+  const follower = await Follower.create(geometries, { grid: 32, signal, cageOptions: { target: 60 } });
+  follower.pose.set(follower.pose.map((x, k) => (k % 3 === 0 ? 2 * x : x)));
+  await follower.update();
+  // @ts-expect-error A cage is not an option of `bind`.
+  await Follower.create(geometries, { target: 60 });
+  return follower.edges.length + follower.report.iterations;
 }

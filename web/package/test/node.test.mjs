@@ -9,14 +9,20 @@ import { join } from "node:path";
 import { after, test } from "node:test";
 import { inflateRawSync } from "node:zlib";
 import { bind, deform, field, generateCage, readModel, reshape } from "@cagework/core";
+import { CageDeformer } from "@cagework/core/three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  InterleavedBuffer,
+  InterleavedBufferAttribute,
+  Matrix4,
+  SphereGeometry,
+} from "three";
 import { sample } from "./sample.mjs";
 
-/** Rounding of 32-bit sums, over the model's size. */
+/** Tolerance for the rounding of 32-bit sums, as a fraction of the model's size. */
 const ROUNDING = 1e-6;
-/**
- * Largest difference of weights between wasm and native code. The solver stops at tau = 1e-5, and sums differ in their
- * last bits.
- */
+/** Allowed difference between weights of wasm and of native code, which round sums differently. */
 const WEIGHTS = 1e-6;
 
 const { glb, cage, posed } = await sample(import.meta.dirname, "humanoid");
@@ -99,7 +105,7 @@ test("weights match the command's and each row sums to 1", async () => {
 });
 
 test("an affine pose of a generated cage moves the model by the same map", async () => {
-  const made = await generateCage(mesh, { vertices: 60 });
+  const made = await generateCage(mesh, { target: 60 });
   assert.ok(made.positions.length <= 180 && made.problems.every(({ severity }) => severity !== "error"));
   const { weights } = await bind(mesh.positions, made, { grid: 24 });
   const affine = (p) => p.map((x, k) => (k % 3 === 1 ? 2 * x + 0.5 * p[k - 1] - 1 : x));
@@ -110,7 +116,7 @@ test("an affine pose of a generated cage moves the model by the same map", async
 });
 
 test("a field maps points, maps them back, and its texture holds the same displacements", async () => {
-  const made = await generateCage(mesh, { vertices: 60 });
+  const made = await generateCage(mesh, { target: 60 });
   const affine = (p) => p.map((x, k) => (k % 3 === 1 ? 1.5 * x + 0.25 * p[k - 1] - 1 : x));
   const bent = await field(made, made.positions, { cells: 24 });
   const points = Float32Array.from(mesh.positions.slice(0, 300));
@@ -124,7 +130,7 @@ test("a field maps points, maps them back, and its texture holds the same displa
   close(bent.map(points), affine(Float64Array.from(points)));
   close(bent.inverse(bent.map(points)), points);
   assert.ok(Math.abs(bent.gradient(points)[4] - 1.5) < 1e-2);
-  // Trilinear interpolation, as a sampler does it.
+  // Interpolate the texture trilinearly, as a sampler of a shader does.
   const { data, size: n, origin, spacing } = bent.texture();
   const at = [...points.slice(0, 3)].map((x, k) => (x - origin[k]) / spacing);
   const by = [0, 0, 0];
@@ -147,6 +153,8 @@ test("a field maps points, maps them back, and its texture holds the same displa
 for (const [options, line] of [
   [{}, ""],
   [{ joints: "turn", keep_travel: true }, " --joints turn --keep-travel"],
+  [{ ground: true, feet: "lock" }, " --ground --feet lock"],
+  [{ quantize: true, compress: "meshopt" }, " --quantize --compress meshopt"],
   [{ plain: true }, " --static"],
 ]) {
   test(`a reshaped rigged file equals the command's, byte for byte${line}`, async () => {
@@ -274,6 +282,7 @@ test("errors name the argument, its value and the expected one", async () => {
     [() => bind(mesh.positions, cage, { grid: "32" }), /^grid is a string; it must be a number$/],
     [() => bind(mesh.positions, cage, { backend: "gpu" }), /^WebGPU is missing here/, "NoAdapter"],
     [() => deform(weights, [1, 2, 3]), new RegExp(`^posed has 3 numbers; it must have ${n},`)],
+    [() => deform(weights, new Array(n).fill(1e308)), /^the pose moves point 0 to .* end at 3.4/],
     [() => reshape(glb, cage, [1, 2, 3]), new RegExp(`^posed has 3 numbers; the cage has ${n}$`)],
     [() => reshape("fox.glb", cage, posed), /^model must be the bytes of a file/],
     [() => generateCage({ positions: [0, 0, 0], triangles: [0, 1] }), /^triangles has 2 numbers/],
@@ -295,3 +304,52 @@ test("errors name the argument, its value and the expected one", async () => {
   ];
   for (const [call, message, name = "Error"] of wrong) await assert.rejects(call, { name, message });
 });
+
+const QUARTER = new Matrix4().makeRotationZ(Math.PI / 2);
+
+/** Largest distance between vectors of the same index in two attributes of three.js. */
+function apart(a, b) {
+  let most = 0;
+  for (let v = 0; v < a.count; v++) {
+    most = Math.max(most, Math.hypot(a.getX(v) - b.getX(v), a.getY(v) - b.getY(v), a.getZ(v) - b.getZ(v)));
+  }
+  return most;
+}
+
+test("geometries of three.js follow one cage, with smooth normals across seams", async () => {
+  const [body, shirt] = [new SphereGeometry(1, 24, 16), new SphereGeometry(0.8, 12, 8).toNonIndexed()];
+  const interleaved = new InterleavedBuffer(new Float32Array(4 * shirt.attributes.position.count), 4);
+  const position = new InterleavedBufferAttribute(interleaved, 3, 1);
+  const { array } = shirt.attributes.position;
+  for (let v = 0; v < position.count; v++) position.setXYZ(v, ...array.subarray(3 * v, 3 * v + 3));
+  shirt.setAttribute("position", position);
+  const [bodyBefore, shirtBefore] = [body.clone(), shirt.attributes.position.clone()];
+  const deformer = await CageDeformer.create([body, shirt], { grid: 24, cageOptions: { target: 40 } });
+  assert.equal(
+    deformer.edges.length / 2,
+    deformer.cage.positions.length / 3 + facesOf(deformer.cage) - 2,
+    "Euler's formula",
+  );
+  // A quarter turn about z: x becomes y, and y becomes -x.
+  deformer.pose.set(
+    deformer.pose.map((_, k, p) => (k % 3 === 0 ? -p[k + 1] : k % 3 === 1 ? p[k - 1] : p[k])),
+  );
+  await Promise.all([deformer.update(), deformer.update()]);
+  assert.ok(
+    apart(body.attributes.position, bodyBefore.attributes.position.clone().applyMatrix4(QUARTER)) < 1e-5,
+  );
+  assert.ok(apart(shirt.attributes.position, shirtBefore.applyMatrix4(QUARTER)) < 1e-5);
+  // The deformer computes normals from the mesh's facets. They differ from the exact normals of the sphere, but no more
+  // at the texture seam than elsewhere.
+  const turned = bodyBefore.attributes.normal.clone().applyMatrix4(QUARTER);
+  assert.ok(apart(body.attributes.normal, turned) < 0.05, `${apart(body.attributes.normal, turned)}`);
+  assert.ok(Math.abs(body.boundingSphere.radius - 1) < 1e-4);
+  const empty = new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(0), 3));
+  await assert.rejects(CageDeformer.create(empty), { name: "Missing" });
+});
+
+function facesOf({ corners }) {
+  let faces = 0;
+  for (let k = 0; k < corners.length; k += 1 + corners[k]) faces += 1;
+  return faces;
+}

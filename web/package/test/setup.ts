@@ -8,7 +8,7 @@ import { join } from "node:path";
 import webpack from "webpack";
 import { dracoGlb, meshoptGlb, torus } from "../../e2e/models";
 
-/** Number of vertices of the torus. It is small, because the tests draw on the processor. */
+/** Number of vertices of the torus. The number is small, because the tests draw on the processor. */
 const VERTICES = 1500;
 
 export default async function setup(): Promise<void> {

@@ -10,7 +10,9 @@ export default defineConfig({
   build: {
     outDir: "bundled",
     target: "es2023",
-    rollupOptions: { input: ["three.html", "element.html"].map((name) => join(project, name)) },
+    rollupOptions: {
+      input: ["three.html", "element.html", "stackblitz/index.html"].map((name) => join(project, name)),
+    },
   },
   worker: { format: "es" },
 });

@@ -10,26 +10,10 @@ import { messageOf, sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
-export interface BindActions {
-  /**
-   * Binds the model to the cage. Resolves with true if there are weights then. `unasked`: the page started the bind,
-   * not the user, so error messages stay on screen.
-   */
-  start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
-  /** Changes options and binds. */
-  again(patch: Partial<BindOptions>): Promise<boolean>;
-  cancel(): void;
-  /** Whether the model is bound to the current cage, is being bound to it, or has cached weights for it. */
-  covers(): boolean;
-  setOptions(patch: Partial<BindOptions>): void;
-  /** Computes coordinates of these kinds for comparison, once for each cage. Resolves with false on failure. */
-  prepareCompare(kinds: readonly Coordinates[]): Promise<boolean>;
-}
-
 /** Number of earlier reports kept for comparing methods. */
 const EARLIER = 4;
 
-export function createBind(ctx: Context): BindActions {
+export function createBind(ctx: Context) {
   const { store } = ctx;
   const estimate = () => {
     const { model, cage, bindOptions } = store.get();
@@ -52,7 +36,7 @@ export function createBind(ctx: Context): BindActions {
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
     // Colours of weights or errors may have been chosen before there were weights.
-    const { engine } = ctx.session();
+    const engine = ctx.engine();
     engine.setScene(drawn(store.get()));
     store.set({ legend: engine.legend() ?? null });
   };
@@ -102,20 +86,25 @@ export function createBind(ctx: Context): BindActions {
     }
   };
 
-  const actions: BindActions = {
-    async start(unasked = false, options = store.get().bindOptions) {
+  const actions = {
+    /**
+     * Binds the model to the cage. Resolves with true if the model is bound afterwards. `unasked`: the page started the
+     * bind, not the user, so earlier error messages remain.
+     */
+    async start(unasked = false, options: BindOptions = store.get().bindOptions): Promise<boolean> {
       if (!store.get().cage || cageBroken(store.get())) return false;
       if (!unasked) ctx.tell.clear();
-      const { revision } = ctx.session().engine;
+      const { revision } = ctx.engine();
       store.set({ bindRun: start("coarse", revision, options) });
       const ok = await attempt(ctx, T.failed.bind, () =>
         ctx.queue.replace("bind", (signal) => bind(revision, signal, options)),
       );
-      // Meanwhile, a bind of another cage may have been queued. It has another revision.
+      // In the meantime, a bind of another cage may have been queued. It has another revision.
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;
     },
-    again(patch) {
+    /** Changes the bind options by `patch` and binds again. */
+    again(patch: Partial<BindOptions>): Promise<boolean> {
       actions.setOptions(patch);
       return actions.start();
     },
@@ -124,15 +113,17 @@ export function createBind(ctx: Context): BindActions {
       ctx.queue.cancel("bind");
       if (bindRun && bound && report !== coarse) ctx.tell.say(T.bind.cancelled);
     },
-    covers() {
+    /** Whether the model is bound to the current cage, is being bound to it, or has cached weights for it. */
+    covers(): boolean {
       const { bound, bindRun } = store.get();
-      const { engine } = ctx.session();
+      const engine = ctx.engine();
       return bound || engine.hasWeights || bindRun?.revision === engine.revision;
     },
-    setOptions(patch) {
+    setOptions(patch: Partial<BindOptions>) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },
-    async prepareCompare(kinds) {
+    /** Computes coordinates of these kinds for comparison, once for each cage. Resolves with false on failure. */
+    async prepareCompare(kinds: readonly Coordinates[]): Promise<boolean> {
       for (const kind of kinds) {
         if (kind === "harmonic") continue;
         const isThere = await attempt(ctx, T.failed.formula(T.coordinates[kind]), () =>
@@ -149,6 +140,8 @@ export function createBind(ctx: Context): BindActions {
   return actions;
 }
 
+export type BindActions = ReturnType<typeof createBind>;
+
 function start(pass: BindRun["pass"], revision: number, options: BindOptions): BindRun {
   return {
     pass,
@@ -164,8 +157,8 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
 }
 
 /**
- * Whether two binds had the same method, solver, grid and backend. The report of the newer bind then replaces the
- * other.
+ * Whether two binds had the same method, solver, preconditioner, grid and backend. The report of the newer bind then
+ * replaces the other.
  */
 export function sameWay(a: BindReport, b: BindReport): boolean {
   return (

@@ -1,43 +1,19 @@
 /** Makes cages (generated, as a box, or from a file) and repairs them. */
 
 import type { CageOptions, CheckedCage, Command, Mend, NamedFile, Reading, Repair } from "../contract";
-import { type CageSettings, cageKey, cageSettings, hasUnmadeCage } from "../derived";
+import { HULL_TARGET } from "../defaults";
+import { cageKey, cageSettings, hasUnmadeCage } from "../derived";
 import type { DocumentMirror } from "../document";
 import { follow } from "../queue";
+import type { CageSettings } from "../state";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import { attempt, type Context, waitFor } from "./context";
 import type { Edit } from "./edit";
-import { carriableOf, type PoseActions } from "./poses";
+import { type PoseActions, snapshotCage } from "./poses";
 
-export interface CageActions {
-  /** Sets how often the cage is subdivided for a smooth surface, 0 to 3 times. Returns false if that fails. */
-  setSmooth(steps: number): boolean;
-  /**
-   * Changes smoothing or inner controls of the cage as one undo step, and carries poses over. Shows an error and
-   * returns false if that fails.
-   */
-  change(label: string, change: Command | (() => void), failed?: string): boolean;
-  /**
-   * Makes a cage with the settings of the Cage panel. Resolves with false on failure. `unasked`: the page started this,
-   * not the user, so error messages stay on screen.
-   */
-  make(unasked?: boolean): Promise<boolean>;
-  cancel(): void;
-  /** Draws the cage of the panel's settings as lines, unless it is the current one. */
-  preview(): Promise<void>;
-  load(files: readonly NamedFile[], unasked?: boolean): Promise<boolean>;
-  repair(kind: Repair): Promise<boolean>;
-  /** Selects generated cages in the panel and generates one. */
-  regenerate(): Promise<boolean>;
-  /** Runs the fix that the check offers for a problem. */
-  mend(fix: Mend): void;
-}
-
-/** Largest model whose cages are previewed, vertices: each preview generates a cage. */
+/** Maximum number of vertices of a model for which cages are previewed, because each preview generates a cage. */
 const MAX_PREVIEWED = 200_000;
-/** Maximum number of vertices of a hull cage. It is small, because a hull does not follow limbs. */
-const HULL_VERTICES = 24;
 
 export interface CageNeeds {
   readonly edit: Pick<Edit, "settle" | "step">;
@@ -47,24 +23,24 @@ export interface CageNeeds {
   readonly poses: Pick<PoseActions, "carry">;
 }
 
-export function createCage(ctx: Context, { bind, edit, know, made, poses }: CageNeeds): CageActions {
-  const engine = () => ctx.session().engine;
+export function createCage(ctx: Context, { bind, edit, know, made, poses }: CageNeeds) {
+  const { engine } = ctx;
 
-  const change: CageActions["change"] = (label, change, failed = T.failed.controls) => {
+  const change = (label: string, change: Command | (() => void), failed = T.failed.controls): boolean => {
     edit.settle();
-    const before = carriableOf(ctx);
+    const before = snapshotCage(ctx);
     const work = typeof change === "function" ? change : () => engine().apply(change, label);
     if (!before || !edit.step(work, failed)) return false;
     if (engine().restPositions().length !== before.cage.positions.length) void poses.carry(before);
     return true;
   };
 
-  /** Replaces the cage and adds an undo step, except for the first cage of a model. */
+  /** Replaces the cage and adds an undo step, except for the first cage of a model that was not changed. */
   const take = (label: string, cage: CheckedCage) => {
     edit.settle();
-    const before = carriableOf(ctx);
+    const before = snapshotCage(ctx);
     const { posed, poses: saved } = ctx.store.get();
-    const isFirst = !before && ctx.store.get().undoLabel === null;
+    const isFirst = !before && ctx.store.get().undo === null;
     ctx.session().takeCage(cage, isFirst ? undefined : label);
     if (cage.check) know(cage.check);
     // A first cage or one from a file may not fit into the view.
@@ -80,7 +56,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
   let isPreviewing = false;
 
   const optionsOf = ({ cageSource, cageOptions }: CageSettings): CageOptions => {
-    const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
+    const hull = { shape: "hull", target: HULL_TARGET, voxels: 0 } as const;
     return cageSource === "hull" ? { ...cageOptions, ...hull } : cageOptions;
   };
   const isCurrent = (settings: CageSettings) =>
@@ -113,12 +89,12 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
           ? previewed.cage
           : await follow(signal, ctx.session().generateCage(options, hear, cageClip ?? undefined));
       const vertices = made.positions.length / 3;
-      if (vertices > options.vertices) {
-        ctx.tell.say(T.cage.more(vertices, options.vertices));
+      if (vertices > options.target) {
+        ctx.tell.say(T.cage.more(vertices, options.target));
       }
       if (made.bridged) {
         const each = { label: T.cage.perPart, run: () => makeForEachPart() };
-        ctx.tell.say(T.cage.bridged(made.bridged), each);
+        ctx.tell.say(T.cage.bridged(made.bridged, ctx.store.get().model?.members.length ?? 1), each);
       }
       return made;
     } finally {
@@ -132,10 +108,19 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     void actions.regenerate();
   };
 
-  const actions: CageActions = {
+  const actions = {
+    /**
+     * Changes smoothing or interior controls of the cage as one undo step. If the number of controls changes, converts
+     * the poses to the changed cage. Shows an error and returns false if the change fails.
+     */
     change,
-    setSmooth: (steps) => change(T.did.smooth(steps), { do: "subdivide", steps }),
-    make(unasked = false) {
+    /** Sets the number of subdivision steps that smooth the cage, 0 to 3. Returns false on failure. */
+    setSmooth: (steps: number): boolean => change(T.did.smooth(steps), { do: "subdivide", steps }),
+    /**
+     * Makes a cage with the settings of the Cage panel. Resolves with false on failure. `unasked`: the page called
+     * this, not the user, so earlier error messages remain.
+     */
+    make(unasked = false): Promise<boolean> {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
@@ -147,6 +132,10 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
       );
     },
     cancel: () => ctx.queue.cancel("cage"),
+    /**
+     * Draws the cage that the panel's settings would make as lines. Removes this preview if the current cage was made
+     * with these settings, or if they cannot be previewed.
+     */
     async preview() {
       if (!toPreview()) {
         ctx.queue.cancel("preview");
@@ -155,7 +144,8 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
       if (isPreviewing) return;
       isPreviewing = true;
       try {
-        // Finish each preview before the next one: a slider that moves would cancel all of them.
+        // Finish each preview before starting the next one. If each movement of a slider cancelled the preview in
+        // progress, none would be shown before the slider stops.
         for (let settings = toPreview(); settings && !isCurrent(settings); settings = toPreview()) {
           const { cageSource, boxDivisions, cageClip } = settings;
           const options = optionsOf(settings);
@@ -170,13 +160,13 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
           showPreview(cage);
         }
       } catch {
-        // Making the cage reports why these settings fail.
+        // Ignore the error: making a cage with these settings reports it.
         showPreview(undefined);
       } finally {
         isPreviewing = false;
       }
     },
-    load(files, unasked = false) {
+    load(files: readonly NamedFile[], unasked = false): Promise<boolean> {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.cageFile, () =>
         ctx.queue.replace("open", async (signal) => {
@@ -188,7 +178,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
         }),
       );
     },
-    repair(kind) {
+    repair(kind: Repair): Promise<boolean> {
       return attempt(ctx, T.failed.repair, () =>
         ctx.queue.replace("open", async (signal) => {
           const repair = () => ctx.session().repair(kind);
@@ -196,11 +186,13 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
         }),
       );
     },
-    regenerate() {
+    /** Selects generated cages in the panel and generates one. */
+    regenerate(): Promise<boolean> {
       ctx.store.set({ cageSource: "auto" });
       return actions.make();
     },
-    mend(fix) {
+    /** Runs the fix that the check offers for a problem. */
+    mend(fix: Mend) {
       if (fix.kind === "repair") void actions.repair(fix.repair);
       else if (fix.kind === "regenerate") void actions.regenerate();
       else void bind.again({ grid: fix.cells });
@@ -208,3 +200,5 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
   };
   return actions;
 }
+
+export type CageActions = ReturnType<typeof createCage>;

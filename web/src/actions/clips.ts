@@ -1,4 +1,7 @@
-/** Plays the clips of a rigged model, deformed as in an exported file. */
+/**
+ * Plays the clips of a rigged model, deformed as in an exported file. While a clip is paused, the cage can be moved:
+ * the engine shows the frame in each new pose.
+ */
 
 import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
@@ -8,66 +11,58 @@ import type { ClipState } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
-export interface ClipActions {
-  /** Shows the clip with this index, and plays it unless the user prefers reduced motion; null calls `stop`. */
-  choose(clip: number | null): Promise<void>;
-  toggle(): Promise<void>;
-  /** Seeks to a time in seconds and pauses. */
-  scrub(seconds: number): Promise<void>;
-  speed(factor: number): void;
-  loop(on: boolean): void;
-  /** Sets the weight of a morph target that no clip drives. */
-  target(index: number, weight: number): Promise<void>;
-  rig(patch: Partial<RigOptions>): void;
-  /** Ends the clip and shows the cage's pose. */
-  stop(): void;
-}
-
 /** Computes the lattice by which the cage deforms a moving model, if the options need one and the engine has none. */
-export async function loadLattice(ctx: Context): Promise<void> {
-  const { engine } = ctx.session();
+export async function loadClipLattice(ctx: Context): Promise<void> {
+  const engine = ctx.engine();
   if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
   ctx.tell.say(T.clips.preparing);
   const { grid } = ctx.store.get().bindOptions;
-  await ctx.queue.add("lattice", (signal) => follow(signal, ctx.session().loadLattice(grid)));
+  // Playback and export use the same lattice: neither may cancel the computation of the other.
+  await ctx.queue.add("lattice", async (signal) => {
+    if (!engine.hasLattice) await follow(signal, ctx.session().loadLattice(grid));
+  });
 }
 
-export function createClips(ctx: Context, settle: () => void): ClipActions {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+export function createClips(ctx: Context, settle: () => void) {
+  const { store, engine } = ctx;
   let frame = 0;
   let last = 0;
+  /** The clip that a change of options has ended, until it is shown again. */
+  let interrupted: ClipState | undefined;
 
   const set = (patch: Partial<ClipState>) => store.set({ clip: { ...store.get().clip, ...patch } });
 
   const show = () => {
-    const { clip, seconds, targets } = store.get().clip;
-    engine().showClip(clip ?? undefined, seconds, Float32Array.from(targets));
+    const { clip, seconds, targets, playing } = store.get().clip;
+    engine().showClip(clip ?? undefined, seconds, Float32Array.from(targets), !playing);
   };
 
   const pause = () => {
     cancelAnimationFrame(frame);
-    if (store.get().clip.playing) set({ playing: false });
+    if (!store.get().clip.playing) return;
+    set({ playing: false });
+    if (engine().showsClip) show();
   };
 
   const stop = () => {
+    interrupted = undefined;
     pause();
     if (engine().showsClip) engine().stopClip();
     if (store.get().clip.clip !== null || store.get().clip.targets.length > 0)
       set({ clip: null, seconds: 0, targets: [] });
   };
 
-  // Undo steps, gestures and blends pose the cage, which ends the clip in the engine: reset the state.
+  // A change of models, cage or weights ends the clip in the engine: reset the state. Reshaping the cage and playing
+  // the saved poses end the clip, too.
   effect(() => {
     store.get().steps;
-    store.get().gesture;
-    store.get().shares;
-    untracked(() => {
-      if (store.get().clip.clip !== null && !engine().showsClip) stop();
-    });
+    store.get().report;
+    const { bound, editingRest, playing, clip } = store.get();
+    const isShown = clip.clip !== null || clip.targets.length > 0;
+    if (isShown && (!bound || editingRest || playing || !engine().showsClip)) untracked(stop);
   });
 
-  /** Prepares the model in its current pose for playback. False if that fails. */
+  /** Prepares the model in its current pose for playback. False if it is not bound or the preparation fails. */
   const ready = async (): Promise<boolean> => {
     if (engine().showsClip) return true;
     settle();
@@ -76,7 +71,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
       return false;
     }
     return attempt(ctx, T.failed.clip, async () => {
-      await loadLattice(ctx);
+      await loadClipLattice(ctx);
       await engine().startClip(rigOf(store.get()));
     });
   };
@@ -84,7 +79,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
   const step = (now: number) => {
     const { clip, seconds, speed, loop } = store.get().clip;
     const length = store.get().model?.clips[clip ?? -1]?.seconds ?? 0;
-    // Posing the cage has ended the clip.
+    // A change of models or cage has ended the clip.
     if (!engine().showsClip || length <= 0) {
       stop();
       return;
@@ -93,7 +88,6 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     last = now;
     if (next >= length && !loop) {
       set({ seconds: length });
-      show();
       pause();
       return;
     }
@@ -116,7 +110,8 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
   };
 
   return {
-    async choose(clip) {
+    /** Shows the clip with this index, and plays it unless the user prefers reduced motion; null calls `stop`. */
+    async choose(clip: number | null) {
       pause();
       if (clip === null) {
         stop();
@@ -131,15 +126,19 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
       if (store.get().clip.playing) pause();
       else await play();
     },
-    async scrub(seconds) {
+    /** Pauses the clip, so that the cage is shown and can be moved. */
+    pause,
+    /** Seeks to a time in seconds and pauses. */
+    async scrub(seconds: number) {
       pause();
       if (store.get().clip.clip === null || !(await ready())) return;
       set({ seconds });
       show();
     },
-    speed: (speed) => set({ speed }),
-    loop: (loop) => set({ loop }),
-    async target(index, weight) {
+    speed: (speed: number) => set({ speed }),
+    loop: (loop: boolean) => set({ loop }),
+    /** Sets the weight of a morph target that no clip drives. */
+    async target(index: number, weight: number) {
       if (!(await ready())) return;
       const defaults = store.get().model?.targets.map((target) => target.default) ?? [];
       const targets = [...(store.get().clip.targets.length > 0 ? store.get().clip.targets : defaults)];
@@ -147,11 +146,25 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
       set({ targets });
       show();
     },
-    rig(patch) {
+    /** Changes options of the skeleton. A shown clip is prepared again with the new options, and continues. */
+    async rig(patch: Partial<RigOptions>) {
+      const before = store.get().clip.clip === null ? interrupted : store.get().clip;
       stop();
       store.set({ rigOptions: { ...store.get().rigOptions, ...patch } });
       engine().setScene(drawn(store.get()));
+      interrupted = before;
+      if (!before || !(await ready())) return;
+      if (interrupted !== before) {
+        // In the meantime, the user has changed another option or ended the clip.
+        if (!interrupted && store.get().clip.clip === null) engine().stopClip();
+        return;
+      }
+      interrupted = undefined;
+      set({ clip: before.clip, seconds: before.seconds, targets: before.targets });
+      show();
+      if (before.playing) await play();
     },
+    /** Ends the clip and shows the cage's pose. */
     stop,
   };
 }

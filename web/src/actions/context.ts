@@ -1,10 +1,10 @@
 /** What every action needs (session, state, queue, messages), and functions that run actions and show their errors. */
 
-import type { Job, ReadFile, Reading, Session } from "../contract";
+import type { Engine, Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import { onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
-import { type Explained, explain, isCancelled, type Message } from "../strings";
+import { type Explanation, explain, isCancelled, type Message } from "../strings";
 import { T } from "../words";
 
 export interface Fix {
@@ -16,20 +16,21 @@ export interface Tell {
   /** Shows a short message that disappears by itself. */
   say(text: Message, ...fixes: Fix[]): void;
   /** Shows an error that stays until it is closed or fixed. */
-  problem(explained: Explained, fix?: Fix): void;
+  problem(explained: Explanation, fix?: Fix): void;
   /** Removes all error messages. Called when the user starts something new. */
   clear(): void;
 }
 
 export interface Context {
   readonly session: () => Session;
+  readonly engine: () => Engine;
   readonly store: Store;
   readonly queue: Queue;
   readonly tell: Tell;
   /** Rectangle of the view in the window. */
   readonly viewport: () => DOMRect;
-  /** The button for an error's fix. */
-  readonly fixFor: (fix: NonNullable<Explained["fix"]>) => Fix;
+  /** Returns the button that runs the fix of an error. */
+  readonly fixFor: (fix: NonNullable<Explanation["fix"]>) => Fix;
 }
 
 /** Runs `work` and shows errors, except cancellations, with their fix. Returns whether it succeeded. */
@@ -47,12 +48,12 @@ export async function attempt(
   }
 }
 
-/** Time for which opening a file may block the page without asking the user first, ms. */
-const LONG_MS = 4000;
+/** Number of vertices above which opening a file asks the user first, because the browser may run out of memory. */
+const LARGE = 2_000_000;
 
 /**
- * Blocks the page until a job is done, and shows its progress with a cancel button. Asks for confirmation if opening
- * the result would block the page for long.
+ * Blocks the page until a job is done, and shows its progress with a cancel button. Asks for confirmation if the result
+ * is a large model.
  */
 export async function waitFor<T extends object>(
   ctx: Context,
@@ -69,11 +70,11 @@ export async function waitFor<T extends object>(
   store.set({ busy: what, busyStep: "", cancelBusy });
   try {
     const read = await job.done;
-    const { took = 0, vertices = 0 } = read as Partial<ReadFile>;
-    if (took > LONG_MS) {
+    const { vertices = 0 } = read as Partial<ReadFile>;
+    if (vertices > LARGE) {
       await new Promise<void>((goOn, giveUp) => {
         cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
-        const busyStep = T.opening.freezes(vertices, took);
+        const busyStep = T.opening.large(vertices);
         store.set({ busyStep, goOn, cancelBusy });
       });
     }
@@ -84,7 +85,8 @@ export async function waitFor<T extends object>(
 }
 
 /**
- * Shows an error, unless it is a cancellation. `file`: whether the fix "file" offers to open or to add another file.
+ * Shows an error, unless it is a cancellation. `file`: what the button offers if the file is at fault: to open
+ * another file ("file") or to add one ("add").
  */
 export function report(ctx: Context, title: string, error: unknown, file: "file" | "add" = "file"): void {
   if (isCancelled(error)) return;

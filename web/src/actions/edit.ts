@@ -3,45 +3,16 @@
  */
 
 import { nextAmount } from "../amount";
-import type { Command, Gesture, GestureView, GizmoHandle, RestEdit } from "../contract";
+import type { Command, Gesture, GestureView, GizmoPart, RestEdit } from "../contract";
 import { decimals } from "../format";
 import { T } from "../words";
 import { type Context, report } from "./context";
 
-export interface Edit {
-  /** Starts a gesture at a point of the view. False if nothing is selected. */
-  begin(gesture: Gesture, x: number, y: number): boolean;
-  beginGizmo(handle: GizmoHandle, x: number, y: number): boolean;
-  drag(x: number, y: number): void;
-  constrain(axis: 0 | 1 | 2, plane: boolean): void;
-  /** Handles a key as part of the gesture's amount, such as "-0.5". Returns false for other keys. */
-  type(key: string): boolean;
-  end(keep: boolean): void;
-  active(): boolean;
-  nudge(right: number, up: number): void;
-  /** Adds the undo step of nudges or of a released pull, and ends an animation. */
-  settle(): void;
-  /** Adds a function that `settle` calls. */
-  alsoSettles(write: () => void): void;
-  moveTo(x: number, y: number, z: number): void;
-  /**
-   * Runs a command as one undo step. If it throws, shows the error under the title `failed`. Returns whether the
-   * command succeeded.
-   */
-  apply(command: Command, label: string, failed?: string): boolean;
-  /** Like `apply`, for a method of the engine that adds an undo step itself. */
-  step(work: () => void, failed: string): boolean;
-  restEdit(edit: RestEdit): void;
-  /** Turns reshaping of the cage on or off. Calls `settle` first. */
-  setEditingRest(on: boolean): void;
-}
-
 /** Longest interval between two presses of arrow keys that become one undo step, ms. */
 const NUDGE_PAUSE_MS = 600;
 
-export function createEdit(ctx: Context): Edit {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+export function createEdit(ctx: Context) {
+  const { store, engine } = ctx;
   /** Name of the gesture in progress, which the label of its undo step contains. */
   let verb: string | undefined;
   let typed = "";
@@ -70,7 +41,7 @@ export function createEdit(ctx: Context): Edit {
     keep(T.did.vertices(T.did.nudge, store.get().selected.count));
   };
 
-  const step: Edit["step"] = (work, failed) => {
+  const step = (work: () => void, failed: string): boolean => {
     settle();
     try {
       work();
@@ -80,7 +51,7 @@ export function createEdit(ctx: Context): Edit {
       return false;
     }
   };
-  const apply: Edit["apply"] = (command, label, failed = T.failed.edit(label)) =>
+  const apply = (command: Command, label: string, failed = T.failed.edit(label)): boolean =>
     step(() => engine().apply(command, label), failed);
 
   const start = (name: string, begin: () => boolean): boolean => {
@@ -104,21 +75,24 @@ export function createEdit(ctx: Context): Edit {
   };
 
   return {
-    begin: (gesture, x, y) => start(T.did[gesture], () => engine().beginTransform(gesture, x, y)),
-    beginGizmo(handle, x, y) {
+    /** Starts a gesture at a point of the view. False if nothing is selected, or during a gesture or animation. */
+    begin: (gesture: Gesture, x: number, y: number): boolean =>
+      start(T.did[gesture], () => engine().beginTransform(gesture, x, y)),
+    beginGizmo(part: GizmoPart, x: number, y: number): boolean {
       const { gizmo } = store.get().scene;
       const name = gizmo === "rotate" || gizmo === "scale" ? T.did[gizmo] : T.did.grab;
-      return start(name, () => engine().beginGizmo(handle, x, y));
+      return start(name, () => engine().beginGizmo(part, x, y));
     },
-    drag(x, y) {
+    drag(x: number, y: number) {
       engine().dragTransform(x, y);
       showLabel();
     },
-    constrain(axis, plane) {
+    constrain(axis: 0 | 1 | 2, plane: boolean) {
       engine().constrain(axis, plane);
       showLabel();
     },
-    type(key) {
+    /** Handles a key as part of the gesture's amount, such as "-0.5". Returns false for other keys. */
+    type(key: string): boolean {
       const next = nextAmount(typed, key);
       if (next === undefined) return false;
       typed = next;
@@ -127,7 +101,7 @@ export function createEdit(ctx: Context): Edit {
       showLabel();
       return true;
     },
-    end(keepIt) {
+    end(keepIt: boolean) {
       if (verb === undefined) return;
       const label = T.did.vertices(verb, store.get().selected.count);
       verb = undefined;
@@ -135,27 +109,37 @@ export function createEdit(ctx: Context): Edit {
       store.set({ gesture: null, strays: 0 });
       if (moved) keep(label);
     },
-    active: () => verb !== undefined,
-    nudge(right, up) {
+    active: (): boolean => verb !== undefined,
+    nudge(right: number, up: number) {
       if (!engine().nudge(right, up)) return;
       clearTimeout(nudging);
       nudging = setTimeout(settle, NUDGE_PAUSE_MS);
     },
+    /** Adds the pending undo step of nudges or of a released pull, and ends an animation. */
     settle,
-    alsoSettles: (write) => others.push(write),
-    moveTo(x, y, z) {
+    /** Adds a function that `settle` calls. */
+    alsoSettles: (write: () => void) => others.push(write),
+    moveTo(x: number, y: number, z: number) {
       settle();
       if (engine().moveSelectionTo(x, y, z)) keep(T.did.type);
     },
+    /**
+     * Runs a command as one undo step. If it throws, shows the error under the title `failed`. Returns whether the
+     * command succeeded.
+     */
     apply,
+    /** Like `apply`, for a method of the engine that adds an undo step itself. */
     step,
-    restEdit: (edit) => void apply({ do: "edit_rest", edit }, T.did.edits[edit]),
-    setEditingRest(on) {
+    restEdit: (edit: RestEdit) => void apply({ do: "edit_rest", edit }, T.did.edits[edit]),
+    /** Turns reshaping of the cage on or off. Calls `settle` first. */
+    setEditingRest(on: boolean) {
       settle();
       if (store.get().editingRest !== on) engine().setEditingRest(on, T.did.reset);
     },
   };
 }
+
+export type Edit = ReturnType<typeof createEdit>;
 
 /** The status line of a gesture, such as "Move 0.25 along X". */
 export function sayGesture({ kind, amounts, axis, plane }: GestureView): string {

@@ -2,45 +2,51 @@
 
 import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
-import { EXPORT_TYPES, SHAPE_FORMATS } from "../defaults";
+import { EXPORT_TYPES, SHAPE_FORMATS, type SPLAT_FORMATS } from "../defaults";
 import { rigOf } from "../derived";
 import { exportStem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { loadLattice } from "./clips";
+import { loadClipLattice } from "./clips";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
+import type { Pulling } from "./pull";
 
-export type ExportKind = "glb" | "shape" | "poses" | "cage" | "controls" | "weights" | "picture" | "project";
+export type ExportKind =
+  | "glb"
+  | "shape"
+  | "poses"
+  | "clips"
+  | "cage"
+  | "controls"
+  | "weights"
+  | "picture"
+  | "project";
 
-export type ShapeFormatName = (typeof SHAPE_FORMATS)[number];
+export type ShapeFormatName = (typeof SHAPE_FORMATS | typeof SPLAT_FORMATS)[number];
 
-export interface Exports {
-  save(kind: ExportKind): Promise<void>;
-  /** Copies a link to the open work, or offers to save a project if a link cannot contain it. */
-  share(): Promise<void>;
-  /** Sets the pixels of a picture per CSS pixel of the view, and whether the picture shows only the model. */
-  pictureOf(scale: number, alone: boolean): void;
-  /** Sets the format of exported shapes, and whether they are the shown frame of a clip. */
-  shapeIn(format: ShapeFormatName, frame: boolean): void;
+/** A file to download. */
+interface ExportedFile {
+  readonly name: string;
+  readonly bytes: Uint8Array<ArrayBuffer>;
 }
 
 /** Pause between two downloads, ms. Browsers drop downloads that start at the same time. */
 const BETWEEN_MS = 250;
 
-/** Media type of formats without a registered one. */
+/** Media type for formats that have no registered type. */
 const OCTETS = "application/octet-stream";
 
-/** Largest side of a picture, pixels. */
+/** Maximum length of a picture's longer side, pixels. */
 const LONGEST_SIDE = 8192;
 
-export function createExports(ctx: Context, project: Project): Exports {
+export function createExports(ctx: Context, project: Project, pull: Pick<Pulling, "released">) {
   let scale = 2;
   let alone = false;
   let format: ShapeFormatName = SHAPE_FORMATS[0];
   let frame = true;
 
-  const engine = () => ctx.session().engine;
+  const { engine } = ctx;
   const rig = () => rigOf(ctx.store.get());
 
   /** Exports that write one file for each model. */
@@ -50,24 +56,24 @@ export function createExports(ctx: Context, project: Project): Exports {
     poses: (id: number) => engine().exportPoses(id, rig()),
     weights: (id: number) => engine().exportWeights(id),
   };
-  const isOwn = (kind: ExportKind): kind is keyof typeof own => kind in own;
+  const isOwn = (kind: string): kind is keyof typeof own => kind in own;
   const shared = {
     cage: () => engine().exportCage(),
     controls: () => engine().exportControls(),
     project: () => project.write(),
   };
 
-  const suffix = (kind: Exclude<ExportKind, "project">): string =>
+  const suffix = (kind: Exclude<ExportKind, "project" | "clips">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
   /** Downloads one file for each model to export, or all of them in a zip archive. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
-    if (kind === "glb") await loadLattice(ctx);
+    if (kind === "glb") await loadClipLattice(ctx);
     const { members } = model;
     const { exportOnly } = ctx.store.get();
     const chosen = members.filter(({ id }) => id === exportOnly);
     const notices = new Set<string>();
-    const files: { name: string; bytes: Uint8Array<ArrayBuffer> }[] = [];
+    const files: ExportedFile[] = [];
     for (const member of chosen.length > 0 ? chosen : members) {
       // A single model may be shown under the name of its sample or project.
       const source = members.length === 1 ? model.name : member.name;
@@ -86,6 +92,11 @@ export function createExports(ctx: Context, project: Project): Exports {
       const name = first.name.replace(/\.\w+$/, ".zip");
       files.splice(0, files.length, { name, bytes: ctx.session().zip(files) as Uint8Array<ArrayBuffer> });
     }
+    await deliver(files, notices);
+  };
+
+  /** Downloads files, then shows their names, their total size and the notices. */
+  const deliver = async (files: readonly ExportedFile[], notices: ReadonlySet<string>) => {
     for (const [k, { name, bytes }] of files.entries()) {
       if (k > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
       download(blobOf(name, bytes), name);
@@ -106,10 +117,11 @@ export function createExports(ctx: Context, project: Project): Exports {
     return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), alone);
   };
 
-  const exports: Exports = {
-    async save(kind) {
+  const exports = {
+    async save(kind: Exclude<ExportKind, "clips">) {
       const { model } = ctx.store.get();
       await attempt(ctx, T.failed.write, async () => {
+        await pull.released();
         // Right after a bind, its weights may still be uploading to the GPU.
         await engine().ready();
         if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
@@ -121,6 +133,26 @@ export function createExports(ctx: Context, project: Project): Exports {
         ctx.tell.say(T.exports.saved([file], blob.size));
       });
     },
+    /** Fits the clips of files without a mesh to the posed skeleton, and downloads a GLB for each file. */
+    async clips(chosen: readonly NamedFile[]) {
+      await attempt(ctx, T.failed.write, async () => {
+        await pull.released();
+        await engine().ready();
+        const notices = new Set<string>();
+        const files: ExportedFile[] = [];
+        for (const { name, file } of chosen) {
+          const bytes = new Uint8Array(await file.arrayBuffer());
+          const taken = files.map((file) => file.name);
+          files.push({
+            name: other(`${exportStem(name)}-posed.glb`, taken),
+            bytes: engine().exportClips(name, bytes, rig()) as Uint8Array<ArrayBuffer>,
+          });
+          for (const notice of engine().rigNotices()) notices.add(notice);
+        }
+        await deliver(files, notices);
+      });
+    },
+    /** Copies a link to the open work, or offers to save a project if a link cannot contain it. */
     async share() {
       const link = await project.link();
       if (!link) {
@@ -133,15 +165,19 @@ export function createExports(ctx: Context, project: Project): Exports {
       }
       await copyLink(ctx, link, T.exports.copied);
     },
-    pictureOf(size, isAlone) {
+    /** Sets the number of picture pixels per CSS pixel of the view, and whether the picture shows only the model. */
+    pictureOf(size: number, isAlone: boolean) {
       [scale, alone] = [size, isAlone];
     },
-    shapeIn(chosen, isFrame) {
+    /** Sets the format of exported shapes, and whether they show the current frame of a clip. */
+    shapeIn(chosen: ShapeFormatName, isFrame: boolean) {
       [format, frame] = [chosen, isFrame];
     },
   };
   return exports;
 }
+
+export type Exports = ReturnType<typeof createExports>;
 
 /** Copies a link to the clipboard and shows `done`. */
 export async function copyLink(ctx: Context, link: string, done: string): Promise<void> {
@@ -155,7 +191,7 @@ export async function copyLink(ctx: Context, link: string, done: string): Promis
   }
 }
 
-const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
+const SUFFIX: Record<Exclude<ExportKind, "project" | "shape" | "clips">, string> = {
   glb: "-posed.glb",
   poses: "-poses.glb",
   cage: "-cage.obj",
@@ -178,7 +214,7 @@ function other(name: string, taken: readonly string[]): string {
   return taken.includes(name) ? again(n) : name;
 }
 
-/** Downloads a file. */
+/** Downloads a blob as a file called `name`. */
 function download(blob: Blob, name: string): void {
   const url = URL.createObjectURL(blob);
   const link = document.createElement("a");

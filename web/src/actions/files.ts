@@ -1,6 +1,6 @@
 /** Opens samples, files and projects, then makes a cage and binds automatically. */
 
-import type { BindOptions, NamedFile, Opened, Settings, UpAxis } from "../contract";
+import type { BindOptions, NamedFile, OpenedFile, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS } from "../defaults";
 import type { DocumentMirror } from "../document";
 import { planDrop } from "../drop";
@@ -13,18 +13,9 @@ import { attempt, type Context } from "./context";
 import type { ControlActions } from "./controls";
 import type { Models } from "./models";
 import type { Project } from "./project";
-import { modelsOf, type Named, readModels } from "./read";
+import { modelsOf, type ReadResult, readModels } from "./read";
 import type { View } from "./view";
 import type { WorkActions } from "./works";
-
-export interface Files {
-  /** `bind`: bind options in place of the defaults. */
-  openSample(id: string, bind?: BindOptions): Promise<boolean>;
-  /** Opens dropped or chosen files, whose names determine their roles. */
-  openFiles(files: readonly NamedFile[]): Promise<boolean>;
-  /** Rotates the model with its cage and poses to another up axis. */
-  turn(up: UpAxis): Promise<boolean>;
-}
 
 export interface FileNeeds {
   readonly know: DocumentMirror["know"];
@@ -34,31 +25,33 @@ export interface FileNeeds {
   readonly controls: Pick<ControlActions, "load">;
   readonly models: Pick<Models, "join">;
   readonly project: Pick<Project, "write">;
-  readonly view: Pick<View, "symmetry">;
+  readonly view: Pick<View, "tools">;
   readonly works: Pick<WorkActions, "flush" | "leave">;
   /** Ends playback and operations in progress before something else is opened. */
   settle(): void;
-  /** Called before a sample is opened, or before a file is opened (null). */
+  /** Called before a sample or a file is opened. `sample` is null for a file. */
   overtaken(sample: string | null): void;
 }
 
 /**
- * Largest work of a bind that starts by itself, updates of one value: 10 s on one processor core. A number in a project could
- * otherwise ask for hours.
+ * Limit on the estimated work of the automatic bind of a project, in updates of one value at a grid node. This many
+ * take about 10 s on one processor core; the options of a project file could ask for hours.
  */
 const MOST_UPDATES = 1e10;
 
 /** What is opened together with a model: further models, a cage, and bind options. */
 interface Along {
-  readonly others: readonly Named[];
+  readonly others: readonly ReadResult[];
   readonly cageFiles: readonly NamedFile[] | undefined;
   readonly signal: AbortSignal;
   readonly bind: BindOptions | undefined;
 }
 
-export function createFiles(ctx: Context, needs: FileNeeds): Files {
+export function createFiles(ctx: Context, needs: FileNeeds) {
   const { store } = ctx;
-  const take = async (opened: Opened, sample: string | null, along: Partial<Along> = {}) => {
+  let prepared: Promise<void> = Promise.resolve();
+
+  const take = async (opened: OpenedFile, sample: string | null, along: Partial<Along> = {}) => {
     const { others = [], cageFiles, signal, bind } = along;
     // A cage generation or bind in progress is for the previous model.
     for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
@@ -80,7 +73,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
       ...(rigOptions ? { rigOptions } : {}),
     });
     needs.made();
-    needs.view.symmetry(symmetry ?? false);
+    needs.view.tools({ symmetry: symmetry ?? false });
     for (const notice of [...opened.model.notices, ...opened.notices]) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(sentence(settings.notices.join(" ")));
     // Add the other models first, so that the cage encloses all of them.
@@ -88,35 +81,43 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
-    if (opened.model.lies && sample === null) {
-      ctx.tell.say(T.model.lies, { label: T.model.stand, run: () => void actions.turn("z") });
+    const { suggestedUp: up, splats } = opened.model;
+    // For a capture in a project, the user has chosen the axis before saving: do not suggest another.
+    if (up !== null && sample === null && !(splats > 0 && opened.settings !== null)) {
+      const [said, label] = splats > 0 ? T.model.upsideDown : T.model.lies;
+      ctx.tell.say(said, { label, run: () => void actions.turn(up) });
     }
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
-    void prepare(cageFiles, sample !== null, opened.settings !== null);
+    prepared = prepare(cageFiles, sample !== null, opened.settings !== null);
   };
 
-  const settingsOf = (opened: Opened): Settings => {
-    // The memory limit depends on this computer, not on the file.
-    const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
-    return opened.settings === null ? { notices: [] } : ctx.session().readSettings(opened.settings, bind);
+  const settingsOf = (opened: OpenedFile): Settings => {
+    const { memory_limit } = store.get().bindOptions;
+    return opened.settings === null
+      ? { notices: [] }
+      : ctx.session().readSettings(opened.settings, memory_limit);
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {
     if (from.includes(store.get().step)) store.set({ step });
   };
 
-  /** Replaces the bind options of a project by the defaults if a bind with them would take long. */
+  /**
+   * If a bind with the options of a project would exceed `MOST_UPDATES`, replaces the options by the defaults. Keeps
+   * the memory limit.
+   */
   const limitWork = () => {
     const { bindOptions, model } = store.get();
-    const updates = ctx.session().engine.estimateUpdates(bindOptions);
+    const updates = ctx.engine().estimateUpdates(bindOptions);
     if (updates <= MOST_UPDATES) return;
     store.set({ bindOptions: { ...BIND_DEFAULTS, memory_limit: bindOptions.memory_limit } });
     ctx.tell.say(T.opening.longBind(model?.name ?? "", updates / (MOST_UPDATES / 10)));
   };
 
   /**
-   * Makes the cage and binds, unless the user has to repair the cage first. Changes the step of the page, except for samples
-   * and projects.
+   * Loads the cage from `cageFiles`, or makes one if the model has none, and binds the model to it. If the cage has
+   * faults that prevent a bind, shows step Cage instead. Except for samples and projects, shows step Bind during the
+   * bind and step Pose after it.
    */
   const prepare = async (
     cageFiles: readonly NamedFile[] | undefined,
@@ -150,7 +151,7 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     });
 
   /** Saves the open work, then opens another model. */
-  const replace = async (open: () => Promise<Opened>, sample: string | null, along: Partial<Along>) => {
+  const replace = async (open: () => Promise<OpenedFile>, sample: string | null, along: Partial<Along>) => {
     needs.settle();
     needs.overtaken(sample);
     await needs.works.flush();
@@ -159,15 +160,19 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
     await take(opened, sample, along);
   };
 
-  const actions: Files = {
-    openSample(id, bind) {
-      // Free the worker for the sample: it also generates cages and binds.
+  const actions = {
+    /** Resolves when the model that was opened last has a cage and is bound, or cannot be. */
+    prepared: (): Promise<void> => prepared,
+    /** `bind`: options of the bind; the default options if omitted. */
+    openSample(id: string, bind?: BindOptions): Promise<boolean> {
+      // Cancel cage generation and binds, because their worker also builds the sample.
       for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
-      return busy(T.opening.file(T.samples[id]?.name ?? id), T.failed.sample, () =>
-        replace(() => ctx.session().openSample(id), id, { bind }),
+      return busy(T.opening.file(T.samples[id]?.name ?? id), T.failed.sample, (signal) =>
+        replace(() => ctx.session().openSample(id, signal), id, { bind }),
       );
     },
-    openFiles(files) {
+    /** Opens dropped or chosen files, whose names determine their roles. */
+    openFiles(files: readonly NamedFile[]): Promise<boolean> {
       const plan = planDrop(files.map((file) => file.path || file.name));
       const main = plan.main === undefined ? undefined : files[plan.main];
       if (!main) {
@@ -185,7 +190,8 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
         if (first) await replace(() => ctx.session().open(first.read), null, along);
       });
     },
-    turn(up) {
+    /** Rotates the model with its cage and poses to another up axis. */
+    turn(up: UpAxis): Promise<boolean> {
       return busy(T.opening.turning, T.failed.turn, async () => {
         needs.settle();
         await take(await ctx.session().turn(needs.project.write(), up), null);
@@ -195,8 +201,12 @@ export function createFiles(ctx: Context, needs: FileNeeds): Files {
   return actions;
 }
 
-/** The sample that a project was made from. The name of its model is not that of a file. */
-function sampleOf({ settings }: Opened): string | undefined {
+export type Files = ReturnType<typeof createFiles>;
+
+/**
+ * The sample that a project was made from. The page shows the sample's name in place of the name in the project file.
+ */
+function sampleOf({ settings }: OpenedFile): string | undefined {
   try {
     const { sample } = JSON.parse(settings ?? "");
     return typeof sample === "string" ? sample : undefined;

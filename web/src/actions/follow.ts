@@ -1,17 +1,19 @@
 /** Updates the view and binds again after the rest cage has changed. */
 
 import { effect, untracked } from "@preact/signals";
-import { optionsInUse } from "../derived";
+import { isCapture, optionsInUse } from "../derived";
+import { follow } from "../queue";
+import { T } from "../words";
 import type { BindActions } from "./bind";
 import type { CageActions } from "./cage";
-import type { Context } from "./context";
+import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 import type { Pulling } from "./pull";
 import type { View } from "./view";
 
 /** Pause after the last change before binding, ms. */
 const PAUSE_MS = 150;
-/** Largest number of cells along the cage's longest side with which the page binds automatically. */
+/** Maximum number of cells along the cage's longest side with which the page binds automatically. */
 const FINEST = 128;
 
 export interface Followers {
@@ -32,14 +34,15 @@ export function followSettings({ store }: Context, cage: Pick<CageActions, "prev
   });
 }
 
-export function followCage({ store }: Context, { bind, edit, view, pull }: Followers): void {
+export function followCage(ctx: Context, { bind, edit, view, pull }: Followers): void {
+  const { store } = ctx;
   let soon: ReturnType<typeof setTimeout> | undefined;
   const bindSoon = (pause: number) => {
     clearTimeout(soon);
     soon = setTimeout(() => {
       const { cage } = store.get();
       const options = optionsInUse(store.get());
-      // Wait for the end of a gesture in progress. If it changes nothing, its end does not start a bind.
+      // During a gesture, try again after a pause. A gesture that changes nothing does not start a bind when it ends.
       if (edit.active()) bindSoon(PAUSE_MS);
       else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
     }, pause);
@@ -61,6 +64,19 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
     if (cage && bound && bindRun === null) untracked(() => pull.prepare());
   });
   effect(() => {
+    const { model, bound, bindRun, lattice } = store.get();
+    // Splats follow the cage by the deformation field of a lattice, which is bound after the model.
+    if (isCapture(model) && bound && bindRun === null && !lattice) untracked(() => void followSplats(ctx));
+  });
+  effect(() => {
     if (!store.get().editingRest) untracked(() => store.get().cage && bindSoon(0));
   });
+}
+
+/** Computes the lattice by which the splats follow the cage. */
+async function followSplats(ctx: Context): Promise<void> {
+  const { grid } = ctx.store.get().bindOptions;
+  await attempt(ctx, T.failed.bind, () =>
+    ctx.queue.replace("lattice", (signal) => follow(signal, ctx.session().loadLattice(grid))),
+  );
 }

@@ -6,26 +6,10 @@ import { T } from "../words";
 import type { CageActions } from "./cage";
 import { attempt, type Context, waitFor } from "./context";
 import type { Edit } from "./edit";
-import { modelsOf, type Named, readModels } from "./read";
+import { modelsOf, type ReadResult, readModels } from "./read";
 
 /** Treatment of a part that does not follow the cage: it keeps its shape, or it stays in place. */
 export type How = "rigid" | "stays";
-
-export interface Models {
-  /** Adds models from files to the open cage. */
-  add(files: readonly NamedFile[]): Promise<boolean>;
-  /**
-   * Adds models that were read from files. `label` returns the name of the undo step for a number of models; without
-   * it, no step is added.
-   */
-  join(others: readonly Named[], signal: AbortSignal, label?: (models: number) => string): Promise<boolean>;
-  /** Removes a model from the cage. */
-  bin(id: number): boolean;
-  /** Shows or hides a model, without an undo step. */
-  show(id: number, shown: boolean): void;
-  /** Makes a part keep its shape or stay in place, or follow the cage again. "all" is the whole model. */
-  part(id: number, name: string, how: How): void;
-}
 
 export interface ModelNeeds {
   readonly cage: Pick<CageActions, "load" | "regenerate">;
@@ -37,18 +21,19 @@ export interface ModelNeeds {
   settle(): void;
 }
 
-export function createModels(ctx: Context, { cage, edit, checked, openFiles, settle }: ModelNeeds): Models {
+export function createModels(ctx: Context, { cage, edit, checked, openFiles, settle }: ModelNeeds) {
   const { store } = ctx;
   const members = (): readonly MemberInfo[] => store.get().model?.members ?? [];
   const memberOf = (id: number) => members().find((member) => member.id === id);
 
-  /** Generates a cage if there is none yet, because a generation in progress is for the previous models. */
+  /** Without a cage, generates one. This cancels a generation in progress, which is for the previous models. */
   const remakeCage = () => {
     if (!store.get().cage) void cage.regenerate();
   };
 
-  const models: Models = {
-    async add(files) {
+  const models = {
+    /** Adds models from files to the open cage. If no model is open, opens the files instead. */
+    async add(files: readonly NamedFile[]): Promise<boolean> {
       const plan = planDrop(files.map((file) => file.path || file.name));
       if (!store.get().model) return openFiles(files);
       if (plan.kind !== "model") {
@@ -59,7 +44,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       const went = await attempt(ctx, T.models.notAdded, () => {
         ctx.tell.clear();
         return ctx.queue.replace("open", async (signal) => {
-          const { texturePixels } = ctx.session().engine;
+          const { texturePixels } = ctx.engine();
           const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", texturePixels);
           settle();
           const n = members().length;
@@ -77,36 +62,48 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       const second = files[plan.second ?? -1];
       return second && went ? cage.load([second], true) : went;
     },
-    join(others, signal, label) {
+    /**
+     * Adds models that were read from files. `label` returns the name of the undo step for a number of models; without
+     * it, no step is added.
+     */
+    join(
+      others: readonly ReadResult[],
+      signal: AbortSignal,
+      label?: (models: number) => string,
+    ): Promise<boolean> {
       const [first] = others;
       if (!first) return Promise.resolve(true);
       const title = others.length > 1 ? T.models.notAdded : T.failed.open(first.name);
-      const say = (k: number) =>
-        store.set({ busy: T.opening.fileOf(others[k]?.name ?? "", k, others.length) });
       return attempt(ctx, title, async () => {
         const reads = others.map(({ read }) => read);
-        const what = T.opening.fileOf(first.name, 0, others.length);
-        const notices = await waitFor(ctx, signal, what, () => ctx.session().add(reads, label, say));
+        const what = T.opening.joining(members().length + reads.length);
+        const notices = await waitFor(ctx, signal, what, () => ctx.session().add(reads, label));
         const { model } = store.get();
         if (model) store.set({ model: { ...model, notices: [...new Set([...model.notices, ...notices])] } });
       });
     },
-    bin(id) {
+    /** Removes a model from the cage. */
+    bin(id: number): boolean {
       settle();
       const label = T.did.binModel(memberOf(id)?.name ?? "");
       const went = edit.apply({ do: "remove_model", id }, label, T.models.notBinned);
       if (went) remakeCage();
       return went;
     },
-    show(id, shown) {
+    /** Shows or hides a model, without an undo step. */
+    show(id: number, shown: boolean) {
       const member = memberOf(id);
       if (!member) return;
-      const { engine } = ctx.session();
+      const engine = ctx.engine();
       edit.settle();
       engine.apply({ do: "set_parts", id, options: { ...member.options, shown } });
       engine.amend();
     },
-    part(id, name, how) {
+    /**
+     * Makes a part keep its shape or stay in place. If it already does, makes it follow the cage again. "all" is the
+     * whole model.
+     */
+    part(id: number, name: string, how: How) {
       const member = memberOf(id);
       if (!member) return;
       const { options } = member;
@@ -119,5 +116,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
   };
   return models;
 }
+
+export type Models = ReturnType<typeof createModels>;
 
 const rest = (names: readonly string[], name: string) => names.filter((other) => other !== name);

@@ -6,40 +6,16 @@ import { T } from "../words";
 import { type Context, report } from "./context";
 import type { Edit } from "./edit";
 
-export interface PaintActions {
-  /** Starts painting a model; null ends painting. */
-  on(id: number | null): void;
-  brush(patch: Partial<Omit<Painting, "id">>): void;
-  /** Removes all paint from a model. */
-  clear(id: number): void;
-  /** Starts a stroke. False if the point is not on the model. */
-  begin(x: number, y: number): boolean;
-  drag(x: number, y: number): void;
-  /** Keeps the stroke as an undo step, or reverts it. */
-  end(keep: boolean): void;
-  active(): boolean;
-  /**
-   * Radius of the brush at a position of the view, CSS pixels; null where it would not paint, undefined while the GPU
-   * is busy.
-   */
-  radiusAt(x: number, y: number): number | null | undefined;
-}
-
-/** Largest distance between two points of a stroke at which the brush paints, CSS pixels. */
+/** Maximum distance between consecutive dabs of the brush along a stroke, CSS pixels. */
 const DAB_PX = 6;
 /** Initial radius of the brush, as a fraction of the model's size. */
 const RADIUS = 0.05;
-/** Painted amounts of a vertex that follows the cage completely, and of one that stays in place. */
+/** Values that the brush paints: vertices with 0 follow the cage completely, vertices with 255 stay in place. */
 const [FOLLOWS, STAYS] = [0, 255];
 
 /** `settle` ends playback and operations in progress. */
-export function createPainting(
-  ctx: Context,
-  edit: Pick<Edit, "apply" | "settle">,
-  settle: () => void,
-): PaintActions {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+export function createPainting(ctx: Context, edit: Pick<Edit, "apply" | "settle">, settle: () => void) {
+  const { store, engine } = ctx;
   /** Radius of the brush when painting starts again, as a fraction of the model's size. */
   let radius = RADIUS;
   let stroke: { readonly x: number; readonly y: number } | undefined;
@@ -49,25 +25,28 @@ export function createPainting(
     return painting !== null && engine().paint(x, y, painting.radius, painting.erase ? FOLLOWS : STAYS);
   };
 
-  const actions: PaintActions = {
-    on(id) {
+  const actions = {
+    /** Starts painting a model; null ends painting. */
+    on(id: number | null) {
       actions.end(true);
       if (id !== null) settle();
       if ((store.get().painting?.id ?? null) === id) return;
       store.set({ painting: id === null ? null : { id, radius, erase: false }, boxArmed: false });
       engine().showPainting(id ?? undefined);
     },
-    brush(patch) {
+    brush(patch: Partial<Omit<Painting, "id">>) {
       const { painting } = store.get();
       radius = patch.radius ?? radius;
       store.set({ painting: painting && { ...painting, ...patch } });
     },
-    clear(id) {
+    /** Removes all paint from a model. */
+    clear(id: number) {
       actions.end(true);
       if (engine().painted(id).length > 0)
         edit.apply({ do: "set_painted", id, amounts: [] }, T.did.clearPaint);
     },
-    begin(x, y) {
+    /** Starts a stroke. False if no model is being painted, or the point is not on it. */
+    begin(x: number, y: number): boolean {
       const { painting } = store.get();
       if (!painting || stroke) return false;
       edit.settle();
@@ -78,12 +57,12 @@ export function createPainting(
           report(ctx, T.models.notPainted, error);
           return false;
         }
-        // The GPU is still busy with the previous stroke: this one starts painting with its first movement.
+        // The GPU is still busy with the previous stroke: the new stroke starts painting with its first movement.
       }
       stroke = { x, y };
       return true;
     },
-    drag(x, y) {
+    drag(x: number, y: number) {
       if (!stroke) return;
       const { x: x0, y: y0 } = stroke;
       const n = Math.max(1, Math.ceil(Math.hypot(x - x0, y - y0) / DAB_PX));
@@ -94,7 +73,8 @@ export function createPainting(
         // The GPU is busy: the next movement continues from the last painted point.
       }
     },
-    end(keepIt) {
+    /** Keeps the stroke as an undo step, or reverts it. */
+    end(keepIt: boolean) {
       const { painting } = store.get();
       const isOpen = stroke !== undefined && painting !== null;
       stroke = undefined;
@@ -103,8 +83,12 @@ export function createPainting(
       if (keepIt) engine().commit(painting.erase ? T.did.erase : T.did.paint);
       else engine().revert();
     },
-    active: () => stroke !== undefined,
-    radiusAt(x, y) {
+    active: (): boolean => stroke !== undefined,
+    /**
+     * Radius of the brush at a position of the view, CSS pixels; null where the brush would not paint, undefined while
+     * the GPU is busy.
+     */
+    radiusAt(x: number, y: number): number | null | undefined {
       const { painting } = store.get();
       try {
         return (painting && engine().brushRadius(x, y, painting.radius)) ?? null;

@@ -8,34 +8,8 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 
-/** Indices refer to the list of saved poses. */
-export interface PoseActions {
-  save(): void;
-  apply(index: number): void;
-  rename(index: number, name: string): void;
-  remove(index: number): void;
-  /** Replaces a pose by the current one. */
-  update(index: number): void;
-  /** Inserts a copy after the pose. */
-  duplicate(index: number): void;
-  move(index: number, to: number): void;
-  /** Sets the time of a pose in the animation. Returns whether that is possible. */
-  time(index: number, seconds: number): boolean;
-  transition(transition: Transition): void;
-  /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */
-  blend(index: number, share: number, done: boolean): void;
-  /**
-   * Converts the poses of the previous cage to poses of the current cage. With a label, this is an undo step of its
-   * own, otherwise a part of the last step.
-   */
-  carry(before: Carriable, label?: string): Promise<boolean>;
-  reset(): void;
-  togglePlay(): void;
-  stop(): void;
-}
-
 /** A cage and its poses, stored before the cage is replaced. */
-export interface Carriable {
+export interface CageSnapshot {
   readonly cage: CageArrays;
   /** The current pose, then each saved pose that fits this cage. `[1 + n_poses, n_controls, 3]` */
   readonly poses: Float32Array;
@@ -43,15 +17,17 @@ export interface Carriable {
 }
 
 /** The current cage and its poses; undefined without a cage. */
-export function carriableOf(ctx: Context): Carriable | undefined {
+export function snapshotCage(ctx: Context): CageSnapshot | undefined {
   const { cage, shares } = ctx.store.get();
   const session = ctx.session();
   return cage ? { cage: session.cageArrays(), poses: session.engine.carriable(), shares } : undefined;
 }
 
-export function createPoses(ctx: Context, edit: Edit): PoseActions {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+/** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for dense screens. */
+const PICTURE = [128, 96] as const;
+
+export function createPoses(ctx: Context, edit: Edit) {
+  const { store, engine } = ctx;
   let frame: number | undefined;
 
   const stop = () => {
@@ -64,7 +40,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   // Undo steps must not contain an intermediate pose of the animation.
   edit.alsoSettles(stop);
 
-  const carry: PoseActions["carry"] = ({ cage, poses, shares }, label) => {
+  const carry = ({ cage, poses, shares }: CageSnapshot, label?: string): Promise<boolean> => {
     const n = cage.positions.length;
     const isAtRest = cage.positions.every((x, i) => x === poses[i]);
     return attempt(ctx, T.failed.carry, () =>
@@ -73,7 +49,8 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
         const carried = await follow(signal, ctx.session().carryPoses(cage, poses));
         stop();
         if (label) edit.setEditingRest(false);
-        // A cage that was in its rest pose stays in its rest pose.
+        // `carried` starts with the current pose. If this is not an undo step of its own, keep the new cage's current
+        // pose if the old cage was at rest or the cage is being reshaped.
         if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
         const positions = triples(carried);
         engine().apply({ do: "carry_poses", from: n / 3, positions, shares: [...shares] }, label);
@@ -96,6 +73,22 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     frame = requestAnimationFrame(step(start));
   };
 
+  /** Makes the picture of a saved pose, which must be the current one. */
+  const portray = async (index: number) => {
+    const { poses, pictures, steps, clip } = store.get();
+    const hash = poses[index]?.hash;
+    // While a clip is shown, the picture would show a frame of the clip instead of the pose.
+    if (hash === undefined || pictures[hash] || clip.clip !== null || clip.targets.length > 0) return;
+    try {
+      const picture = await ctx.session().picture(...PICTURE, true);
+      // A change of the document before the picture was drawn may have changed the pose in it.
+      if (store.get().steps !== steps || store.get().gesture !== null) return;
+      store.set({ pictures: { ...store.get().pictures, [hash]: URL.createObjectURL(picture) } });
+    } catch {
+      // The card stays without a picture. The next frame reports a lost device.
+    }
+  };
+
   return {
     save() {
       if (!store.get().cage) return;
@@ -104,31 +97,45 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       if (moment) engine().apply({ do: "set_pose", positions: moment });
       const name = freshName(store.get().poses);
       if (!edit.apply({ do: "save_pose", name }, T.did.save)) return;
+      void portray(store.get().poses.length - 1);
       ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(name));
     },
-    apply(index) {
+    apply(index: number) {
       edit.setEditingRest(false);
       edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
+      void portray(index);
     },
-    rename(index, text) {
+    rename(index: number, text: string) {
       const name = text.trim();
       if (name === "" || name === store.get().poses[index]?.name) return;
       edit.apply({ do: "rename_pose", index, name }, T.did.rename);
     },
-    remove: (index) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
-    update: (index) => void edit.apply({ do: "update_pose", index }, T.did.update),
-    duplicate(index) {
+    remove: (index: number) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
+    /** Replaces a pose by the current one. */
+    update(index: number) {
+      if (edit.apply({ do: "update_pose", index }, T.did.update)) void portray(index);
+    },
+    /** Inserts a copy after the pose. */
+    duplicate(index: number) {
       const name = T.did.copyName(store.get().poses[index]?.name ?? "");
       edit.apply({ do: "duplicate_pose", index, name }, T.did.duplicate);
     },
-    move: (index, to) => void edit.apply({ do: "move_pose", index, to }, T.did.movePose),
-    time: (index, seconds) => edit.apply({ do: "set_pose_time", index, seconds }, T.did.time),
-    transition: (transition) => void edit.apply({ do: "set_transition", transition }, T.did.transition),
-    blend(index, share, done) {
+    move: (index: number, to: number) => void edit.apply({ do: "move_pose", index, to }, T.did.movePose),
+    /** Sets the time of a pose in the animation. Returns false if the time is not allowed. */
+    time: (index: number, seconds: number): boolean =>
+      edit.apply({ do: "set_pose_time", index, seconds }, T.did.time),
+    transition: (transition: Transition) =>
+      void edit.apply({ do: "set_transition", transition }, T.did.transition),
+    /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */
+    blend(index: number, share: number, done: boolean) {
       edit.setEditingRest(false);
       engine().apply({ do: "blend", index, share });
       if (done) engine().commit(T.did.blend);
     },
+    /**
+     * Converts the poses of the previous cage to poses of the current cage. With a label, this is an undo step of its
+     * own, otherwise a part of the last step.
+     */
     carry,
     reset() {
       stop();
@@ -151,8 +158,11 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   };
 }
 
+/** Actions of the list of saved poses. Indices refer to this list. */
+export type PoseActions = ReturnType<typeof createPoses>;
+
 /**
- * The default name of a new pose: "Pose" and a number, the first one above the number of poses whose name is not used.
+ * The default name of a new pose: "Pose" and the smallest number above the number of poses that makes an unused name.
  */
 export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));

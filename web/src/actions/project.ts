@@ -7,41 +7,48 @@ import { encodeShare } from "../share";
 import type { Context } from "./context";
 import type { ControlActions } from "./controls";
 
-export interface Project {
-  /** The project file's bytes. */
-  write(): Uint8Array<ArrayBuffer>;
-  fileName(): string;
-  /** The link to copy; undefined if a link cannot contain the open work. */
-  link(): Promise<string | undefined>;
-}
-
-export function createProject(ctx: Context, shared: ControlActions["shared"]): Project {
+export function createProject(ctx: Context, shared: ControlActions["shared"]) {
   const { store } = ctx;
 
   const write = (): Uint8Array<ArrayBuffer> => {
     const state = store.get();
-    const { cageOptions: cage, symmetry, rigOptions: rig, model } = state;
-    const settings = { bind: optionsInUse(state), cage, symmetry, ...(model?.rigged ? { rig } : {}) };
-    // A copy out of the wasm memory, so its buffer is not shared.
-    return ctx.session().engine.writeProject(JSON.stringify(settings)) as Uint8Array<ArrayBuffer>;
+    const { cageOptions: cage, tools, rigOptions: rig, model } = state;
+    const settings = {
+      bind: optionsInUse(state),
+      cage,
+      symmetry: tools.symmetry,
+      ...(model?.rigged ? { rig } : {}),
+    };
+    // wasm-bindgen copies the bytes out of the wasm memory, so their buffer is an ArrayBuffer of its own.
+    return ctx.engine().writeProject(JSON.stringify(settings)) as Uint8Array<ArrayBuffer>;
   };
 
   return {
+    /** Returns the bytes of a project file with the open work. */
     write,
-    fileName: () => `${exportStem(store.get().model?.name ?? "model")}.cagework.glb`,
-    async link() {
-      const { sample, sampleCage, posed, scene, model } = store.get();
-      const { engine } = ctx.session();
+    fileName: (): string => `${exportStem(store.get().model?.name ?? "model")}.cagework.glb`,
+    /** The link to copy; undefined if a link cannot contain the open work. */
+    async link(): Promise<string | undefined> {
+      const { sample, sampleCage, posed, scene, model, clip: shown } = store.get();
+      const engine = ctx.engine();
       if (!sample || !sampleCage || model?.members.some(hasChoices)) return undefined;
       const pose = posed ? engine.encodePose() : undefined;
       const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
       const controls = shared();
-      const link = { sample, seen, ...(pose ? { pose } : {}), ...(controls ? { controls } : {}) };
+      const link = {
+        sample,
+        seen,
+        ...(pose ? { pose } : {}),
+        ...(controls ? { controls } : {}),
+        ...(shown.clip === null ? {} : { clip: shown.clip }),
+      };
       const fragment = await encodeShare(link);
       return `${location.origin}${location.pathname}${fragment}`;
     },
   };
 }
+
+export type Project = ReturnType<typeof createProject>;
 
 /**
  * Scene options that a link contains: no preferences, such as the theme, and none that need a computation, such as

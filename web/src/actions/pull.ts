@@ -2,37 +2,10 @@
 
 import type { SurfacePoint } from "../contract";
 import { clamped, SLIDERS } from "../defaults";
-import { controlCount } from "../derived";
 import { follow } from "../queue";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
-import { createPins } from "./pins";
-
-export interface Pulling {
-  /** Prepares pulls of the bound model and cage. */
-  prepare(): void;
-  /** Marks the point of the model that a press at this position would grab. Returns whether there is one. */
-  hover(x: number, y: number): boolean;
-  /** Removes the mark of `hover`. */
-  leave(): void;
-  /** Grabs the model at a position of the view. False if the model is not there. */
-  begin(x: number, y: number): boolean;
-  /** Grabs a vertex of the cage. Returns false if pulls are not ready. */
-  beginCage(vertex: number, x: number, y: number): boolean;
-  drag(x: number, y: number): void;
-  /** Releases the grab, or restores the previous pose. */
-  end(keep: boolean): void;
-  active(): boolean;
-  /** Scales how far the drag reaches along the surface. */
-  reach(factor: number): void;
-  /** Moves the point that was grabbed last, or the point in the middle of the view, by CSS pixels. */
-  nudge(right: number, up: number): void;
-  /** Adds or removes a pin at a position of the view. False if neither is possible. */
-  pin(x: number, y: number): boolean;
-  unpinAll(): void;
-  whole(on: boolean): void;
-}
 
 /** Distance of a grabbed point from its target above which the target is shown, as a fraction of the model's size. */
 const OFF = 0.01;
@@ -42,14 +15,13 @@ const SETTLING = 30;
 const WIDEST = SLIDERS.reach.max / 2;
 /** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
 const NUDGE_PAUSE_MS = 600;
-/** Seed that stands for a vertex of the cage. Must equal `ON_CAGE` in crates/cagework-web/src/puller.rs. */
-const ON_CAGE = 0xffffffff;
 
 interface Drag {
   /** Pose of the cage at the start of the drag. */
   readonly before: Float32Array;
   /** Engine revision that the grabbed points belong to. */
   readonly revision: number;
+  /** Points of the model, or vertices of the cage. */
   readonly grabs: readonly (SurfacePoint | number)[];
   /** Position of the pointer at the start of the drag, CSS pixels. */
   readonly from: { readonly x: number; readonly y: number };
@@ -57,7 +29,7 @@ interface Drag {
   place: Float32Array;
   /** Target of the first grabbed point. */
   to: Float32Array;
-  /** Number of targets so far, to recognise answers for an older target. */
+  /** Number of times that `to` was set. A frame is current if the number has not changed since its request. */
   wanted: number;
   /** Reach of the pull as a fraction of the model's size; null until the solver has chosen it. */
   reach: number | null;
@@ -67,15 +39,16 @@ interface Drag {
   by: { right: number; up: number };
 }
 
-export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "apply" | "settle">): Pulling {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "apply" | "settle">) {
+  const { store, engine } = ctx;
   let current: Drag | undefined;
+  /** Settles when the last drag has ended and its undo step exists. */
+  let ended: Promise<unknown> = Promise.resolve();
   let held: SurfacePoint | undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  const pins = createPins(ctx, edit.apply);
-  const { show } = pins;
+  /** Marks the point that is grabbed, or would be by a press, and its target. Without arguments, removes the marks. */
+  const show = (held?: SurfacePoint, target?: Float32Array) => engine().showHeld(held ? [held] : [], target);
 
   const isReady = () => {
     const { bound, editingRest, playing, pullReady } = store.get();
@@ -84,30 +57,21 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
 
   /** Sends the grabbed points, and all pins that are not grabbed, to the worker. */
   const grab = async (drag: Drag) => {
-    const { pullWhole, symmetry } = store.get();
-    const n = controlCount(store.get());
-    const rows: number[] = [];
-    const seeds: number[] = [];
-    for (const handle of [...drag.grabs, ...pins.free(drag.from.x, drag.from.y)]) {
-      if (typeof handle === "number") {
-        rows.push(...Array.from({ length: n }, (_, i) => (i === handle ? 1 : 0)));
-        seeds.push(ON_CAGE);
-        continue;
-      }
-      const grip = engine().gripOf(handle);
-      if (!grip) continue;
-      rows.push(...grip.row);
-      seeds.push(grip.seed);
-    }
+    const { pullWhole, tools } = store.get();
+    const [rows, seeds] = engine().gripsOf(drag.grabs, drag.from.x, drag.from.y);
     const { place, stays, reach } = await ctx.session().pullGrab({
       start: drag.before,
-      rows: Float64Array.from(rows),
-      seeds: Uint32Array.from(seeds),
+      rows,
+      seeds,
       grabs: drag.grabs.length,
       options: {
-        reach: drag.reach,
-        whole: pullWhole || (drag.reach ?? 0) > WIDEST,
-        mirrored: symmetry && drag.grabs.length > 1,
+        reach:
+          pullWhole || (drag.reach ?? 0) > WIDEST
+            ? "whole"
+            : drag.reach === null
+              ? "automatic"
+              : { of: drag.reach },
+        symmetry: tools.symmetry && drag.grabs.length > 1,
       },
     }).done;
     if (current !== drag) return;
@@ -137,7 +101,10 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       answered = asked;
       settling += drag.letGo ? 1 : 0;
       const isDone = settled && answered === drag.wanted;
-      if (drag.letGo && (isDone || settling > SETTLING)) finish(drag);
+      if (drag.letGo && (isDone || settling > SETTLING)) {
+        finish(drag);
+        return;
+      }
       await new Promise(requestAnimationFrame);
       while (current === drag && !drag.letGo && settled && answered === drag.wanted) {
         await new Promise(requestAnimationFrame);
@@ -180,13 +147,14 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     };
     current = drag;
     store.set({ gesture: T.pull.pulling, grip: null });
-    void attempt(ctx, T.failed.pull, () => run(drag)).then((went) => {
+    ended = attempt(ctx, T.failed.pull, () => run(drag)).then((went) => {
       if (!went && current === drag) pulling.end(false);
     });
     return true;
   };
 
-  const pulling: Pulling = {
+  const pulling = {
+    /** Prepares pulls of the bound model and cage. */
     prepare() {
       store.set({ pullReady: false });
       void attempt(ctx, T.failed.pull, () =>
@@ -204,29 +172,34 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
         }),
       );
     },
-    hover(x, y) {
+    /** Marks the point of the model that a press at this position would grab. Returns whether there is one. */
+    hover(x: number, y: number): boolean {
       const point = isReady() ? engine().surfaceAt(x, y) : undefined;
       show(point);
       return point !== undefined;
     },
+    /** Removes the mark of `hover`. */
     leave() {
       if (!current) show();
     },
-    begin(x, y) {
+    /** Grabs the model at a position of the view. False if the model is not there or pulls are not ready. */
+    begin(x: number, y: number): boolean {
       const point = isReady() ? engine().surfaceAt(x, y) : undefined;
       if (!point) return false;
       held = point;
-      const image = store.get().symmetry ? engine().imageOf(point) : undefined;
+      const image = store.get().tools.symmetry ? engine().imageOf(point) : undefined;
       show(point);
       return start(image ? [point, image] : [point], x, y);
     },
-    beginCage: (vertex, x, y) => isReady() && start([vertex], x, y),
-    drag(x, y) {
+    /** Grabs a vertex of the cage. Returns false if pulls are not ready. */
+    beginCage: (vertex: number, x: number, y: number): boolean => isReady() && start([vertex], x, y),
+    drag(x: number, y: number) {
       if (!current) return;
       current.by = { right: x - current.from.x, up: y - current.from.y };
       aim(current);
     },
-    end(keep) {
+    /** Releases the grab and keeps the pose if `keep` is true; otherwise restores the pose before the drag. */
+    end(keep: boolean) {
       const drag = current;
       if (!drag) return;
       if (keep) {
@@ -239,19 +212,23 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       show();
       store.set({ gesture: null });
     },
-    active: () => current !== undefined && !current.letGo,
-    reach(factor) {
+    active: (): boolean => current !== undefined && !current.letGo,
+    /** If the pointer was released, waits until the pull has ended, at most `SETTLING` frames later. */
+    released: (): Promise<unknown> => (current?.letGo ? ended : Promise.resolve()),
+    /** Scales how far the drag reaches along the surface. */
+    reach(factor: number) {
       const drag = current;
       if (!drag || drag.reach === null) return;
       drag.reach = clamped(drag.reach * factor, SLIDERS.reach);
       void attempt(ctx, T.failed.pull, () => grab(drag));
     },
-    nudge(right, up) {
+    /** Moves the point that was grabbed last, or the point in the middle of the view, by CSS pixels. */
+    nudge(right: number, up: number) {
       if (!current || current.letGo) {
-        const [x = 0, y = 0, z = 0] = engine().camera().target;
+        const place = held ? engine().placeOf(held) : [];
+        const [x = 0, y = 0, z = 0] = place.length > 0 ? place : engine().camera().target;
         const [right = 0, down = 0] = engine().project(x, y, z);
-        const at = (held && pins.inView(held)) ?? { x: right, y: down };
-        if (!pulling.begin(at.x, at.y)) {
+        if (!pulling.begin(right, down)) {
           ctx.tell.say(T.pull.nothingThere);
           return;
         }
@@ -262,9 +239,16 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       clearTimeout(timer);
       timer = setTimeout(() => pulling.end(true), NUDGE_PAUSE_MS);
     },
-    pin: (x, y) => pins.toggle(x, y, isReady()),
-    unpinAll: pins.removeAll,
-    whole: (on) => store.set({ pullWhole: on }),
+    /** Adds or removes a pin at a position of the view. False if neither is possible. */
+    pin(x: number, y: number): boolean {
+      const pins = engine().pinsAfter(x, y, isReady());
+      const isNew = (pins?.length ?? 0) > store.get().pins.length;
+      return pins !== undefined && edit.apply({ do: "set_pins", pins }, isNew ? T.did.pin : T.did.unpin);
+    },
+    unpinAll: () => void edit.apply({ do: "set_pins", pins: [] }, T.did.unpin),
+    whole: (on: boolean) => store.set({ pullWhole: on }),
   };
   return pulling;
 }
+
+export type Pulling = ReturnType<typeof createPulling>;

@@ -9,7 +9,7 @@ import { type Context, report, waitFor } from "./context";
 const cancelled = (message: string) => Object.assign(new Error(message), { name: "Cancelled" });
 
 /** A model that was read, and the name of its file. */
-export interface Named {
+export interface ReadResult {
   readonly name: string;
   readonly read: ReadFile;
 }
@@ -26,8 +26,9 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
 }
 
 /**
- * Reads models in sequence. If none can be read, shows their errors and throws a cancellation. `another`: whether the
- * fixes of errors offer to open or to add another file. `used`: pixels of the textures of the open models, if these stay.
+ * Reads models in sequence, each with its companion files. Shows an error for each model that cannot be read. Throws a
+ * cancellation if none can be read. `another`: what the button of an error message does: open another file, or add one.
+ * `used`: pixels of the textures of the open models, if these remain open.
  */
 export async function readModels(
   ctx: Context,
@@ -35,11 +36,11 @@ export async function readModels(
   models: readonly (readonly NamedFile[])[],
   another: "file" | "add",
   used = 0,
-): Promise<Named[]> {
+): Promise<ReadResult[]> {
   const what = T.opening.fileOf(models[0]?.[0]?.name ?? "", 0, models.length);
   const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another, used));
   if (reads.length === 0) throw cancelled("there is nothing to open");
-  ctx.store.set({ busy: what });
+  ctx.store.set({ busy: reads.length > 1 ? T.opening.joining(reads.length) : what });
   return reads;
 }
 
@@ -49,13 +50,13 @@ function readAll(
   hear: (progress: Reading) => void,
   another: "file" | "add",
   before: number,
-): Job<{ reads: Named[] } & ReadFile> {
+): Job<{ reads: ReadResult[]; vertices: number }> {
   const release = ctx.session().shareReader();
   let isGivenUp = false;
   let cancelOne = () => {};
   const work = async () => {
-    const reads: Named[] = [];
-    let longest: ReadFile = { took: 0, vertices: 0, pixels: 0 };
+    const reads: ReadResult[] = [];
+    let vertices = 0;
     let used = before;
     for (const [k, own] of models.entries()) {
       if (isGivenUp) throw cancelled("cancelled");
@@ -71,14 +72,14 @@ function readAll(
         cancelOne = job.cancel;
         const read = await job.done;
         used += read.pixels;
-        if (read.took > longest.took) longest = read;
+        vertices += read.vertices;
         reads.push({ name, read });
       } catch (error) {
         if (isCancelled(error)) throw error;
         report(ctx, T.failed.open(name), error, another);
       }
     }
-    return { ...longest, reads };
+    return { vertices, reads };
   };
   return {
     done: work().finally(release),

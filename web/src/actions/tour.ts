@@ -1,31 +1,25 @@
 /** Starts the tour, whose code is downloaded at the first start. */
 
 import { loadPart } from "@cagework/core/session/parts";
-import type { Guide, GuideNeeds, Loaded } from "../tour";
+import type { Guide, GuideNeeds, TourParts } from "../tour";
 import { loadTour, T } from "../words";
 import { attempt, type Context } from "./context";
 
-export interface TourActions {
-  /** Starts the tour at a stop, counted from 0, by default where the user left it. */
-  start(stop?: number): Promise<void>;
-  /** The downloaded code of the tour; undefined before the first start. */
-  loaded(): Loaded | undefined;
-  /** The guide of the tour in progress; undefined otherwise. */
-  guide(): Guide | undefined;
-}
-
-export function createTour(ctx: Context, needs: GuideNeeds): TourActions {
-  let loaded: Loaded | undefined;
+export function createTour(ctx: Context, needs: GuideNeeds) {
+  let loaded: TourParts | undefined;
   return {
-    async start(stop) {
+    /** Starts the tour at a stop, counted from 0, by default where the user left it. */
+    async start(stop?: number) {
       await attempt(ctx, T.failed.tour, async () => {
         const [{ load }] = await loadPart(Promise.all([import("../tour"), loadTour()]));
         loaded ??= load(ctx, needs);
         await loaded.guide.start(stop);
       });
     },
-    loaded: () => loaded,
-    guide: () => (ctx.store.get().tour ? loaded?.guide : undefined),
+    /** The downloaded code of the tour; undefined before the first start. */
+    loaded: (): TourParts | undefined => loaded,
+    /** The guide of the tour in progress; undefined otherwise. */
+    guide: (): Guide | undefined => (ctx.store.get().tour ? loaded?.guide : undefined),
   };
 }
 

@@ -1,42 +1,16 @@
 /** Scene options and camera. */
 
-import { effect } from "@preact/signals";
-import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
-import { clamped, SCENE_DEFAULTS, SLIDERS } from "../defaults";
+import type { Element as CageElement, Coordinates, SceneOptions, Tools } from "../contract";
+import { SCENE_DEFAULTS } from "../defaults";
 import { drawn, elementInUse } from "../derived";
 import { follow } from "../queue";
-import type { Seen } from "../share";
-import { MODEL_STATE, type Slice } from "../state";
+import type { SharedView } from "../share";
+import type { Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import { attempt, type Context } from "./context";
 import { ofLink } from "./project";
-
-export interface View {
-  scene(patch: Partial<SceneOptions>): void;
-  /** Applies scene options, camera and selection of a link. */
-  show(seen: Seen): void;
-  theme(theme: Theme): void;
-  slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): void;
-  /** Compares coordinates side by side. A single kind ends the comparison. */
-  compare(kinds: readonly Coordinates[]): Promise<void>;
-  frameAll(): void;
-  frameSelection(): void;
-  axis(axis: 0 | 1 | 2, negative: boolean): void;
-  ortho(): void;
-  symmetry(on: boolean): void;
-  proportional(on: boolean, radius?: number): void;
-  element(element: CageElement): void;
-  pivot(pivot: Pivot): void;
-  gizmo(gizmo: SceneOptions["gizmo"]): void;
-  /** Shows the model at rest while Space is held. */
-  original(on: boolean): void;
-  /** Updates the scene after the cage has changed. */
-  refresh(): void;
-  /** Passes the size of the view and of what covers it to the session. Set at startup. */
-  resized: () => void;
-}
 
 /** Pause after the last movement of a slice before it is computed, ms. A slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
@@ -53,9 +27,8 @@ export function createView(
   ctx: Context,
   prepareCompare: BindActions["prepareCompare"],
   dark: MediaQueryList,
-): View {
-  const { store } = ctx;
-  const engine = () => ctx.session().engine;
+) {
+  const { store, engine } = ctx;
   let sliceTimer: ReturnType<typeof setTimeout> | undefined;
 
   const scene = (patch: Partial<SceneOptions>) => {
@@ -79,13 +52,7 @@ export function createView(
     if (store.get().theme === "auto") scene({ theme: shown("auto") });
   });
 
-  let engineElement: CageElement = MODEL_STATE.element;
-  effect(() => {
-    const element = elementInUse(store.get());
-    if (element === engineElement) return;
-    engineElement = element;
-    engine().setElement(element);
-  });
+  const tools = (patch: Partial<Tools>) => engine().setTools({ ...store.get().tools, ...patch });
 
   const loadSlice = async (signal: AbortSignal) => {
     const { slice, scene: now, bindOptions, cage } = store.get();
@@ -99,9 +66,17 @@ export function createView(
     }
   };
 
+  const setSlice = (patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]) => {
+    store.set({ slice: { ...store.get().slice, ...patch } });
+    if (kind !== undefined) scene({ slice: kind });
+    clearTimeout(sliceTimer);
+  };
+  const showSlice = () => attempt(ctx, T.failed.slice, () => ctx.queue.replace("slice", loadSlice));
+
   return {
     scene,
-    show(seen) {
+    /** Applies scene options, camera and selection of a link. */
+    show(seen: SharedView) {
       const next = { ...store.get().scene, ...ofLink({ ...SCENE_DEFAULTS, ...seen.scene }) };
       engine().setScene(next);
       engine().setCamera(seen.camera);
@@ -110,48 +85,41 @@ export function createView(
       scene(next);
     },
     theme,
-    slice(patch, kind) {
-      store.set({ slice: { ...store.get().slice, ...patch } });
-      if (kind !== undefined) scene({ slice: kind });
-      clearTimeout(sliceTimer);
-      const load = () => ctx.queue.replace("slice", loadSlice);
-      sliceTimer = setTimeout(() => void attempt(ctx, T.failed.slice, load), SLICE_PAUSE_MS);
+    slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]) {
+      setSlice(patch, kind);
+      sliceTimer = setTimeout(() => void showSlice(), SLICE_PAUSE_MS);
     },
-    async compare(kinds) {
+    /** Like `slice`, without a pause; resolves when the slice is shown. */
+    sliceNow(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): Promise<boolean> {
+      setSlice(patch, kind);
+      return showSlice();
+    },
+    /** Compares coordinates side by side. A single kind ends the comparison. */
+    async compare(kinds: readonly Coordinates[]) {
       const next = isComparison(kinds) && (await prepareCompare(kinds)) ? kinds : SCENE_DEFAULTS.compare;
       if (String(store.get().scene.compare) !== String(next)) scene({ compare: [...next] });
     },
     frameAll: () => engine().frameAll(),
     frameSelection: () => engine().frameSelection(),
-    axis: (axis, negative) => engine().axisView(axis, negative),
+    axis: (axis: 0 | 1 | 2, negative: boolean) => engine().axisView(axis, negative),
     ortho: () => store.set({ ortho: engine().toggleOrtho() }),
-    symmetry(on) {
-      engine().setSymmetry(on);
-      store.set({ symmetry: on, unmatched: on && store.get().cage ? engine().unmatched().length : 0 });
-    },
-    proportional(on, radius) {
-      const next = clamped(radius ?? store.get().proportional, SLIDERS.proportional);
-      engine().setProportional(on ? next : 0);
-      store.set({ proportionalOn: on, proportional: next });
-    },
-    element(element) {
-      store.set({ element });
+    /** Changes how clicks and gestures act on the cage. */
+    tools,
+    element(element: CageElement) {
+      tools({ element });
       // Pull mode selects only vertices. Choosing edges or faces ends it, unless the cage is being reshaped.
       if (elementInUse(store.get()) !== element) scene({ pull: false });
     },
-    pivot(pivot) {
-      engine().setPivot(pivot);
-      store.set({ pivot });
-    },
-    gizmo: (gizmo) => scene({ gizmo, pull: false }),
-    original(on) {
+    gizmo: (gizmo: SceneOptions["gizmo"]) => scene({ gizmo, pull: false }),
+    /** Shows the model at rest while Space is held. */
+    original(on: boolean) {
       if (store.get().scene.original !== on) scene({ original: on });
     },
-    refresh() {
-      scene({});
-      const { symmetry, cage } = store.get();
-      store.set({ unmatched: symmetry && cage ? engine().unmatched().length : 0 });
-    },
-    resized: () => undefined,
+    /** Updates the scene after the cage has changed. */
+    refresh: () => scene({}),
+    /** Passes the size of the view and of what covers it to the session. Set at startup. */
+    resized: (): void => undefined,
   };
 }
+
+export type View = ReturnType<typeof createView>;

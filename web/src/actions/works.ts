@@ -9,24 +9,6 @@ import { ago, type Entry, isExpired, newestFirst, toOpen, type Work } from "../w
 import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
 import { attempt, type Context } from "./context";
 
-export interface WorkActions {
-  /** Saves the open work when no further call has come for `PAUSE_MS`. */
-  touch(): void;
-  /** Saves pending changes, and a model that was never saved, before something else is opened. */
-  flush(): Promise<void>;
-  /** Releases the previous work after something else was opened, and offers to return to it. */
-  leave(): void;
-  /** Reads the list of saved work into `AppState.works`. */
-  refresh(): Promise<void>;
-  /** Opens saved work, as a copy if another tab has it open. */
-  open(work: Work): Promise<boolean>;
-  remove(id: string): Promise<void>;
-  /** Opens the work that `toOpen` chooses. Resolves with false if it chooses none, or if the work cannot be opened. */
-  restore(): Promise<boolean>;
-  /** Excludes the work of this tab from automatic opening, because the page crashed with it. */
-  distrust(): Promise<void>;
-}
-
 /** Pause after the last change before the work is saved, ms. */
 const PAUSE_MS = 1500;
 /** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
@@ -40,7 +22,7 @@ export interface WorkNeeds {
   startFresh(): void;
 }
 
-export function createWorks(ctx: Context, { write, openFiles, startFresh }: WorkNeeds): WorkActions {
+export function createWorks(ctx: Context, { write, openFiles, startFresh }: WorkNeeds) {
   const { store } = ctx;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let saving: Promise<void> | undefined;
@@ -68,10 +50,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const put = async () => {
     const name = current?.name ?? store.get().model?.name ?? "";
     try {
-      const file = write();
-      if (file.length > LARGEST) {
+      const when = Date.now();
+      const file = new Blob([write() as BlobPart]);
+      if (file.size > LARGEST) {
         hasFailed = true;
-        ctx.tell.say(T.works.large(name, file.length, LARGEST));
+        ctx.tell.say(T.works.large(name, file.size, LARGEST));
         return;
       }
       if (!current) {
@@ -79,8 +62,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
         current = { id, name, release: (await hold(id)) ?? (() => undefined) };
       }
       const { id } = current;
-      const when = Date.now();
-      await writeEntry({ id, name, when, size: file.length }, file);
+      await writeEntry({ id, name, when, size: file.size }, file);
       rememberOwn(id);
       store.set({ savedAt: when });
       await refresh();
@@ -141,13 +123,13 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       return undefined;
     }
     const path = `${stem(name)}.cagework.glb`;
-    return { name: path, path, file: new Blob([new Uint8Array(file)]) };
+    return { name: path, path, file };
   };
 
   const open = async (work: Work, isFirst = false): Promise<boolean> => {
     const isCopy = work.where === "elsewhere" && !isFirst;
     const release = isCopy ? undefined : await hold(work.id);
-    // Remember the work before opening it. If that crashes the page, the next start must know which work it was.
+    // Remember the work before opening it. If opening crashes the page, the next start must know which work it was.
     if (isFirst) rememberOwn(release ? work.id : null);
     if (!isCopy && !release) {
       await refresh();
@@ -175,12 +157,15 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const showList = { label: T.works.show, run: () => store.set({ worksOpen: true }) };
 
   return {
+    /** Saves the open work after `PAUSE_MS` without a further call, but not during a bind, gesture or animation. */
     touch,
+    /** Saves pending changes, and a model that was never saved, before something else is opened. */
     async flush() {
       const { sample } = store.get();
       if (timer !== undefined || (sample === null && !current && !isUnwanted)) await save();
       await saving;
     },
+    /** Releases the previous work after something else was opened, and offers to return to it. */
     leave() {
       clearTimeout(timer);
       timer = undefined;
@@ -193,9 +178,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       const back = { label: T.works.back, run: () => void open({ ...left, where: "nowhere" }) };
       ctx.tell.say(T.works.left(left.name), back);
     },
+    /** Reads the list of saved work into `AppState.works`. */
     refresh,
+    /** Opens saved work, as a copy if another tab has it open. */
     open,
-    async remove(id) {
+    async remove(id: string) {
       if (current?.id === id) {
         clearTimeout(timer);
         timer = undefined;
@@ -206,9 +193,15 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       await attempt(ctx, T.failed.delete, () => deleteEntry(id));
       await refresh();
     },
-    async restore() {
+    /**
+     * Opens the work that `toOpen` chooses, unless a model is open or being opened. Resolves with false if nothing is
+     * open afterwards: `toOpen` chooses none, or the work cannot be opened.
+     */
+    async restore(): Promise<boolean> {
       await refresh();
-      const { works } = store.get();
+      const { works, busy, model } = store.get();
+      // Files that the user dropped in the meantime take precedence.
+      if (busy !== null || model !== null) return true;
       const chosen = toOpen(works, ownId());
       if (!chosen || !(await open(chosen, true))) return false;
       const text = T.works.restored(chosen.name, ago(Date.now() - chosen.when));
@@ -216,6 +209,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       ctx.tell.say(text, works.length > 1 ? showList : fresh);
       return true;
     },
+    /** Excludes the work of this tab from automatic opening, because the page crashed with it. */
     async distrust() {
       const { entries } = await readEntries();
       const entry = entries.find(({ id }) => id === ownId());
@@ -224,3 +218,5 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     },
   };
 }
+
+export type WorkActions = ReturnType<typeof createWorks>;

@@ -28,7 +28,7 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
   };
   const follow = (event: PointerEvent | WheelEvent) => {
     if (app.store.get().painting === null) return;
-    // A drag that started beside the model turns the view instead of painting.
+    // A drag that started beside the model orbits the camera instead of painting.
     if (event.buttons > 0 && !app.painting.active()) {
       hide();
       return;

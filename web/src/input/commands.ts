@@ -14,7 +14,7 @@ const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "
 
 export function createCommands(app: App): Record<Command, () => void> {
   const { store, edit, pull, view, poses, cage, bind, painting, exports, tour } = app;
-  const engine = () => app.ctx.session().engine;
+  const { engine } = app.ctx;
   const hasCage = () => store.get().cage !== null;
 
   const gesture = (kind: Gesture) => () => {
@@ -79,15 +79,15 @@ export function createCommands(app: App): Record<Command, () => void> {
     gizmoMove: () => view.gizmo("move"),
     gizmoRotate: () => view.gizmo("rotate"),
     gizmoScale: () => view.gizmo("scale"),
-    toolPull: () => view.scene({ gizmo: "none", pull: true }),
-    toolSelect: () => view.scene({ gizmo: "none", pull: false }),
+    toolPull: () => view.scene({ gizmo: null, pull: true }),
+    toolSelect: () => view.scene({ gizmo: null, pull: false }),
     pin: () => {
       const { x, y } = app.pointer();
       if (store.get().scene.pull) pull.pin(x, y);
     },
-    symmetry: () => view.symmetry(!store.get().symmetry),
+    symmetry: () => view.tools({ symmetry: !store.get().tools.symmetry }),
     proportional: () => {
-      view.proportional(!store.get().proportionalOn);
+      view.tools({ proportionalOn: !store.get().tools.proportionalOn });
       if (edit.active()) edit.drag(app.pointer().x, app.pointer().y);
     },
     nudgeLeft: nudge(-NUDGE, 0),
@@ -137,7 +137,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     split: () => edit.restEdit("split_edge"),
     collapse: () => edit.restEdit("collapse_edge"),
     extrude: () => edit.restEdit("extrude_face"),
-    remove: () => edit.restEdit(store.get().element === "face" ? "delete_face" : "delete_vertex"),
+    remove: () => edit.restEdit(store.get().tools.element === "face" ? "delete_face" : "delete_vertex"),
 
     savePose: () => poses.save(),
     play: () => poses.togglePlay(),

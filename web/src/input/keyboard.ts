@@ -34,8 +34,8 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
     const gesture = app.edit.active();
-    // During a gesture, Enter ends the gesture even if a button has the focus.
     const mod = event.ctrlKey || event.metaKey;
+    // During a gesture, Enter ends the gesture even if a button has the focus.
     if (!gesture && !mod && isControlKey(event.target, event.key)) return;
     if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
     const { editingRest, busy, cancelBusy, model, tour } = app.store.get();
@@ -54,8 +54,8 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     }
     const command = commandOf(event, { gesture, rest: editingRest, tour: tour !== null });
     if (!command) return;
-    // Tab switches the mode only if the view got the focus by a click. If it got the focus by keyboard, Tab moves the
-    // focus.
+    // Tab switches between posing and reshaping only if the view got the focus by a click. If the view got it by
+    // keyboard, Tab moves the focus.
     if (command === "restMode") {
       const clicked = document.activeElement === viewport && !viewport.matches(":focus-visible");
       if (!clicked || event.shiftKey) return;

@@ -2,12 +2,12 @@
 
 import { createTouch } from "@cagework/core/session/touch";
 import type { App } from "../app";
-import type { GizmoHandle, SelectMode } from "../contract";
+import type { GizmoPart, SelectMode } from "../contract";
 import type { Stage } from "../ui/viewport";
 
 /** Movement of the pointer above which a press is a drag instead of a click, CSS pixels. */
 const SLOP = 4;
-/** Time after which the press of a finger that does not move sets a pin, ms. */
+/** Duration of a long press, which pins the model under the finger or removes the pin there, ms. */
 const LONG_PRESS_MS = 500;
 /** Distance from a handle of the cage or the gizmo within which a press grabs it, CSS pixels. */
 const MOUSE_RADIUS = 10;
@@ -33,7 +33,7 @@ type Drag =
 export function attachPointer(stage: Stage, app: App): void {
   const { viewport } = stage;
   const { store, edit, pull, controls, painting } = app;
-  const engine = () => app.ctx.session().engine;
+  const { engine } = app.ctx;
   const ready = () => store.get().busy === null && store.get().model !== null;
   let drag: Drag | undefined;
   let start = { x: 0, y: 0 };
@@ -49,9 +49,9 @@ export function attachPointer(stage: Stage, app: App): void {
   };
   const radiusOf = (event: PointerEvent) => (event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS);
 
-  const takeGizmo = (handle: GizmoHandle, at: { x: number; y: number }) => {
-    app.clips.stop();
-    return edit.beginGizmo(handle, at.x, at.y);
+  const takeGizmo = (part: GizmoPart, at: { x: number; y: number }) => {
+    app.clips.pause();
+    return edit.beginGizmo(part, at.x, at.y);
   };
 
   const press = (event: PointerEvent, at: { x: number; y: number }): Drag => {
@@ -76,9 +76,9 @@ export function attachPointer(stage: Stage, app: App): void {
     if (store.get().cage && store.get().scene.cage) {
       // A vertex under the finger takes precedence over a nearby gizmo.
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
-      const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
-      if (handle !== undefined && takeGizmo(handle, at)) return { kind: "gizmo" };
-      // A finger on the model pulls the model, unless a handle is closer to it than MOUSE_RADIUS.
+      const part = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
+      if (part !== undefined && takeGizmo(part, at)) return { kind: "gizmo" };
+      // A finger on the model pulls the model, unless a handle is closer to the finger than MOUSE_RADIUS.
       const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
       if (vertices.length > 0) {
@@ -128,16 +128,15 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "handle":
         if (!drag.started && moved) {
-          // End a clip, because only the model at rest can be posed.
-          app.clips.stop();
+          app.clips.pause();
           if (!drag.was || drag.mode === "replace") {
             if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
           }
           const [vertex = 0] = drag.vertices;
-          const { scene, proportionalOn, symmetry } = store.get();
+          const { scene, tools } = store.get();
           const isOne = drag.vertices.length === 1 && engine().selection().length === 1;
           // A single handle is pulled like a point of the model, except with Alt, proportional editing or mirroring.
-          if (scene.pull && isOne && !drag.bare && !proportionalOn && !symmetry) {
+          if (scene.pull && isOne && !drag.bare && !tools.proportionalOn && !tools.symmetry) {
             if (pull.beginCage(vertex, start.x, start.y)) {
               drag = { kind: "pull", started: true };
               pull.drag(at.x, at.y);
@@ -227,7 +226,8 @@ export function attachPointer(stage: Stage, app: App): void {
     viewport.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
     const at = place(event);
     pointer = at;
-    // After G, R or S the selection follows the pointer without a button: left click keeps it, right click cancels.
+    // After G, R or S the selection follows the pointer without a button. A left click keeps the change, a right click
+    // reverts it.
     if (edit.active() && !drag) {
       edit.end(event.button !== 2);
       return;
@@ -293,8 +293,8 @@ export function attachPointer(stage: Stage, app: App): void {
         pull.reach(Math.exp(-step * WHEEL_RATE));
         return;
       }
-      if (edit.active() && store.get().proportionalOn) {
-        app.view.proportional(true, store.get().proportional * Math.exp(-step * WHEEL_RATE));
+      if (edit.active() && store.get().tools.proportionalOn) {
+        app.view.tools({ proportional: store.get().tools.proportional * Math.exp(-step * WHEEL_RATE) });
         edit.drag(pointer.x, pointer.y);
         return;
       }

@@ -21,26 +21,14 @@ const TABLE = {
   grab: { keys: ["g"], group: "move" },
   rotate: { keys: ["r"], group: "move" },
   scale: { keys: ["s"], group: "move" },
-  axisX: {
-    keys: ["x"],
-    group: "moving",
-    scope: "gesture",
-    shown: ["x", "y", "z"],
-  },
+  axisX: { keys: ["x"], group: "moving", scope: "gesture", shown: ["x", "y", "z"] },
   axisY: { keys: ["y"], group: "moving", scope: "gesture" },
   axisZ: { keys: ["z"], group: "moving", scope: "gesture" },
   planeX: { keys: ["shift+x"], group: "moving", scope: "gesture" },
   planeY: { keys: ["shift+y"], group: "moving", scope: "gesture" },
   planeZ: { keys: ["shift+z"], group: "moving", scope: "gesture" },
-  keep: {
-    keys: ["enter"],
-    group: "moving",
-    scope: "gesture",
-  },
-  cancel: {
-    keys: ["escape"],
-    group: "moving",
-  },
+  keep: { keys: ["enter"], group: "moving", scope: "gesture" },
+  cancel: { keys: ["escape"], group: "moving" },
   gizmoMove: { keys: ["w"], group: "move" },
   gizmoRotate: { keys: ["e"], group: "move" },
   gizmoScale: { keys: ["t"], group: "move" },
@@ -101,11 +89,7 @@ const TABLE = {
   split: { keys: ["shift+s"], group: "cage", scope: "rest" },
   collapse: { keys: ["shift+c"], group: "cage", scope: "rest" },
   extrude: { keys: ["shift+e"], group: "cage", scope: "rest" },
-  remove: {
-    keys: ["delete", "backspace"],
-    group: "cage",
-    scope: "rest",
-  },
+  remove: { keys: ["delete", "backspace"], group: "cage", scope: "rest" },
 
   savePose: { keys: ["shift+p"], group: "poses" },
   play: { keys: ["j"], group: "poses" },
@@ -150,7 +134,10 @@ export function keyOf(event: KeyPress): string {
   return `${event.shiftKey && !sign ? "shift+" : ""}${mod ? "mod+" : ""}${event.altKey ? "alt+" : ""}${key}`;
 }
 
-/** The command of a key press. During a gesture, only commands with the scope "gesture" and a few others apply. */
+/**
+ * The command of a key press. During a gesture, only commands with the scope "gesture" apply, and those that cancel the
+ * gesture, start another one or toggle proportional editing.
+ */
 export function commandOf(
   event: KeyPress,
   scopes: Partial<Record<Exclude<Scope, "page">, boolean>>,
@@ -176,7 +163,7 @@ const MAC_KEYS = { mod: "⌘", shift: "⇧", alt: "⌥" };
 
 /** Labels of the keys of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], on a Mac ["⇧", "⌘", "Z"]. */
 export function caps(keys: string, mac: boolean): string[] {
-  const names: Readonly<Record<string, string>> = { ...ARROWS, ...T.sheet.keys, ...(mac ? MAC_KEYS : {}) };
+  const names: Readonly<Record<string, string>> = { ...ARROWS, ...T.keys, ...(mac ? MAC_KEYS : {}) };
   return keys.split("+").map((part) => names[part] ?? part.toUpperCase());
 }
 

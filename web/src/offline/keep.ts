@@ -1,16 +1,11 @@
 /** Registers the service worker of worker.js, which stores the page's files in the browser, and offers new versions. */
 
-export interface Offline {
-  /** Registers the service worker, which then downloads all files of the page. Call it when nothing else is urgent. */
-  register(): Promise<void>;
-}
-
 /**
  * Calls `offer` at most once, when another version of the page is ready. The argument of `offer` is a function that
  * makes the browser use that version from the next load on. Without service workers (over plain http, in some private
  * windows), the page is not stored.
  */
-export function keepOffline(offer: (adopt: () => Promise<void>) => void): Offline {
+export function keepOffline(offer: (adopt: () => Promise<void>) => void) {
   const { serviceWorker, locks } = navigator;
   if (!serviceWorker || !locks || import.meta.env.DEV) return { register: async () => undefined };
   // While a tab holds this lock, the service worker keeps the files of the build that the tab has loaded.
@@ -22,6 +17,9 @@ export function keepOffline(offer: (adopt: () => Promise<void>) => void): Offlin
     isOffered = true;
   };
   return {
+    /**
+     * Registers the service worker, which downloads all files of the page. Call this function when the page is idle.
+     */
     async register() {
       // Registration fails if the browser forbids storage.
       const registration = await serviceWorker.register("./sw.js").catch(() => undefined);
@@ -44,6 +42,8 @@ export function keepOffline(offer: (adopt: () => Promise<void>) => void): Offlin
     },
   };
 }
+
+export type Offline = ReturnType<typeof keepOffline>;
 
 /** Activates the service worker of the new version. Tabs with the previous version still get their files. */
 async function adopt({ waiting }: ServiceWorkerRegistration): Promise<void> {

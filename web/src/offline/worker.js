@@ -12,6 +12,8 @@ const PREFIX = `cagework ${SCOPE} `;
 const CACHE = PREFIX + BUILD.id;
 /** Key under which index.html is stored. It is the folder's address, because some servers redirect index.html to it. */
 const PAGE = new URL("./", SCOPE).href;
+/** Names under which servers offer index.html and gallery.html, which have the same script. */
+const NAMES = ["", "index.html", "gallery", "gallery.html"];
 
 addEventListener("install", (event) => event.waitUntil(install()));
 addEventListener("activate", (event) => event.waitUntil(clean().then(() => clients.claim())));
@@ -26,7 +28,7 @@ addEventListener("fetch", (event) => {
 /** Downloads and stores the files of the build. Fails if the server now has another build. */
 async function install() {
   const cache = await caches.open(CACHE);
-  // The names of these files contain a hash of their content, so files from the browser's HTTP cache are right.
+  // The names of these files contain a hash of their content, so copies in the browser's HTTP cache are never outdated.
   await cache.addAll(BUILD.hashed);
   await cache.addAll(BUILD.named.map((name) => new Request(name, { cache: "no-cache" })));
   const page = await fetch(PAGE, { cache: "no-cache" });
@@ -50,7 +52,7 @@ async function clean() {
 async function answer(request) {
   const address = new URL(request.url);
   address.search = "";
-  const isPage = request.mode === "navigate" && [PAGE, `${PAGE}index.html`].includes(address.href);
+  const isPage = request.mode === "navigate" && NAMES.some((name) => address.href === PAGE + name);
   const key = isPage ? PAGE : request;
   const how = { ignoreSearch: true, ignoreVary: true };
   return (

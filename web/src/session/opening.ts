@@ -1,6 +1,7 @@
 /** Helpers for startup. */
 
 import type { Client } from "@cagework/core/session/client";
+import { T } from "../words";
 
 /** Returns a function that calls `work` the first time it is called. */
 export function once(work: () => void): () => void {
@@ -16,9 +17,9 @@ export function once(work: () => void): () => void {
  * GPU is being opened.
  */
 export function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
-  const build = (id: string) => client.run("sample", { id }).done;
+  const build = (id: string) => client.run("sample", { id, name: `${T.samples[id]?.name ?? id}.glb` }).done;
   let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
-  // If this fails, the error is reported when the sample is opened.
+  // If the build fails, the error is reported when the sample is opened.
   early.catch(() => undefined);
   return async (id: string) => {
     // The caller takes over the arrays, so the next call builds the sample again.

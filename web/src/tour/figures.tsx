@@ -1,14 +1,15 @@
 /** Figures of the tour's card: measurements of the stop's binds, and the option that the user can change. */
 
+import { useEffect, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { BindReport } from "../contract";
-import { percent, scientific } from "../format";
+import { scientific } from "../format";
 import type { TourState } from "../state";
-import { Button, Facts, Segments, Slider } from "../ui/controls";
+import { Button, choicesOf, Facts, Segments } from "../ui/controls";
 import { curvesOf } from "../ui/curves";
 import { Plot } from "../ui/plot";
 import { CompareTable, solverName } from "../ui/report";
-import { Comparison } from "../ui/see";
+import { Comparison, SlicePosition } from "../ui/see";
 import { T, TOUR } from "../words";
 import type { Guide } from "./guide";
 import { BONE, GRIDS, isOf, ofPaper, STEPS, type StopName, solvers, stopsOf, TAUS } from "./stops";
@@ -42,27 +43,20 @@ const FIGURES: Partial<Record<StopName, (figure: Figure) => preact.JSX.Element |
   error: Errors,
   coordinates: Comparison,
   smooth: Smooth,
+  splat: Ellipses,
 };
 
 function Grid({ app }: Figure) {
-  const { scene, slice } = app.store.get();
+  const { scene } = app.store.get();
   return (
     <>
       <Segments
         label={T.see.slice}
-        choices={(["value", "kinds"] as const).map((value) => ({ value, label: T.see.slices[value] }))}
+        choices={choicesOf(["value", "kinds"] as const, T.see.slices)}
         value={scene.slice === "kinds" ? "kinds" : "value"}
         onChange={(kind) => app.view.slice({}, kind)}
       />
-      <Slider
-        label={T.see.where}
-        min={0}
-        max={1}
-        step={0.005}
-        format={percent}
-        value={slice.position}
-        onInput={(position) => app.view.slice({ position })}
-      />
+      <SlicePosition app={app} />
     </>
   );
 }
@@ -172,7 +166,7 @@ function Times({ guide, reports }: Figure) {
 }
 
 /**
- * Table of mean rest errors, like the paper's. Each number is a button that runs its bind again and shows the result.
+ * Table of mean rest errors by grid and `tau`. Each number is a button that runs its bind again and shows the result.
  */
 function Errors({ app, guide, reports }: Figure) {
   const { grid: gridNow, tau: tauNow } = app.store.get().bindOptions;
@@ -213,6 +207,51 @@ function Errors({ app, guide, reports }: Figure) {
         ))}
       </tbody>
     </table>
+  );
+}
+
+/**
+ * Three ellipses for the splat under the pointer: its outline at rest, the image of the unit circle under the
+ * deformation gradient there, and its outline in the pose.
+ */
+function Ellipses({ app }: Figure) {
+  const [outlines, setOutlines] = useState<readonly number[]>([]);
+  useEffect(() => {
+    const canvas = document.querySelector("canvas");
+    const look = ({ clientX, clientY }: { clientX: number; clientY: number }) => {
+      const { left = 0, top = 0 } = canvas?.getBoundingClientRect() ?? {};
+      const found = app.ctx.engine().outlinesAt(clientX - left, clientY - top);
+      if (found.length > 0) setOutlines(Array.from(found));
+    };
+    // A tap sends pointerdown, but no pointermove.
+    const kinds = ["pointermove", "pointerdown"] as const;
+    for (const kind of kinds) window.addEventListener(kind, look);
+    return () => {
+      for (const kind of kinds) window.removeEventListener(kind, look);
+    };
+  }, [app]);
+  // The splats at rest and in the pose share one scale. The ellipse of the gradient has its own scale, and is drawn
+  // over the unit circle, of which it is the image.
+  const longest = (first: number) => Math.max(outlines[first] ?? 0, outlines[first + 6] ?? 0);
+  const scales = [24 / longest(0), 24 / Math.max(outlines[3] ?? 0, 1.5), 24 / longest(0)];
+  return outlines.length === 0 ? (
+    <p class="hint">{TOUR.pointAt}</p>
+  ) : (
+    <div class="row">
+      {TOUR.ellipses.map((name, k) => {
+        const [rx = 0, ry = 0, angle = 0] = outlines.slice(3 * k, 3 * k + 3);
+        const scale = scales[k] ?? 0;
+        return (
+          <figure key={name} class="ellipse">
+            <svg viewBox="-26 -26 52 52" role="img" aria-label={name}>
+              {k === 1 && <circle r={scale} class="unit" />}
+              <ellipse rx={scale * rx} ry={scale * ry} transform={`rotate(${(-180 / Math.PI) * angle})`} />
+            </svg>
+            <figcaption>{name}</figcaption>
+          </figure>
+        );
+      })}
+    </div>
   );
 }
 

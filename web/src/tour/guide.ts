@@ -13,26 +13,11 @@ import type { AppState } from "../state";
 import { loadStop, saveStop } from "../store";
 import { isOf, STOPS, type Stop, type StopName, stopsOf } from "./stops";
 
-export interface Guide {
-  /** Starts at the given stop, or at the stop where the user left the tour. */
-  start(stop?: number): Promise<void>;
-  /** Goes to a stop. After the last stop, ends the tour. */
-  go(stop: number): Promise<void>;
-  /** Runs other binds, whose measurements replace those of this stop. */
-  measure(binds: readonly Partial<BindOptions>[]): Promise<void>;
-  /** Runs one more bind to show its result, and adds its measurements to those of this stop. */
-  show(way: Partial<BindOptions>): Promise<void>;
-  /** Ends the tour and restores the previous work and settings. */
-  end(): Promise<void>;
-  /** Called when a sample or file is opened. Unless the tour opened it, ends the tour and restores the settings. */
-  overtaken(sample: string | null): void;
-}
-
 export interface GuideNeeds {
   readonly bind: Pick<BindActions, "start">;
   readonly edit: Pick<Edit, "setEditingRest">;
   readonly view: View;
-  readonly files: Pick<Files, "openSample">;
+  readonly files: Pick<Files, "openSample" | "prepared">;
   readonly works: Pick<WorkActions, "flush" | "open" | "restore">;
 }
 
@@ -48,7 +33,7 @@ interface Before {
   readonly link: string;
 }
 
-export function createGuide(ctx: Context, { bind, edit, view, files, works }: GuideNeeds): Guide {
+export function createGuide(ctx: Context, { bind, edit, view, files, works }: GuideNeeds) {
   const { store } = ctx;
   let before: Before | undefined;
   /** Incremented whenever other binds or another stop start. Asynchronous work with an older value is ignored. */
@@ -88,7 +73,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
 
   /** Undoes what the user did at the previous stop, and sets a pose of the sample; undefined for the rest pose. */
   const rest = (pose: number | undefined) => {
-    const { engine } = ctx.session();
+    const engine = ctx.engine();
     engine.revert();
     while (engine.undo());
     engine.apply(pose === undefined ? { do: "reset_pose" } : { do: "apply_pose", index: pose });
@@ -103,7 +88,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     return { ...BIND_DEFAULTS, backend, memory_limit, ...way };
   };
 
-  /** Runs the binds and collects their reports. */
+  /** Runs binds in order and adds their reports to those of the stop. Ends early if a bind fails or `turn` changes. */
   const run = async (binds: readonly Partial<BindOptions>[], mine: number) => {
     for (const [k, way] of binds.entries()) {
       set({ doing: [k + 1, binds.length] });
@@ -123,7 +108,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     if (!(await open(stop.sample, mine)) || mine !== turn) return;
     rest(stop.pose);
     const { turn: by } = stop;
-    const { engine } = ctx.session();
+    const engine = ctx.engine();
     engine.axisView(0, false);
     if (by) engine.orbit(by[0], by[1]);
     const { theme } = store.get().scene;
@@ -136,13 +121,20 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     if (mine !== turn) return;
     view.scene({ ...stop.scene, slice: "off" });
     if (stop.vertex !== undefined) engine.select(Uint32Array.of(stop.vertex), "replace");
-    if (stop.slice) view.slice(stop.slice, stop.scene?.slice);
+    if (stop.slice) await view.sliceNow(stop.slice, stop.scene?.slice);
+    if (mine !== turn) return;
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
+    // The cage of a capture is made, and the model bound, after the capture is opened.
+    await files.prepared();
+    // Splats follow the cage only after a job of kind "lattice" has bound the lattice. That job is queued when the
+    // model is bound. An empty job of the same kind ends after it.
+    await ctx.queue.add("lattice", async () => undefined).catch(() => undefined);
   };
 
-  const guide: Guide = {
-    async start(stop = loadStop()) {
+  const guide = {
+    /** Starts at the given stop, or at the stop where the user left the tour. */
+    async start(stop: number = loadStop()) {
       if (!before) {
         // Save pending changes of the work before the tour replaces it.
         await works.flush();
@@ -150,12 +142,13 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
         const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
         const work = state.works.find(({ where }) => where === "here");
         before = { settings, scene: state.scene, work, sample: state.sample, link: location.hash };
-        const isUntouched = state.sampleCage && !state.posed && state.undoLabel === null && !work;
+        const isUntouched = state.sampleCage && !state.posed && state.undo === null && !work;
         opened = isUntouched ? (state.sample ?? undefined) : undefined;
       }
       await guide.go(Math.min(stop, STOPS.length - 1));
     },
-    async go(stop) {
+    /** Goes to a stop. After the last stop, ends the tour. */
+    async go(stop: number) {
       const name: StopName | undefined = STOPS[stop];
       if (!before) return;
       if (!name) {
@@ -173,19 +166,22 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       await visit(stopsOf(gpu)[name], mine);
       if (mine === turn) set({ doing: null });
     },
-    async measure(binds) {
+    /** Runs other binds, whose measurements replace those of this stop. */
+    async measure(binds: readonly Partial<BindOptions>[]) {
       turn += 1;
       const mine = turn;
       set({ reports: [] });
       await run(binds, mine);
       if (mine === turn) set({ doing: null });
     },
-    async show(way) {
+    /** Runs one more bind to show its result, and adds its measurements to those of this stop. */
+    async show(way: Partial<BindOptions>) {
       turn += 1;
       const mine = turn;
       await run([way], mine);
       if (mine === turn) set({ doing: null });
     },
+    /** Ends the tour and restores the previous work and settings. */
     async end() {
       const was = before;
       if (!was) return;
@@ -204,14 +200,15 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
         else await files.openSample(sample, was.settings.bindOptions);
       }
       store.set({ step: was.settings.step });
-      ctx.session().engine.frameAll();
+      ctx.engine().frameAll();
     },
-    overtaken(sample) {
+    /** Called when a sample or file is opened. Unless the tour opened it, ends the tour and restores the settings. */
+    overtaken(sample: string | null) {
       if (!before || (sample !== null && sample === opening)) return;
       turn += 1;
       ctx.queue.cancel("bind");
       // What the user did on the tour cannot be undone after it, and is not saved.
-      ctx.session().engine.clearHistory();
+      ctx.engine().clearHistory();
       store.set({ tour: null });
       putBack(before);
       before = undefined;
@@ -222,3 +219,5 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
   };
   return guide;
 }
+
+export type Guide = ReturnType<typeof createGuide>;

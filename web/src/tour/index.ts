@@ -9,11 +9,12 @@ import { createGuide, type Guide, type GuideNeeds } from "./guide";
 
 export type { Guide, GuideNeeds } from "./guide";
 
-export interface Loaded {
+/** The guide of the tour, and the component that draws its card. */
+export interface TourParts {
   readonly guide: Guide;
   readonly Card: FunctionComponent<{ app: App; tour: TourState; guide: Guide }>;
 }
 
-export function load(ctx: Context, needs: GuideNeeds): Loaded {
+export function load(ctx: Context, needs: GuideNeeds): TourParts {
   return { guide: createGuide(ctx, needs), Card };
 }

@@ -15,6 +15,7 @@ export const STOPS = [
   "error",
   "coordinates",
   "smooth",
+  "splat",
 ] as const;
 export type StopName = (typeof STOPS)[number];
 
@@ -34,16 +35,22 @@ export interface Stop {
   readonly turn?: readonly [x: number, y: number];
 }
 
-/** Grids of the error table. All binds of the table take about a second together. */
+/**
+ * Numbers of cells along each side of the cage's bounding box, for the error table. All its binds together take about a
+ * second.
+ */
 export const GRIDS = [16, 32] as const;
-/** Thresholds of the error table. */
+/** Values of `tau`, the threshold at which the solver stops, in the error table. */
 export const TAUS = [1e-3, 1e-4, 1e-5] as const;
 
 const paper = (grid: number, tau: number): Partial<BindOptions> => {
   const { backend: _, memory_limit: __, ...way } = PAPER_DEFAULTS;
   return { ...way, grid, tau };
 };
-/** The view of the paper's figures: the model as wireframe, its reconstruction from the weights as solid. */
+/**
+ * The view of figures 2 to 5 of K. Smith's paper (docs/method.md): the model's wireframe over its reconstruction from
+ * the weights.
+ */
 const FIGURE: Partial<SceneOptions> = { base_wireframe: true, cage: false, colour: "clay" };
 
 /** Bind options of the classic method with each solver. */
@@ -100,6 +107,8 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
       scene: { colour: "clay" },
       turn: [-90, 0],
     },
+    // `binds` is empty, because opening a capture makes its cage and binds it.
+    splat: { sample: "spot", step: "pose", binds: [], scene: { cage: false }, turn: [60, 20] },
   };
 }
 

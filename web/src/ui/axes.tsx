@@ -42,7 +42,7 @@ export function Axes({ app }: { app: App }) {
   );
 }
 
-/** Moves buttons and lines to the axes. `axes`: right, up and towards the eye, for each axis. */
+/** Moves buttons and lines to the ends of the axes. `axes`: components right, up and towards the eye, for each axis. */
 function placeEnds(picture: HTMLElement, axes: Float32Array): void {
   for (const [axis, line] of picture.querySelectorAll("line").entries()) {
     line.setAttribute("x2", String(axes[3 * axis]));

@@ -11,7 +11,7 @@ const NEXT_THEME: Record<Theme, Theme> = { auto: "dark", dark: "light", light: "
 const THEME_ICON = { auto: "auto", dark: "moon", light: "sun" } as const;
 
 export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
-  const { model, undoLabel, redoLabel, theme } = app.store.get();
+  const { model, undo, redo, theme } = app.store.get();
   return (
     <>
       <div class="brand">
@@ -32,17 +32,17 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
         <IconButton
           icon="undo"
           label={T.bar.undo}
-          tip={T.bar.undoOf(undoLabel)}
+          tip={T.bar.undoOf(undo)}
           shortcut={app.key("undo")}
-          disabled={undoLabel === null}
+          disabled={undo === null}
           onClick={() => app.run("undo")}
         />
         <IconButton
           icon="redo"
           label={T.bar.redo}
-          tip={T.bar.redoOf(redoLabel)}
+          tip={T.bar.redoOf(redo)}
           shortcut={app.key("redo")}
-          disabled={redoLabel === null}
+          disabled={redo === null}
           onClick={() => app.run("redo")}
         />
         <span class="gap" />

@@ -8,7 +8,18 @@ import { timeLeft } from "../eta";
 import { percent } from "../format";
 import type { BindRun } from "../state";
 import { T } from "../words";
-import { Button, Fold, Head, NumberField, Say, Section, Segments, Slider, Toggle } from "./controls";
+import {
+  Button,
+  choicesOf,
+  Fold,
+  Head,
+  NumberField,
+  Say,
+  Section,
+  Segments,
+  Slider,
+  Toggle,
+} from "./controls";
 import { curvesOf } from "./curves";
 import { Icon } from "./icons";
 import { Plot } from "./plot";
@@ -66,7 +77,7 @@ function Running({ run }: { run: BindRun }) {
   );
 }
 
-/** Plot of the change per iteration for this bind and earlier ones by other solvers. */
+/** Plot of the weights' change per iteration, for this bind and earlier ones by other solvers. */
 function Figure({ app }: { app: App }) {
   const state = app.store.get();
   const curves = curvesOf(state).filter((curve) => curve.points.length > 0);
@@ -113,21 +124,13 @@ function Ways({ app }: { app: App }) {
       />
       <Segments<BindOptions["method"]>
         label={T.bind.method}
-        choices={(["embedded", "classic"] as const).map((value) => ({
-          value,
-          label: T.bind.methods[value],
-          tip: T.bind.methodTips[value],
-        }))}
+        choices={choicesOf(["embedded", "classic"], T.bind.methods, T.bind.methodTips)}
         value={options.method}
         onChange={(method) => set({ method })}
       />
       <Segments<BindOptions["solver"]>
         label={T.bind.solver}
-        choices={[
-          { value: "multigrid", label: T.bind.solvers.multigrid },
-          { value: "jacobi", label: T.bind.solvers.jacobi },
-          { value: "cg", label: T.bind.solvers.cg, tip: T.bind.cgTip },
-        ]}
+        choices={choicesOf(["multigrid", "jacobi", "cg"], T.bind.solvers, { cg: T.bind.cgTip })}
         value={options.solver}
         onChange={(solver) => set({ solver })}
       />
@@ -214,16 +217,13 @@ function Advanced({ app }: { app: App }) {
         <div class="stack">
           <Segments<BindOptions["cell_shape"]>
             label={T.bind.cells}
-            choices={(["box", "cubic"] as const).map((value) => ({ value, label: T.bind.cellShapes[value] }))}
+            choices={choicesOf(["box", "cubic"], T.bind.cellShapes)}
             value={options.cell_shape}
             onChange={(cell_shape) => set({ cell_shape })}
           />
           <Segments<BindOptions["delta_norm"]>
             label={T.bind.norm}
-            choices={(["euclidean", "literal"] as const).map((value) => ({
-              value,
-              label: T.bind.norms[value],
-            }))}
+            choices={choicesOf(["euclidean", "literal"], T.bind.norms)}
             value={options.delta_norm}
             onChange={(delta_norm) => set({ delta_norm })}
           />
@@ -231,11 +231,7 @@ function Advanced({ app }: { app: App }) {
       )}
       <Segments<BindOptions["outside"]>
         label={T.bind.outside}
-        choices={(["extend", "stay", "refuse"] as const).map((value) => ({
-          value,
-          label: T.bind.outsides[value],
-          tip: T.bind.outsideTips[value],
-        }))}
+        choices={choicesOf(["extend", "stay", "refuse"], T.bind.outsides, T.bind.outsideTips)}
         value={options.outside}
         onChange={(outside) => set({ outside })}
       />

@@ -5,7 +5,7 @@ import type { CageOptions } from "../contract";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
-import { Segments, Slider, Toggle } from "./controls";
+import { choicesOf, Segments, Slider, Toggle } from "./controls";
 
 /**
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
@@ -30,10 +30,10 @@ export function Automatic({ app }: { app: App }) {
     <div class="stack">
       <Slider
         label={T.cage.wanted}
-        {...SLIDERS.vertices}
+        {...SLIDERS.target}
         format={count}
-        value={options.vertices}
-        onInput={(vertices) => change({ vertices })}
+        value={options.target}
+        onInput={(target) => change({ target })}
       />
       <Slider
         label={T.cage.closeness}
@@ -52,19 +52,16 @@ export function Automatic({ app }: { app: App }) {
       />
       <Segments<CageOptions["symmetry"]>
         label={T.cage.symmetry}
-        choices={(["auto", "on", "off"] as const).map((value) => ({
-          value,
-          label: T.cage.symmetries[value],
-        }))}
+        choices={choicesOf(["auto", "x", "none"], T.cage.symmetries)}
         value={options.symmetry}
         onChange={(symmetry) => change({ symmetry })}
       />
       <Slider
         label={T.cage.margin}
-        {...SLIDERS.margin}
+        {...SLIDERS.clearance}
         format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
-        value={options.margin}
-        onInput={(margin) => change({ margin })}
+        value={options.clearance}
+        onInput={(clearance) => change({ clearance })}
       />
       <Slider
         label={T.cage.gaps}

@@ -9,7 +9,7 @@ import type { CageSource } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Automatic } from "./cage-options";
-import { Badge, Button, Facts, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
+import { Badge, Button, choicesOf, Facts, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon } from "./icons";
 import { Inside, Smooth } from "./inside";
 
@@ -25,7 +25,7 @@ export function CagePanel({ app }: { app: App }) {
         <Segments<CageSource>
           label={T.cage.how}
           hideLabel
-          choices={SOURCES.map((value) => ({ value, label: T.cage.sources[value] }))}
+          choices={choicesOf(SOURCES, T.cage.sources)}
           value={cageSource}
           onChange={(value) => set({ cageSource: value })}
         />
@@ -67,13 +67,13 @@ export function CagePanel({ app }: { app: App }) {
 }
 
 /** Sentence that says why a cage has fewer vertices than requested, and which option would change that. */
-function sparse({ vertices, detail }: CageOptions): string {
+function sparse({ target, detail }: CageOptions): string {
   const share = percent(detail, 1);
-  return detail > 1.01 * SLIDERS.detail.min ? T.cage.sparse(share, count(vertices)) : T.cage.sparsest(share);
+  return detail > 1.01 * SLIDERS.detail.min ? T.cage.sparse(share, count(target)) : T.cage.sparsest(share);
 }
 
 function Reshape({ app }: { app: App }) {
-  const { editingRest, element } = app.store.get();
+  const { editingRest, tools } = app.store.get();
   return (
     <div class="stack">
       <Toggle
@@ -82,7 +82,7 @@ function Reshape({ app }: { app: App }) {
         on={editingRest}
         onChange={(on) => app.edit.setEditingRest(on)}
       />
-      {editingRest && <p class="hint">{T.cage.hints[element]}</p>}
+      {editingRest && <p class="hint">{T.cage.hints[tools.element]}</p>}
     </div>
   );
 }
@@ -126,7 +126,7 @@ export function sayMend(fix: Mend, count: number): string {
 
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
   const { fix } = problem;
-  // If the fix is a finer grid, the problem is solved once such a grid is chosen.
+  // If the fix is a finer grid, choosing one solves the problem.
   const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return (
     <div class={`problem-card ${problem.severity}`}>

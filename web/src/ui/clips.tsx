@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import { duration, percent } from "../format";
 import { T } from "../words";
-import { Fold, IconButton, Segments, Slider, Toggle } from "./controls";
+import { Fold, IconButton, Segments, SHARES, Slider, Toggle } from "./controls";
 
 const SPEEDS = ["0.25", "0.5", "1"] as const;
 
@@ -33,38 +33,36 @@ export function Clips({ app }: { app: App }) {
           </select>
         </label>
       )}
-      {clip.clip !== null && <p class="hint">{T.clips.posing}</p>}
       {clip.clip !== null && (
-        <div class="row">
-          <IconButton
-            icon={clip.playing ? "pause" : "play"}
-            label={clip.playing ? T.clips.pause : T.clips.play}
-            tip={`${clip.playing ? T.clips.pause : T.clips.play} (${app.key("playClip")})`}
-            onClick={() => void app.clips.toggle()}
-          />
-          <div class="grow">
-            <Slider
-              label={T.clips.time}
-              min={0}
-              max={length}
-              step={length / 200}
-              format={(seconds) => T.clips.seconds(seconds)}
-              value={clip.seconds}
-              onInput={(seconds) => void app.clips.scrub(seconds)}
+        <>
+          <p class="hint">{clip.playing ? T.clips.playing : T.clips.paused}</p>
+          <div class="row">
+            <IconButton
+              icon={clip.playing ? "pause" : "play"}
+              label={clip.playing ? T.clips.pause : T.clips.play}
+              tip={`${clip.playing ? T.clips.pause : T.clips.play} (${app.key("playClip")})`}
+              onClick={() => void app.clips.toggle()}
             />
+            <div class="grow">
+              <Slider
+                label={T.clips.time}
+                min={0}
+                max={length}
+                step={length / 200}
+                format={(seconds) => T.clips.seconds(seconds)}
+                value={clip.seconds}
+                onInput={(seconds) => void app.clips.scrub(seconds)}
+              />
+            </div>
           </div>
-        </div>
-      )}
-      {clip.clip !== null && (
-        <Segments
-          label={T.clips.speed}
-          choices={SPEEDS.map((value) => ({ value, label: percent(Number(value)) }))}
-          value={String(clip.speed)}
-          onChange={(value) => app.clips.speed(Number(value))}
-        />
-      )}
-      {clip.clip !== null && (
-        <Toggle label={T.clips.loop} on={clip.loop} onChange={(on) => app.clips.loop(on)} />
+          <Segments
+            label={T.clips.speed}
+            choices={SPEEDS.map((value) => ({ value, label: percent(Number(value)) }))}
+            value={String(clip.speed)}
+            onChange={(value) => app.clips.speed(Number(value))}
+          />
+          <Toggle label={T.clips.loop} on={clip.loop} onChange={app.clips.loop} />
+        </>
       )}
       {clips.length > 0 && (
         <Toggle
@@ -81,10 +79,7 @@ export function Clips({ app }: { app: App }) {
               <Slider
                 key={k}
                 label={name}
-                min={0}
-                max={1}
-                step={0.01}
-                format={percent}
+                {...SHARES}
                 value={clip.targets[k] ?? atRest}
                 onInput={(weight) => void app.clips.target(k, weight)}
               />
@@ -108,7 +103,7 @@ export function Clips({ app }: { app: App }) {
 export function RigChoices({ app }: { app: App }) {
   const { rigOptions, model } = app.store.get();
   if (!model?.joints) return null;
-  const { joints, keep_travel, rigid } = rigOptions;
+  const { joints, keep_travel, ground, feet, rigid } = rigOptions;
   return (
     <>
       <Toggle
@@ -117,6 +112,22 @@ export function RigChoices({ app }: { app: App }) {
         on={joints !== "stay"}
         onChange={(on) => app.clips.rig({ joints: on ? "follow" : "stay" })}
       />
+      {joints !== "stay" && (
+        <>
+          <Toggle
+            label={T.clips.ground}
+            sentence={T.clips.groundSentence}
+            on={ground}
+            onChange={(on) => app.clips.rig({ ground: on })}
+          />
+          <Toggle
+            label={T.clips.feet}
+            sentence={T.clips.feetSentence}
+            on={feet === "lock"}
+            onChange={(on) => app.clips.rig({ feet: on ? "lock" : "free" })}
+          />
+        </>
+      )}
       {joints !== "stay" && model.props.length > 0 && (
         <Fold title={T.clips.rigid(rigid.length, model.props.length)}>
           <div class="stack">

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { percent } from "../format";
 import { type Message, textOf } from "../strings";
 import { Icon, type IconName } from "./icons";
 
@@ -29,13 +30,12 @@ interface ButtonProps {
 }
 
 /** Button with text and an optional icon. */
-export function Button({ label, onClick, icon, kind = "", tip, name, disabled, pressed }: ButtonProps) {
+export function Button({ label, icon, kind = "", tip, name, pressed, ...rest }: ButtonProps) {
   return (
     <button
+      {...rest}
       type="button"
       class={`button ${kind}`.trim()}
-      onClick={onClick}
-      disabled={disabled}
       aria-label={name}
       aria-pressed={pressed}
       data-tip={tip}
@@ -52,22 +52,13 @@ interface IconButtonProps extends Omit<ButtonProps, "icon" | "name"> {
 }
 
 /** Button with only an icon. `label` is its accessible name and, with the shortcut, its tool tip. */
-export function IconButton({
-  icon,
-  label,
-  onClick,
-  shortcut,
-  kind = "",
-  tip = label,
-  disabled,
-  pressed,
-}: IconButtonProps) {
+export function IconButton(props: IconButtonProps) {
+  const { icon, label, shortcut, kind = "", tip = label, pressed, ...rest } = props;
   return (
     <button
+      {...rest}
       type="button"
       class={`icon-button ${kind}`.trim()}
-      onClick={onClick}
-      disabled={disabled}
       aria-label={label}
       aria-pressed={pressed}
       data-tip={shortcut ? `${tip} (${shortcut})` : tip}
@@ -87,8 +78,17 @@ export function useUid(): string {
 export interface Choice<T extends string> {
   value: T;
   label: string;
-  tip?: string;
+  tip?: string | undefined;
   disabled?: boolean;
+}
+
+/** Choices for `values`, with the label and tool tip of each value. */
+export function choicesOf<T extends string>(
+  values: readonly T[],
+  labels: Readonly<Record<T, string>>,
+  tips?: Readonly<Partial<Record<T, string>>>,
+): Choice<T>[] {
+  return values.map((value) => ({ value, label: labels[value], tip: tips?.[value] }));
 }
 
 interface SegmentsProps<T extends string> {
@@ -166,18 +166,12 @@ interface SliderProps {
   name?: string;
 }
 
+/** Range and format of a slider for a fraction, 0 to 1, shown in percent. */
+export const SHARES = { min: 0, max: 1, step: 0.01, format: percent } as const;
+
 /** A slider with its value next to the label. */
-export function Slider({
-  label,
-  min,
-  max,
-  step,
-  value,
-  onInput,
-  onCommit,
-  format = String,
-  name,
-}: SliderProps) {
+export function Slider(props: SliderProps) {
+  const { label, value, onInput, onCommit, format = String, name, ...range } = props;
   const id = useUid();
   return (
     <div class="field">
@@ -186,11 +180,9 @@ export function Slider({
         <output for={id}>{format(value)}</output>
       </label>
       <input
+        {...range}
         type="range"
         id={id}
-        min={min}
-        max={max}
-        step={step}
         value={value}
         aria-label={name}
         aria-valuetext={format(value)}
@@ -212,7 +204,7 @@ interface NumberInputProps {
 }
 
 /** Number field. Calls `onCommit` when the user presses Enter or leaves the field, if the number is valid. */
-export function NumberInput({ id, name, value, onCommit, min, max, step = "any" }: NumberInputProps) {
+export function NumberInput({ name, value, onCommit, ...rest }: NumberInputProps) {
   const input = useRef<HTMLInputElement>(null);
   useLayoutEffect(() => {
     // Do not overwrite the field while the user types in it.
@@ -221,14 +213,12 @@ export function NumberInput({ id, name, value, onCommit, min, max, step = "any" 
   }, [value]);
   return (
     <input
+      step="any"
+      {...rest}
       ref={input}
       type="number"
-      id={id}
       aria-label={name}
       inputMode="decimal"
-      min={min}
-      max={max}
-      step={step}
       onChange={(event) => {
         const { currentTarget: field } = event;
         const isValid = field.value !== "" && field.validity.valid;
@@ -276,7 +266,7 @@ export function Head({ title, sentence }: { title: string; sentence: string }) {
   );
 }
 
-/** Short status label. */
+/** Short label with an icon, coloured by its kind. */
 export function Badge({ kind, icon, text }: { kind: "good" | "warn" | "bad"; icon: IconName; text: string }) {
   return (
     <span class={`badge ${kind}`}>

@@ -2,7 +2,10 @@
 
 type Box = Pick<DOMRect, "left" | "top" | "right" | "bottom">;
 
-/** Overlays along a side of the view. Those in a corner, such as the axes and the status, cover too little. */
+/**
+ * Selectors of overlays along a side of the view. Overlays in a corner, such as the axes and the status, are not
+ * counted, because they cover little.
+ */
 const OVERLAYS = ".mode, .tools, .looks, .hint-line";
 
 /** Widths of the margins under overlays: left, top, right, bottom, CSS pixels. */
@@ -14,7 +17,10 @@ export function coveredIn(viewport: HTMLElement): Margins {
   return marginsOf(viewport.getBoundingClientRect(), boxes);
 }
 
-/** A column covers the nearer of the left and right sides, a row the nearer of the top and the bottom. */
+/**
+ * Widths of the margins of a view that overlays hide. An overlay that is taller than it is wide counts towards the left
+ * or right margin, whichever is nearer; any other counts towards the top or bottom.
+ */
 export function marginsOf(view: Box, overlays: readonly Box[]): Margins {
   const margins: Margins = [0, 0, 0, 0];
   for (const { left, top, right, bottom } of overlays) {

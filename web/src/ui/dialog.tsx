@@ -1,4 +1,4 @@
-/** Modal dialog. Escape and clicks on the backdrop close it. */
+/** Modal dialog. With `onClose`, Escape, a button and clicks on the backdrop close it. */
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
@@ -8,7 +8,7 @@ import { IconButton, useUid } from "./controls";
 interface DialogProps {
   title: string;
   isOpen: boolean;
-  /** Called after the dialog was closed. Without this function, the dialog cannot be closed. */
+  /** Called after the dialog was closed. Without this function, the user cannot close the dialog. */
   onClose?: () => void;
   kind?: string;
   onKeyDown?: (event: KeyboardEvent) => void;

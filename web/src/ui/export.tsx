@@ -3,8 +3,9 @@
 import { useEffect, useState } from "preact/hooks";
 import type { ExportKind, ShapeFormatName } from "../actions/exports";
 import type { App } from "../app";
-import { SHAPE_FORMATS } from "../defaults";
-import { fittingPoses, rigOf } from "../derived";
+import type { ModelInfo, RigOptions } from "../contract";
+import { SHAPE_FORMATS, SPLAT_FORMATS } from "../defaults";
+import { fittingPoses, isCapture, rigOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
@@ -16,6 +17,7 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["glb", "model"],
   ["shape", "shape"],
   ["poses", "layers"],
+  ["clips", "play"],
   ["cage", "cage"],
   ["controls", "bone"],
   ["weights", "table"],
@@ -33,13 +35,19 @@ function missing(kind: ExportKind, state: AppState): string | null {
 }
 
 export function ExportPanel({ app }: { app: App }) {
-  const hasInside = (app.store.get().cage?.controls.inner ?? 0) > 0;
+  const { cage, model } = app.store.get();
+  const isThere = (kind: ExportKind) => {
+    if (kind === "controls") return (cage?.controls.inner ?? 0) > 0;
+    if (kind === "glb" && model?.points) return false;
+    if (kind === "clips") return (model?.joints ?? 0) > 0;
+    return !isCapture(model) || (kind !== "poses" && kind !== "weights");
+  };
   return (
     <div class="stack loose">
       <Head title={T.exports.title} sentence={T.exports.sentence} />
       <Which app={app} />
       <ul class="stack">
-        {ITEMS.filter(([kind]) => kind !== "controls" || hasInside).map(([kind, icon]) => (
+        {ITEMS.filter(([kind]) => isThere(kind)).map(([kind, icon]) => (
           <Item key={kind} app={app} kind={kind} icon={icon} />
         ))}
       </ul>
@@ -50,7 +58,7 @@ export function ExportPanel({ app }: { app: App }) {
 
 function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName }) {
   const state = app.store.get();
-  const [title = "", sentence = ""] = T.exports.items[kind];
+  const [title = "", sentence = ""] = wordsOf(kind, state.model);
   const reason = missing(kind, state);
   const n = kind === "poses" ? fittingPoses(state).length : 0;
   return (
@@ -60,7 +68,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
         class="export-card"
         data-kind={kind}
         disabled={reason !== null}
-        onClick={() => void app.exports.save(kind)}
+        onClick={() => (kind === "clips" ? app.chooseClips() : void app.exports.save(kind))}
       >
         <span class="tile">
           <Icon name={icon} />
@@ -73,12 +81,23 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
       </button>
       {kind === "picture" && <PictureOptions app={app} />}
       {kind === "glb" && <RigExport app={app} />}
+      {kind === "glb" && !isCapture(state.model) && <FileSize app={app} />}
+      {kind === "poses" && state.model?.vrm && (
+        <div class="export-option">
+          <Toggle
+            label={T.exports.expressions}
+            sentence={T.exports.expressionsSentence}
+            on={state.rigOptions.expressions}
+            onChange={(expressions) => app.clips.rig({ expressions })}
+          />
+        </div>
+      )}
       {kind === "shape" && <ShapeFormat app={app} />}
     </li>
   );
 }
 
-/** List to choose which model to export, or all of them. */
+/** Selection of the models to export: one of them, all as separate files, or all in an archive. */
 function Which({ app }: { app: App }) {
   const { model, exportOnly } = app.store.get();
   const members = model?.members ?? [];
@@ -123,8 +142,48 @@ function RigExport({ app }: { app: App }) {
   );
 }
 
+const FILE_SIZES = {
+  plain: { quantize: false, compress: "none" },
+  small: { quantize: true, compress: "none" },
+  smallest: { quantize: true, compress: "meshopt" },
+} as const satisfies Record<string, Partial<RigOptions>>;
+
+type FileSizeName = keyof typeof FILE_SIZES;
+
+/** Options that reduce the size of exported GLBs. */
+function FileSize({ app }: { app: App }) {
+  const { quantize, compress } = app.store.get().rigOptions;
+  const value: FileSizeName = compress === "meshopt" ? "smallest" : quantize ? "small" : "plain";
+  const names = Object.keys(FILE_SIZES) as FileSizeName[];
+  const [, sentence] = T.exports.fileSizes[value];
+  return (
+    <div class="export-option stack tight">
+      <Segments
+        label={T.exports.fileSize}
+        choices={names.map((value) => ({ value, label: T.exports.fileSizes[value][0] ?? value }))}
+        value={value}
+        onChange={(value) => app.clips.rig(FILE_SIZES[value])}
+      />
+      {sentence && <p class="hint">{sentence}</p>}
+    </div>
+  );
+}
+
+function wordsOf(kind: ExportKind, model: ModelInfo | null): readonly string[] {
+  if (kind === "shape" && model?.splats) return T.exports.splats;
+  return kind === "shape" && model?.points ? T.exports.points : T.exports.items[kind];
+}
+
+function formatsOf(model: ModelInfo | null): readonly ShapeFormatName[] {
+  if (model?.splats) return SPLAT_FORMATS;
+  // STL stores only faces, which a point cloud does not have.
+  return model?.points ? SHAPE_FORMATS.filter((format) => format !== "stl") : SHAPE_FORMATS;
+}
+
 function ShapeFormat({ app }: { app: App }) {
-  const [format, setFormat] = useState<ShapeFormatName>(SHAPE_FORMATS[0]);
+  const formats = formatsOf(app.store.get().model);
+  const [chosen, setFormat] = useState<ShapeFormatName>(SHAPE_FORMATS[0]);
+  const format = formats.find((one) => one === chosen) ?? formats[0] ?? chosen;
   const [moment, setMoment] = useState<"frame" | "rest">("frame");
   useEffect(() => app.exports.shapeIn(format, moment === "frame"), [app, format, moment]);
   const isClipShown = app.store.get().clip.clip !== null;
@@ -143,7 +202,7 @@ function ShapeFormat({ app }: { app: App }) {
       )}
       <Segments
         label={T.exports.format}
-        choices={SHAPE_FORMATS.map((value) => ({ value, label: value.toUpperCase() }))}
+        choices={formats.map((value) => ({ value, label: value.toUpperCase() }))}
         value={format}
         onChange={setFormat}
       />

@@ -1,4 +1,4 @@
-/** Options of the smooth cage and of the controls inside it. */
+/** Options of the cage's smoothing and of its interior controls. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";

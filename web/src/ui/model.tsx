@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import type { App } from "../app";
 import type { ModelInfo, UpAxis } from "../contract";
-import { asksToPull } from "../derived";
+import { asksToPull, isCapture } from "../derived";
 import { count, scientific } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -22,7 +22,7 @@ export function ModelPanel({ app }: { app: App }) {
   const open = model && (
     <>
       {model.members.length === 1 ? <ModelCard app={app} model={model} /> : <Up app={app} model={model} />}
-      <Models app={app} model={model} />
+      {!isCapture(model) && <Models app={app} model={model} />}
       {model.notices.map((notice) => (
         <Say key={notice} kind="hint" text={sentence(notice)} />
       ))}
@@ -59,6 +59,11 @@ export function ModelPanel({ app }: { app: App }) {
             <SampleCard key={id} app={app} id={id} isOpen={id === sample} />
           ))}
         </ul>
+        <p class="hint">
+          <a href="./gallery.html" target="_blank" rel="noopener">
+            {T.model.gallery}
+          </a>
+        </p>
       </Section>
       {sample !== null && open}
       <Privacy />
@@ -78,6 +83,7 @@ function Up({ app, model }: { app: App; model: ModelInfo }) {
       choices={[
         { value: "y", label: "Y", tip: T.model.upY },
         { value: "z", label: "Z", tip: T.model.upZ },
+        ...(isCapture(model) ? [{ value: "y_down", label: "−Y", tip: T.model.upYDown } as const] : []),
       ]}
       value={model.up}
       onChange={(axis) => void app.files.turn(axis)}
@@ -131,13 +137,16 @@ function SampleCard({ app, id, isOpen }: { app: App; id: string; isOpen: boolean
 function ModelCard({ app, model }: { app: App; model: ModelInfo }) {
   const { min, max } = model.bounds;
   const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
-  const rows: [string, string][] = [
-    [T.model.vertices, count(model.vertices)],
-    [T.model.triangles, count(model.triangles)],
-    [T.model.size, size],
+  const some = (...counts: [string, number][]) =>
+    counts.filter(([, n]) => n > 0).map(([name, n]) => [name, count(n)] as [string, string]);
+  const rows = [
+    ...some([T.model.splats, model.splats], [T.model.points, model.points]),
+    ...(isCapture(model)
+      ? []
+      : some([T.model.vertices, model.vertices], [T.model.triangles, model.triangles])),
+    [T.model.size, size] as [string, string],
+    ...some([T.model.materials, model.materials], [T.model.textures, model.textures]),
   ];
-  if (model.materials > 0) rows.push([T.model.materials, count(model.materials)]);
-  if (model.textures > 0) rows.push([T.model.textures, count(model.textures)]);
   const also = alsoThere(model);
   if (also !== "") rows.push([T.model.also, also]);
   return (

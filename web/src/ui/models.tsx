@@ -6,7 +6,7 @@ import type { MemberInfo, ModelInfo } from "../contract";
 import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
-import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls";
+import { Button, choicesOf, Fold, IconButton, Section, Segments, Slider } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { useTouch } from "./touch";
 
@@ -175,7 +175,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
       <p class="hint">{T.models.paintSentence}</p>
       <Segments
         label={T.models.brush}
-        choices={(["paint", "erase"] as const).map((value) => ({ value, label: T.models.brushes[value] }))}
+        choices={choicesOf(["paint", "erase"], T.models.brushes)}
         value={painting.erase ? "erase" : "paint"}
         onChange={(value) => app.painting.brush({ erase: value === "erase" })}
       />

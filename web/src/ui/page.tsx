@@ -1,13 +1,16 @@
 /** Mounts all components of the page. */
 
+import { loadPart } from "@cagework/core/session/parts";
 import { type FunctionComponent, render } from "preact";
+import { useEffect, useState } from "preact/hooks";
+import { attempt } from "../actions/context";
 import type { App } from "../app";
 import type { Lack } from "../contract";
+import { loadSheet, T } from "../words";
 import { Bar } from "./bar";
 import { Hover } from "./hover";
 import { Panel } from "./panel";
 import { See } from "./see";
-import { Sheet } from "./sheet";
 import { Overlays } from "./stage";
 import { attachTips } from "./tips";
 import { Notice, Unsupported, WaysDialog } from "./unsupported";
@@ -59,11 +62,30 @@ function Tour({ app }: { app: App }) {
   return tour && loaded ? <loaded.Card app={app} tour={tour} guide={loaded.guide} /> : null;
 }
 
-function Dialogs({ app }: { app: App }) {
+let Sheet: typeof import("./sheet").Sheet | undefined;
+
+/** Downloads the shortcut sheet with its sentences. */
+export async function loadSheetPart(): Promise<void> {
+  const [part] = await loadPart(Promise.all([import("./sheet"), loadSheet()]));
+  Sheet = part.Sheet;
+}
+
+/** The shortcut sheet, which is downloaded when it is first opened. */
+function LateSheet({ app }: { app: App }) {
   const { sheetOpen } = app.store.get();
+  const [, setLoaded] = useState(false);
+  const close = () => app.store.set({ sheetOpen: false });
+  useEffect(() => {
+    if (!sheetOpen || Sheet) return;
+    void attempt(app.ctx, T.failed.sheet, loadSheetPart).then((went) => (went ? setLoaded(true) : close()));
+  }, [sheetOpen]);
+  return Sheet ? <Sheet app={app} isOpen={sheetOpen} onClose={close} /> : null;
+}
+
+function Dialogs({ app }: { app: App }) {
   return (
     <>
-      <Sheet app={app} isOpen={sheetOpen} onClose={() => app.store.set({ sheetOpen: false })} />
+      <LateSheet app={app} />
       <WaysDialog app={app} />
       <WorksList app={app} />
     </>

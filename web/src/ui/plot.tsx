@@ -1,4 +1,7 @@
-/** Live plot of the change per iteration on a logarithmic scale, like figure 7 of K. Smith. */
+/**
+ * Live plot of the weights' change per iteration on a logarithmic scale, like figure 7 of K. Smith's paper
+ * (docs/method.md).
+ */
 
 import { count } from "../format";
 import { T } from "../words";
@@ -6,7 +9,7 @@ import { T } from "../words";
 export interface Curve {
   name: string;
   points: readonly (readonly [iteration: number, delta: number])[];
-  /** Class that determines the colour. */
+  /** CSS class that determines the colour of the curve. */
   kind: (typeof KINDS)[number];
 }
 
@@ -25,7 +28,7 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
-/** Height of a text line, and width of a letter that also suffices for accents, in units of the drawing. */
+/** Height of a text line, and width reserved for a letter, with or without accents, in units of the `viewBox`. */
 const LABEL = 11;
 const LETTER = 5.8;
 
@@ -37,7 +40,10 @@ export interface Scale {
   logarithmic: boolean;
 }
 
-/** Ranges of both axes: powers of ten that enclose all deltas and the threshold, and the last iteration. */
+/**
+ * Ranges of the axes. The vertical axis extends between powers of ten that enclose all deltas and the threshold, the
+ * horizontal axis to the last iteration.
+ */
 export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   const deltas = curves
     .flatMap((curve) => curve.points.map(([, delta]) => delta))
@@ -55,12 +61,12 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   };
 }
 
-/** A point of the drawing, in its units. */
+/** A point of the plot, in units of its `viewBox`. */
 export type Place = readonly [x: number, y: number];
 
 /**
  * Position of the label of the threshold, the left end of its baseline. Tries positions below and above the threshold's
- * line, which is at height `at`, and returns the first that no curve crosses.
+ * line, which is at height `at`, and returns the first that no curve crosses, or else the first of all.
  */
 export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
   const right = WIDTH - RIGHT - 4 - width;

@@ -10,12 +10,14 @@ import { T } from "../words";
 import { Clips } from "./clips";
 import {
   Button,
+  choicesOf,
   Head,
   IconButton,
   NumberField,
   NumberInput,
   Section,
   Segments,
+  SHARES,
   Slider,
   Toggle,
 } from "./controls";
@@ -71,7 +73,7 @@ function PullOptions({ app }: { app: App }) {
 
 /** Position of the selection in number fields. */
 function Selection({ app }: { app: App }) {
-  const { model, cage, selected, editingRest, pivot, scene } = app.store.get();
+  const { model, cage, selected, editingRest, tools, scene } = app.store.get();
   const size = model ? Math.max(...model.bounds.max.map((high, i) => high - (model.bounds.min[i] ?? 0))) : 0;
   const { count, last, center } = selected;
   const inner = (last ?? 0) - (cage?.info.vertices ?? 0);
@@ -96,13 +98,9 @@ function Selection({ app }: { app: App }) {
       {count > 1 && (
         <Segments<Pivot>
           label={T.pose.pivot}
-          choices={PIVOTS.map((value) => ({
-            value,
-            label: T.pose.pivots[value],
-            tip: T.pose.pivotTips[value],
-          }))}
-          value={pivot}
-          onChange={(value) => app.view.pivot(value)}
+          choices={choicesOf(PIVOTS, T.pose.pivots, T.pose.pivotTips)}
+          value={tools.pivot}
+          onChange={(pivot) => app.view.tools({ pivot })}
         />
       )}
       {count > 0 && (
@@ -124,7 +122,8 @@ function Selection({ app }: { app: App }) {
 }
 
 function Help({ app }: { app: App }) {
-  const { symmetry, unmatched, proportionalOn, proportional } = app.store.get();
+  const { tools, unmatched } = app.store.get();
+  const { symmetry, proportionalOn, proportional } = tools;
   const isTouch = useTouch();
   return (
     <>
@@ -132,14 +131,14 @@ function Help({ app }: { app: App }) {
         label={T.pose.mirror}
         sentence={T.pose.mirrorSentence}
         on={symmetry}
-        onChange={(on) => app.view.symmetry(on)}
+        onChange={(on) => app.view.tools({ symmetry: on })}
       />
       {symmetry && unmatched > 0 && <p class="hint warn-text">{T.pose.unmatched(unmatched)}</p>}
       <Toggle
         label={T.pose.proportional}
         sentence={isTouch ? T.pose.proportionalTouch : T.pose.proportionalSentence}
         on={proportionalOn}
-        onChange={(on) => app.view.proportional(on)}
+        onChange={(on) => app.view.tools({ proportionalOn: on })}
       />
       {proportionalOn && (
         <Slider
@@ -147,7 +146,7 @@ function Help({ app }: { app: App }) {
           {...SLIDERS.proportional}
           format={(value) => T.pose.ofCage(percent(value))}
           value={proportional}
-          onInput={(value) => app.view.proportional(true, value)}
+          onInput={(value) => app.view.tools({ proportional: value })}
         />
       )}
     </>
@@ -160,11 +159,11 @@ function Poses({ app }: { app: App }) {
   const places = poses.flatMap(({ fits }, index) => (fits ? [index] : []));
   const others = poses.length - places.length;
   const list = useRef<HTMLUListElement>(null);
-  /** Place in `places` to which a card is being dragged. */
+  /** Index in `places` to which a card is being dragged; null without a drag. */
   const [over, setOver] = useState<number | null>(null);
   const count = useRef(poses.length);
   useLayoutEffect(() => {
-    // A saved pose is the last one, with the whole share of the blend.
+    // A pose that was just saved is the last of the list, and the blend consists of it alone.
     const isSaved = poses.length === count.current + 1 && shares.at(-1) === 1;
     count.current = poses.length;
     if (isSaved) list.current?.lastElementChild?.scrollIntoView({ block: "nearest" });
@@ -175,7 +174,7 @@ function Poses({ app }: { app: App }) {
     app.poses.move(index, target);
     list.current?.children[to]?.querySelector<HTMLElement>(".grip")?.focus();
   };
-  /** Place of the card under the pointer. */
+  /** Index in `places` of the card at the height `y` of the window, CSS pixels. */
   const placeAt = (y: number) => {
     const middles = [...(list.current?.children ?? [])].map((card) => card.getBoundingClientRect());
     return Math.max(0, middles.filter(({ top }) => top <= y).length - 1);
@@ -229,7 +228,7 @@ function Poses({ app }: { app: App }) {
   );
 }
 
-/** How the animation of the poses goes from one to the next, and how it ends. */
+/** Options for the animation of the poses: how it interpolates, whether it returns to its start, and its length. */
 function Timing({ app }: { app: App }) {
   const state = app.store.get();
   const { transition, animationSeconds } = state;
@@ -238,11 +237,7 @@ function Timing({ app }: { app: App }) {
     <>
       <Segments<Interpolation>
         label={T.pose.between}
-        choices={INTERPOLATIONS.map((value) => ({
-          value,
-          label: T.pose.interpolations[value],
-          tip: T.pose.interpolationTips[value],
-        }))}
+        choices={choicesOf(INTERPOLATIONS, T.pose.interpolations, T.pose.interpolationTips)}
         value={transition.interpolation}
         onChange={(interpolation) => app.poses.transition({ ...transition, interpolation })}
       />
@@ -267,7 +262,7 @@ function Timing({ app }: { app: App }) {
 interface PoseRowProps {
   app: App;
   index: number;
-  /** Whether another card would be dropped here. */
+  /** Whether the card that is being dragged would be dropped at this row. */
   isOver: boolean;
   share: number;
   /** `y`: position of the pointer in the window; null if the drag was cancelled. */
@@ -277,9 +272,13 @@ interface PoseRowProps {
 }
 
 function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowProps) {
-  const { poses, playingPose } = app.store.get();
-  const { name, seconds } = poses[index] ?? { name: "", seconds: 0 };
-  /** Counts refused times. A new key makes the field show the time of the pose again. */
+  const { poses, playingPose, pictures } = app.store.get();
+  const { name, seconds, hash } = poses[index] ?? { name: "", seconds: 0, hash: 0 };
+  const picture = pictures[hash];
+  /**
+   * Number of rejected inputs in the time field. It is the key of the field, so that a new field with the pose's time
+   * replaces the rejected text.
+   */
   const [refused, setRefused] = useState(0);
   return (
     <li
@@ -328,6 +327,7 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
         />
       </div>
       <div class="row">
+        {picture && <img class="pose-picture" src={picture} alt="" width="64" height="48" />}
         <div class="pose-time">
           <NumberInput
             key={refused}
@@ -356,10 +356,7 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
       <Slider
         label={T.pose.blend}
         name={T.pose.blendOf(name)}
-        min={0}
-        max={1}
-        step={0.01}
-        format={percent}
+        {...SHARES}
         value={share}
         onInput={(value) => app.poses.blend(index, value, false)}
         onCommit={(value) => app.poses.blend(index, value, true)}
@@ -368,7 +365,7 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
   );
 }
 
-/** Seconds without the digits that their storage as 32-bit numbers adds. */
+/** Rounds seconds to thousandths: removes the digits that conversion from a 32-bit number adds. */
 function thousandths(seconds: number): number {
   return Number(seconds.toFixed(3));
 }

@@ -7,11 +7,12 @@ import { T } from "../words";
 import { Badge, Facts, Fold, Say } from "./controls";
 
 /**
- * Rest error that is invisible, as a fraction of the cage's diagonal: a tenth of a pixel on a screen 4,000 pixels wide.
+ * Rest error below which the bound model at rest looks like the original, as a fraction of the cage's diagonal: a tenth
+ * of a pixel if the diagonal spans a screen 4,000 pixels wide.
  */
 const INVISIBLE = 2.5e-5;
 
-/** Says in one sentence whether the solver converged and how exactly the weights restore the model. */
+/** Says in one sentence whether the solver converged and how closely the weights reproduce the model at rest. */
 export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
   const { stopped, invisible, off } = T.report.verdicts;
   if (!report.converged) return stopped;
@@ -79,7 +80,7 @@ export function ReportCard({ report }: { report: BindReport }) {
   );
 }
 
-/** Rows with the mean and the largest solver error. */
+/** Rows with the mean and the largest value of the error called `name`. */
 function rawFacts(name: string, error: MeanMax): [string, string][] {
   return [
     [T.report.mean(name), scientific(error.mean)],

@@ -15,7 +15,8 @@ const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "ext
 ];
 
 export function ReshapeTools({ app }: { app: App }) {
-  const { element, selected } = app.store.get();
+  const { tools, selected } = app.store.get();
+  const { element } = tools;
   return (
     <Toolbar label={T.cage.tools} kind="reshape">
       {EDITS.map(([edit, icon, command]) => (

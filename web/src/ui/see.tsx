@@ -4,10 +4,10 @@ import { isComparison } from "../actions/view";
 import type { App } from "../app";
 import type { Coordinates, SceneOptions } from "../contract";
 import { COORDINATES } from "../defaults";
-import { percent } from "../format";
+import { isCapture } from "../derived";
 import type { Slice } from "../state";
 import { T } from "../words";
-import { IconButton, Section, Segments, Slider, Toggle } from "./controls";
+import { choicesOf, IconButton, Section, Segments, SHARES, Slider, Toggle } from "./controls";
 
 const COLOURS = ["material", "clay", "weight", "error"] as const satisfies SceneOptions["colour"][];
 const SLICES = ["off", "kinds", "value"] as const satisfies SceneOptions["slice"][];
@@ -47,16 +47,15 @@ export function See({ app }: { app: App }) {
 }
 
 function Colours({ app }: { app: App }) {
-  const { scene, selected, bound } = app.store.get();
+  const { scene, selected, bound, model } = app.store.get();
   const needsVertex = scene.colour === "weight" && selected.last === null;
   return (
     <div class="stack">
       <Segments<SceneOptions["colour"]>
         label={T.see.colour}
-        choices={COLOURS.map((value) => ({
-          value,
-          label: T.see.colours[value],
-          disabled: !bound && (value === "weight" || value === "error"),
+        choices={choicesOf(COLOURS, T.see.colours).map((choice) => ({
+          ...choice,
+          disabled: !bound && (choice.value === "weight" || choice.value === "error"),
         }))}
         value={scene.colour}
         onChange={(colour) => app.view.scene({ colour })}
@@ -70,7 +69,7 @@ function Colours({ app }: { app: App }) {
           onChange={(on) => app.view.scene({ weights_to_one: on })}
         />
       )}
-      <Comparison app={app} />
+      {!isCapture(model) && <Comparison app={app} />}
     </div>
   );
 }
@@ -118,7 +117,7 @@ function Grid({ app }: { app: App }) {
     <>
       <Segments<SceneOptions["slice"]>
         label={T.see.slice}
-        choices={SLICES.map((value) => ({ value, label: T.see.slices[value] }))}
+        choices={choicesOf(SLICES, T.see.slices)}
         value={scene.slice}
         onChange={(kind) => app.view.slice({}, kind)}
       />
@@ -130,19 +129,23 @@ function Grid({ app }: { app: App }) {
             value={String(slice.axis)}
             onChange={(value) => app.view.slice({ axis: Number(value) as Slice["axis"] })}
           />
-          <Slider
-            label={T.see.where}
-            min={0}
-            max={1}
-            step={0.005}
-            format={percent}
-            value={slice.position}
-            onInput={(position) => app.view.slice({ position })}
-          />
+          <SlicePosition app={app} />
           <p class="hint">{about}</p>
         </div>
       )}
     </>
+  );
+}
+
+export function SlicePosition({ app }: { app: App }) {
+  return (
+    <Slider
+      label={T.see.where}
+      {...SHARES}
+      step={0.005}
+      value={app.store.get().slice.position}
+      onInput={(position) => app.view.slice({ position })}
+    />
   );
 }
 
@@ -162,6 +165,22 @@ function Parts({ app }: { app: App }) {
           />
         );
       })}
+      <Floaters app={app} />
     </div>
+  );
+}
+
+/** Shows or hides the splats outside the cage. */
+function Floaters({ app }: { app: App }) {
+  const { scene, floaters } = app.store.get();
+  if (floaters === 0) return null;
+  const [label, sentence] = T.see.floaters(floaters);
+  return (
+    <Toggle
+      label={label}
+      sentence={sentence}
+      on={scene.floaters}
+      onChange={(on) => app.view.scene({ floaters: on })}
+    />
   );
 }

@@ -2,7 +2,7 @@
 
 import type { App } from "../app";
 import { caps, GROUPS, SHORTCUTS, type Shortcut } from "../input/shortcuts";
-import { T } from "../words";
+import { SHEET, T } from "../words";
 import { Button } from "./controls";
 import { Dialog } from "./dialog";
 
@@ -14,9 +14,9 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
     onClose();
   };
   return (
-    <Dialog title={T.sheet.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
+    <Dialog title={SHEET.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: scrollable regions must be reachable by keyboard */}
-      <section class="sheet-body" tabIndex={0} aria-label={T.sheet.all}>
+      <section class="sheet-body" tabIndex={0} aria-label={SHEET.all}>
         <section class="keys">
           <Button
             label={T.tour.begin}
@@ -30,18 +30,18 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
         </section>
         {GROUPS.map((group) => (
           <section class="keys" key={group}>
-            <h3>{T.sheet.groups[group]}</h3>
+            <h3>{SHEET.groups[group]}</h3>
             <dl>
-              {SHORTCUTS.filter((s) => s.group === group && T.sheet.commands[s.command]).map((shortcut) => (
+              {SHORTCUTS.filter((s) => s.group === group && SHEET.commands[s.command]).map((shortcut) => (
                 <Row key={shortcut.command} shortcut={shortcut} mac={mac} />
               ))}
             </dl>
           </section>
         ))}
         <section class="keys">
-          <h3>{T.sheet.pointer}</h3>
+          <h3>{SHEET.pointer}</h3>
           <dl>
-            {T.sheet.pointers.flatMap(([what, does]) => [
+            {SHEET.pointers.flatMap(([what, does]) => [
               <dt key={what}>
                 <span>{what}</span>
               </dt>,
@@ -60,7 +60,7 @@ function Row({ shortcut, mac }: { shortcut: Shortcut; mac: boolean }) {
       <dt>
         {(shortcut.shown ?? shortcut.keys).map((combination, i) => (
           <>
-            {i > 0 && !shortcut.shown && <span class="or">{T.sheet.or}</span>}
+            {i > 0 && !shortcut.shown && <span class="or">{SHEET.or}</span>}
             <span class="caps">
               {caps(combination, mac).map((cap) => (
                 <kbd key={cap}>{cap}</kbd>
@@ -69,7 +69,7 @@ function Row({ shortcut, mac }: { shortcut: Shortcut; mac: boolean }) {
           </>
         ))}
       </dt>
-      <dd>{T.sheet.commands[shortcut.command]}</dd>
+      <dd>{SHEET.commands[shortcut.command]}</dd>
     </>
   );
 }

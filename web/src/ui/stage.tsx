@@ -3,13 +3,13 @@
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
-import type { Element as CageElement, CageState, SceneOptions } from "../contract";
+import type { Element as CageElement, CageState, GizmoMode } from "../contract";
 import { asksToPull, elementInUse } from "../derived";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Axes } from "./axes";
-import { Button, IconButton, Say, Segments } from "./controls";
+import { Button, choicesOf, IconButton, Say, Segments } from "./controls";
 import { useFrames } from "./frame";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
@@ -26,7 +26,7 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
     stage.toggleAttribute("data-painting", painting !== null);
   }, [stage, editingRest, painting]);
   const hasCage = cage !== null;
-  // The tools appear with the cage.
+  // The tools appear with the cage and cover a part of the view, so measure the margins again.
   useLayoutEffect(() => app.view.resized(), [app, hasCage]);
   return (
     <>
@@ -64,7 +64,7 @@ function Mode({ app }: { app: App }) {
       <Segments
         label={T.view.mode}
         hideLabel
-        choices={(["pose", "rest"] as const).map((value) => ({ value, label: T.view.modes[value] }))}
+        choices={choicesOf(["pose", "rest"], T.view.modes)}
         value={app.store.get().editingRest ? "rest" : "pose"}
         onChange={(value) => {
           app.edit.setEditingRest(value === "rest");
@@ -75,7 +75,7 @@ function Mode({ app }: { app: App }) {
   );
 }
 
-/** Whether the bound surface is the cage itself: not smoothed, and no controls inside. */
+/** Whether the bound surface is the cage itself, without smoothing and without interior controls. */
 function isPlain(cage: CageState | null): boolean {
   return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
 }
@@ -108,7 +108,7 @@ function Encloses({ app }: { app: App }) {
   );
 }
 
-const GIZMOS: readonly (readonly [Exclude<SceneOptions["gizmo"], "none">, IconName, Command])[] = [
+const GIZMOS: readonly (readonly [GizmoMode, IconName, Command])[] = [
   ["move", "move", "gizmoMove"],
   ["rotate", "rotate", "gizmoRotate"],
   ["scale", "scale", "gizmoScale"],
@@ -116,7 +116,7 @@ const GIZMOS: readonly (readonly [Exclude<SceneOptions["gizmo"], "none">, IconNa
 const ELEMENTS: readonly CageElement[] = ["vertex", "edge", "face"];
 
 function Tools({ app }: { app: App }) {
-  const { scene, boxArmed, additive, symmetry, proportionalOn } = app.store.get();
+  const { scene, boxArmed, additive, tools } = app.store.get();
   const element = elementInUse(app.store.get());
   const command = (icon: IconName, label: string, run: Command, pressed: boolean) => (
     <IconButton
@@ -130,7 +130,7 @@ function Tools({ app }: { app: App }) {
   return (
     <Toolbar label={T.view.tools} kind="tools">
       {command("pull", T.pull.tool, "toolPull", scene.pull)}
-      {command("select", T.view.gizmos.none, "toolSelect", !scene.pull && scene.gizmo === "none")}
+      {command("select", T.view.gizmos.none, "toolSelect", !scene.pull && scene.gizmo === null)}
       {GIZMOS.map(([gizmo, icon, key]) => (
         <IconButton
           key={gizmo}
@@ -161,8 +161,8 @@ function Tools({ app }: { app: App }) {
         kind="touch-only"
         pressed={additive}
       />
-      {command("symmetry", T.pose.mirror, "symmetry", symmetry)}
-      {command("proportional", T.pose.proportional, "proportional", proportionalOn)}
+      {command("symmetry", T.pose.mirror, "symmetry", tools.symmetry)}
+      {command("proportional", T.pose.proportional, "proportional", tools.proportionalOn)}
     </Toolbar>
   );
 }
@@ -219,7 +219,7 @@ function BottomLine({ app }: { app: App }) {
   );
 }
 
-/** Marks the point of the sample to pull first. The Model panel says it in words. */
+/** Marks the point of the sample that the user should pull first. The Model panel describes the task in words. */
 function Cue({ app }: { app: App }) {
   const element = useRef<HTMLDivElement>(null);
   const { grip } = app.store.get();
@@ -237,7 +237,7 @@ function Cue({ app }: { app: App }) {
   );
 }
 
-/** Progress of opening a file, with a button to cancel. Before a long freeze, also asks whether to go on. */
+/** Progress of opening a file, with a button to cancel. For a large model, also asks whether to go on. */
 function Busy({ app }: { app: App }) {
   const { busy, busyStep, cancelBusy, goOn } = app.store.get();
   return (

@@ -9,7 +9,7 @@ export function statusOf(state: AppState): string {
   return underWay(state) ?? settled(state);
 }
 
-/** The operation in progress, or a condition that must not be missed; null otherwise. */
+/** Sentence about the operation or mode in progress, or about a cage that cannot be bound; null without one. */
 export function underWay(state: AppState): string | null {
   if (state.busy) return `${state.busy}…`;
   if (state.gesture) return state.gesture;
@@ -40,7 +40,7 @@ export function hintOf(state: AppState, isTouch: boolean): string {
   if (placing) return T.hints.placing;
   if (painting) return isTouch ? T.models.hintTouch : T.models.hint;
   if (!cage) return T.hints.noCage;
-  if (clip.clip !== null) return isTouch ? T.hints.clipTouch : T.hints.clip;
+  if (clip.clip !== null) return T.hints[`clip${clip.playing ? "" : "Paused"}${isTouch ? "Touch" : ""}`];
   if (editingRest && !scene.cage) return T.hints.restHidden;
   if (editingRest) return isTouch ? T.hints.restTouch : T.hints.rest;
   if (!bound) return bindRun ? T.hints.binding : T.hints.unbound;
@@ -51,5 +51,5 @@ export function hintOf(state: AppState, isTouch: boolean): string {
 function dragOf({ scene, selected }: AppState): keyof typeof T.hints.drags {
   if (scene.pull) return scene.cage ? "pullOrHandle" : "pull";
   if (!scene.cage) return "nothing";
-  return scene.gizmo !== "none" && selected.count > 0 ? "gizmo" : "handle";
+  return scene.gizmo !== null && selected.count > 0 ? "gizmo" : "handle";
 }

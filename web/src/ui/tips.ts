@@ -2,9 +2,9 @@
 
 /** Hover time before a tip appears, ms. */
 const REST_MS = 500;
-/** Time for which a tip stays after the finger is lifted, ms. */
+/** Time for which a tip stays visible after the finger is lifted, ms. */
 const READ_MS = 2500;
-/** Distance of a tip to its element and to the window's edge, CSS pixels. */
+/** Distance of a tip from its element, and minimum distance from the window's edge, CSS pixels. */
 const GAP = 6;
 
 interface Size {
@@ -12,7 +12,7 @@ interface Size {
   readonly height: number;
 }
 
-/** Upper left corner of a tip: below its element, or above if there is no room, or beside an element in a column. */
+/** Upper left corner of a tip: below its element, above it if there is no room, or beside it in a vertical toolbar. */
 export function placeTip(box: DOMRectReadOnly, tip: Size, isInColumn: boolean, window: Size) {
   const inside = (at: number, size: number, limit: number) => Math.min(Math.max(GAP, at), limit - size - GAP);
   if (isInColumn) {
@@ -25,7 +25,7 @@ export function placeTip(box: DOMRectReadOnly, tip: Size, isInColumn: boolean, w
   return { x: inside(box.x + (box.width - tip.width) / 2, tip.width, window.width), y };
 }
 
-/** Whether an element is in a toolbar that runs downwards. */
+/** Whether an element is in a vertical toolbar. */
 function isInColumn(element: Element): boolean {
   return element.closest("[role=toolbar]")?.getAttribute("aria-orientation") === "vertical";
 }

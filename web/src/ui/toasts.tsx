@@ -15,6 +15,8 @@ import { Icon } from "./icons";
 const SHOWN_MS = 5000;
 /** Time for which a message with a button is shown, ms. */
 const SHOWN_WITH_BUTTON_MS = 12_000;
+/** Time after which a touch beside a message closes it, ms. A touch that started earlier was not a reaction to it. */
+const READ_MS = 1000;
 /** Maximum number of visible messages of a kind, so that they do not hide the model. */
 const MOST = 3;
 
@@ -25,6 +27,8 @@ interface Toast {
   readonly fixes: readonly Fix[];
   /** Whether the message stays until the user closes it. */
   readonly stays?: boolean;
+  /** Time at which the message was shown, ms. */
+  readonly since: number;
 }
 
 let next = 0;
@@ -41,11 +45,11 @@ export function createToasts(): ToastParts {
   const problems = signal<readonly Toast[]>([]);
 
   /** Adds a message. If the same message is already shown, replaces it. */
-  const add = (list: typeof said, toast: Omit<Toast, "id">) => {
+  const add = (list: typeof said, toast: Omit<Toast, "id" | "since">) => {
     const isSame = ({ title, text }: Toast) => title === toast.title && textOf(text) === textOf(toast.text);
     const others = list.value.filter((other) => !isSame(other));
     next += 1;
-    const all = [...others, { ...toast, id: next }];
+    const all = [...others, { ...toast, id: next, since: performance.now() }];
     const latest = all.filter(({ stays }) => !stays).slice(-MOST);
     list.value = all.filter((one) => one.stays || latest.includes(one));
   };
@@ -90,6 +94,15 @@ function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
     if (isOpen && (isEmpty || document.querySelector("dialog[open]"))) current?.hidePopover();
     if (!isEmpty && !current?.matches(":popover-open")) current?.showPopover();
   }, [said, problems, isEmpty]);
+  useEffect(() => {
+    // A touch beside the messages closes them, because they cover much of the model on a small screen.
+    const press = ({ pointerType, target, timeStamp }: PointerEvent) => {
+      if (pointerType !== "touch" || element.current?.contains(target as Node)) return;
+      for (const { id, stays, since } of said) if (!stays && timeStamp - since > READ_MS) closeSaid(id);
+    };
+    document.addEventListener("pointerdown", press, true);
+    return () => document.removeEventListener("pointerdown", press, true);
+  }, [said]);
   return (
     <div class="toasts" id="toasts" popover="manual" ref={element}>
       <div class="toast-list" role="alert">

@@ -2,18 +2,8 @@
 
 import { T } from "../words";
 
-export interface Stage {
-  /** Receives pointer and keyboard events; contains the canvas. */
-  readonly viewport: HTMLElement;
-  readonly canvas: () => HTMLCanvasElement;
-  /** Replaces the canvas by a new one, which is needed for another GPU device. */
-  freshCanvas(): HTMLCanvasElement;
-  /** Shows the rubber band of a box selection; null hides it. */
-  band(box: { x: number; y: number; width: number; height: number } | null): void;
-}
-
 /** Creates the view. Call this before opening the session, which needs the canvas. */
-export function createStage(element: HTMLElement): Stage {
+export function createStage(element: HTMLElement) {
   const make = () => {
     const made = document.createElement("canvas");
     made.setAttribute("aria-hidden", "true");
@@ -37,15 +27,18 @@ export function createStage(element: HTMLElement): Stage {
   help.textContent = T.view.help;
   element.append(viewport, help);
   return {
+    /** Receives pointer and keyboard events; contains the canvas. */
     viewport,
     canvas: () => canvas,
-    freshCanvas() {
+    /** Replaces the canvas. Another GPU device needs a new one. */
+    freshCanvas(): HTMLCanvasElement {
       const next = make();
       canvas.replaceWith(next);
       canvas = next;
       return next;
     },
-    band(box) {
+    /** Shows the rubber band of a box selection; null hides it. */
+    band(box: { x: number; y: number; width: number; height: number } | null) {
       rubber.hidden = box === null;
       if (!box) return;
       rubber.style.translate = `${box.x}px ${box.y}px`;
@@ -54,3 +47,5 @@ export function createStage(element: HTMLElement): Stage {
     },
   };
 }
+
+export type Stage = ReturnType<typeof createStage>;

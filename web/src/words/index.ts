@@ -12,12 +12,16 @@ const LANGUAGES = new Map<string, () => Promise<Language>>([
 ]);
 
 let language = EN;
-/** The sentences of the page. */
+/** The sentences of the page in the selected language. */
 export let T = EN.words;
 /** The sentences of the tour, after `loadTour`. */
 export let TOUR: Awaited<ReturnType<Language["tourWords"]>>;
+/** The sentences of the shortcut sheet, after `loadSheet`. */
+export let SHEET: Awaited<ReturnType<Language["sheetWords"]>>;
+/** The sentences of the gallery, after `loadGallery`. */
+export let GALLERY: Awaited<ReturnType<Language["galleryWords"]>>;
 
-/** Selects the language that the address asks for (`?lang=`), or else the first one that the browser prefers. */
+/** Selects the language that the address names (`?lang=`), or else the first available one of the browser's list. */
 export async function chooseLanguage(): Promise<void> {
   const asked = new URLSearchParams(location.search).get("lang") ?? "";
   const preferred = navigator.languages.map((tag) => tag.replace(/-.*/, ""));
@@ -31,4 +35,12 @@ export async function chooseLanguage(): Promise<void> {
 
 export async function loadTour(): Promise<void> {
   TOUR = await language.tourWords();
+}
+
+export async function loadSheet(): Promise<void> {
+  SHEET = await language.sheetWords();
+}
+
+export async function loadGallery(): Promise<void> {
+  GALLERY = await language.galleryWords();
 }

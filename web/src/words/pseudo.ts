@@ -55,4 +55,6 @@ export const PSEUDO: Language = {
   locale: "el",
   words: pseudo(EN.words),
   tourWords: async () => pseudo(await EN.tourWords()),
+  sheetWords: async () => pseudo(await EN.sheetWords()),
+  galleryWords: async () => pseudo(await EN.galleryWords()),
 };

@@ -7,7 +7,7 @@ const VERSION = 2;
 const ENTRIES = "entries";
 const FILES = "projects";
 
-/** A new id. Pages served over plain HTTP have no `randomUUID`. */
+/** A new id. `randomUUID` does not exist on pages served over plain HTTP. */
 export function newId(): string {
   return crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4))).join("-");
 }
@@ -63,13 +63,16 @@ export async function readEntries(): Promise<{ entries: Entry[]; damaged: number
 }
 
 /** The project file of an entry; undefined if it is missing or incomplete. */
-export async function readFile(id: string): Promise<Uint8Array | undefined> {
+export async function readFile(id: string): Promise<Blob | undefined> {
   const file: unknown = await run("readonly", (_, files) => files.get(id));
-  return isWhole(file) ? file : undefined;
+  return file instanceof Blob && (await isWhole(file)) ? file : undefined;
 }
 
-/** Writes an entry and its project file, replacing those with the same id. Without `file`, leaves the stored file. */
-export async function writeEntry(entry: Entry, file?: Uint8Array): Promise<void> {
+/**
+ * Writes an entry and its project file, replacing those with the same id. Without `file`, leaves the stored file. The
+ * browser stores a Blob without a copy in the memory of the page.
+ */
+export async function writeEntry(entry: Entry, file?: Blob): Promise<void> {
   await run("readwrite", (entries, files) => {
     if (file) files.put(file, entry.id);
     return entries.put(entry, entry.id);

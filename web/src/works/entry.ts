@@ -5,13 +5,13 @@ import { T } from "../words";
 
 export interface Entry {
   readonly id: string;
-  /** Name of the model. */
+  /** Name of the model, which the list of saved work shows. */
   readonly name: string;
   /** Time of the last save, ms since 1970. */
   readonly when: number;
   /** Size of the project file, bytes. */
   readonly size: number;
-  /** Set if the page has crashed twice with this work open; it is then not opened automatically. */
+  /** Set if the page has crashed twice with this work open. The work is then not opened automatically. */
   readonly stopped?: true;
 }
 
@@ -43,10 +43,10 @@ export function isEntry(value: unknown): value is Entry {
 }
 
 /** Whether this is a complete project file: a GLB whose header states the file's length. */
-export function isWhole(file: unknown): file is Uint8Array {
-  if (!(file instanceof Uint8Array) || file.length < GLB_HEAD) return false;
-  const view = new DataView(file.buffer, file.byteOffset, file.byteLength);
-  return view.getUint32(0, true) === GLB && view.getUint32(GLB_LENGTH_AT, true) === file.length;
+export async function isWhole(file: Blob): Promise<boolean> {
+  if (file.size < GLB_HEAD) return false;
+  const head = new DataView(await file.slice(0, GLB_HEAD).arrayBuffer());
+  return head.getUint32(0, true) === GLB && head.getUint32(GLB_LENGTH_AT, true) === file.size;
 }
 
 export function isExpired({ when }: Entry, now: number): boolean {

@@ -2,17 +2,17 @@ import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createCage } from "../../src/actions/cage";
 import { createEdit } from "../../src/actions/edit";
-import type { Carriable } from "../../src/actions/poses";
+import type { CageSnapshot } from "../../src/actions/poses";
 import type { App } from "../../src/app";
 import type { CageOptions } from "../../src/contract";
 import { hasUnmadeCage, isCageSparse } from "../../src/derived";
 import { nextActions } from "../../src/ui/panel";
-import { cageOf, createFake, settled } from "../fake";
+import { cageOf, createFake, memberOf, modelOf, settled } from "../fake";
 
 function page() {
   const fake = createFake();
   const grids: number[] = [];
-  const carried: Carriable[] = [];
+  const carried: CageSnapshot[] = [];
   const cage = createCage(fake.ctx, {
     edit: createEdit(fake.ctx),
     know: fake.mirror.know,
@@ -42,7 +42,7 @@ it("a generated cage replaces the previous cage as one undo step; the first cage
 it("poses of the previous cage do not fit a new cage: the page offers to carry them over", async () => {
   const { cage, asked, said, show, showCage, carried, teach, offers } = page();
   showCage(cageOf(8, 1));
-  show({ poses: [{ name: "a", fits: true, seconds: 1 }], shares: [0.5] });
+  show({ poses: [{ name: "a", fits: true, seconds: 1, hash: 7 }], shares: [0.5] });
   teach({ carriable: () => Float32Array.of(7) });
   const made = cage.make();
   await settled();
@@ -95,7 +95,7 @@ it("after a change of the cage settings, the next action is to make the cage", a
   store.set({ bound: true });
   expect(labels()).toEqual(["Pose it", "Make this cage"]);
   expect(isCageSparse(store.get()), "76 of 80").toBe(false);
-  change({ vertices: 400 });
+  change({ target: 400 });
   expect(labels()).toEqual(["Make this cage", "Pose it"]);
   expect(isCageSparse(store.get()), "not made yet").toBe(false);
   await make(116);
@@ -104,7 +104,7 @@ it("after a change of the cage settings, the next action is to make the cage", a
   expect(labels()).toEqual(["Make this cage", "Bind the model"]);
   // A cage from the convex hull does not use the options of automatic cages.
   await make(24);
-  change({ vertices: 100 });
+  change({ target: 100 });
   expect([labels()[0], isCageSparse(store.get())]).toEqual(["Bind the model", false]);
   store.set({ cageSource: "file" });
   expect(labels()).toEqual(["Open a cage file", "Bind the model"]);
@@ -112,7 +112,7 @@ it("after a change of the cage settings, the next action is to make the cage", a
 
 it("changed settings are previewed, and the preview is taken when it is made", async () => {
   const { cage, asked, store, calls, height } = page();
-  const change = (vertices: number) => store.set({ cageOptions: { ...store.get().cageOptions, vertices } });
+  const change = (target: number) => store.set({ cageOptions: { ...store.get().cageOptions, target } });
   store.set({ step: "cage" });
   const first = cage.make();
   await settled();
@@ -141,7 +141,7 @@ it("changed settings are previewed, and the preview is taken when it is made", a
 it("undo of a cage returns to the settings of the cage that it shows", async () => {
   const { cage, asked, store, show } = page();
   const make = async (vertices: number) => {
-    store.set({ cageOptions: { ...store.get().cageOptions, vertices } });
+    store.set({ cageOptions: { ...store.get().cageOptions, target: vertices } });
     const made = cage.make();
     await settled();
     asked.at(-1)?.resolve(cageOf(vertices));
@@ -154,7 +154,7 @@ it("undo of a cage returns to the settings of the cage that it shows", async () 
     [2, 400],
   ] as const) {
     show({ cage: key });
-    expect([store.get().cageOptions.vertices, hasUnmadeCage(store.get())]).toEqual([vertices, false]);
+    expect([store.get().cageOptions.target, hasUnmadeCage(store.get())]).toEqual([vertices, false]);
   }
 });
 
@@ -203,14 +203,18 @@ it("a generated cage lists the gaps that it closes", async () => {
   expect(store.get().cage?.info.notices).toEqual(["the cage closes the gap"]);
 });
 
-it("offers one cage per part if a cage joins separate parts", async () => {
+it.each([
+  ["model has", ["cube.obj"]],
+  ["models have", ["body.obj", "shirt.obj"]],
+])("offers one cage per part if a cage joins separate parts: the %s", async (subject, names) => {
   const all = page();
   const { asked, cage, said, store } = all;
+  all.showModel(modelOf(names.map((name, id) => memberOf(id, name))));
   const made = cage.make();
   await settled();
   asked[0]?.resolve({ ...cageOf(8), bridged: 3 });
   await made;
-  expect(said).toEqual(["The model has 3 separate parts; this cage joins them."]);
+  expect(said).toEqual([`The ${subject} 3 separate parts; this cage joins them.`]);
   all.offers()[0]?.run();
   await settled();
   expect(asked[1]?.input).toMatchObject({ per_component: true });

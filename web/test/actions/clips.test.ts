@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
-import { createClips } from "../../src/actions/clips";
+import { createClips, loadClipLattice } from "../../src/actions/clips";
 import { rigOf } from "../../src/derived";
 import { createFake, MODEL, settled } from "../fake";
 
@@ -17,11 +17,15 @@ afterEach(() => {
   vi.restoreAllMocks();
 });
 
-/** A bound model with a clip of two seconds and two morph targets. */
+/**
+ * A page with a bound model that has a clip of two seconds and two morph targets. `shown` lists the calls of
+ * `showClip`, `starts` counts those of `startClip`, and `end` stops the clip as the engine does.
+ */
 function page() {
   const fake = createFake();
   const shown: [clip: number | undefined, seconds: number, targets: number[]][] = [];
   let starts = 0;
+  let paused = false;
   fake.teach({
     showsClip: false,
     startClip: () => {
@@ -30,8 +34,9 @@ function page() {
       return Promise.resolve();
     },
     stopClip: () => fake.teach({ showsClip: false }),
-    showClip: (clip, seconds, targets) => {
+    showClip: (clip, seconds, targets, isPaused) => {
       shown.push([clip ?? undefined, seconds, [...targets]]);
+      paused = isPaused;
     },
   });
   const targets = [
@@ -45,21 +50,30 @@ function page() {
   const clips = createClips(fake.ctx, () => undefined);
   /** Runs the next requested animation frame with the timestamp `now`, ms. */
   const frame = (now: number) => frames.shift()?.(now);
-  return { ...fake, clips, shown, frame, starts: () => starts, end: () => fake.teach({ showsClip: false }) };
+  return {
+    ...fake,
+    clips,
+    shown,
+    frame,
+    starts: () => starts,
+    paused: () => paused,
+    end: () => fake.teach({ showsClip: false }),
+  };
 }
 
 it("a chosen clip plays in a loop and pauses in place", async () => {
-  const { clips, shown, frame, store, starts } = page();
+  const { clips, shown, frame, store, starts, paused } = page();
   await clips.choose(0);
   frame(1500);
   frame(3250);
+  expect(paused()).toBe(false);
   expect(shown.map(([clip, seconds]) => [clip, seconds])).toEqual([
     [0, 0],
     [0, 0.5],
     [0, 0.25],
   ]);
   await clips.toggle();
-  expect([store.get().clip.playing, frames.length, starts()]).toEqual([false, 0, 1]);
+  expect([store.get().clip.playing, frames.length, starts(), paused()]).toEqual([false, 0, 1, true]);
   await clips.scrub(1.5);
   expect(shown.at(-1)).toEqual([0, 1.5, []]);
 });
@@ -88,7 +102,7 @@ it("changing a morph target keeps the others' defaults", async () => {
   expect(shown.at(-1)).toEqual([undefined, 0, [0.25, expect.closeTo(0.8)]]);
 });
 
-it("posing the cage ends a clip", async () => {
+it("another cage ends a clip", async () => {
   const { clips, frame, store, end } = page();
   await clips.choose(0);
   end();
@@ -108,15 +122,18 @@ it("asks for a bind first, and reports clips that cannot be played", async () =>
   expect(problems).toMatchObject([{ title: "The clip cannot be played" }]);
 });
 
-it("posing the cage ends a paused clip", async () => {
+it("another cage and reshaping end a paused clip, posing the cage does not", async () => {
   const { clips, store, end } = page();
   await clips.choose(0);
   await clips.scrub(0.5);
-  store.set({ undoLabel: "Move" });
+  store.set({ gesture: "Move", steps: 1 });
   expect(store.get().clip).toMatchObject({ clip: 0, seconds: 0.5 });
   end();
-  store.set({ gesture: "Move" });
+  store.set({ steps: 2 });
   expect(store.get().clip).toMatchObject({ clip: null, seconds: 0 });
+  await clips.choose(0);
+  store.set({ editingRest: true });
+  expect(store.get().clip).toMatchObject({ clip: null, playing: false });
 });
 
 it("rigid parts are limited to those of the open model", () => {
@@ -127,23 +144,32 @@ it("rigid parts are limited to those of the open model", () => {
   expect(rigOf(store.get()).rigid).toEqual(["sword"]);
 });
 
-it("changing the joint option ends the clip", async () => {
-  const { clips, store } = page();
+it("a clip is prepared again for each change of options, and shows the same time", async () => {
+  const { clips, store, starts, shown, engine } = page();
   await clips.choose(0);
-  clips.rig({ joints: "stay" });
-  expect([store.get().clip.clip, store.get().rigOptions.joints]).toEqual([null, "stay"]);
+  await clips.scrub(0.5);
+  await Promise.all([clips.rig({ joints: "stay" }), clips.rig({ ground: true })]);
+  expect(store.get().rigOptions).toMatchObject({ joints: "stay", ground: true });
+  expect([store.get().clip, starts()]).toMatchObject([{ clip: 0, seconds: 0.5, playing: false }, 3]);
+  expect(shown.at(-1)).toEqual([0, 0.5, []]);
+  const changed = clips.rig({ ground: false });
+  await clips.choose(null);
+  await changed;
+  expect([store.get().clip.clip, engine.showsClip], "the user has ended it").toEqual([null, false]);
 });
 
-it("with the option `dynamic`, a clip starts once the lattice is ready; the lattice is requested once", async () => {
-  const { clips, asked, starts, teach, said } = page();
+it("with the option `dynamic`, a clip starts once the lattice is ready, which is requested once", async () => {
+  const { clips, asked, ctx, starts, teach, said } = page();
   clips.rig({ dynamic: true });
   teach({ hasLattice: false });
   const chosen = clips.choose(0);
   await settled();
   expect([starts(), said.at(-1)]).toEqual([0, "Computing how the cage bends the moving model"]);
+  const exported = loadClipLattice(ctx);
+  await settled();
   asked.at(-1)?.resolve(undefined);
   teach({ hasLattice: true });
-  await chosen;
+  await Promise.all([chosen, exported]);
   expect(starts()).toBe(1);
   await clips.choose(null);
   await clips.choose(0);

@@ -3,7 +3,7 @@ import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
 import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
-/** File names of downloads since the start of the test. */
+/** File names and MIME types of downloads, and texts copied to the clipboard, since the start of the test. */
 let downloads: string[] = [];
 let types: string[] = [];
 let copied: string[] = [];
@@ -35,11 +35,31 @@ afterEach(() => {
 function page() {
   const fake = createFake();
   const project = createProject(fake.ctx, () => undefined);
-  const exports = createExports(fake.ctx, project);
+  const pull = { released: () => Promise.resolve<unknown>(undefined) };
+  const exports = createExports(fake.ctx, project, pull);
   fake.showModel(MODEL);
   fake.showCage(cageOf(2));
-  return { ...fake, exports, project };
+  return { ...fake, exports, project, pull };
 }
+
+it("an export waits until a released pull has ended", async () => {
+  const { exports, pull, teach } = page();
+  let isPulling = true;
+  pull.released = async () => {
+    await settled();
+    isPulling = false;
+  };
+  const during: boolean[] = [];
+  teach({
+    exportShape: () => {
+      during.push(isPulling);
+      return new Uint8Array(1);
+    },
+    rigNotices: () => [],
+  });
+  await exports.save("shape");
+  expect(during).toEqual([false]);
+});
 
 it("files are named after the model and their size is shown", async () => {
   const { exports, teach, said, store } = page();
@@ -104,6 +124,28 @@ it("each of several models is exported to its own file; one of them can be expor
   expect(said.at(-2)).toBe("body-posed.zip is in your downloads (1 byte).");
 });
 
+it("files of clips are fitted to the skeleton and downloaded", async () => {
+  const { exports, teach, said, problems } = page();
+  const file = (name: string) => ({ name, path: name, file: new File([name], name) });
+  teach({
+    exportClips: (name: string, bytes: Uint8Array) => {
+      if (new TextDecoder().decode(bytes) !== name) throw new Error("other bytes");
+      if (name === "tree.glb") throw new Error("no joints in common");
+      return Uint8Array.of(1);
+    },
+    rigNotices: () => ["3 of 4 joints moved"],
+  });
+  await exports.clips([file("walk.glb"), file("walk.glb")]);
+  expect(downloads).toEqual(["walk-posed.glb", "walk-posed-2.glb"]);
+  expect(said).toEqual([
+    "walk-posed.glb and walk-posed-2.glb are in your downloads (2 byte).",
+    "3 of 4 joints moved.",
+  ]);
+  await exports.clips([file("tree.glb")]);
+  expect(downloads.length).toBe(2);
+  expect(problems).toMatchObject([{ title: "The file could not be written" }]);
+});
+
 it("a failed export is reported and saves nothing", async () => {
   const { exports, teach, problems, asked } = page();
   teach({
@@ -129,11 +171,11 @@ it("a project contains the page's settings", async () => {
       return Uint8Array.of(1);
     },
   });
-  store.set({ symmetry: true });
+  store.set({ tools: { ...store.get().tools, symmetry: true } });
   project.write();
   expect(JSON.parse(written[0] ?? "")).toMatchObject({
     bind: { grid: 64 },
-    cage: { vertices: 80 },
+    cage: { target: 80 },
     symmetry: true,
   });
   expect(project.fileName()).toBe("cube.cagework.glb");

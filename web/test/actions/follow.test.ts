@@ -11,7 +11,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A page that counts cage checks (`looks`) and binds. */
+/** A page that follows changes of its cage. `count` counts updates of the view (`looks`) and binds. */
 function page() {
   const fake = createFake();
   const count = { looks: 0, binds: 0 };

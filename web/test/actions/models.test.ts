@@ -37,7 +37,7 @@ function page() {
   fake.show({ bound: true });
   /** Resolves the pending read. If all files are read, also resolves the add job, which adds models of these names. */
   const read = async (...names: string[]) => {
-    fake.asked.at(-1)?.resolve({ took: 0 });
+    fake.asked.at(-1)?.resolve({ vertices: 4 });
     await settled();
     const job = fake.asked.at(-1);
     if (job?.kind !== "add") return;
@@ -71,7 +71,7 @@ it("adding several models reads each; unreadable ones are named and skipped", as
   await settled();
   asked.at(-1)?.reject(Object.assign(new Error("bad.glb: not a GLB"), { name: "Format" }));
   await settled();
-  asked.at(-1)?.resolve({ took: 0 });
+  asked.at(-1)?.resolve({ vertices: 4 });
   await settled();
   await read("shirt.glb", "hat.glb");
   await added;
@@ -89,14 +89,15 @@ it("cancelling the read adds no model; neither does an engine that refuses them"
   await settled();
   expect(store.get().busy).toBe("Opening shirt.glb (1 of 2)");
   store.get().cancelBusy?.();
-  asked.at(-1)?.resolve({ took: 0 });
+  asked.at(-1)?.resolve({ vertices: 4 });
   expect([await cancelled, store.get().busy, problems]).toEqual([false, null, []]);
   const refused = models.add([file("shirt.glb"), file("hat.glb")]);
   for (const _ of [1, 2]) {
     await settled();
-    asked.at(-1)?.resolve({ took: 0 });
+    asked.at(-1)?.resolve({ vertices: 4 });
   }
   await settled();
+  expect(store.get().busy).toBe("Joining 3 models");
   asked.at(-1)?.reject(new Error("too many vertices"));
   await refused;
   expect([problems.map(({ title }) => title), names()]).toEqual([["Nothing was added"], ["body.glb"]]);

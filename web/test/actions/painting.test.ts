@@ -3,7 +3,10 @@ import { createEdit } from "../../src/actions/edit";
 import { createPainting } from "../../src/actions/painting";
 import { createFake, memberOf, modelOf } from "../fake";
 
-/** Two models of eight vertices. The first has 10 pixels in x for each vertex; pixels with y < 100 are background. */
+/**
+ * A page with two models of eight vertices. A dab at the pixel (x, y) paints the vertex floor(x / 10), or nothing if
+ * y < 100.
+ */
 function page() {
   const fake = createFake();
   let amounts = new Uint8Array();

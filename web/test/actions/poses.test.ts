@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createEdit } from "../../src/actions/edit";
-import { carriableOf, createPoses, freshName } from "../../src/actions/poses";
+import { createPoses, freshName, snapshotCage } from "../../src/actions/poses";
 import { cageOf, createFake } from "../fake";
 
 beforeEach(() => {
@@ -20,7 +20,7 @@ function page() {
   fake.showCage(cageOf(2));
   fake.engine.setCagePositions(new Float32Array(6).fill(1));
   fake.engine.commit("Move");
-  fake.show({ poses: [{ name: "Pose 1", fits: true, seconds: 1 }], shares: [1], posed: true });
+  fake.show({ poses: [{ name: "Pose 1", fits: true, seconds: 1, hash: 7 }], shares: [1], posed: true });
   return { ...fake, poses };
 }
 
@@ -51,6 +51,23 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 10]);
 });
 
+it("saved, updated and shown poses get a picture, unless the pose changes before it is drawn", async () => {
+  const { poses, asked, store, show } = page();
+  const ofCard = async (act: () => void, meanwhile = () => {}) => {
+    act();
+    meanwhile();
+    asked.at(-1)?.resolve(new Blob());
+    await new Promise((done) => setTimeout(done));
+    return store.get().pictures[7];
+  };
+  const change = () => show({ steps: store.get().steps + 1 });
+  expect(await ofCard(() => poses.update(0), change)).toBeUndefined();
+  expect(await ofCard(() => poses.apply(0))).toMatch(/^blob:/);
+  const before = asked.length;
+  await ofCard(() => poses.save());
+  expect(asked.length, "the picture of this pose exists").toBe(before);
+});
+
 it("an animation that does not loop ends with the pose before it", () => {
   const { poses, calls, show, store } = page();
   let frame: (now: number) => void = () => undefined;
@@ -69,7 +86,7 @@ it("an animation that does not loop ends with the pose before it", () => {
 
 it("poses of a previous cage are carried over as one step", async () => {
   const { poses, ctx, show, showCage, asked, commands, did } = page();
-  const before = carriableOf(ctx);
+  const before = snapshotCage(ctx);
   if (!before) throw new Error("no cage");
   showCage(cageOf(3));
   show({ editingRest: true });
@@ -86,7 +103,7 @@ it("poses of a previous cage are carried over as one step", async () => {
 it("carrying poses over to a new control adds no undo step, and a pose at rest stays at rest", async () => {
   const { poses, engine, ctx, showCage, asked, commands, did, calls } = page();
   showCage(cageOf(2));
-  const before = carriableOf(ctx);
+  const before = snapshotCage(ctx);
   if (!before) throw new Error("no cage");
   await poses.carry(before);
   expect(asked.length, "there is nothing to carry").toBe(0);
@@ -133,7 +150,7 @@ it("saving while poses are playing saves the pose on screen", () => {
 it("reset returns to rest; playing without poses is reported", () => {
   const { poses, commands, said, show, store } = page();
   poses.reset();
-  show({ posed: false, poses: [{ name: "of another cage", fits: false, seconds: 1 }] });
+  show({ posed: false, poses: [{ name: "of another cage", fits: false, seconds: 1, hash: 7 }] });
   poses.reset();
   expect(commands).toEqual([{ do: "reset_pose" }]);
   poses.togglePlay();

@@ -21,7 +21,8 @@ function page() {
   const shown: unknown[][] = [];
   fake.teach({
     surfaceAt: (x) => (x === 10 ? POINT : undefined),
-    gripOf: () => ({ row: [0.5, 0.5], seed: 3 }),
+    gripsOf: () => [Float64Array.of(0.5, 0.5), Uint32Array.of(3)],
+    pinsAfter: (x) => (x === 10 ? [POINT] : undefined),
     placeOf: () => Float32Array.of(0, 0, 0),
     project: () => Float32Array.of(10, 10, 1),
     followed: (place, dx, dy) => Float32Array.of((place[0] ?? 0) + dx, (place[1] ?? 0) + dy, 0),
@@ -66,6 +67,24 @@ it("a pull moves the cage with the worker's answers and is one undo step", async
   expect([engine.cagePositions()[0], did, store.get().gesture]).toEqual([3, ["Pull"], null]);
 });
 
+it("a released pull is awaited until its undo step exists, and a held one is not", async () => {
+  const { pull, answer, frame, took, cage, did } = page();
+  pull.begin(10, 10);
+  pull.drag(14, 10);
+  await pull.released();
+  await answer(took);
+  await answer(cage(2, false));
+  pull.end(true);
+  let steps: string[] | undefined;
+  void pull.released().then(() => {
+    steps = [...did];
+  });
+  await frame();
+  expect(steps).toBeUndefined();
+  await answer(cage(3, true));
+  expect(steps).toEqual(["Pull"]);
+});
+
 it("Esc restores the cage and later answers are dropped", async () => {
   const { pull, answer, took, cage, engine, did } = page();
   const before = engine.cagePositions();
@@ -77,20 +96,12 @@ it("Esc restores the cage and later answers are dropped", async () => {
   expect([engine.cagePositions(), did, pull.active()]).toEqual([before, [], false]);
 });
 
-it("a grab includes all pins except the grabbed one", async () => {
-  const { pull, asked, store, did, teach } = page();
+it("a click sets a pin or removes it, as one undo step", () => {
+  const { pull, store, did, teach } = page();
   expect(pull.pin(50, 10)).toBe(false);
   pull.pin(10, 10);
   expect(store.get().pins).toEqual([POINT]);
-  pull.begin(10, 10);
-  expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { grabs: 1, seeds: Uint32Array.of(3) } });
-  pull.end(false);
-  // After a change of view, the pin is no longer under the pointer, so that the pull starts a second grab.
-  teach({ project: () => Float32Array.of(90, 90, 1) });
-  pull.begin(10, 10);
-  expect(asked.at(-1)).toMatchObject({ input: { grabs: 1, seeds: Uint32Array.of(3, 3) } });
-  pull.end(false);
-  teach({ project: () => Float32Array.of(10, 10, 1) });
+  teach({ pinsAfter: () => [] });
   pull.pin(10, 10);
   expect([store.get().pins, did]).toEqual([[], ["Pin", "Remove pins"]]);
 });
@@ -100,9 +111,9 @@ it("changing the reach during a pull sends a new grab", async () => {
   pull.begin(10, 10);
   await answer(took);
   pull.reach(2);
-  expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { options: { reach: 0.6, whole: false } } });
+  expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { options: { reach: { of: 0.6 } } } });
   pull.reach(10);
-  expect(asked.at(-1)).toMatchObject({ input: { options: { whole: true } } });
+  expect(asked.at(-1)).toMatchObject({ input: { options: { reach: "whole" } } });
 });
 
 it("a failing worker is reported and leaves the cage unchanged", async () => {

@@ -15,14 +15,10 @@ function page(canCompare = true) {
   const fake = createFake();
   const dark = Object.assign(new EventTarget(), { matches: true }) as MediaQueryList;
   const scenes: SceneOptions[] = [];
-  const elements: string[] = [];
-  fake.teach({
-    setScene: (scene) => scenes.push(scene),
-    setElement: (element) => elements.push(element),
-  });
+  fake.teach({ setScene: (scene) => scenes.push(scene) });
   const view = createView(fake.ctx, async () => canCompare, dark);
   fake.showCage(cageOf(8));
-  return { ...fake, view, scenes, elements };
+  return { ...fake, view, scenes };
 }
 
 it("the theme follows the system unless one is chosen", () => {
@@ -70,22 +66,12 @@ it("a single kind of coordinates, or weights that are missing, end the compariso
   expect(other.store.get().scene.compare).toEqual(["harmonic"]);
 });
 
-it("pulling selects vertices whatever element was used for reshaping", () => {
-  const { view, store, elements } = page();
-  store.set({ editingRest: true });
+it("choosing faces ends pulling, except while the cage is reshaped", () => {
+  const { view, show, store } = page();
+  show({ editingRest: true });
   view.element("face");
-  expect(elements.at(-1)).toBe("face");
-  store.set({ editingRest: false });
-  expect([store.get().scene.pull, elements.at(-1)]).toEqual([true, "vertex"]);
+  expect([store.get().scene.pull, store.get().tools.element]).toEqual([true, "face"]);
+  show({ editingRest: false });
   view.element("edge");
-  expect([store.get().scene.pull, elements.at(-1)], "another tool than Pull").toEqual([false, "edge"]);
-  view.scene({ pull: true });
-  expect(elements.at(-1)).toBe("vertex");
-});
-
-it("the proportional radius is clamped and remembered", () => {
-  const { view, store } = page();
-  view.proportional(true, 7);
-  view.proportional(false);
-  expect(store.get()).toMatchObject({ proportional: 1, proportionalOn: false });
+  expect([store.get().scene.pull, store.get().tools.element]).toEqual([false, "edge"]);
 });

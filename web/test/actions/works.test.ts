@@ -5,9 +5,10 @@ import type { Entry } from "../../src/works/entry";
 import { cageOf, createFake, MODEL } from "../fake";
 
 /**
- * Simulated browser storage: saved work by identifier. `held`: identifiers locked by a tab; `own`: the one of this tab.
+ * Simulated browser storage: saved work by identifier. `held`: identifiers that a tab has locked; `own`: identifier of
+ * the work that this tab has open.
  */
-const kept = new Map<string, { entry: Entry; file: Uint8Array | undefined }>();
+const kept = new Map<string, { entry: Entry; file: Blob | undefined }>();
 const disk: { error: Error | undefined } = { error: undefined };
 let held: string[] = [];
 let own: string | null = null;
@@ -16,7 +17,7 @@ vi.mock("../../src/works/database", () => ({
   newId: () => `work${kept.size}`,
   readEntries: async () => ({ entries: Array.from(kept.values(), ({ entry }) => entry), damaged: 0 }),
   readFile: async (id: string) => kept.get(id)?.file,
-  async writeEntry(entry: Entry, file?: Uint8Array) {
+  async writeEntry(entry: Entry, file?: Blob) {
     if (disk.error) throw disk.error;
     kept.set(entry.id, { entry, file: file ?? kept.get(entry.id)?.file });
   },
@@ -46,7 +47,7 @@ afterEach(() => {
   [disk.error, held, own] = [undefined, [], null];
 });
 
-function page() {
+function page({ isEmpty = false } = {}) {
   const fake = createFake();
   const opened: string[] = [];
   const works = createWorks(fake.ctx, {
@@ -57,14 +58,15 @@ function page() {
     },
     startFresh: () => opened.push("fresh"),
   });
-  fake.showModel(MODEL);
-  fake.showCage(cageOf(8));
+  if (!isEmpty) {
+    fake.showModel(MODEL);
+    fake.showCage(cageOf(8));
+  }
   return { ...fake, works, opened };
 }
 
 const entryOf = (id: string, when = Date.now()): Entry => ({ id, name: `${id}.obj`, when, size: 10 });
-const keep = (id: string, when?: number) =>
-  kept.set(id, { entry: entryOf(id, when), file: Uint8Array.of(1) });
+const keep = (id: string, when?: number) => kept.set(id, { entry: entryOf(id, when), file: new Blob(["1"]) });
 
 it("work is saved after a pause without changes, but not during a gesture", async () => {
   const { works, store } = page();
@@ -104,7 +106,7 @@ it("a full disk is reported once, with a remedy", async () => {
 });
 
 it("work of this tab is restored; with several others, the user chooses", async () => {
-  const { works, opened, said, store } = page();
+  const { works, opened, said, store } = page({ isEmpty: true });
   keep("a");
   keep("b");
   expect(await works.restore()).toBe(false);
@@ -115,6 +117,14 @@ it("work of this tab is restored; with several others, the user chooses", async 
     "pose",
     expect.stringMatching(/^Your work on b\.obj is back/),
   ]);
+});
+
+it("work is not restored over files that were dropped while the list was read", async () => {
+  const { works, opened, store } = page({ isEmpty: true });
+  keep("a");
+  own = "a";
+  store.set({ busy: "Opening cube.obj" });
+  expect([await works.restore(), opened]).toEqual([true, []]);
 });
 
 it("work open in another tab is opened as a copy", async () => {

@@ -1,4 +1,4 @@
-//! Faults of the connectivity: open and non-manifold edges, duplicate, unused and non-manifold vertices.
+//! Faults in connectivity: open and non-manifold edges; duplicate, unused and non-manifold vertices.
 
 use super::mirror::Plane;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
@@ -22,7 +22,8 @@ impl Edges {
         self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
     }
 
-    /// Edges with exactly one face, in the direction in which a face that fills the hole would traverse them.
+    /// Open edges (edges with exactly one face), each in the direction in which a face that fills the hole would
+    /// traverse it.
     pub(super) fn open(&self) -> Vec<[u32; 2]> {
         self.groups()
             .filter(|g| g.len() == 1)
@@ -132,7 +133,7 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     pinched
 }
 
-/// Root of a set: find with path halving.
+/// Root of the set that contains `k`, by union-find with path halving.
 fn find(root: &mut [u32], mut k: u32) -> u32 {
     while root[k as usize] != k {
         root[k as usize] = root[root[k as usize] as usize];

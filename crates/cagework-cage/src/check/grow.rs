@@ -12,7 +12,7 @@ use cagework_core::mesh::{Bounds, PolygonMesh};
 /// Limit on rounds. Each round moves the cage's surface past the vertices that are still outside.
 const MAX_ROUNDS: usize = 40;
 
-/// Gap that is left beyond each point, as a fraction of the cage's diagonal.
+/// Distance from a model vertex to the triangle that is moved past it, as a fraction of the cage's diagonal.
 const MARGIN: f64 = 0.004;
 
 fn control_set(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
@@ -23,8 +23,8 @@ fn outside(mesh: &PolygonMesh, smooth: u32, model: &[Vec3]) -> Result<Vec<u32>, 
     Ok(Enclosure::new(Controls::from(&control_set(mesh, smooth)?).surface(), model).outside())
 }
 
-/// Moves vertices outward until the surface, subdivided `smooth` times, encloses the model. Returns the number of moved
-/// vertices.
+/// Moves the vertices of a cage outward until its surface, subdivided `smooth` times, encloses the model. Returns the
+/// number of moved vertices.
 pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<usize, RepairError> {
     let before = mesh.positions.clone();
     let mut left = 0;
@@ -38,7 +38,7 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
         }
         push(mesh, controls, outside.iter().map(|&v| model[v as usize].as_dvec3()));
     }
-    // Enclose the vertices that local moves left outside by scaling about the model's centre.
+    // Scale the mesh about the model's centre to enclose the vertices that the local moves have left outside.
     scale(mesh, model, smooth)?;
     let left_now = outside(mesh, smooth, model)?.len();
     if left_now > 0 {
@@ -47,8 +47,8 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
     Ok(before.iter().zip(&mesh.positions).filter(|(a, b)| a != b).count())
 }
 
-/// Moves the triangle nearest to each point outward past it: its corners, or those of its cage face if the surface is
-/// subdivided.
+/// For each point, moves the nearest triangle of the surface outward past the point. This moves the triangle's corners
+/// or, if the surface is subdivided, the corners of the triangle's cage face.
 fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<Item = DVec3>) {
     let (cage, is_smooth) = (controls.surface(), controls.smooth() > 0);
     let margin = MARGIN * f64::from(cage.diagonal());
@@ -83,7 +83,7 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
     }
 }
 
-/// Scales a mesh about the model's centre in small steps until its surface encloses the model's box.
+/// Scales a mesh about the model's centre until its surface encloses all model vertices, by `STEP` up to `STEPS` times.
 fn scale(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<(), RepairError> {
     const STEPS: usize = 24;
     const STEP: f32 = 1.08;

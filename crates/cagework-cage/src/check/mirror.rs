@@ -1,11 +1,13 @@
-//! Half a cage, modelled with a mirror that was not applied: all open edges lie in one axis-aligned plane.
+//! Detects and completes half a cage, modelled with a mirror modifier that was not applied. All open edges of such a
+//! cage lie in one axis-aligned plane.
 
 use cagework_core::mesh::PolygonMesh;
 
-/// Tolerance of the plane, as a fraction of the diagonal of the mesh: rounding of the modelling program.
+/// Largest distance of a vertex that counts as in the mirror plane, as a fraction of the diagonal of the mesh. It
+/// allows for rounding by the modelling program.
 const PLANE_TOLERANCE: f64 = 1e-4;
 
-/// An axis-aligned plane that holds all open edges.
+/// An axis-aligned plane that contains all open edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plane {
     axis: usize,
@@ -13,7 +15,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The plane that holds all `open` edges, if there is one and the whole mesh lies on one side of it.
+    /// The plane that contains all `open` edges, if there is one and the whole mesh lies on one side of it.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
         let reach = (PLANE_TOLERANCE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];
@@ -28,12 +30,12 @@ impl Plane {
         })
     }
 
-    /// Whether the plane goes through the origin, as a modelling program's mirror does.
+    /// Whether the plane goes through the origin, as the mirror plane of a modelling program does by default.
     pub(super) fn is_central(self) -> bool {
         self.at == 0.0
     }
 
-    /// Adds the mirror image of the mesh. Both halves share the vertices of open edges, which are moved into the plane.
+    /// Adds the mirror image of the mesh. Moves the vertices of open edges, which both halves share, into the plane.
     pub(super) fn mirror(self, mesh: &mut PolygonMesh, open: &[[u32; 2]]) -> String {
         let Self { axis, at } = self;
         let mut other: Vec<u32> = (0..mesh.positions.len() as u32).collect();
@@ -71,7 +73,7 @@ mod tests {
     use cagework_core::cage::subdivided_box;
     use cagework_core::mesh::Bounds;
 
-    /// Half of a box of side 2, cut by a plane across `axis`. The centre of the whole box is at `at` along `axis`.
+    /// Half of a box of side 2, cut by a plane normal to `axis`. The centre of the whole box is at `at` along `axis`.
     fn half(axis: usize, at: f32) -> PolygonMesh {
         let mut mesh = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [2; 3]);
         mesh.faces.retain(|face| face.iter().all(|&v| mesh.positions[v as usize][axis] <= 0.0));

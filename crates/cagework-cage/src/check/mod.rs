@@ -1,6 +1,6 @@
 //! Checks a mesh for use as a cage and repairs it.
 //!
-//! [`Cage::new`] stops at the first fault. [`check`] reports all faults with their locations, of any polygon mesh.
+//! [`Cage::new`] stops at the first fault. [`check`] reports all faults of any polygon mesh, with their locations.
 //! [`repair`] makes those repairs that need no decision by the user.
 
 mod edges;
@@ -25,12 +25,12 @@ use cagework_core::mesh::PolygonMesh;
 pub(crate) use grow::grow;
 pub use repair::{Repair, RepairError, RepairedMesh, repair, repair_smooth};
 
-/// Kinds of problems. The names are part of the file format and stay stable.
+/// Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Code {
-    /// The mesh has no faces.
+    /// The mesh has no faces or no vertices.
     Empty,
     /// A coordinate is infinite or not a number.
     NotFinite,
@@ -64,7 +64,7 @@ pub enum Code {
     NotACage,
 }
 
-/// Severity of a problem.
+/// Effect of a problem on binding and its results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -94,14 +94,14 @@ pub struct Places {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Fix {
-    /// A repair.
+    /// Apply a repair.
     Repair {
-        /// The repair.
+        /// The repair to apply.
         repair: Repair,
     },
     /// Bind with this many cells along the cage's longest side.
     Grid {
-        /// Number of cells.
+        /// Number of cells with which no measured part is thinner than a cell.
         cells: u32,
     },
 }
@@ -109,13 +109,13 @@ pub enum Fix {
 /// All occurrences of one kind of problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Problem {
-    /// Kind of problem.
+    /// Kind of the problem.
     pub code: Code,
-    /// How severe the problem is.
+    /// Whether the problem prevents binding, may spoil the results, or is harmless.
     pub severity: Severity,
-    /// Number of occurrences.
+    /// Number of occurrences, including those that `places` does not list.
     pub count: usize,
-    /// Locations, at most [`MAX_PLACES`] of each kind.
+    /// Locations of the occurrences; each of the four lists has at most [`MAX_PLACES`] entries.
     pub places: Places,
     /// Description, one sentence.
     pub message: String,
@@ -123,20 +123,21 @@ pub struct Problem {
     pub fixes: Vec<Fix>,
 }
 
-/// Result of a check.
+/// Result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageCheck {
     /// Whether the mesh can be bound: no problem is an error.
     pub valid: bool,
     /// Whether the cage encloses the model; `None` without a model or if the cage is not valid.
     pub encloses: Option<bool>,
-    /// Number of vertices.
+    /// Number of vertices of the checked mesh.
     pub vertices: usize,
-    /// Number of faces.
+    /// Number of faces of the checked mesh.
     pub faces: usize,
     /// Number of edge-connected components.
     pub components: usize,
-    /// Smallest thickness that was measured, object units; `None` if the cage has no interior.
+    /// Smallest measured thickness of the cage, object units; `None` if the mesh is not a valid cage, or no thickness
+    /// could be measured.
     pub thickness: Option<f32>,
     /// Problems, worst first.
     pub problems: Vec<Problem>,
@@ -206,7 +207,8 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
         p.places.faces.truncate(MAX_PLACES);
         p.places.points.truncate(MAX_PLACES);
     }
-    // Other code also sorts arrays of `u32`; sorting another key type would add 2 kB to the wasm module.
+    // Sort `[u32; 2]`, as other code does: the sort of another type would be compiled separately and add 2 kB to the
+    // wasm module.
     let kind = |p: &Problem| (p.severity as u32) << 16 | p.code as u32;
     let mut order: Vec<[u32; 2]> = (0u32..).zip(&found).map(|(k, p)| [kind(p), k]).collect();
     order.sort_unstable();

@@ -6,13 +6,13 @@ use glam::DVec3;
 
 use super::edges::Edges;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
-use cagework_core::enclosure::winding_number;
+use cagework_core::geometry::winding_number;
 use cagework_core::mesh::PolygonMesh;
 
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     pub(super) faces: Vec<u32>,
-    /// Whether each of `faces` must be flipped so that all point outward.
+    /// Whether each of `faces` must be flipped so that all of them point away from the solid.
     pub(super) turn: Vec<bool>,
     /// An edge at which no consistent orientation exists.
     pub(super) one_sided: Option<[u32; 2]>,
@@ -57,7 +57,7 @@ pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Ve
     components
 }
 
-/// Smallest number of triangles of a component that may contain another component.
+/// Components with fewer triangles are not tested for enclosing other components: two triangles enclose no volume.
 const MIN_ENCLOSING_TRIANGLES: usize = 3;
 
 fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
@@ -65,11 +65,12 @@ fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
     [corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max)]
 }
 
-/// Flips whole components whose volume has the wrong sign: negative, or positive for a component nested inside another.
+/// Flips whole components whose volume has the wrong sign. The volume must be positive, or negative for a cavity: a
+/// component that lies inside an odd number of other components.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
-    // A triangle soup may have as many components as faces: search for nested parts only in components that can enclose
-    // any.
+    // A triangle soup may have as many components as faces. Therefore only components that can enclose another one are
+    // searched for nested ones.
     let around: Vec<(usize, [DVec3; 2])> = solids
         .iter()
         .enumerate()
@@ -88,7 +89,7 @@ fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
                 *j != k
                     && probe.cmpge(*min).all()
                     && probe.cmple(*max).all()
-                    && winding_number(probe, &solids[*j]).abs() > 0.5
+                    && winding_number(probe, solids[*j].iter().copied()).abs() > 0.5
             })
             .count();
         if (volume < 0.0) != (depth % 2 == 1) {
@@ -99,7 +100,8 @@ fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     }
 }
 
-/// Triangle fans of a component's faces with consistent orientation, which suffice for volumes and winding numbers.
+/// Consistently oriented triangle fans of a component's faces. Fan triangles of a concave face overlap, but the
+/// overlaps cancel in signed volumes and winding numbers.
 fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
     let mut triangles = Vec::new();
     for (&f, &turned) in component.faces.iter().zip(&component.turn) {

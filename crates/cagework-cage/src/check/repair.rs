@@ -19,7 +19,7 @@ use cagework_core::mesh::PolygonMesh;
 use cagework_core::options::{Choice, UnknownWord, choose};
 use cagework_core::words::counted;
 
-/// A repair.
+/// A repair of a cage mesh that needs no decision by the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -57,10 +57,10 @@ impl FromStr for Repair {
     }
 }
 
-/// A repaired mesh.
+/// Result of [`repair`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RepairedMesh {
-    /// The repaired mesh.
+    /// The mesh after all repairs.
     pub mesh: PolygonMesh,
     /// New index of every old vertex; `None` if it was dropped. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
@@ -71,13 +71,13 @@ pub struct RepairedMesh {
 /// Why a repair failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RepairError {
-    /// Growing needs a model.
+    /// [`Repair::Grow`] was requested without a model to enclose.
     #[error("growing the cage needs the model that should be inside: give it")]
     NoModel,
-    /// Growing needs a valid cage.
+    /// [`Repair::Grow`] was requested for a mesh that is not a valid cage after the other repairs.
     #[error("the mesh must be a valid cage before it can grow: {0}")]
     NotACage(#[from] CageError),
-    /// Growing needs a valid subdivided surface.
+    /// [`Repair::Grow`] was requested, but the subdivided surface of the cage is invalid.
     #[error(transparent)]
     NotSmooth(#[from] ControlError),
     /// Model vertices are still outside the grown cage.

@@ -42,7 +42,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
         Code::UnusedVertex => {
             format!("{} to no face: moving it does nothing.", with("vertex belongs", "vertices belong"))
         }
-        // Composed by the functions below.
+        // These messages need more than a count. The functions below compose them.
         Code::Flipped
         | Code::OneSided
         | Code::SelfIntersection

@@ -13,15 +13,17 @@ use cagework_core::options::MAX_GRID;
 /// Number of triangles up to which thickness is measured at every triangle; larger cages are sampled evenly.
 const MAX_MEASURED_TRIANGLES: usize = 1500;
 
-/// Thickness from which on a part is not reported, in cells. A part of one cell may have no unknown of its own.
+/// Smallest thickness that is not reported, in cells. A thinner part may contain no cell centre and then has no
+/// unknowns.
 const MIN_CELLS: f64 = 1.0;
 
-/// Two faces bound a thin part if the cosine between one normal and the opposite of the other exceeds this (70 degrees;
-/// the faces of a regular tetrahedron still count). Faces at a larger angle form a corner, near which their distance
-/// tends to zero.
+/// Two faces bound a thin part if the cosine between one normal and the reversed normal of the other exceeds this, that
+/// is, if the angle between the faces is below 72.5 degrees. This includes the faces of a regular tetrahedron, at 70.5
+/// degrees. Faces at a larger angle form a corner of the cage, near which their distance tends to zero.
 const MIN_OPPOSITION_COSINE: f64 = 0.3;
 
-/// Indices of valid faces, which have existing, finite, distinct vertices and an area. Reports all other faces.
+/// Indices of valid faces: they have existing, finite, distinct vertices and an area, and differ from earlier faces.
+/// Reports the faults of all other faces.
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
@@ -74,8 +76,8 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     sound
 }
 
-/// Measures thickness by rays from face centres inwards to opposing faces. Reports where the thickness is less than a
-/// grid cell. Returns the smallest thickness.
+/// Measures thickness by rays from triangle centres inwards to opposing triangles. Reports where the thickness is less
+/// than a grid cell. Returns the smallest thickness, object units; `None` if no ray hits an opposing triangle.
 pub(super) fn report_thickness(
     controls: Controls<'_>,
     grid: Option<u32>,

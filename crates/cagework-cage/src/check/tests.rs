@@ -31,7 +31,8 @@ fn sound_cage_has_no_problems() {
     assert!((found.thickness.unwrap() - 2.0).abs() < 1e-6, "the box is 2 wide");
 }
 
-/// The diagonal must not include vertices without faces: with one far away, all faces would seem to have no area.
+/// The mesh diagonal scales the area tolerance, so it must ignore vertices without faces. Otherwise one such vertex far
+/// away would make every face count as having no area.
 #[test]
 fn a_far_unused_vertex_does_not_make_a_valid_cage_faulty() {
     let mut mesh = box_mesh(2);
@@ -263,8 +264,8 @@ fn a_cube_with_a_far_vertex_is_checked() {
     mesh.positions[0].y = -1_429_490.6;
     let found = check(&mesh, Some(&[Vec3::ZERO]), Some(64));
     assert!(found.valid, "closed and free of intersections: {:?}", found.problems);
-    // The tolerance, 2e-6 of the diagonal, is 2.86. Of the other six corners near corner 1, five are within it and count
-    // as its duplicates. The sixth is opposite and 3.46 away.
+    // The tolerance, 2e-6 of the diagonal, is 2.86. Of the other six corners near corner 1, five are within it and
+    // count as its duplicates. The sixth is opposite and 3.46 away.
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 5);
     // Two corners of a face are at the same position, as in a damaged file.
     let mut mesh = box_mesh(1);
@@ -274,8 +275,8 @@ fn a_cube_with_a_far_vertex_is_checked() {
     assert_eq!(codes(&repaired), [], "a cube with one edge collapsed");
 }
 
-/// Separate triangles have as many components and holes as faces. Comparing all pairs of 100,000 would take half an
-/// hour.
+/// A mesh of separate triangles has as many components and holes as faces. Comparing all pairs of components would take
+/// minutes.
 #[test]
 fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     let mut soup = PolygonMesh::default();
@@ -291,7 +292,8 @@ fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     assert_eq!(repaired.faces.len(), 60_000, "each hole is filled by the triangle's back side");
 }
 
-/// Triangles that all intersect each other: a list of all pairs of 100,000 of them would take 40 GB.
+/// The test meshes are stars of triangles, any two of which intersect. A list of all pairs of 100,000 such triangles
+/// would take 40 GB.
 #[test]
 fn crossings_are_counted_and_listed_up_to_a_limit() {
     let star = |n: u32| {

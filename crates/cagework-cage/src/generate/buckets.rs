@@ -10,7 +10,8 @@ pub(super) struct Buckets {
     origin: DVec3,
     dims: [usize; 3],
     lists: Vec<Vec<u32>>,
-    /// For each triangle, the last list reading and the last search that found it, as values of the two counters below.
+    /// Two stamps per triangle, which prevent duplicates: the value of `lists_read` when a list last contained the
+    /// triangle, and the value of `searches` when a search last found it.
     met: Vec<(u32, u32)>,
     lists_read: u32,
     searches: u32,
@@ -47,7 +48,7 @@ impl Buckets {
     }
 
     /// Writes to `found` all triangles whose box overlaps `min`..`max`, each once. `bounds`: current box of a triangle,
-    /// if it exists.
+    /// or `None` if the triangle has been removed.
     pub(super) fn near(
         &mut self,
         min: DVec3,

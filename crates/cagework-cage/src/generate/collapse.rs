@@ -19,16 +19,17 @@ use cagework_core::progress::Cancelled;
 /// Offsets along the normal that are tried for the merged vertex, voxels.
 const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
 
-/// Smallest cosine between the normals of a triangle before and after a collapse.
+/// Smallest allowed cosine between the normals of a triangle before and after a collapse.
 const MIN_COLLAPSE_COSINE: f64 = 0.15;
 
-/// Smallest quality of a new triangle, see [`quality`].
+/// Smallest allowed [`quality`] of a triangle that a collapse changes.
 pub(super) const MIN_QUALITY: f64 = 0.12;
 
-/// Largest number of triangles around a vertex.
+/// Largest allowed number of triangles around a vertex.
 const MAX_VALENCE: usize = 11;
 
-/// An edge whose collapse costs more than this factor times the expected cost returns to the heap.
+/// An edge whose collapse costs more than this factor times the expected cost returns to the heap, unless it is still
+/// the cheapest.
 const MAX_COST_RATIO: f64 = 1.2;
 
 /// Number of collapses between polls for cancellation.
@@ -62,11 +63,12 @@ impl Ord for HeapEdge {
 pub(super) struct Collapser<'g, 'a> {
     pub(super) surface: &'g mut GuardedSurface<'a>,
     pub(super) quadrics: Vec<Quadric>,
-    /// Quadrics of the planes alone: squared distance of a vertex from the part of the hull that the vertex replaces.
+    /// Quadrics of the planes without the point term of [`Quadric::of_corner`]: squared distance of a vertex from the
+    /// part of the hull that the vertex replaces.
     planes: Vec<Quadric>,
     /// Limit on the RMS of the distance in `planes`, voxels; `None` for no limit.
     pub(super) budget: Option<f64>,
-    /// Whether the spacing of vertices on plates is limited.
+    /// Whether to limit the spacing of vertices on plates (thin flat parts; see [`Spacing`]).
     pub(super) keeps_plates: bool,
     /// Limit on the distance of each vertex from its neighbours, if it lies on a limb or plate.
     spacings: Vec<Option<Spacing>>,
@@ -153,8 +155,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 if self.count == count_then || self.surface.has_band() {
                     break;
                 }
-                // Blocked edges may be free now that the triangles around them have changed. (With a band, they are
-                // retried in the next, wider band.)
+                // Blocked edges may be free now that the triangles around them have changed, so try all edges again.
+                // With a band, this is not needed, because the next, wider band tries all edges.
                 count_then = self.count;
                 self.wait_for_all();
                 continue;
@@ -208,8 +210,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
     }
 
-    /// Pushes an edge to the heap with the cost of its best merged vertex. Whether the edge can be collapsed is tested
-    /// later.
+    /// Pushes an edge to the heap with the cost of a merged vertex at [`Self::optimum`]. Whether the edge can be
+    /// collapsed is tested later.
     fn wait(&mut self, edge: [u32; 2]) {
         let [a, b] = edge;
         let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
@@ -240,8 +242,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
             return false;
         }
-        // Each of the two vertices opposite the edge loses a triangle and must keep enough of them to be the corner of
-        // a solid.
+        // Each vertex opposite the edge loses a triangle. A corner of a solid needs at least three triangles; on the
+        // mirror plane, two of this half suffice.
         let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
         if sides.iter().any(|&tip| surface.around[tip as usize].len() <= least(tip)) {
             return false;
@@ -307,7 +309,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
         candidates.retain(|&c| !self.surface.is_blocked(c));
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
-        // Test candidates from the cheapest up. The first one is mostly valid, so they are not sorted.
+        // Test candidates from the cheapest up. The first one is usually valid, so sorting all would cost more.
         while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
             let (cost, place) = priced.remove(k);
             if self.is_place(kept, place) {
@@ -317,7 +319,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         None
     }
 
-    /// Whether the triangles found by [`Self::place_of`] are valid with the vertex `kept` at `p`.
+    /// Whether the triangles that [`Self::place_of`] collected are valid with the vertex `kept` at `p`.
     fn is_place(&mut self, kept: u32, p: DVec3) -> bool {
         let Scratch { star, gone, new, .. } = &mut self.scratch;
         new.clear();
@@ -340,7 +342,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
     }
 
     /// Whether the merged vertex at `at` exceeds its limits: the RMS distance to the planes of the hull (weighted by
-    /// area), or the distance from its neighbours on a limb or plate. Limbs are limited only while a budget applies.
+    /// area), or the distance from its neighbours on a limb or plate. The distance along limbs is limited only while
+    /// `budget` is set.
     fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
         let is_off = |budget: f64| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;

@@ -13,7 +13,7 @@ const ROUNDING_MARGIN: f64 = 1e-6;
 /// A separating axis with a smaller x component does not bound x.
 const MIN_AXIS_X: f64 = 1e-12;
 
-/// Separating-axis bounds of a triangle on voxel centres.
+/// Bounds on the centres of the voxels that a triangle overlaps, from its separating axes.
 #[derive(Debug)]
 pub(crate) struct Footprint {
     /// Bounds on x that depend on y and z; the first `n_slanted` are used.
@@ -84,10 +84,10 @@ impl Footprint {
         ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
     }
 
-    /// Adds the run of every row to `voxels`. Skips rows in which the bounding box is already set.
+    /// Adds the run of every row to `voxels`. Skips rows whose part of the bounding box is already in the set.
     pub(crate) fn add_to(&self, voxels: &mut Voxels) {
         let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
-        // Rounding may extend runs by one voxel.
+        // Because of rounding, a run may extend one voxel beyond the bounding box at either end.
         let (from, to) = (xs[0].saturating_sub(1), xs[1].min(voxels.dims[0] - 1));
         for z in zs[0]..zs[1] {
             for y in ys[0]..ys[1] {
@@ -119,9 +119,9 @@ impl Footprint {
     }
 }
 
-/// Whether `each(y, z, first, last)` holds for the run of any row that a triangle overlaps, for voxels enlarged by
-/// `grow`. `each` is first called with the row's part of the bounding box and, only if it holds there, with the run.
-/// Most rows are rejected without computing the run.
+/// Whether `each(y, z, first, last)` returns true for the run of any row that a triangle overlaps, for voxels enlarged
+/// by `grow`. `each` is first called with the row's part of the bounding box and, only if it returns true, with the
+/// run. Most rows are rejected without computing the run.
 pub(super) fn any_run(
     triangle: [DVec3; 3],
     grow: f64,

@@ -10,46 +10,52 @@ use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancelled;
 
-/// Largest cosine between the directions from a sheet to its two walls: creases wider than 60 degrees are not gaps.
+/// Largest allowed cosine of the angle between the directions from a sheet to its two walls. Creases whose walls open
+/// by more than 60 degrees are therefore not gaps.
 const MAX_WALL_COSINE: f64 = -0.5;
 
-/// Smallest distance of a sheet from the crease where its walls meet, as a multiple of the distance between the walls.
+/// Smallest allowed distance of a sheet from the crease where its walls meet, as a multiple of the distance between the
+/// walls.
 const MIN_DEPTH: f64 = 1.0;
 
-/// Narrowest gap, in voxels, that a hull leaves open: three, plus one for flat walls beside round limbs.
+/// Smallest width, in voxels, of a gap that a hull always leaves open. Most gaps need only three voxels; a gap at the
+/// mirror plane needs four, because the plane lies between two voxels.
 const MIN_OPEN_WIDTH: f64 = 4.0;
 
 /// Smallest area of a gap for which the lattice is refined, as a fraction of the squared longest side of the model.
 const MIN_GAP_AREA: f64 = 0.003;
 
-/// Length of a voxel divided by its thickness across narrow gaps. The second value is used where the first would need
-/// more than [`MAX_RESOLUTION`] thicknesses along the model's longest side.
+/// Aspect ratios of a voxel: length divided by thickness across narrow gaps. The second is used if the first would need
+/// a resolution above [`MAX_RESOLUTION`].
 const STRETCHES: [f64; 2] = [3.0, 8.0];
 
-/// Limit on the model's longest side divided by the thickness of a voxel, with the first of [`STRETCHES`].
+/// Largest resolution for the first of [`STRETCHES`]. The resolution is the model's longest side divided by the
+/// thickness of a voxel.
 const MAX_RESOLUTION: f64 = 250.0;
 
-/// Number of thin voxels across the narrow part of a gap that a hull leaves open. With six, one of two test figures was
-/// bridged.
+/// Smallest width of the narrow part of a gap that a hull leaves open, in thicknesses of a stretched voxel. Six is too
+/// small: the hull of a figure in the tests then bridges a gap.
 const MIN_OPEN_NARROW_WIDTH: f64 = 7.0;
 
 /// Share of a gap's sheet that counts as the narrow part.
 const NARROW_SHARE: f64 = 0.1;
 
-/// A gap is measured again on a stretched lattice if the mean `cos^2` between its direction and the thin axis is at
-/// least this.
+/// A gap counts as lying across the thin axis of a stretched lattice if the mean `cos^2` between this axis and the
+/// vectors from wall to wall exceeds this.
 const MIN_ACROSS: f64 = 0.7;
 
-/// Voxels are stretched rather than refined if gaps need more than this factor times the voxels of the target.
+/// If cubes leave as many gaps open as stretched voxels, voxels are stretched only if the number of cubes along the
+/// longest side would exceed this factor times [`super::first_voxels`].
 const MIN_REFINEMENT: f64 = 2.0;
 
-/// Limit on the voxels along the longest side of a stretched lattice, as a fraction of [`MAX_VOXELS`].
+/// Two limits on the number of voxels along the longest side of a stretched lattice: this fraction of [`MAX_VOXELS`],
+/// and, if a lattice of cubes leaves as many gaps open, this fraction of the cubes along its longest side.
 const MAX_STRETCHED_SHARE: f64 = 0.66;
 
 /// Number of sample points of a sheet at which a cage is tested for closing the gap.
 const SAMPLES: usize = 32;
 
-/// Stands for the number of a wall at a voxel that no wall reaches.
+/// Marks a voxel that has no solid voxel within the search distance.
 const NO_WALL: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
@@ -59,7 +65,8 @@ pub(super) struct Gap {
     pub(super) area: f64,
     /// Mean distance between the gap's two walls, voxels.
     width: f64,
-    /// Distance between the two walls, voxels: the quantile [`NARROW_SHARE`] over the sheet, at its narrow part.
+    /// Distance between the two walls where the sheet is narrow, voxels: the quantile [`NARROW_SHARE`] of the distances
+    /// over the sheet.
     narrow_width: f64,
     /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
@@ -74,9 +81,9 @@ pub(super) struct ModelGap {
     width: f64,
     /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
-    /// Number of cubic voxels along the model's longest side from which on the gap stays open.
+    /// Smallest number of cubic voxels along the model's longest side with which the gap stays open.
     least_voxels: f64,
-    /// Number of voxels of the chosen lattice along the model's longest side from which on the gap stays open.
+    /// Smallest number of voxels of the chosen lattice along the model's longest side with which the gap stays open.
     pub(super) voxels: usize,
 }
 
@@ -86,13 +93,14 @@ pub(super) struct NarrowGaps {
     pub(super) gaps: Vec<ModelGap>,
     /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
-    /// Voxels along the model's longest side.
+    /// Number of voxels along the model's longest side.
     pub(super) voxels: usize,
 }
 
 /// Finds the large gaps that a lattice with `base` voxels along the model's longest side closes or nearly closes, and a
-/// lattice with at most `most` voxels along that side that leaves them open. Gaps narrower than twice the `clearance`
-/// of the cage from the model (object units) are left out, because they close on any lattice.
+/// lattice that leaves them open. With more than `most` gaps, the lattice has `base` cubic voxels instead. Gaps
+/// narrower than twice the `clearance` of the cage from the model (object units) are left out, because they close on
+/// any lattice.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -143,7 +151,7 @@ pub(super) fn narrow_gaps(
 }
 
 /// Resolution (longest side divided by voxel thickness) that leaves open the narrow parts of the large gaps across the
-/// thin axis of `stretch`. Ignores narrow parts that are not wider than two clearances; 0 without such gaps.
+/// thin axis of `stretch`. Ignores gaps whose narrow part is at most two clearances wide; 0 if no gap is left.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -175,8 +183,8 @@ fn most_voxels(stretch: DVec3) -> usize {
     if stretch == DVec3::ONE { usize::MAX } else { (MAX_STRETCHED_SHARE * MAX_VOXELS as f64) as usize }
 }
 
-/// Stretch of the voxels. If most gaps have the same direction, fewer voxels that are thin in this direction are needed
-/// than cubes.
+/// Stretch of the voxels. If most gaps have the same direction, a lattice of voxels that are thin in this direction
+/// needs fewer voxels than a lattice of cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
     // Number of gaps that stay closed, and number of voxels with which all other gaps stay open.
     let closed_and_finest = |stretch: DVec3| {
@@ -194,12 +202,13 @@ fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
 }
 
 impl ModelGap {
-    /// Number of voxels with this stretch along the model's longest side from which on the gap stays open.
+    /// Smallest number of voxels with this stretch along the model's longest side with which the gap stays open.
     fn voxels_of(&self, stretch: DVec3) -> usize {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// If the cage, made with `voxels` voxels, closes the gap: a sentence with the gap's place and a remedy.
+    /// A sentence with the gap's position and a remedy if the cage, made with `voxels` voxels along the longest side,
+    /// closes the gap; otherwise `None`.
     pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
@@ -207,13 +216,13 @@ impl ModelGap {
             return None;
         }
         let remedy = if voxels < self.voxels.min(MAX_VOXELS) {
-            format!("take {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
+            format!("use {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
         } else if self.voxels > MAX_VOXELS {
             "move its two sides apart: no lattice is fine enough".to_owned()
         } else if 10 * cage.n_vertices() > 9 * options.target as usize {
             format!("allow more than {} vertices", options.target)
         } else {
-            format!("take a smaller detail than {}", options.detail)
+            format!("choose a smaller detail than {}", options.detail)
         };
         let Vec3 { x, y, z } = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
         let width = self.width;
@@ -231,7 +240,7 @@ impl Gap {
             let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
             winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
         };
-        // Majority of three points; the third is needed only if the first two differ.
+        // Decide by the majority of three points of the sheet; the third is needed only if the first two differ.
         let [first, second] = [1, 2].map(is_inside);
         if first == second { first } else { is_inside(3) }
     }
@@ -288,7 +297,7 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
         widths.sort_by(f64::total_cmp);
         let width = widths.iter().sum::<f64>() / n;
         let narrow_width = widths[(NARROW_SHARE * n) as usize];
-        // A sheet is two voxels thick.
+        // The area below is half the number of voxels, because a sheet is two voxels thick.
         let across = |&v: &[usize; 3]| to_wall(number(dims, v)).normalize_or_zero().powf(2.0);
         let across = voxels.iter().map(across).sum::<DVec3>() / n;
         Gap { voxels, area: 0.5 * n, width, narrow_width, across }
@@ -298,8 +307,8 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     gaps
 }
 
-/// Approximate nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere. Results
-/// spread from voxel to voxel, so a result may be the second nearest.
+/// Approximate nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere. A voxel
+/// chooses among the results of its neighbours, which may not include its own nearest solid voxel.
 fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     let dims = solid.dims;
     let square = |i: u32, v: [usize; 3]| {

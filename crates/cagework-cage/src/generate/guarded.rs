@@ -1,4 +1,4 @@
-//! A surface whose edits are rejected if it would meet the solid or itself.
+//! A surface that tests whether an edit would make it meet the solid or itself ([`GuardedSurface::may_stand`]).
 
 use glam::DVec3;
 
@@ -8,31 +8,32 @@ use super::surface::Surface;
 use super::voxels::Voxels;
 use cagework_core::contact::{Corners, meet};
 
-/// Smallest distance between triangles that share no vertex, in voxels.
+/// Smallest allowed distance between triangles that share no vertex, in voxels.
 const MIN_GAP: f64 = 0.05;
 
-/// Shrinkage of the voxels of gap sheets on all sides, in voxels, because walls beside a sheet may graze it.
+/// Amount by which each voxel of a gap sheet is shrunk on all sides, in voxels, so that walls of the cage beside a
+/// sheet may graze it.
 const SHEET_SHRINKAGE: f64 = 0.4;
 
-/// Smallest distance from the mirror plane of vertices that do not lie on it, in voxels.
+/// Smallest allowed distance of vertices from the mirror plane, in voxels; vertices on the plane are excepted.
 const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
-/// Smallest cosine between the normals of neighbouring triangles (120 degrees). Sharper folds invert the model when
-/// they are bent.
+/// Smallest allowed cosine between the normals of neighbouring triangles: folds of up to 120 degrees. Deforming a cage
+/// with a sharper fold would turn the model inside out there.
 pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
 
 /// A solid that the surface must not meet.
 #[derive(Debug)]
 pub(super) struct Obstacle {
     pub(super) voxels: Voxels,
-    /// Distance that triangles keep from the voxels along each axis, in voxels.
+    /// Smallest allowed Chebyshev distance of triangles from the voxels, in voxels.
     pub(super) clearance: f64,
     /// Longest edge of a voxel divided by its edge along each axis.
     pub(super) stretch: DVec3,
 }
 
 impl Obstacle {
-    /// Whether a triangle (centred coordinates) keeps this distance.
+    /// Whether a triangle (centred coordinates) keeps the clearance from the voxels.
     pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         !overlaps(&self.voxels, triangle, self.clearance)
     }
@@ -63,10 +64,12 @@ pub(super) struct GuardedSurface<'a> {
     /// Whether folds sharper than [`MIN_FOLD_COSINE`] are allowed.
     pub(super) may_fold: bool,
     obstacle: &'a Obstacle,
-    /// Voxels that no triangle may overlap: the solid and, with a band, everything outside the band.
+    /// Voxels that no triangle may overlap: the solid and everything outside the band, if there is one
+    /// ([`Self::set_band`]).
     keep_out: Voxels,
     has_band: bool,
-    /// Sheets of gaps, which no triangle may cross, with the corners of their box (centred coordinates).
+    /// Sheets of gaps ([`super::gaps`]), which no triangle may cross, with the corners of their box (centred
+    /// coordinates).
     sheets: Option<(Voxels, [DVec3; 2])>,
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
@@ -140,8 +143,8 @@ impl<'a> GuardedSurface<'a> {
             && !self.sheets.as_ref().is_some_and(crosses)
     }
 
-    /// Whether no triangle may have a corner at a point, because its voxel belongs to the solid or lies outside the
-    /// band.
+    /// Whether no triangle may have a corner at a point, because the point's voxel belongs to the solid or lies outside
+    /// the band.
     pub(super) fn is_blocked(&self, p: DVec3) -> bool {
         let dims = self.keep_out.dims.map(|n| n as f64);
         let at = p + 0.5 * DVec3::from_array(dims);
@@ -202,7 +205,8 @@ impl<'a> GuardedSurface<'a> {
         self.folds(triangles, &others).into_iter().map(|cosine| (MIN_FOLD_COSINE - cosine).max(0.0)).sum()
     }
 
-    /// Fold cosines between the normals of `triangles` and of their neighbours: each other, `others` and mirror images.
+    /// Cosines between the normals of `triangles` and those of their neighbours, which are found among `triangles`,
+    /// `others` and the mirror images.
     fn folds(&self, triangles: &[Corners], others: &[Corners]) -> Vec<f64> {
         let real = |t: &Corners| self.obstacle.unstretched(t);
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
@@ -219,9 +223,10 @@ impl<'a> GuardedSurface<'a> {
         folds.collect()
     }
 
-    /// Whether the triangles `new` may replace those with the indices `gone`: they must be clear of the obstacle, of
-    /// the rest of the surface and of each other, and not folded more sharply than [`MIN_FOLD_COSINE`] or than the
-    /// replaced triangles.
+    /// Whether the triangles `new` may replace those with the indices `gone`: they must keep clear of the obstacle, of
+    /// sheets, of the mirror plane, of the rest of the surface and of each other, and lie in the band. Unless
+    /// [`Self::may_fold`], they must not be folded more sharply than both [`MIN_FOLD_COSINE`] and the replaced
+    /// triangles.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
         if let Some(axis) = self.mirror {
             let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
@@ -261,7 +266,7 @@ impl<'a> GuardedSurface<'a> {
         fold >= MIN_FOLD_COSINE || fold >= self.sharpest(&before(), &others)
     }
 
-    /// Vertices of triangles that intersect other triangles.
+    /// Vertices of triangles that intersect other triangles, or come closer to them than [`MIN_GAP`].
     pub(super) fn offenders(&mut self) -> Vec<u32> {
         let mut offenders = Vec::new();
         for t in 0..self.triangles.len() as u32 {
@@ -310,7 +315,7 @@ impl<'a> GuardedSurface<'a> {
 
     /// Flip of the edge from corner `k` of triangle `t`. Returns the triangle on the other side of the edge `a`-`b`,
     /// and the two triangles `[a, d, c]` and `[d, b, c]` that have the edge between the opposite corners `c` and `d`
-    /// instead. `None` if the surface would then be no manifold (or no half of one).
+    /// instead. `None` if the surface would no longer be a manifold (with a mirror, half of one).
     pub(super) fn swapped(&self, t: u32, k: usize) -> Option<(u32, [Corners; 2])> {
         let first = self.triangles[t as usize];
         let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);

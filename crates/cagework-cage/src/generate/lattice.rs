@@ -21,8 +21,8 @@ const MIN_VOXEL_RATIO: f64 = 2e-5;
 /// Number of triangles between polls for cancellation.
 const TRIANGLES_PER_CHECK: usize = 4096;
 
-/// Triangles whose bounding box has more rows than this are deduplicated before they are rasterised, because instances
-/// at the same place repeat them.
+/// Number of rows of a triangle's bounding box above which repetitions of the triangle are skipped. Models may contain
+/// several instances of a mesh at the same place.
 const MAX_ROWS_WITHOUT_LOOKUP: usize = 64;
 
 /// A lattice of voxels: cubes, or boxes that are thinner along one axis. *Lattice coordinates* count voxels from the
@@ -35,7 +35,7 @@ pub(super) struct Lattice {
     pub(super) cell: f64,
     /// Longest edge of a voxel divided by its edge along x, y and z.
     stretch: DVec3,
-    /// Voxels along x, y, z: even numbers.
+    /// Numbers of voxels along x, y, z; all even.
     pub(super) dims: [usize; 3],
 }
 
@@ -45,7 +45,7 @@ impl Lattice {
     pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
         let extent = max - min;
         let largest = min.abs().max(max.abs()).max_element();
-        // A single point has no size: use the unit of length.
+        // A single point has no extent: choose voxels of which `n` span one object unit.
         let smallest = if extent.max_element() > 0.0 { f64::from(f32::MIN_POSITIVE) } else { 1.0 / n as f64 };
         let cell = (VOXEL_ENLARGEMENT * extent.max_element() / n as f64)
             .max(MIN_VOXEL_RATIO * largest)
@@ -75,7 +75,7 @@ impl Lattice {
         (p.as_dvec3() - self.center) * self.stretch / self.cell
     }
 
-    /// Object units of a point in centred coordinates.
+    /// Position in object units of a point in centred coordinates.
     pub(super) fn object(&self, p: DVec3) -> Vec3 {
         (self.center + p * self.cell / self.stretch).as_vec3()
     }

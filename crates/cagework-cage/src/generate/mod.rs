@@ -1,4 +1,4 @@
-//! Cage generation: a box of quads, or a coarse closed surface that follows the model's shape.
+//! Cage generation: a coarse closed surface that follows the model's shape.
 //!
 //! [`generate`] accepts any triangle soup, however open, overlapping or scattered. Steps: conservative voxelisation;
 //! flood fill of the outside; a dilated hull of voxels whose boundary is a 2-manifold by construction; smoothing of the
@@ -39,7 +39,8 @@ use gaps::NarrowGaps;
 use guarded::GuardedSurface;
 pub use options::{
     BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS,
-    GeneratedCage, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
+    GeneratedCage, HULL_TARGET, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry,
+    TARGET, VOXELS,
 };
 use quads::Faces;
 use shell::Shell;
@@ -59,23 +60,24 @@ const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), Non
 /// order until the target is met.
 const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 
-/// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
+/// Number of [`BAND_LAYERS`], from the first, in which edges are first collapsed only within the allowed distance from
+/// the hull ([`CageOptions::detail`]).
 const N_NARROW_BANDS: usize = 3;
 
-/// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried at once if collapsing
-/// within the budget leaves more than this multiple of the target. Bridges between pieces and walls of gaps cannot be
-/// collapsed.
+/// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried without further passes if
+/// the collapses within the allowed distance leave more than this multiple of the target. Bridges between pieces and
+/// walls of gaps cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// In the cases of [`MAX_FIRST_RATIO`]: number of vertices after collapsing within the budget, divided by the final
-/// number.
+/// Estimate of the number of vertices after the collapses within the allowed distance, divided by the final number.
+/// Predicts the final number where [`MAX_FIRST_RATIO`] ends the passes.
 const LATER_RATIO: f64 = 3.7;
 
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
-/// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps: two seconds of
-/// collapses.
+/// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps. Collapsing that many
+/// takes about two seconds.
 const MAX_HULL: usize = 20_000;
 
 /// Limit on the gaps that a report names.
@@ -84,11 +86,12 @@ const MAX_NOTICES: usize = 3;
 /// Limit on rounds that split quads back into triangles where verification fails.
 const MAX_SPLIT_ROUNDS: usize = 4;
 
-/// Generates a cage that strictly encloses a model.
+/// Generates a cage that strictly encloses a model. With [`CageOptions::smooth`], the subdivided surface encloses the
+/// model.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`:
-/// `[n_triangles]`, any soup. Takes 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps
-/// between limbs.
+/// `[n_triangles]`, any soup. A cage of 80 vertices for a human figure takes 0.2 to 1.5 s on one core, most of it for
+/// the gaps between limbs.
 ///
 /// # Errors
 /// [`CageGenError`]: the model is empty, numbers or options are out of range, no cage passes verification, or the work
@@ -139,7 +142,8 @@ fn generate_plain(
         let mut shell = Shell::new(positions, triangles, bounds, (voxels, stretch), options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
-        // Handles and gaps of the solid may need more vertices than the target; a coarser lattice closes them.
+        // Gaps and handles (in the sense of topology) of the solid may need more vertices than the target; a coarser
+        // lattice closes them.
         let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
         let n_half = shell.hull.positions.len();
         if options.voxels == 0 && voxels > base && may_coarsen && n_half > MAX_HULL {
@@ -194,7 +198,8 @@ fn first_voxels(target: usize) -> usize {
 enum Simplification {
     /// The verified cage, and whether it is the hull without simplification.
     Cage(Box<Cage>, bool),
-    /// The simplified surface has too many vertices (their number): try a coarser lattice.
+    /// Too many vertices are left: try a coarser lattice. The value is their number, or an estimate of the final
+    /// number.
     TooMany(usize),
 }
 
@@ -215,13 +220,13 @@ fn simplify_hull(
         let has_plates = spacings.iter().flatten().any(|spacing| spacing.along.is_none());
         let mut collapser = Collapser::new(&mut guarded, spacings);
         let mut left = n_hull;
-        // The first passes collapse edges within the allowed distance, in narrow bands; then down to the target, in any
-        // band.
+        // The first passes collapse edges within the allowed distance, in narrow bands. Later passes ignore this
+        // distance and collapse edges down to the target, in any band.
         let narrow = BAND_LAYERS[..N_NARROW_BANDS]
             .iter()
             .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false, true));
-        // Order of preference: sharp folds are allowed before gaps are closed, and plates that bend badly before sharp
-        // folds.
+        // The passes give up one goal after another until the target is met: first the limit on the spacing of vertices
+        // on plates, then the limit on folds, and last, with a larger `least`, open gaps.
         let passes_of_gaps = |&least| {
             let plates = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, true));
             let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, false));
@@ -253,8 +258,8 @@ fn simplify_hull(
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
             return Ok(Simplification::TooMany(left));
         }
-        // Convert to the lattice that follows from the target, so that relaxation weighs distance against shape as on
-        // it.
+        // Convert to voxels of the lattice of `first_voxels`, so that relaxation weighs distance against shape in the
+        // same way on every lattice.
         let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
         if let Some(cage) = relax_and_verify(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok(Simplification::Cage(Box::new(cage), false));

@@ -9,13 +9,13 @@ use cagework_core::choice;
 use cagework_core::options::{Number, OutOfRange, SMOOTH, Slider};
 use cagework_core::progress::Cancelled;
 
-/// Smallest target number of vertices.
+/// Smallest allowed target number of vertices.
 pub const MIN_TARGET: u32 = 8;
-/// Largest target number of vertices.
+/// Largest allowed target number of vertices.
 pub const MAX_TARGET: u32 = 400;
-/// Smallest number of voxels along the longest side.
+/// Smallest allowed number of voxels along the model's longest side.
 pub const MIN_VOXELS: usize = 8;
-/// Largest number of voxels along the longest side.
+/// Largest allowed number of voxels along the model's longest side.
 pub const MAX_VOXELS: usize = 128;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
@@ -33,8 +33,8 @@ pub const DETAIL: Number = Number {
     unit: "fraction of the model's longest side",
     allowed: "a fraction of the longest side from 0.005 to 0.2",
     is_allowed: |part| (f64::from(0.005_f32)..=f64::from(0.2_f32)).contains(&part),
-    // The slider is logarithmic, from a quarter of the default to four times the default. The step is a share of its
-    // length.
+    // The slider is logarithmic, from a quarter of the default to four times the default. The step is a share of the
+    // slider's length.
     slider: Some(Slider { min: 0.007, max: 0.112, step: 0.05 }),
 };
 /// Range of [`CageOptions::clearance`].
@@ -55,8 +55,8 @@ pub const VOXELS: Number = Number {
     is_allowed: |n| n == 0.0 || n.fract() == 0.0 && (MIN_VOXELS as f64..=MAX_VOXELS as f64).contains(&n),
     slider: Some(Slider { min: 16.0, max: MAX_VOXELS as f64, step: 8.0 }),
 };
-/// Range of the number of quads along each edge of a box cage: 16 give 1,538 vertices, whose columns are solved in
-/// minutes.
+/// Range of the number of quads along each edge of a box cage: 16 give 1,538 vertices, whose weights take minutes to
+/// solve.
 pub const DIVISIONS: Number = Number {
     name: "divisions",
     help: "Quads along each edge of a box cage",
@@ -66,6 +66,8 @@ pub const DIVISIONS: Number = Number {
     slider: Some(Slider { min: 1.0, max: 8.0, step: 1.0 }),
 };
 
+/// Default of [`CageOptions::target`] for [`Shape::Hull`], which does not follow limbs.
+pub const HULL_TARGET: u32 = 24;
 /// Default number of quads along each edge of a box cage.
 pub const BOX_DIVISIONS: u32 = 2;
 /// Default distance between the model and a box cage, as a fraction of the diagonal of the model's box.
@@ -85,7 +87,7 @@ choice! {
 choice! {
     /// Mirror symmetry of the cage about a plane through the centre of the model's box.
     Symmetry {
-        /// Symmetric if the model is symmetric up to about a voxel.
+        /// Symmetric if the model is symmetric up to 1/36 of its longest side, apart from small parts.
         #[default]
         Auto = "auto",
         /// Not symmetric.
@@ -119,32 +121,30 @@ impl Mirror {
     }
 }
 
-/// Options of [`super::generate`]. Aliases are their names on the page, in projects and in JavaScript.
+/// Options of [`super::generate`]. Serde aliases are names in older project files.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CageOptions {
     /// Target number of vertices, 8 to 400. Default 80.
     #[serde(alias = "vertices")]
-    #[cfg_attr(feature = "typescript", ts(rename = "vertices"))]
     pub target: u32,
     /// Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
-    /// 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, a voxel of 36.
+    /// 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
+    /// lattice for the default target, which has 36 voxels along the longest side.
     pub detail: f32,
     /// Whether to pair triangles into quads. Default true.
     pub quads: bool,
     /// Shape that the cage follows. Default follow.
     pub shape: Shape,
     /// Mirror symmetry. Default auto.
-    #[cfg_attr(feature = "typescript", ts(type = "\"auto\" | \"on\" | \"off\""))]
     pub symmetry: Symmetry,
     /// Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
     /// Otherwise thin bridges join them to one cage. Default false.
     pub per_component: bool,
-    /// Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
-    /// half a voxel. Default 0.
+    /// Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
+    /// of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
     #[serde(alias = "margin")]
-    #[cfg_attr(feature = "typescript", ts(rename = "margin"))]
     pub clearance: f32,
     /// Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
     /// voxels are closed, detail thinner than one is lost. Default 0.
@@ -201,24 +201,24 @@ pub struct GeneratedCage {
 /// Statistics of the generation of a cage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageReport {
-    /// Target number of vertices.
+    /// Target number of vertices, as in the options.
     pub target: u32,
-    /// Number of vertices.
+    /// Number of vertices of the cage.
     pub vertices: u32,
-    /// Number of faces.
+    /// Number of faces of the cage.
     pub faces: u32,
-    /// Number of faces that are quads.
+    /// Number of those faces that are quads.
     pub quads: u32,
     /// Whether the cage has at most a tenth more vertices than the target. If not, the model's holes and gaps need
     /// more.
     pub target_met: bool,
     /// Voxels along the model's longest side.
     pub voxels: u32,
-    /// Edge of a voxel, object units. Gaps narrower than three voxels are closed.
+    /// Longest edge of a voxel, object units. Gaps narrower than three voxels are closed.
     pub voxel_size: f32,
     /// Distance from the model that every point of the cage keeps along at least one axis, object units.
     pub clearance: f32,
-    /// Mirror symmetry of the cage.
+    /// Axis along which the cage is mirror-symmetric; `None` if it is not symmetric by construction.
     pub mirror: Option<Mirror>,
     /// Gaps of the model that the cage closes, one sentence each with a remedy.
     pub notices: Vec<String>,
@@ -248,20 +248,20 @@ pub enum CageGenError {
     /// A coordinate of a model vertex is not a finite number.
     #[error("model vertex {vertex} is not a finite number")]
     NotFinite {
-        /// Index of the vertex.
+        /// Index of the vertex that is not finite.
         vertex: u32,
     },
     /// A triangle has the index of a vertex that does not exist.
     #[error("model triangle {triangle} names vertex {vertex}, but there are only {n}")]
     Index {
-        /// Index of the triangle.
+        /// Index of the triangle with the invalid index.
         triangle: u32,
-        /// The invalid index.
+        /// The vertex index that does not exist.
         vertex: u32,
-        /// Number of vertices.
+        /// Number of vertices of the model.
         n: usize,
     },
-    /// The model is too large.
+    /// A coordinate of the model is larger than a tenth of [`MAX_DIAGONAL`].
     #[error("model has coordinates up to {largest:e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
     Size {
         /// Largest coordinate, object units.
@@ -274,7 +274,7 @@ pub enum CageGenError {
     Unresolved,
     /// No subdivided surface encloses the model.
     #[error(
-        "no cage was found whose smooth surface encloses the model: take fewer steps (--smooth), or more vertices"
+        "no cage was found whose smooth surface encloses the model: use fewer steps (--smooth) or more vertices"
     )]
     Unsmooth,
     /// Cancelled by the caller.

@@ -1,6 +1,6 @@
 //! Pairs triangles into quads: a maximum-weight matching by simulated annealing.
 //!
-//! Seven times as many moves give no more quads; see `docs/notes/cage-generator.md`.
+//! Seven times [`MOVES`] moves give no more quads; see `docs/notes/cage-generator.md`.
 
 use glam::DVec3;
 
@@ -10,13 +10,14 @@ use cagework_core::contact::Corners;
 /// Corners of a quad: a vertex, and whether the corner is the vertex's mirror image.
 pub(super) type Quad = [(u32, bool); 4];
 
-/// Smallest cosine between the normals of the two triangles of a quad, cut either way. Creases therefore stay between
-/// quads.
+/// Smallest allowed cosine between the normals of a quad's two triangles, for either diagonal. A sharper crease is
+/// therefore a border between quads.
 const MIN_FOLD_COSINE: f64 = 0.0;
 /// Largest [`badness`] for which a quad is allowed.
 const MAX_BADNESS: f64 = 4.0;
-/// Number of moves of the annealing, and its initial temperature; a quad is worth about 1.
+/// Number of moves of the annealing.
 const MOVES: usize = 15_000;
+/// Initial temperature of the annealing, in units of the quads' weights, which are about 1.
 const TEMPERATURE: f64 = 0.25;
 /// Seed of the pseudo-random moves.
 const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -33,7 +34,7 @@ pub(super) enum Partner {
     Triangle(u32),
 }
 
-/// Partner of every triangle, and the weight of the quad that both form.
+/// Partner of every triangle, and the weight of the quad that the two triangles form.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing {
     pub(super) partner: Vec<Partner>,
@@ -50,7 +51,7 @@ pub(super) fn places(surface: &GuardedSurface<'_>, quad: &Quad) -> [DVec3; 4] {
     })
 }
 
-/// Deviation of a quad from a plane: half the distance between its diagonals, divided by its mean side.
+/// Deviation of a quad from a plane: the distance between its diagonals, divided by its mean side.
 pub(super) fn warp(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let side = 0.25 * (0..4).map(|k| p[k].distance(p[(k + 1) % 4])).sum::<f64>();
@@ -100,7 +101,7 @@ pub(super) fn other_cut(surface: &GuardedSurface<'_>, t: u32, u: u32) -> Option<
     Some([[a, b, d], [b, c, d]].map(corners))
 }
 
-/// Whether the surface allows the other diagonal of a quad.
+/// Whether the surface allows the other diagonal of a quad; true if the partner is not a second triangle.
 pub(super) fn is_free(surface: &mut GuardedSurface<'_>, t: u32, partner: Partner) -> bool {
     let Partner::Triangle(u) = partner else { return true };
     other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
@@ -246,8 +247,8 @@ impl Pairing {
         gain
     }
 
-    /// Splits one of two quads with the same other diagonal: if both were cut along it, four triangles would share this
-    /// edge. This occurs at a vertex with two edges.
+    /// Splits a quad if an earlier quad has the same unused diagonal: another program may cut both quads along it, and
+    /// four triangles would then share this edge. Such quads occur at a vertex with only two edges.
     fn part_doubles(&mut self, surface: &GuardedSurface<'_>) {
         let mut taken = Vec::new();
         for t in 0..self.partner.len() as u32 {

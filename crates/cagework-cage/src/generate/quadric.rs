@@ -3,8 +3,8 @@
 
 use glam::{DMat3, DVec3};
 
-/// Weight of the squared distance to a vertex's original position, relative to the planes. It keeps the triangles of
-/// flat parts evenly sized.
+/// Weight of the squared distance to a vertex's original position, relative to the weight of the squared distances to
+/// planes. It keeps the triangles of flat parts evenly sized.
 const POINT_WEIGHT: f64 = 0.004;
 
 /// The function `p . a p - 2 b . p + c` of a point p: sum of squared distances weighted by area, voxel units.
@@ -18,14 +18,15 @@ pub(super) struct Quadric {
 }
 
 impl Default for Quadric {
-    /// Zero everywhere. (glam's default matrix is the identity.)
+    /// The quadric that is zero everywhere. A derived default would not be zero, because glam's default matrix is the
+    /// identity.
     fn default() -> Self {
         Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0, area: 0.0 }
     }
 }
 
 impl Quadric {
-    /// Squared distance to a triangle's plane.
+    /// Squared distance to a triangle's plane, weighted by a third of the triangle's area.
     pub(super) fn of_plane(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, 0.0)
     }
@@ -53,7 +54,7 @@ impl Quadric {
         }
     }
 
-    /// The same quadric for distances in a unit `unit` times as long.
+    /// The quadric with distances measured in a unit `unit` times as long. Positions keep their unit.
     pub(super) fn in_units(&self, unit: f64) -> Self {
         let scale = 1.0 / (unit * unit);
         Self { a: self.a * scale, b: self.b * scale, c: self.c * scale, area: self.area }
@@ -73,7 +74,8 @@ impl Quadric {
         self.at(p).powi(2) / self.area.max(1e-12)
     }
 
-    /// Minimum, restricted to `p[axis] = 0` if an axis is given.
+    /// Point at which the quadric is minimal, restricted to `p[axis] = 0` if an axis is given; `None` if there is no
+    /// single minimum.
     pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
         let (mut a, mut b) = (self.a, self.b);
         if let Some(axis) = on_mirror {

@@ -1,4 +1,4 @@
-//! Turns a collapsed triangle surface into quads: pairs triangles, moves vertices to make quads rectangular, and splits
+//! Turns a collapsed triangle surface into quads: pairs triangles, moves vertices to make quads rectangular, and cuts
 //! quads along the diagonal that the cage will use.
 
 use glam::DVec3;
@@ -17,8 +17,9 @@ use cagework_core::progress::Cancelled;
 const ROUNDS: [usize; 3] = [2, 2, 3];
 /// Weight of the mean squared distance from the hull (voxels squared) against [`badness`].
 const DISTANCE_WEIGHT: f64 = 0.6;
-/// Weights of the inverse quality of unpaired triangles, and of both halves of quads.
+/// Weight of the inverse quality of unpaired triangles against [`badness`].
 const TRIANGLE_WEIGHT: f64 = 0.3;
+/// Weight of the inverse quality of all triangles, including the halves of quads, against [`badness`].
 const HALF_WEIGHT: f64 = 0.01;
 /// Penalty of a quad that can be cut along one diagonal only.
 const SINGLE_CUT_PENALTY: f64 = 6.0;
@@ -26,11 +27,11 @@ const SINGLE_CUT_PENALTY: f64 = 6.0;
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// Length of the outward step that is tried, as a multiple of the mean distance between a vertex and its neighbours.
 const OUTWARD_STEP: f64 = 0.3;
-/// Smallest decrease of the energy for which a move is accepted.
+/// Smallest decrease of [`Star::energy`] plus [`Star::penalty`] for which a move is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 /// Largest [`warp`] of a quad that counts as planar.
 const MAX_PLANAR_WARP: f64 = 1e-2;
-/// Smallest cosine between the normals of a triangle before and after a move.
+/// Smallest allowed cosine between the normals of a triangle before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
 /// Pairs the triangles of a surface and moves its vertices to improve the quads.
@@ -103,8 +104,9 @@ impl Star {
         SINGLE_CUT_PENALTY * bound.count() as f64
     }
 
-    /// Candidate positions of the vertex: those that make each quad a parallelogram or planar, the mean of the
-    /// neighbours, the minimum of the quadric, and a step outward. Leaves out positions that the model blocks.
+    /// Candidate positions of the vertex: those that make each quad planar, the mean of those that make each quad a
+    /// parallelogram, the mean of the neighbours, the minimum of the quadric, the mean of these candidates, and a step
+    /// outward.
     fn goals(&self, surface: &GuardedSurface<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
         let here = surface.positions[v as usize];
         let mut goals = Vec::new();
@@ -178,8 +180,8 @@ fn straighten(surface: &mut GuardedSurface<'_>, pairing: &Pairing, quadrics: &[Q
     }
 }
 
-/// Cuts every quad along its shorter diagonal, as [`Cage`](cagework_core::cage::Cage) does. Splits a quad into two
-/// triangles if that is not allowed.
+/// Cuts the quads of two triangles along their shorter diagonals, as [`Cage`](cagework_core::cage::Cage) does. Splits a
+/// quad into its triangles if the surface does not allow this cut, or if moves have made the quad invalid.
 fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
     for t in 0..surface.triangles.len() as u32 {
         let partner = pairing.partner[t as usize];
@@ -187,7 +189,7 @@ fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
         let Some(quad) = quad_of(surface, t, partner).filter(|_| u > t) else { continue };
         let p = places(surface, &quad);
         if worth(surface, t, partner) <= 0.0 {
-            // Moves of its vertices have made the quad invalid.
+            // Moves of vertices have made the quad invalid.
             pairing.part(t);
             continue;
         }
@@ -206,7 +208,7 @@ fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
 pub(super) struct Faces {
     pub(super) positions: Vec<DVec3>,
     pub(super) faces: Vec<Vec<u32>>,
-    /// A triangle of the half surface from which each face comes.
+    /// For each face, one of the triangles of the half surface that the face was made from. `[n_faces]`
     pub(super) first: Vec<u32>,
 }
 
@@ -241,8 +243,8 @@ pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
         let partner = pairing.partner[t as usize];
         let quad = quad_of(surface, t, partner).filter(|quad| {
             let p = places(surface, quad);
-            // The other diagonal of a quad across the mirror has not been checked; for a planar quad both cuts are the
-            // same.
+            // The other diagonal of a quad across the mirror has not been checked; in a planar quad, both diagonals
+            // give the same surface.
             let is_guarded = partner != Partner::Image || p[0].distance(p[2]) <= p[1].distance(p[3]);
             is_guarded || warp(&p) <= MAX_PLANAR_WARP
         });

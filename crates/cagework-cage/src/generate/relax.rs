@@ -1,5 +1,5 @@
-//! Improves triangles under the guard's constraints: moves vertices towards the mean of their neighbours and back to
-//! the hull, and swaps edges.
+//! Improves the triangles of a [`GuardedSurface`]: moves vertices towards the mean of their neighbours and back to the
+//! hull, and swaps edges.
 
 use glam::DVec3;
 
@@ -18,19 +18,19 @@ const DISTANCE_WEIGHT: f64 = 1.5;
 /// Step lengths that are tried for a move, as shares of the full step.
 const STEP_SHARES: [f64; 3] = [0.8, 0.4, 0.15];
 
-/// Smallest decrease of the energy (dimensionless) for which a change is accepted.
+/// Smallest decrease of [`fit`] plus [`shape`] (dimensionless) for which a change is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 
-/// Smallest cosine between the normals of a triangle before and after a move.
+/// Smallest allowed cosine between the normals of a triangle before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.5;
 
-/// Smallest cosine between the normals of a triangle before and after an edge swap.
+/// Smallest allowed cosine between the normals of a triangle before and after an edge swap.
 const MIN_SWAP_COSINE: f64 = 0.6;
 
-/// Largest number of triangles around a vertex after a swap.
+/// Largest allowed number of triangles around a vertex after a swap.
 const MAX_VALENCE: usize = 9;
 
-/// Improves the shape of triangles under the guard's constraints.
+/// Improves the shape of triangles by moves and swaps that [`GuardedSurface::may_stand`] allows.
 ///
 /// # Errors
 /// If `go_on`, called with the completed share, cancels.
@@ -100,7 +100,7 @@ fn slide(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], v: u32) {
     }
 }
 
-/// Swaps the edge from corner `k` of a triangle if that improves both triangles at the edge.
+/// Swaps the edge from corner `k` of a triangle if that lowers [`fit`] of its midpoint plus [`shape`] of its triangles.
 fn swap(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], t: u32, k: usize) {
     let Some((other, after)) = surface.swapped(t, k) else { return };
     let [a, d, c] = after[0].index;

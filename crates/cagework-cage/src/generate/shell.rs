@@ -19,7 +19,8 @@ use cagework_core::progress::Cancelled;
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
 const MIN_MIRROR_SHARE: f64 = 0.985;
 
-/// Largest distance of a voxel from its mirror image, as a fraction of the model's longest side; at least one voxel.
+/// Distance up to which a voxel counts as the mirror image of another one, as a fraction of the model's longest side;
+/// at least one voxel.
 const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
 
 /// Largest extent of a cluster of voxels without mirror image, as a fraction of the model's longest side. A larger
@@ -29,35 +30,40 @@ const MAX_UNMATCHED: f64 = 0.08;
 /// Half the width of the widest gaps that are detected, as a fraction of the model's longest side.
 const MAX_GAP_HALF: f64 = 0.12;
 
-/// Minimum clearance in voxels.
+/// Minimum clearance between the cage and the solid, in voxels. It applies if the options request less.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// Clearance of a hull dilated by one voxel, in voxels: one voxel minus the reach of smoothing and rounding.
+/// Clearance of a hull dilated by one voxel, in voxels: one voxel minus the largest movement of a smoothed vertex and
+/// an allowance for rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
-/// Smallest ratio of length to thickness of a limb.
+/// The hull around a vertex counts as a limb if its length along the longest chord, divided by its mean thickness
+/// across this chord, exceeds this.
 const MIN_LIMB_RATIO: f64 = 2.2;
 
-/// Largest cosine between a limb's axis and directions across it.
+/// A direction counts as across a limb or plate if its cosine with the longest chord is below this.
 const MAX_ACROSS_COSINE: f64 = 0.3;
 
-/// Largest distance between rings along a limb, as a multiple of its thickness. The vertex budget may enlarge it.
+/// Largest allowed distance between rings of cage vertices along a limb, as a multiple of the limb's thickness. A small
+/// target number of vertices may enlarge the distance.
 const MAX_RING_DISTANCE: f64 = 1.3;
 
-/// Smallest ratio of length to thickness of a plate.
+/// The hull around a vertex counts as a plate if its length along the longest chord, divided by its smallest thickness
+/// across this chord, exceeds this, and it is wide enough ([`MIN_PLATE_WIDTH`]).
 const MIN_PLATE_RATIO: f64 = 5.0;
 
-/// Smallest ratio of width to length of a plate.
+/// Ratio of width to length that a plate exceeds. The width is the longest chord across the length.
 const MIN_PLATE_WIDTH: f64 = 0.5;
 
-/// Largest distance between vertices on a plate, as a fraction of its length. The vertex budget may enlarge it.
+/// Largest allowed distance between vertices on a plate, as a fraction of the plate's length. A small target number of
+/// vertices may enlarge the distance.
 const MAX_PLATE_SPACING: f64 = 0.5;
 
-/// The spacing of plates is limited only if at least this share of the hull's vertices lies on plates.
+/// The spacing of vertices on plates is limited only if at least this share of the hull's vertices lies on plates.
 const MIN_PLATE_SHARE: f64 = 0.25;
 
-/// Directions in which length and thickness of limbs are measured: to the 26 neighbours on the lattice, one of each
-/// opposite pair.
+/// Directions of the chords that measure length and thickness of limbs and plates: to the 26 neighbours on the lattice,
+/// one of each opposite pair.
 const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(1.0, 0.0, 0.0),
     DVec3::new(0.0, 1.0, 0.0),
@@ -74,7 +80,8 @@ const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// Limit on the distance between neighbouring cage vertices on a limb or plate, so that the cage can bend it.
+/// Limit on the distance between neighbouring cage vertices on a limb or plate. With wider spacing, the cage has too
+/// few vertices to bend the limb or plate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spacing {
     /// Unit vector along a limb, to which the limit applies; `None` on a plate, where it applies in all directions.
@@ -87,7 +94,7 @@ pub(super) struct Spacing {
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) lattice: Lattice,
-    /// Number of voxels along the model's longest side, divided by the number that follows from the target.
+    /// Number of voxels along the model's longest side, divided by [`super::first_voxels`] of the target.
     pub(super) fineness: f64,
     /// Longest side of the model's box, object units.
     pub(super) longest: f64,
@@ -95,22 +102,23 @@ pub(super) struct Shell {
     pub(super) obstacle: Obstacle,
     solid: Voxels,
     filled: Voxels,
-    /// The smoothed hull, which keeps clear of the obstacle and of itself.
+    /// The smoothed hull, which meets neither the obstacle nor itself.
     pub(super) hull: Surface,
     /// The hull before smoothing, a 2-manifold by construction.
     pub(super) stairs: Surface,
-    /// Number of components of the hull before bridging.
+    /// Number of components of the hull before bridges of voxels join them.
     pub(super) separate: usize,
     /// One voxel of each connected component of the solid.
     pub(super) parts: Vec<[usize; 3]>,
-    /// Distance that the hull keeps from the model along each axis, object units.
+    /// Smallest allowed Chebyshev distance of the cage from the model, object units.
     pub(super) clearance: f64,
     /// Gaps that the hull leaves open, largest first, set by [`Self::find_gaps`].
     pub(super) gaps: Vec<Gap>,
 }
 
 impl Shell {
-    /// Hull of a model on a lattice of `n` voxels with the given stretch. `go_on` may cancel.
+    /// Hull of a model on a lattice of `n` voxels along the model's longest side, with the given stretch. `go_on` may
+    /// cancel.
     pub(super) fn new(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
@@ -120,7 +128,7 @@ impl Shell {
         go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
     ) -> Result<Self, Cancelled> {
         let asked = options.distance(bounds);
-        // Layers of voxels between solid and hull that give the requested clearance.
+        // Number of layers of voxels, of edge `cell`, between solid and hull that give the requested clearance.
         let layers_for =
             |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
         let rough = Lattice::around(bounds, n, stretch, MARGIN_VOXELS);
@@ -155,7 +163,8 @@ impl Shell {
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
-        // Dilate the obstacle by the whole voxels of the clearance; triangles keep the fraction as a distance.
+        // Dilate the obstacle by the whole voxels of the clearance; the rest, less than a voxel, is a distance that
+        // triangles keep from it.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
         for _ in 0..whole as usize {
@@ -189,7 +198,7 @@ impl Shell {
         self.gaps = found.take(most).collect();
     }
 
-    /// The hull and layers of voxels around it.
+    /// The voxels of the hull, dilated by `layers` voxels.
     pub(super) fn band(&self, layers: usize) -> Voxels {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
     }
@@ -201,7 +210,7 @@ impl Shell {
             let [a, b, c] = t.map(|i| self.hull.positions[i as usize]);
             t.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
         }
-        // Number of hull voxels in a row from a point (lattice coordinates).
+        // Number of steps `along` from a point (lattice coordinates) until the next point is outside the hull.
         let run = |from: DVec3, along: DVec3| {
             let is_inside = |k: usize| {
                 let p = from + k as f64 * along;
@@ -233,7 +242,7 @@ impl Shell {
         let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
         let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
         let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
-        // If only few vertices lie on plates, they belong to crossing wires rather than plates.
+        // If only a few vertices are classified as plate, they are where wires cross: drop their limits.
         if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
             spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
         }
@@ -260,7 +269,7 @@ fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     hull = hull.filled();
     loop {
         hull.compose(mirror);
-        // Adding voxels may have closed off a cavity.
+        // The added voxels may enclose a cavity: fill it, and repeat.
         let filled = hull.filled();
         if filled == hull {
             return hull;
@@ -317,8 +326,8 @@ fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usi
     }
 }
 
-/// Joins the components of the hull by paths of voxels in the solid, shortest first (breadth-first search from the
-/// joined set). The paths will be dilated by `layers`. Returns false if there is only one component.
+/// Adds to the solid paths of voxels that join the components of the hull, shortest first (breadth-first search from
+/// the joined set). The paths will be dilated by `layers`. Returns false if there is only one component.
 fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize>) -> bool {
     let parts = hull.parts();
     if parts.len() < 2 {
@@ -332,7 +341,7 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
         && let Some(voxel) = queue.pop_front()
     {
         for next in hull.neighbours(voxel) {
-            // Keep the outermost layer empty.
+            // Stay far enough from the border that the dilated path leaves the outermost layer of voxels empty.
             let edge = (0..3).any(|k| next[k] <= layers || next[k] + layers + 1 >= hull.dims[k]);
             if edge || joined.has(next) {
                 continue;
@@ -401,8 +410,8 @@ impl JoinedVoxels<'_> {
     }
 }
 
-/// Voxels inside the model's 26-DOP, bounded by planes across the faces, edges and corners of a cube (Klosowski et al.
-/// 1998).
+/// Voxels inside the model's 26-DOP: the intersection of 13 slabs, normal to the directions from the centre of a cube
+/// to its faces, edges and corners (Klosowski et al. 1998).
 fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
     let mut axes = Vec::new();
     for x in -1..=1 {

@@ -1,5 +1,5 @@
-//! Cages whose subdivided surface encloses the model. Subdivision shrinks a cage, so it is generated with more
-//! clearance, then grown.
+//! Cages whose subdivided surface encloses the model. Subdivision shrinks a cage, so cages are generated with
+//! increasing clearance, and grown if they are not mirror-symmetric, until one encloses the model.
 
 use glam::{DVec3, Vec3};
 
@@ -11,8 +11,8 @@ use cagework_core::controls::{ControlSet, Controls, InnerControls};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::progress::Progress;
 
-/// Clearances that are tried in this order, as fractions of the diagonal of the model's box. 0.05 sufficed for all test
-/// models.
+/// Clearances that are tried in this order, as fractions of the diagonal of the model's box. The last ones are a
+/// reserve: 0.05 suffices for all test models.
 const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
 
 /// [`super::generate`] with `options.smooth` subdivision steps.

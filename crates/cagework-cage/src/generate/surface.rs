@@ -54,8 +54,8 @@ impl Surface {
                     corner[v] += dv;
                     corner
                 });
-                // Cut along the diagonal between even corners. This is mirror-symmetric because the dimensions are
-                // even.
+                // Cut along the diagonal between corners with an even coordinate sum. This is mirror-symmetric because
+                // the dimensions are even.
                 let even = quad[0].iter().sum::<usize>() % 2 == 0;
                 let [a, b, c, d] = quad.map(|corner| {
                     let slot = &mut number[(corner[2] * corners[1] + corner[1]) * corners[0] + corner[0]];
@@ -73,7 +73,7 @@ impl Surface {
         surface
     }
 
-    /// Laplacian smoothing, limited to [`SMOOTHING_REACH`] per vertex.
+    /// Laplacian smoothing. Each vertex moves by at most [`SMOOTHING_REACH`] along each axis.
     pub(super) fn smooth(&mut self) {
         let stairs = self.positions.clone();
         let mut sum = vec![DVec3::ZERO; stairs.len()];

@@ -12,10 +12,10 @@ const ROUNDS: usize = 4;
 /// Lengths of the moves that are tried, as fractions of the mean length of the vertex's edges.
 const STEP_SHARES: [f64; 4] = [0.1, 0.25, 0.5, 1.0];
 
-/// Smallest decrease of the sum of excess cosines for which a change is accepted.
+/// Smallest decrease of [`GuardedSurface::excess`] for which a change is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 
-/// Smallest cosine between a triangle's normals before and after a move.
+/// Smallest allowed cosine between a triangle's normals before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
 /// Swaps edges and moves vertices so that fewer folds are above 120 degrees, and those that remain are less sharp.
@@ -59,7 +59,8 @@ fn swap(surface: &mut GuardedSurface<'_>, t: u32, k: usize) -> bool {
     false
 }
 
-/// Moves a vertex to a position at which its triangles have less excess.
+/// Moves a vertex to a position with less excess of folds ([`GuardedSurface::excess`]) around its triangles, if one is
+/// found. Returns whether the vertex has moved.
 fn shift(surface: &mut GuardedSurface<'_>, v: u32, all_ways: bool) -> bool {
     let gone = surface.around[v as usize].clone();
     let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
@@ -116,7 +117,7 @@ mod tests {
     use crate::generate::voxels::Voxels;
 
     /// The fold at the rim of a square bipyramid of half height h and half side 2 is 180 degrees - 2 atan(h / 2): 163
-    /// for 0.3.
+    /// degrees for h = 0.3.
     #[test]
     fn a_flat_bipyramid_is_opened_to_120_degrees() {
         let positions =

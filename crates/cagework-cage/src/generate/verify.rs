@@ -10,10 +10,11 @@ use cagework_core::contact::{Corners, meeting};
 use cagework_core::geometry::winding_number;
 use cagework_core::mesh::PolygonMesh;
 
-/// Smallest share of the clearance that must remain after rounding to f32.
+/// Share of the clearance that must remain after rounding to f32.
 const MIN_CLEARANCE_SHARE: f64 = 0.98;
 
-/// Smallest share of the clearance at facets of bent faces, which lie slightly inside the guarded triangles.
+/// Share of the clearance that must remain at facets of bent faces and at triangles of a quad's other diagonal. Both
+/// may lie slightly inside the triangles for which the full clearance was checked during simplification.
 const MIN_FACET_CLEARANCE_SHARE: f64 = 0.1;
 
 /// Largest allowed distance of a winding number from 1; off the surface, winding numbers are integers.
@@ -83,7 +84,8 @@ pub(super) fn verify_faces(
 struct Cut {
     triangles: Vec<Corners>,
     face_of: Vec<u32>,
-    /// Whether the cage itself cuts the triangle's face this way. `[n_triangles]`
+    /// Whether each triangle is one of the cage's own; false for the halves of quads that are cut along the other
+    /// diagonal. `[n_triangles]`
     is_ours: Vec<bool>,
     /// Whether each triangle is half of a quad. `[n_triangles]`
     is_half: Vec<bool>,
@@ -115,8 +117,9 @@ impl Cut {
         !self.is_half[t] || self.is_ours[t] == ours
     }
 
-    /// Faces that intersect others, or form a sharp fold with them, when they are cut along the diagonal that the cage
-    /// does not use. Of two intersecting faces, prefers one that is cut along this diagonal.
+    /// Faces that intersect others or, when cut along the diagonal that the cage does not use, form a sharp fold with
+    /// others. Of two intersecting faces, lists the one that is cut along that diagonal: the first if both are, both if
+    /// neither is.
     fn wrong(&self, obstacle: &Obstacle) -> Vec<u32> {
         let mut wrong = Vec::new();
         for pair in meeting(&self.triangles) {

@@ -43,7 +43,7 @@ impl Voxels {
         (first / WORD..=last / WORD).any(|w| row[w] & run_mask(w, first, last) != 0)
     }
 
-    /// Whether all of `first..=last` of a row is set.
+    /// Whether all of the voxels `first..=last` of a row are in the set.
     pub(super) fn has_whole_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
         let row = self.row(y, z);
         (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
@@ -198,7 +198,7 @@ impl Voxels {
                 }
             }
             if let (true, Some(axis)) = (changed, mirror) {
-                // Blocks are visited in a fixed order, so the repair must be symmetrised.
+                // Which voxels are added depends on the order of blocks, so add their mirror images, too.
                 let other = self.mirrored(axis);
                 self.unite(&other);
             }
@@ -305,8 +305,8 @@ fn run_mask(w: usize, first: usize, last: usize) -> u64 {
     (u64::MAX << low) & (u64::MAX >> (WORD - 1 - high))
 }
 
-/// Whether a block of 2 x 2 x 2 voxels (bit index x + 2 y + 4 z) has voxels, or gaps, that share only an edge or a
-/// corner.
+/// Whether a block of 2 x 2 x 2 voxels (bit index x + 2 y + 4 z) has two voxels of the set, or two empty voxels, that
+/// share only an edge or a corner.
 fn is_critical(block: usize) -> bool {
     let has = |i: usize| block >> i & 1 == 1;
     let edge = [(0, 3, 1, 2), (4, 7, 5, 6), (0, 5, 1, 4), (2, 7, 3, 6), (0, 6, 2, 4), (1, 7, 3, 5)]

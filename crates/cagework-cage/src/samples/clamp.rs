@@ -1,4 +1,5 @@
-//! A C-shaped clamp with nearly closed jaws, across whose gap mean value coordinates leak.
+//! A C-shaped clamp with nearly closed jaws. With mean value coordinates, cage vertices of one jaw also move the other
+//! jaw, across the gap.
 
 use glam::{Quat, Vec3, vec3};
 
@@ -108,7 +109,8 @@ fn cage() -> PolygonMesh {
     mesh
 }
 
-/// Share of the lower jaw's motion with which a point moves: 0 on the back and above, 1 along the jaw.
+/// Share of the lower jaw's motion with which a point moves: 0 at the back and in the upper half, 1 along the lower
+/// jaw.
 fn share_of_jaw(p: Vec3) -> f32 {
     if p.y >= -0.01 {
         return 0.0;

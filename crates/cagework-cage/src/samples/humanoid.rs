@@ -131,7 +131,7 @@ fn walk(vertices: &[Vec3]) -> Rig {
         match bone {
             0 => vec3(0.0, -0.08 * phase.sin(), 0.0),
             2 => vec3(0.0, 0.10 * phase.sin(), 0.0),
-            // Arms hang and swing against the legs.
+            // Arms hang down, and each swings opposite to the leg on its side.
             4 | 7 => vec3(0.35 * own.sin(), 0.0, -1.1 * side),
             5 | 8 => vec3(0.0, -0.25 * side, 0.0),
             10 | 13 => vec3(-0.42 * own.sin(), 0.0, 0.0),

@@ -7,10 +7,11 @@ use glam::{UVec3, Vec3};
 use super::sdf::Body;
 use cagework_core::mesh::TriMesh;
 
-/// Lattice points along the edge of a block. Blocks far from the surface are not sampled.
+/// Number of lattice points along the edge of a block. Whole blocks far from the surface are not sampled.
 const BLOCK: u32 = 4;
 
-/// Number of Newton steps from a vertex of the net to the surface; two leave less than 1e-3 of a cell.
+/// Number of Newton steps from a vertex of the net to the surface; after two, the distance from the surface is less
+/// than 1e-3 of a cell.
 const STEPS: usize = 2;
 
 /// Mesh of a body's surface on cells of edge `cell`, with vertex colours.
@@ -49,8 +50,9 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
 struct Blocks {
     origin: Vec3,
     cell: f32,
-    /// Numbers of lattice points and of blocks, each along x, y and z.
+    /// Numbers of lattice points along x, y and z.
     n: UVec3,
+    /// Numbers of blocks along x, y and z.
     n_blocks: UVec3,
     /// Distance at the centre of each block. If the surface may pass through the block, also the solids that affect it.
     blocks: Vec<(f32, Option<Body>)>,
@@ -59,7 +61,7 @@ struct Blocks {
 impl Blocks {
     fn new(body: &Body, origin: Vec3, cell: f32, n: UVec3) -> Self {
         let n_blocks = (n + (BLOCK - 1)) / BLOCK;
-        // Distance from a block's centre to its farthest sample, plus one cell.
+        // Upper bound on the distance of a block's centre from points up to one cell outside the block.
         let reach = 1.05 * cell * 3.0_f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
         let mut blocks = Vec::with_capacity((n_blocks.x * n_blocks.y * n_blocks.z) as usize);
         for z in 0..n_blocks.z {
@@ -108,8 +110,8 @@ impl Blocks {
 /// Projects a point near the surface onto it by Newton's method.
 fn on_surface(body: &Body, start: Vec3, cell: f32) -> Vec3 {
     let h = 0.05 * cell;
-    // Corners of a tetrahedron. Their sum weighted by distances gives the gradient, the mean of the distances the
-    // distance.
+    // Corners of a tetrahedron. The sum of the corners, weighted by the distances there, gives the gradient; the mean
+    // of these distances approximates the distance at the centre.
     let corners =
         [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
     let mut p = start;

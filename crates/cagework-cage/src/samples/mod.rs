@@ -1,10 +1,12 @@
 //! Built-in sample models, made by formula: no download and no third-party licence.
 //!
-//! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and projected onto
-//! the zero level. A cage and poses of that cage belong to it. Building one takes a few hundred milliseconds.
+//! Each model is the zero level of a signed distance function, a smooth union of a few round solids. Surface nets mesh
+//! it, and the vertices are projected onto the zero level. A sample also has a cage and poses of this cage. Building a
+//! sample takes a few hundred milliseconds.
 
 mod clamp;
 mod humanoid;
+mod knot;
 mod mesher;
 mod rat;
 mod sdf;
@@ -19,21 +21,22 @@ use cagework_core::mesh::{PolygonMesh, TriMesh};
 use cagework_core::progress::Silent;
 use cagework_core::skin::Rig;
 
+pub use knot::knot;
 use sdf::Body;
 
-/// Description of a sample.
+/// Identifier and name of a sample, known without building it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct SampleInfo {
     /// Identifier: lower case, unique.
     pub id: &'static str,
-    /// Display name.
+    /// Name that users see.
     pub label: &'static str,
 }
 
-/// A built sample.
+/// A sample with its mesh, cage and poses.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Display name.
+    /// Name that users see.
     pub name: String,
     /// The model: y is up, z is forward, about two units long. Closed, counter-clockwise seen from outside.
     pub mesh: TriMesh,
@@ -45,7 +48,7 @@ pub struct Sample {
     pub poses: Vec<(String, Vec<Vec3>)>,
     /// Skeleton with an animation clip, if the sample has one.
     pub rig: Option<Rig>,
-    /// Vertex of the model to pull first: its last pose was made by pulling it.
+    /// Vertex of the model to pull first. The sample's last pose was made by pulling this vertex.
     pub grip: u32,
 }
 
@@ -88,7 +91,7 @@ pub fn build(id: &str) -> Option<Sample> {
 enum CageRecipe {
     /// A mesh modelled by hand.
     Mesh(PolygonMesh),
-    /// Generated around the model.
+    /// Options of a cage that is generated around the model.
     Generate(CageOptions),
 }
 
@@ -102,7 +105,7 @@ struct Recipe {
     rig: Option<fn(&[Vec3]) -> Rig>,
 }
 
-/// A pose made by one pull of the model. It is stored as bytes, because a pull needs a bind.
+/// A pose made by one pull of the model. It is stored as bytes, because computing it takes a bind of the model.
 struct PulledPose {
     name: &'static str,
     /// Point whose nearest vertex of the model is grabbed, object units.

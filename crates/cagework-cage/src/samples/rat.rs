@@ -35,13 +35,14 @@ const TAIL: [(Vec3, f32); 8] = [
     (vec3(0.0, 0.42, -2.48), 0.038),
 ];
 
-/// Points and radii of the left legs from the hip to the toes.
+/// Points and radii of the left front leg from the hip to the toes.
 const FRONT_LEG: [(Vec3, f32); 4] = [
     (vec3(0.17, 0.36, 0.36), 0.125),
     (vec3(0.23, 0.20, 0.32), 0.085),
     (vec3(0.23, 0.055, 0.38), 0.058),
     (vec3(0.23, 0.04, 0.52), 0.045),
 ];
+/// Points and radii of the left hind leg from the hip to the toes.
 const HIND_LEG: [(Vec3, f32); 4] = [
     (vec3(0.23, 0.38, -0.46), 0.21),
     (vec3(0.31, 0.20, -0.32), 0.12),

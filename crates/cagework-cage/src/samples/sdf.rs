@@ -6,15 +6,15 @@ use glam::{Quat, Vec3};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Solid {
-    /// A segment with a radius that varies linearly from `ra` at `a` to `rb` at `b`.
+    /// All points within a radius of the segment from `a` to `b`. The radius varies linearly from `ra` to `rb`.
     Cone { a: Vec3, b: Vec3, ra: f32, rb: f32 },
-    /// An ellipsoid. Its distance function is a lower bound, exact on the surface.
+    /// An ellipsoid. Its distance function is an approximation, exact on the surface.
     Ellipsoid { center: Vec3, radii: Vec3, turn: Quat },
     /// A box with rounded edges; `half` includes the rounding.
     Block { center: Vec3, half: Vec3, round: f32 },
 }
 
-/// A solid with its colour and the width over which it blends into the solids before it.
+/// A solid with its colour and the width over which it blends into the preceding solids.
 #[derive(Clone, Copy, Debug)]
 struct Layer {
     solid: Solid,
@@ -52,7 +52,7 @@ impl Solid {
     fn steepness(&self) -> f32 {
         match *self {
             Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
-            // The distance function is only a bound; a test checks this Lipschitz constant.
+            // The distance function is only an approximation; a test checks this Lipschitz constant.
             Self::Ellipsoid { .. } => 2.0,
             Self::Block { .. } => 1.0,
         }
@@ -71,7 +71,7 @@ impl Solid {
 }
 
 impl Body {
-    /// Adds a solid that blends into the others over the distance `blend`.
+    /// Adds a solid that blends into the previous solids over the distance `blend`.
     pub(super) fn add(&mut self, solid: Solid, blend: f32, colour: [u8; 3]) {
         self.parts.push(Layer { solid, blend, colour });
     }
@@ -108,7 +108,7 @@ impl Body {
         }
     }
 
-    /// Signed distance to the surface, negative inside; at most the true distance, apart from rounding.
+    /// Signed distance to the surface, negative inside; approximate away from the surface.
     pub(super) fn distance(&self, p: Vec3) -> f32 {
         self.parts.iter().fold(f32::MAX, |d, part| smooth_min(d, part.solid.distance(p), part.blend).0)
     }
@@ -120,7 +120,8 @@ impl Body {
         let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
         for part in &self.parts {
             let d = part.solid.distance(p);
-            // Bound on how much the difference between the two distances changes within reach.
+            // Bound on how much the difference between the distances to this solid and to the previous ones changes
+            // within `reach`.
             let slack = reach * (steepest + part.solid.steepness());
             steepest = steepest.max(part.solid.steepness());
             if d - distance >= part.blend + slack {

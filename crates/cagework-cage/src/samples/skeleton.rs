@@ -83,7 +83,8 @@ impl Skeleton {
     }
 
     /// A rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: names of the
-    /// bones; `turns`: rotation vector of a bone at a key, radians; `lift`: translation of the root at a key.
+    /// bones; `clip`: name and times of the keys, seconds; `turns`: rotation vector of a bone at a time, radians;
+    /// `lift`: position of the root at a time.
     pub(super) fn rig(
         &self,
         names: &[&'static str],

@@ -14,7 +14,7 @@ const BACK: [u8; 3] = [96, 44, 40];
 const LEG: [u8; 3] = [206, 150, 84];
 const EYE: [u8; 3] = [20, 20, 26];
 
-/// Angles of the left legs in the horizontal plane, from the front, and lengths of the legs relative to each other.
+/// Angle of each left leg in the horizontal plane, in radians from the front, and factor on the leg's length.
 const LEGS: [(f32, f32); 4] = [(0.50, 1.15), (1.20, 1.0), (1.90, 1.0), (2.62, 1.2)];
 
 pub(super) fn recipe() -> Recipe {

@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use cagework_cage::check::Repair;
 use cagework_cage::generate::{
-    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageOptions, DETAIL, DIVISIONS, Shape, Symmetry, TARGET, VOXELS,
+    BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageOptions, DETAIL, DIVISIONS, HULL_TARGET, Shape, Symmetry,
+    TARGET, VOXELS,
 };
 use cagework_core::BindOptions;
 use cagework_core::options::{GRID, OutOfRange};
@@ -13,19 +14,17 @@ use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
 
-/// Default maximum number of vertices of a hull cage.
-const DEFAULT_HULL_VERTICES: u32 = 24;
-
 /// Arguments of `cagework cage`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \
     cagework cage horse.glb -o cage.obj\n  \
     cagework cage horse.glb -o cage.glb --vertices 120 --symmetry x\n  \
+    cagework cage body.glb clothes -o cage.obj   (one cage around a body and a folder of clothes)\n  \
     cagework cage horse.glb -o box.obj --kind box --divisions 3")]
 pub(crate) struct CageArgs {
-    /// Model to make a cage for.
-    #[arg(help = super::model_help("Model to make a cage for"))]
-    pub(crate) model: PathBuf,
+    /// Models that the cage encloses together, and folders of models.
+    #[arg(value_name = "MODEL", required = true, help = super::model_help("Models that the cage encloses together, and folders of models"))]
+    pub(crate) models: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
     /// File to write (.obj keeps the order of the cage's vertices; .glb opens in any viewer).
@@ -35,7 +34,7 @@ pub(crate) struct CageArgs {
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
-    #[arg(long, help = format!("{} [default: {}; {DEFAULT_HULL_VERTICES} for a hull]", TARGET.about(), CageOptions::default().target), value_name = "N", value_parser = super::number::<u32>(TARGET))]
+    #[arg(long, help = format!("{} [default: {}; {HULL_TARGET} for a hull]", TARGET.about(), CageOptions::default().target), value_name = "N", value_parser = super::number::<u32>(TARGET))]
     pub(crate) vertices: Option<u32>,
     #[arg(long, help = DETAIL.about(), default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
     pub(crate) detail: f32,
@@ -54,7 +53,7 @@ pub(crate) struct CageArgs {
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
-    /// Enclose every frame of the clip with this name as well.
+    /// Enclose every frame of the clip with this name as well, in each model that has it.
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
     #[arg(long, help = DIVISIONS.about(), value_name = "N", value_parser = super::number::<u32>(DIVISIONS))]
@@ -75,11 +74,7 @@ impl CageArgs {
     pub(crate) fn options(&self) -> CageOptions {
         let hull = self.kind() == KindArg::Hull;
         CageOptions {
-            target: self.vertices.unwrap_or(if hull {
-                DEFAULT_HULL_VERTICES
-            } else {
-                CageOptions::default().target
-            }),
+            target: self.vertices.unwrap_or(if hull { HULL_TARGET } else { CageOptions::default().target }),
             detail: self.detail,
             quads: !self.triangles,
             shape: if hull { Shape::Hull } else { Shape::Follow },
@@ -110,7 +105,7 @@ pub(crate) struct CheckArgs {
     /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side.
     #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
-    /// Repairs to apply before the check; several, separated by commas: weld merges vertices at the same position,
+    /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position,
     /// drop-degenerate removes faces without area, duplicate faces and unused vertices, mirror completes half a cage
     /// across its planar open boundary, fill-holes closes holes, flip orients all faces outward, grow moves vertices
     /// outward until the cage encloses the model.
@@ -150,7 +145,7 @@ impl FromStr for CageSource {
         match kind {
             "box" => Ok(Self::Box { divisions: number.map_or(Ok(BOX_DIVISIONS), |n| DIVISIONS.parse(n))? }),
             "auto" => generated(Shape::Follow, CageOptions::default().target),
-            "hull" => generated(Shape::Hull, DEFAULT_HULL_VERTICES),
+            "hull" => generated(Shape::Hull, HULL_TARGET),
             _ => Ok(Self::File(PathBuf::from(text))),
         }
     }

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::{ControlArgs, ReadArgs, number};
 
-/// `cagework map`
+/// Arguments of `cagework map`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Points are text, one point per line (.csv, .txt, .xyz: x y z first or in columns with these names; other \

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use cagework_core::options::{self, BindOptions};
 use clap::Args;
 
-use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
+use super::{ControlArgs, ReadArgs, RigArgs, SizeArgs, SolveArgs, number};
 
 /// Arguments of `cagework refit`.
 #[derive(Args, Debug)]
@@ -14,11 +14,12 @@ use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
     error is printed and the other models are still written; the exit code is then 1.\n\n\
     Examples:\n  \
     cagework refit jacket.glb trousers.glb --cage body.obj --pose bulky.obj -o out\n  \
+    cagework refit walk.glb run.glb --skeleton body.glb --cage body.obj --pose bulky.obj -o out   (clips without a mesh)\n  \
     cagework refit --manifest garments.txt --cage body.obj --pose bulky.obj -o out --resume --json"
 )]
 pub(crate) struct RefitArgs {
-    /// Models inside the cage.
-    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models inside the cage"))]
+    /// Models inside the cage, and folders of models.
+    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models inside the cage, and folders of models"))]
     pub(crate) models: Vec<PathBuf>,
     /// Text file with more models, one name per line; empty lines and lines that start with # are ignored.
     #[arg(long, value_name = "FILE")]
@@ -34,6 +35,10 @@ pub(crate) struct RefitArgs {
     /// Moved inner controls (.obj): the same vertices in the same order [default: at rest].
     #[arg(long, value_name = "FILE", requires = "controls")]
     pub(crate) pose_controls: Option<PathBuf>,
+    /// Body whose joints the models share: joints with the same name move as in this file, and files of clips without a mesh are
+    /// accepted. Without it, a joint that carries vertices in one model counts as such in all models.
+    #[arg(long, value_name = "FILE", conflicts_with = "shape_only")]
+    pub(crate) skeleton: Option<PathBuf>,
     /// Folder to write to; created if it does not exist.
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: PathBuf,
@@ -44,6 +49,8 @@ pub(crate) struct RefitArgs {
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    #[command(flatten)]
+    pub(crate) size: SizeArgs,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
     #[command(flatten)]

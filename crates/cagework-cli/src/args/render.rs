@@ -22,6 +22,8 @@ use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
     cagework render horse.glb --cage cage.obj --pose gallop.obj --compare -o beside-mean-value.png\n  \
     cagework render horse.glb --cage cage.obj --show weights --column 17 -o weights.png\n  \
     cagework render horse.glb --cage cage.obj --show wireframe --method classic -g 16 --no-cage -o figure-4.png\n  \
+    cagework render fox.glb --clip Walk --at 0,0.2,0.4 -o strip.png\n  \
+    cagework render horse.glb --turntable 8 -o turn.png\n  \
     cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png"
 )]
 pub(crate) struct RenderArgs {
@@ -58,12 +60,20 @@ pub(crate) struct RenderArgs {
     /// Axis perpendicular to the slice.
     #[arg(long, default_value = "z", value_parser = axis())]
     pub(crate) axis: usize,
-    /// Position of the slice along the axis, 0 to 1.
-    #[arg(long, default_value_t = 0.5, value_name = "FRACTION")]
-    pub(crate) at: f32,
-    /// Width and height in pixels.
-    #[arg(long, default_value = "1280x960", value_name = "WxH")]
-    pub(crate) size: Size,
+    /// Draw the model as a clip moves it; `cagework info` lists the clips.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["cage", "turntable"])]
+    pub(crate) clip: Option<String>,
+    /// Times of the clip in seconds, separated by commas; several are drawn side by side [default: 0]. Without a clip:
+    /// position of the slice along the axis, 0 to 1 [default: 0.5].
+    #[arg(long, value_name = "NUMBER", value_delimiter = ',', value_parser = finite)]
+    pub(crate) at: Vec<f32>,
+    /// Draw the model from this many directions, side by side: a full turn that starts at --view.
+    #[arg(long, value_name = "N", conflicts_with = "compare", value_parser = clap::value_parser!(u32).range(2..=36))]
+    pub(crate) turntable: Option<u32>,
+    /// Width and height in pixels; with --turntable or several times, of each picture [default: 1280x960; 480x640 for
+    /// several pictures].
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
     /// Pixels per unit of line widths and handle sizes; use 2 for pictures that are displayed at half their size.
     #[arg(long, default_value_t = 1.0, value_parser = super::positive)]
     pub(crate) scale: f32,
@@ -94,7 +104,24 @@ pub(crate) struct RenderArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// Word of `--compare` that compares with harmonic coordinates of the cage without inner controls.
+impl RenderArgs {
+    /// Number of pictures side by side, without those of `--compare`.
+    pub(crate) fn n_pictures(&self) -> usize {
+        self.turntable.map_or(if self.clip.is_some() { self.at.len().max(1) } else { 1 }, |n| n as usize)
+    }
+
+    /// Width and height of each picture, pixels; with `--compare`, of the two pictures together.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        self.size.map_or(if self.n_pictures() > 1 { [480, 640] } else { [1280, 960] }, |size| size.0)
+    }
+}
+
+/// Parser of a finite number.
+fn finite(text: &str) -> Result<f32, String> {
+    text.trim().parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "not a number".into())
+}
+
+/// Value of `--compare` that selects the harmonic coordinates of the cage, without `--smooth` and `--controls`.
 const PLAIN: &str = "plain";
 
 /// Parser of the word that selects the coordinates to compare with.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cagework_io::{Joints, Model, ReshapeOptions, SelectError};
+use cagework_io::{Feet, Joints, Model, ReshapeOptions, SelectError, shown};
 use clap::Args;
 
 use crate::error::CliError;
@@ -41,6 +41,13 @@ pub(crate) struct RigArgs {
     /// Keep the travel distance of clips; by default it is scaled with the height of the hips.
     #[arg(long)]
     keep_travel: bool,
+    /// Lift or lower the deformed model, and each of its clips, so that the lowest point keeps its height.
+    #[arg(long, conflicts_with = "shape_only")]
+    pub(crate) ground: bool,
+    /// Feet in clips: lock holds them in place while they are on the ground, by rotating thighs and shins; free leaves the
+    /// rotations of the clip, so that feet of longer legs slide.
+    #[arg(long, default_value_t, value_name = "KIND", value_parser = super::words::<Feet>(), conflicts_with = "shape_only")]
+    feet: Feet,
     #[command(flatten)]
     pub(crate) parts: PartArgs,
     /// Write the mesh only, without skin and clips; several poses still become morph targets.
@@ -49,23 +56,28 @@ pub(crate) struct RigArgs {
 }
 
 impl RigArgs {
-    /// Options for deforming a rigged model.
+    /// Options for deforming a rigged model, and notices about ambiguous part names.
     ///
     /// # Errors
     /// If no part of the model has a given name.
-    pub(crate) fn options(&self, model: &Model, path: &Path) -> Result<ReshapeOptions, CliError> {
-        self.options_with(model, path, &self.parts)
-    }
-
-    /// Options for deforming one of many models, and the given part names that this model does not have.
-    ///
-    /// # Errors
-    /// If a name is ambiguous, or the rig cannot be read.
-    pub(crate) fn options_for_one(
+    pub(crate) fn options(
         &self,
         model: &Model,
         path: &Path,
     ) -> Result<(ReshapeOptions, Vec<String>), CliError> {
+        self.options_with(model, path, &self.parts)
+    }
+
+    /// Options for deforming one of many models, the names of `--rigid` and `--mask` that this model lacks, and notices
+    /// about ambiguous part names.
+    ///
+    /// # Errors
+    /// If the rig cannot be read.
+    pub(crate) fn options_for_one(
+        &self,
+        model: &Model,
+        path: &Path,
+    ) -> Result<(ReshapeOptions, Vec<String>, Vec<String>), CliError> {
         let props = self.props(model, path)?;
         let mut missing = Vec::new();
         let mut is_there = |name: &String| {
@@ -79,7 +91,33 @@ impl RigArgs {
         let PartArgs { rigid, mask } = &self.parts;
         let rigid = rigid.iter().filter(|name| is_there(name)).cloned().collect();
         let mask = mask.iter().filter(|(name, _)| is_there(name)).cloned().collect();
-        Ok((self.options_with(model, path, &PartArgs { rigid, mask })?, missing))
+        let (options, notices) = self.options_with(model, path, &PartArgs { rigid, mask })?;
+        Ok((options, missing, notices))
+    }
+
+    /// Rejects `--ground` and `--feet lock` where they have no effect.
+    ///
+    /// # Errors
+    /// If there are several poses, or no skeleton for `--feet lock`.
+    pub(crate) fn check_clips(&self, model: &Model, path: &Path, n_poses: usize) -> Result<(), CliError> {
+        if n_poses > 1 && (self.ground || self.feet == Feet::Lock) {
+            return Err(CliError::Mismatch {
+                message: format!("--ground and --feet lock take one pose, but there are {n_poses}"),
+                hint: "run the command once per pose",
+            });
+        }
+        if self.feet == Feet::Lock && !model.is_rigged() {
+            return Err(CliError::file(
+                path,
+                "has no skeleton whose feet could be held: leave out --feet lock",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Whether `--joints stay` leaves the skeleton at rest.
+    pub(crate) fn stays(&self) -> bool {
+        self.joints == Joints::Stay
     }
 
     /// Part names that `--rigid` and `--mask` give.
@@ -91,12 +129,39 @@ impl RigArgs {
         if self.shape_only { Ok(Vec::new()) } else { model.props().map_err(|e| CliError::file(path, e)) }
     }
 
-    fn options_with(&self, model: &Model, path: &Path, parts: &PartArgs) -> Result<ReshapeOptions, CliError> {
+    fn options_with(
+        &self,
+        model: &Model,
+        path: &Path,
+        parts: &PartArgs,
+    ) -> Result<(ReshapeOptions, Vec<String>), CliError> {
         let props = self.props(model, path)?;
         let (rigid, others): (Vec<_>, Vec<_>) =
             parts.rigid.iter().cloned().partition(|name| props.contains(name));
-        let parts = model.parts(&parts.mask, &others).map_err(|e| CliError::file(path, e))?;
+        let mut notices = Vec::new();
+        let others: Vec<String> = others.iter().map(|name| with_kind(model, name, &mut notices)).collect();
+        let mask = parts.mask.iter().map(|(name, amount)| (with_kind(model, name, &mut notices), *amount));
+        let mask: Vec<_> = mask.collect();
+        let parts = model.parts(&mask, &others).map_err(|e| CliError::file(path, e))?;
         let (joints, keep_travel) = (self.joints, self.keep_travel);
-        Ok(ReshapeOptions { joints, keep_travel, rigid, parts, timeline: None })
+        let (ground, feet) = (self.ground, self.feet);
+        Ok((
+            ReshapeOptions { joints, keep_travel, rigid, parts, ground, feet, ..ReshapeOptions::default() },
+            notices,
+        ))
     }
+}
+
+/// The part name. If parts of several kinds share it, prefixes the first kind and adds a notice about the others.
+fn with_kind(model: &Model, name: &str, notices: &mut Vec<String>) -> String {
+    let Err(SelectError::Ambiguous { choices, .. }) = model.select(name) else { return name.to_owned() };
+    let names: Vec<&str> = choices.iter().map(|choice| choice.trim_matches('\'')).collect();
+    let [first, others @ ..] = names.as_slice() else { return name.to_owned() };
+    notices.push(format!(
+        "'{}' means {}; for the other part write {}",
+        shown(name),
+        shown(first),
+        shown(&others.join(" or "))
+    ));
+    (*first).to_owned()
 }

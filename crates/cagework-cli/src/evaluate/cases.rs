@@ -1,4 +1,5 @@
-//! The binds that the evaluation runs: those of the paper, and the embedded method on the same grids.
+//! Runs the binds of the evaluation: the classic method on the grids of the paper, and the embedded method on the same
+//! grids. Figures are numbered as in the paper, which the parent module names.
 
 use cagework_core::Frames;
 use cagework_core::bind::Binding;
@@ -135,7 +136,7 @@ impl Run {
     }
 }
 
-/// A rest pose reconstructed from weights, for one of figures 2 to 5.
+/// Weights and frames that reconstruct the rest pose, for one of figures 2 to 5.
 #[derive(Clone, Debug)]
 pub(super) struct Reconstruction {
     /// File name of the figure, without extension.
@@ -160,7 +161,7 @@ pub(super) struct Evaluation {
     pub(super) adapter: Result<String, String>,
     /// Runs of figures 8 to 11: each implementation on each grid of [`Grids::timed`], for each of [`TIMED_TAUS`].
     pub(super) timed: Vec<Run>,
-    /// Runs of figure 12, for the rest error.
+    /// Runs of figure 12, which shows the error at rest.
     pub(super) errors: Vec<Run>,
     pub(super) reconstructions: Vec<Reconstruction>,
 }
@@ -286,7 +287,7 @@ impl Evaluation {
         })
     }
 
-    /// The run of an implementation that figure 7 shows.
+    /// The run of an implementation whose delta figure 7 shows.
     pub(super) fn delta_run(&self, implementation: Implementation) -> Option<&Run> {
         self.timed(implementation, self.grids.middle, 1e-5)
     }

@@ -1,7 +1,8 @@
-//! `cagework evaluate`: repeats the paper's evaluation, and adds the embedded method for comparison.
+//! `cagework evaluate`: repeats the evaluation of K. Smith's paper *CSC 473 Harmonic Coordinates*, and adds the
+//! embedded method for comparison. "The paper" in this module means Smith's.
 //!
-//! Figures have the numbers of the paper: 2 to 5 are reconstructions, 6 is a deformation, 7 shows delta over time, 8 to
-//! 11 show times to completion, 12 shows the error.
+//! Figures are numbered as in the paper: 2 to 5 are reconstructions, 6 is a deformation, 7 shows the solver's delta
+//! (`BindReport::delta_history`) over time, 8 to 11 show times to completion, 12 shows the error at rest.
 
 mod cases;
 mod pictures;

@@ -1,7 +1,7 @@
-//! Draws figures 2 to 6 as PNG files.
+//! Draws figures 2 to 6 of the evaluation as PNG files.
 
 use cagework_core::Cage;
-use cagework_gpu::render::{MeshStyle, SceneOptions, Theme};
+use cagework_gpu::render::{MeshStyle, SceneOptions, Theme, ViewOptions};
 use cagework_gpu::{GpuContext, Session};
 use cagework_io::Model;
 use glam::{Quat, Vec3};
@@ -30,25 +30,21 @@ pub(super) fn all(
 ) -> Result<Vec<(String, Vec<u8>)>, CliError> {
     let mut session = Session::new(context);
     block_on(session.set_model(draw_model(model).0))?;
-    let bare = SceneOptions {
-        theme: Theme::Light,
-        cage_lines: false,
-        handles: false,
-        floor: false,
-        ..SceneOptions::default()
-    };
+    let view = ViewOptions { theme: Theme::Light, floor: false, ..ViewOptions::default() };
+    let bare = SceneOptions { view, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.camera_mut().set_viewport(glam::Vec2::from(SIZE.map(|s| s as f32)));
     // Frame the mesh before the cage is set, because figures 2 to 5 do not show the cage.
     session.frame_all();
     block_on(session.set_cage(cage))?;
     let mut pictures = Vec::new();
-    session.set_scene(SceneOptions { mesh: MeshStyle::Clay, base_wireframe: true, ..bare.clone() });
+    let wired = ViewOptions { base_wireframe: true, ..view };
+    session.set_scene(SceneOptions { mesh: MeshStyle::Clay, view: wired, ..bare.clone() });
     for r in &evaluation.reconstructions {
         block_on(session.adopt(r.weights.clone(), r.frames.clone()))?;
         let rgba = block_on(session.picture(SIZE, 1.0))?;
         pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
     }
-    // The session still has the weights of the last reconstruction, which the embedded method computed.
+    // Figure 6 uses the weights of the last reconstruction, which is that of the embedded method.
     session.set_scene(SceneOptions { cage_lines: true, handles: true, ..bare });
     session.pose(&bent_cage(cage));
     session.frame_all();

@@ -1,4 +1,4 @@
-//! Draws the paper's plots as SVG.
+//! Draws figures 7 to 12 of the evaluation as SVG.
 
 use plotters::prelude::*;
 
@@ -122,7 +122,7 @@ fn delta(evaluation: &Evaluation) -> Plot {
     )
 }
 
-/// Draws figure 12: mean error over tau, with a line for each grid.
+/// Draws figure 12: mean error over tau, with a line for each method on each grid.
 fn error(evaluation: &Evaluation) -> Plot {
     let mut series = Vec::new();
     for grid in evaluation.grids.all() {

@@ -10,12 +10,13 @@ pub(super) struct Spread {
     pub(super) max: f64,
 }
 
-/// Result of comparing the range of one implementation with that of another.
+/// Result of comparing the times of one implementation with those of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Comparison {
-    /// All its times are shorter than the other's, by a factor between `least` and `most`.
+    /// All times of the first implementation are shorter than those of the other one, by a factor between `least` and
+    /// `most`.
     Faster { least: f64, most: f64 },
-    /// All its times are longer than the other's.
+    /// All times of the first implementation are longer than those of the other one.
     Slower,
     /// The two ranges overlap.
     WithinSpread,

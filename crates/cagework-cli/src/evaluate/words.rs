@@ -1,4 +1,4 @@
-//! Writes the report, which says which findings of the paper hold in this run.
+//! Writes the report, which says which findings of the paper that the parent module names hold in this run.
 
 use std::fmt::Write as _;
 
@@ -77,7 +77,8 @@ fn times(run: &Run) -> String {
     if n < 2 { format!("{median:.1} ms") } else { format!("{median:.1} ms ({min:.1} to {max:.1})") }
 }
 
-/// Text that says how many times as fast as `old` `new` is; empty if the ranges of times overlap.
+/// End of a sentence that compares the times of `new` and `old`: the factor if `new` is faster, otherwise that `new` is
+/// slower or that the difference is not certain.
 fn factors(new: &Run, old: &Run) -> String {
     match new.total_ms.against(old.total_ms) {
         Comparison::Faster { least, most } => {
@@ -128,7 +129,8 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Two decay rates of delta (logarithms of its factor per sweep) count as equal if their ratio is below this.
+/// Two decay rates of delta count as equal if their ratio lies between this value and its reciprocal. A decay rate is
+/// the logarithm of the factor by which delta falls per sweep.
 const MAX_DECAY_RATIO: f64 = 1.25;
 
 fn delta_verdict(evaluation: &Evaluation, out: &mut String) {

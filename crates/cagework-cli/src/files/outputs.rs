@@ -104,8 +104,8 @@ pub(crate) fn refuse_files_named(
     Ok(())
 }
 
-/// Creates or replaces a file atomically; on failure, an existing file is unchanged. A symbolic link stays, and its
-/// target is written. Devices, pipes and open descriptors are appended to.
+/// Creates or replaces a file atomically; on failure, an existing file is unchanged. A symbolic link is preserved, and
+/// its target is written. Devices, pipes and open descriptors are appended to.
 ///
 /// # Errors
 /// If the file cannot be written or was an input, or the work was cancelled.

@@ -10,8 +10,9 @@ use tempfile::{Builder, NamedTempFile};
 
 use super::folder_of;
 
-/// Prefix and suffix of the names of temporary files.
+/// Prefix of the names of temporary files.
 const PREFIX: &str = ".cagework-";
+/// Suffix of the names of temporary files.
 const SUFFIX: &str = ".part";
 
 /// Path of the temporary file that is being written. The lock is held while the file is created, renamed or removed, so

@@ -13,14 +13,14 @@ use crate::error::CliError;
 use crate::files::read;
 use crate::pose::BoundModel;
 
-/// Maximum number of landmarks. The limit bounds the time, because each `point` is searched for in all triangles.
+/// Maximum number of landmarks. The limit bounds the time: a landmark with a `point` is compared with all triangles.
 const MAX_LANDMARKS: usize = 10_000;
 
-/// Number of landmarks, not all in one plane, that determine an affine map. With fewer, the energy determines the
-/// rotation.
+/// Number of landmarks, not all in one plane, that determine an affine map. With fewer, the bending energy of the fit
+/// determines the rotation.
 const N_AFFINE_LANDMARKS: usize = 4;
 
-/// Amount by which a barycentric coordinate may be below 0, and their sum may differ from 1.
+/// Tolerance of barycentric coordinates: each may be this much below 0, and their sum may differ from 1 by this much.
 const BARY_TOLERANCE: f64 = 1e-3;
 
 /// A landmark as the file contains it, with positions in the file's axes.

@@ -6,16 +6,18 @@ use glam::Vec3;
 use serde::Serialize;
 
 /// Edges shorter than this fraction of the model's size are ignored, because their stretch is rounding noise.
-const MIN_EDGE_RATIO: f32 = 1e-9;
-/// Vertices whose distance along the surface from the grabs exceeds the reach by this factor should not move.
+const MIN_EDGE_RATIO: f64 = 1e-9;
+/// Vertices should not move if their distance from the grabs, along the surface, exceeds this multiple of the drag's
+/// [`reach_length`](Drag::reach_length).
 const FAR_REACH_RATIO: f64 = 1.2;
 
 /// Stretch of edges: posed length over rest length.
 #[derive(Debug, Serialize)]
 pub(super) struct Stretches {
     pub(super) stretch_max: f64,
-    /// 99th percentile, interpolated linearly; `stretch_1` is the first percentile.
+    /// 99th percentile, interpolated linearly.
     pub(super) stretch_99: f64,
+    /// First percentile, interpolated linearly.
     pub(super) stretch_1: f64,
 }
 
@@ -29,13 +31,16 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
         .collect();
     edges.sort_unstable();
     edges.dedup();
-    let size = cagework_core::Bounds::of(&mesh.positions).map_or(0.0, |b| b.diagonal());
-    let length = |positions: &[Vec3], [a, b]: [u32; 2]| positions[a as usize].distance(positions[b as usize]);
+    let size = cagework_core::Bounds::of(&mesh.positions).map_or(0.0, |b| f64::from(b.diagonal()));
+    let length = |positions: &[Vec3], edge: [u32; 2]| {
+        let [a, b] = edge.map(|v| positions[v as usize].as_dvec3());
+        a.distance(b)
+    };
     let mut all: Vec<f64> = edges
         .into_iter()
         .map(|edge| (length(&mesh.positions, edge), length(posed, edge)))
         .filter(|(rest, _)| *rest > MIN_EDGE_RATIO * size)
-        .map(|(rest, posed)| f64::from(posed) / f64::from(rest))
+        .map(|(rest, posed)| posed / rest)
         .collect();
     all.sort_by(f64::total_cmp);
     let at = |share: f64| {
@@ -47,13 +52,13 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
 }
 
 /// Mean displacement, object units, of the vertices farther than [`FAR_REACH_RATIO`] times the reach from the grabs
-/// along the surface; `None` if there are none.
+/// along the surface; `None` if no vertex is that far.
 pub(super) fn far_mean(drag: &Drag, before: &[Vec3], after: &[Vec3]) -> Option<f64> {
     let limit = FAR_REACH_RATIO * drag.reach_length();
     let moves = drag.walks().iter().zip(before.iter().zip(after));
     let far: Vec<f64> = moves
         .filter(|(walk, _)| f64::from(**walk) > limit)
-        .map(|(_, (before, after))| f64::from(before.distance(*after)))
+        .map(|(_, (before, after))| before.as_dvec3().distance(after.as_dvec3()))
         .collect();
     (!far.is_empty()).then(|| far.iter().sum::<f64>() / far.len() as f64)
 }

@@ -6,7 +6,7 @@ mod measure;
 use std::path::Path;
 use std::time::Instant;
 
-use cagework_core::deform::deform_bound;
+use cagework_core::deform::{deform_bound, deform_finite};
 use cagework_io::shown;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle};
 use glam::{DVec3, Vec3};
@@ -27,7 +27,8 @@ struct PullSummary {
     samples: usize,
     groups: usize,
     cage: usize,
-    /// Time of the precomputation for this model and cage, ms. It includes binding the sample points.
+    /// Time of the precomputation for this model and cage, ms. It includes the bind of the
+    /// [`Probes`](cagework_pose::pull::Probes).
     precompute_ms: f64,
     /// Time to start a grab, ms.
     grab_ms: f64,
@@ -43,7 +44,7 @@ struct PullSummary {
     settle_frames: u32,
     #[serde(flatten)]
     stretches: Stretches,
-    /// Mean displacement of the vertices farther than 1.2 times `reach` from the grabs; null if there are none.
+    /// Mean displacement of the vertices farther than 1.2 times `reach` from the grabs; null if no vertex is that far.
     far_mean: Option<f64>,
     notices: Vec<String>,
 }
@@ -72,7 +73,7 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
 
     let begun = Instant::now();
     let from: Vec<DVec3> = start.iter().copied().map(Vec3::as_dvec3).collect();
-    let drag_options = DragOptions { reach: job.reach, relax: job.relax, symmetry: None };
+    let drag_options = DragOptions { reach: job.reach, relax: job.relax, ..DragOptions::default() };
     let rows = frames.folded(&weights);
     let grips = |handles: &[Handle]| {
         let grips = handles.iter().map(|&h| Grip::new(h, &pull, &model.triangles, &rows));
@@ -93,9 +94,9 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let at_stop = deformed(&pose(&drag));
     let settle_frames = drag.settle(&to);
     let cage_pose = pose(&drag);
-    let after = deformed(&cage_pose);
+    let after = deform_finite(&weights, &frames, &cage_pose).map_err(|e| CliError::file(&given.job, e))?;
     let drag_length = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
-    let apart = |(a, b): (&Vec3, &Vec3)| f64::from(a.distance(*b));
+    let apart = |(a, b): (&Vec3, &Vec3)| a.as_dvec3().distance(b.as_dvec3());
     write_pose(&model, &cage, &cage_pose, args)?;
     let summary = PullSummary {
         output: output.display().to_string(),

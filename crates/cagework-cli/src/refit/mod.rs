@@ -5,25 +5,28 @@ mod report;
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 use cagework_core::bind::{BindError, SolvedCage};
+use cagework_core::deform::displacements;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Cancelled;
 use cagework_core::{Binding, Controls};
-use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown};
 use glam::{DVec3, Vec3};
 
-use crate::args::{ModelOutput, RefitArgs};
+use crate::args::{ModelOutput, RefitArgs, SizeArgs};
 use crate::bind::{bind_positions, check_memory};
 use crate::controls::with_inner;
 use crate::deform::{Deformation, Poses, pose_name};
 use crate::error::CliError;
 use crate::files::{
-    check_outputs, is_newer, json, make_folder, print, read, refuse_files_named, shown_path, write,
+    check_outputs, is_newer, json, make_folder, models_of_folders, print, read, read_beside,
+    refuse_files_named, shown_path, write,
 };
-use crate::load::{load_cage_file, load_model};
+use crate::load::{load_cage_file, load_model, load_with_clips};
 use crate::progress::Bar;
 use crate::rig;
 use crate::signals::{self, CancelGuard};
@@ -40,12 +43,13 @@ struct Job {
 struct Binder<'a> {
     args: &'a RefitArgs,
     controls: Controls<'a>,
-    /// Origin of the cage's positions, which the models get too.
+    /// Origin of the cage's positions, to which the models' positions are relative as well.
     origin: DVec3,
-    /// Solved fields of the cage, computed for the first model that is not skipped; `None` if they do not fit in half
-    /// of the memory limit.
+    /// Solved fields of the cage, computed at the first bind; `None` if they do not fit in half of the memory limit.
     solved: OnceCell<Option<SolvedCage<'a>>>,
-    /// Given part names that no model has had so far.
+    /// Skeleton that all models share; see [`Binder::skeleton_of`].
+    skeleton: Option<Arc<Skeleton>>,
+    /// Names of `--rigid` and `--mask` that no model so far contains.
     unnamed: RefCell<Vec<String>>,
 }
 
@@ -55,12 +59,12 @@ struct DeformedModel<'a> {
     model: Model,
     deformation: Deformation,
     options: ReshapeOptions,
-    /// Report of the model. The total time and the rig are added after writing.
+    /// Report of the model. The total time and the report of its rig are added after writing.
     report: ModelReport,
     started: Instant,
 }
 
-/// The job that another thread is writing, and this thread's handle; `None` if no job is being written.
+/// The job that another thread is writing, and the handle of that thread; `None` if no job is being written.
 type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
 
 /// A model is written while the next one is read, unless writing it needs more than the memory limit divided by this.
@@ -77,11 +81,16 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
             hint: "leave out `--backend gpu`",
         });
     }
-    let jobs = jobs(args)?;
-    make_folder(&args.output)?;
-    let shared =
-        [Some(&args.cage), Some(&args.pose), args.pose_controls.as_ref(), args.controls.controls.as_ref()];
+    let shared = [
+        Some(&args.cage),
+        Some(&args.pose),
+        args.pose_controls.as_ref(),
+        args.controls.controls.as_ref(),
+        args.skeleton.as_ref(),
+    ];
     let shared: Vec<&Path> = shared.into_iter().flatten().map(AsRef::as_ref).collect();
+    let jobs = jobs(args, &shared)?;
+    make_folder(&args.output)?;
     let outputs: Vec<&Path> = jobs.iter().map(|job| job.output.path.as_path()).collect();
     let models: Vec<&Path> = jobs.iter().map(|job| job.model.as_path()).collect();
     let named = shared.iter().chain(&models).copied();
@@ -89,7 +98,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&outputs, &inputs)?;
     refuse_files_named(&named.collect::<Vec<_>>(), &outputs, args.read.memory.bytes())?;
 
-    // From here on, Ctrl-C cancels after the write in progress.
+    // From here on, the first Ctrl-C ends the command after the write in progress instead of immediately.
     let _guard = CancelGuard::start();
     let (up, memory) = (args.read.axis(), args.read.memory);
     let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
@@ -102,7 +111,9 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
         positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, (up, cage.origin()), memory)?,
     };
     let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
-    let binder = Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), unnamed };
+    let mut binder =
+        Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), skeleton: None, unnamed };
+    binder.skeleton = binder.skeleton_of(&jobs, &poses)?.map(Arc::new);
     let mut models = Vec::with_capacity(jobs.len());
     let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
         // If a signal cancelled a model, do not report it as failed.
@@ -128,7 +139,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
                 Some(Ok(deformed)) => {
                     let is_large = deformed.bytes() > args.read.memory.bytes() / PARALLEL_MEMORY_DIVISOR;
                     let names = &poses.names;
-                    writing = Some((job, scope.spawn(move || deformed.write(names))));
+                    writing = Some((job, scope.spawn(move || deformed.write(names, args.size))));
                     if is_large {
                         settle_one(&mut writing, &mut settle)?;
                     }
@@ -146,7 +157,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
             message: format!("{} of {} models failed", summary.failed, jobs.len()),
             hint: "repair them and run the command again with --resume, which skips finished models",
         }),
-        // A skipped model may have the part, because its parts are not read.
+        // A skipped model is not read, so it may contain the part.
         Some(name) if summary.skipped == 0 => Err(CliError::Mismatch {
             message: format!("no model has a part called '{}'", shown(name)),
             hint: "all models were written without it: correct the name and run the command again, without --resume",
@@ -155,11 +166,12 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-/// All models to read, and the files to write them to.
+/// All models to read, and the files to write them to. `shared`: files of the cage and the pose, which are left out if
+/// a folder of models contains them.
 ///
 /// # Errors
 /// If the manifest cannot be read or names no model, or two models have the same output.
-fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
+fn jobs(args: &RefitArgs, shared: &[&Path]) -> Result<Vec<Job>, CliError> {
     let mut models = args.models.clone();
     if let Some(path) = &args.manifest {
         let text = String::from_utf8(read(path)?).map_err(|e| CliError::file(path, e))?;
@@ -169,6 +181,7 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
             return Err(CliError::file(path, "names no model"));
         }
     }
+    let models = models_of_folders(&models, shared)?;
     let mut by_output: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();
     let mut jobs = Vec::with_capacity(models.len());
     for model in &models {
@@ -198,6 +211,7 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
                 hint: "rename one of them, or run the command once for each, with different -o",
             });
         }
+        args.size.check(&output)?;
         jobs.push(Job { model: model.clone(), output });
     }
     Ok(jobs)
@@ -209,12 +223,18 @@ impl Binder<'_> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
         let (path, format) = (&job.model, job.output.format);
-        let mut model = load_model(path, args.read.axis(), args.read.memory)?;
+        let has_moves = self.skeleton.as_ref().is_some_and(|skeleton| skeleton.has_moves());
+        let load = if has_moves && format == ModelFormat::Gltf { load_with_clips } else { load_model };
+        let mut model = load(path, args.read.axis(), args.read.memory)?;
         model.see_from(self.origin);
+        if model.positions.is_empty() {
+            return self.of_clips(job, model, started);
+        }
         let is_static = args.rig.shape_only || format != ModelFormat::Gltf;
         let (points, extra_points) =
             if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
-        let (options, missing) = args.rig.options_for_one(&model, path)?;
+        let (options, missing, of_names) = args.rig.options_for_one(&model, path)?;
+        let options = ReshapeOptions { skeleton: self.skeleton.clone(), ..options };
         let held = model.bytes();
         let Binding { weights, frames, outside, report } = self.bind(&points, held, extra_points)?;
         let options_with_fields = BindOptions { held: held + self.field_bytes(), ..self.options() };
@@ -230,6 +250,7 @@ impl Binder<'_> {
         let deformation = Deformation::new(&model, saved, poses, format, (&options, args.rig.shape_only));
         let deform_ms = elapsed_ms(deform_start);
         let mut notices = model.notices.clone();
+        notices.extend(of_names);
         notices.extend(missing.iter().map(|name| format!("this model has no part called '{}'", shown(name))));
         self.unnamed.borrow_mut().retain(|name| missing.contains(name));
         if !report.converged {
@@ -248,6 +269,66 @@ impl Binder<'_> {
             notices,
         };
         Ok(DeformedModel { job, model, deformation, options, report, started })
+    }
+
+    /// Prepares a file of clips without a mesh. Binds nothing: its joints move as those with the same names in the
+    /// shared skeleton.
+    fn of_clips<'j>(
+        &self,
+        job: &'j Job,
+        model: Model,
+        started: Instant,
+    ) -> Result<DeformedModel<'j>, CliError> {
+        let (options, _, _) = self.args.rig.options_for_one(&model, &job.model)?;
+        let (_, n) = rig::points(&model, &job.model)?;
+        let report = ModelReport { notices: model.notices.clone(), ..ModelReport::default() };
+        let deformation = Deformation::Rig { by: vec![vec![DVec3::ZERO; n]], outside: Vec::new() };
+        let options = ReshapeOptions { skeleton: self.skeleton.clone(), ..options };
+        Ok(DeformedModel { job, model, deformation, options, report, started })
+    }
+
+    /// The skeleton that all models share, with joints identified by name: how the joints of the `--skeleton` body
+    /// move, or, without `--skeleton`, which joints carry vertices in any of the models. `None` if the joints of each
+    /// model depend on that model alone.
+    fn skeleton_of(&self, jobs: &[Job], poses: &Poses) -> Result<Option<Skeleton>, CliError> {
+        let Self { args, .. } = self;
+        let (up, memory) = (args.read.axis(), args.read.memory);
+        if let Some(path) = &args.skeleton {
+            let mut model = load_model(path, up, memory)?;
+            model.see_from(self.origin);
+            if !model.is_rigged() {
+                return Err(CliError::file(
+                    path,
+                    "has no skeleton: give the body that the models were made for",
+                ));
+            }
+            let (points, extra_points) = rig::points(&model, path)?;
+            let Binding { weights, frames, outside, .. } = self.bind(&points, model.bytes(), extra_points)?;
+            let by = displacements(&weights, &frames, &poses.rest, &poses.positions[0]);
+            let outside: Vec<u32> = outside.iter().map(|o| o.vertex).collect();
+            let (options, _, _) = args.rig.options_for_one(&model, path)?;
+            let skeleton = model.skeleton(&by, &outside, &options).map_err(|e| CliError::file(path, e))?;
+            return Ok(Some(skeleton));
+        }
+        if args.rig.ground && jobs.len() > 1 {
+            return Err(CliError::Mismatch {
+                message: "--ground would lift each model by a different height".into(),
+                hint: "give the body that stands on the ground with --skeleton, which lifts all models by the same height",
+            });
+        }
+        let of_rigs = || jobs.iter().filter(|job| job.output.format == ModelFormat::Gltf);
+        if args.rig.shape_only || args.rig.stays() || of_rigs().nth(1).is_none() {
+            return Ok(None);
+        }
+        let mut all = Skeleton::default();
+        for job in of_rigs() {
+            // A model that cannot be read is reported when it is refitted.
+            let Ok(bytes) = read(&job.model) else { continue };
+            let name = job.model.display().to_string();
+            let mut beside = |relative: &str| read_beside(&job.model, relative);
+            all.add(Model::joints_with_vertices_in(&name, &bytes, &mut beside, memory.bytes()));
+        }
+        Ok(Some(all))
     }
 
     fn options(&self) -> BindOptions {
@@ -306,10 +387,13 @@ impl DeformedModel<'_> {
         self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
     }
 
-    fn write(self, names: &[String]) -> Outcome {
+    fn write(self, names: &[String], size: SizeArgs) -> Outcome {
         let Self { job, model, deformation, options, mut report, started } = self;
-        let encoded = deformation.into_file(&model, names, &job.output, &options);
-        match encoded.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
+        let encoded = deformation.into_file(&model, names, &job.output, &options).and_then(|(bytes, rig)| {
+            write(&job.output.path, &size.apply(bytes, &job.output.path)?)?;
+            Ok(rig)
+        });
+        match encoded {
             Err(error) => Outcome::of_error(&error, &job.model),
             Ok(rig) => {
                 report.notices.extend(rig.iter().flat_map(ReshapeReport::notices));

@@ -39,7 +39,7 @@ pub(super) struct ModelEntry {
 #[serde(tag = "state", rename_all = "snake_case")]
 pub(super) enum Outcome {
     Written(Box<ModelReport>),
-    /// The model was skipped: with `--resume`, because its output is newer than its inputs.
+    /// Skipped by `--resume`, because the output is newer than its inputs.
     Skipped,
     Failed {
         error: String,
@@ -47,7 +47,7 @@ pub(super) enum Outcome {
     },
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct ModelReport {
     pub(super) vertices: usize,
     pub(super) outside_vertices: usize,
@@ -67,7 +67,7 @@ impl Outcome {
     }
 }
 
-/// The error message, with the model's path in front of it unless it already contains that.
+/// The error message, with the model's path in front of it unless the message already contains the path.
 fn named(error: &CliError, model: &Path) -> String {
     let (message, name) = (error.message(), shown_path(model));
     if message.contains(&name) { message } else { format!("{name}: {message}") }

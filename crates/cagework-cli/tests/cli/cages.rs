@@ -1,6 +1,6 @@
 use predicates::str::contains;
 
-use crate::support::{CORNERS, Sandbox, box_obj, glb_json};
+use crate::support::{CORNERS, Sandbox, box_obj, glb_json, obj_positions, sphere_obj};
 
 #[test]
 fn generated_cage_encloses_the_model() {
@@ -106,4 +106,48 @@ fn small_cage_grows_around_the_model() {
     let after = sandbox.json("check small.obj --mesh mesh.obj --repair grow -o grown.obj --json");
     assert_eq!(after["encloses"], true);
     sandbox.run("check small.obj --repair grow -o other.obj").code(1).stderr(contains("--mesh"));
+}
+
+#[test]
+fn one_cage_encloses_models_and_folders_of_models() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    std::fs::create_dir(sandbox.path("clothes")).unwrap();
+    let beside = |line: &str| match line.strip_prefix("v ").and_then(|xyz| xyz.split_once(' ')) {
+        Some((x, yz)) => format!("v {} {yz}\n", x.parse::<f64>().unwrap() + 0.8),
+        None => format!("{line}\n"),
+    };
+    sandbox.write("clothes/b.obj", sphere_obj(0.5).lines().map(beside).collect::<String>());
+    sandbox.write("clothes/c.obj", sphere_obj(0.8));
+    sandbox.write("clothes/.hidden.obj", "damaged");
+    sandbox.write("clothes/notes.txt", "sizes");
+    let together = "cage mesh.obj clothes -o clothes/cage.obj";
+    let made = sandbox.json(&format!("{together} --vertices 60 --json"));
+    assert_eq!((&made["models"], &made["kind"]), (&3.into(), &"auto".into()));
+    for model in ["mesh.obj", "clothes/b.obj", "clothes/c.obj"] {
+        let check = sandbox.json(&format!("check clothes/cage.obj --mesh {model} --json"));
+        assert_eq!((&check["valid"], &check["encloses"]), (&true.into(), &true.into()), "{model}");
+    }
+    // The folder `clothes` now also contains the cage of the first run. The command leaves it out, because it is the
+    // output.
+    sandbox.run(&format!("{together} --kind box")).success().stdout(contains("a box around 3 models of"));
+    // The spheres reach from -0.8 to 1.3 in x.
+    sandbox.run("cage clothes/b.obj clothes/c.obj -o box.obj --kind box --margin 0.001").success();
+    let xs = obj_positions(&sandbox.read("box.obj")).into_iter().map(|p| p[0]);
+    assert!(
+        (xs.clone().fold(0.0, f64::min) + 0.8).abs() < 0.01 && (xs.fold(0.0, f64::max) - 1.3).abs() < 0.01
+    );
+
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    sandbox
+        .run("cage mesh.obj empty -o out.obj")
+        .code(1)
+        .stderr(contains("empty: the folder has no models (.glb, .vrm, .gltf, .obj"));
+    sandbox
+        .run("cage mesh.obj missing.obj -o out.obj")
+        .code(1)
+        .stderr(contains("missing.obj: there is no such"));
+    sandbox
+        .run("cage clothes -o out.obj --around-clip Run")
+        .code(1)
+        .stderr(contains("there is no clip 'Run'"));
 }

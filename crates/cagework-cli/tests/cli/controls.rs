@@ -4,8 +4,9 @@ use predicates::str::contains;
 
 use crate::support::{Sandbox, assert_close, obj_positions, sphere_obj};
 
-/// A polyline of two segments, and a point in front of it. In `SPINE_MOVED`, the point has moved.
+/// Inner controls as OBJ: a polyline of two segments, and a point in front of it.
 const SPINE: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.4\nl 1 2 3\np 4\n";
+/// A pose of the inner controls [`SPINE`], in which only the point has moved.
 const SPINE_MOVED: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.6\nl 1 2 3\np 4\n";
 
 fn with_spine() -> Sandbox {

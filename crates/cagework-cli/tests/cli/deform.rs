@@ -3,7 +3,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, glb_json, obj_positions, sphere_obj};
 
-/// Tolerance of positions. Weights are `f32`, and coordinates are below 10.
+/// Tolerance of positions: weights have the precision of `f32`, and coordinates are below 10.
 const TOLERANCE: f64 = 1e-4;
 
 /// An affine map with scale, shear and translation.
@@ -34,7 +34,8 @@ fn affine_map_of_the_cage_is_applied_to_the_mesh() {
 #[test]
 fn vertices_outside_follow_affine_maps() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Vertices of this sphere are up to 4.3 % of the cage's diagonal outside the cage.
+    // Vertices of this sphere are outside the cage by up to 4.3 % of the cage's diagonal. Up to 5 %, they follow the
+    // cage fully.
     sandbox.write("mesh.obj", sphere_obj(1.15));
     sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
     let moved = |[x, y, z]: [f64; 3]| [-1.5 * y + 1.0, x + 0.2 * z, z + 2.0];
@@ -73,7 +74,8 @@ fn times_and_interpolation_of_the_animation_are_as_given() {
         let [times, weights] = ["input", "output"].map(|key| accessor(key)["count"].as_u64().unwrap());
         (done["animation_seconds"].as_f64().unwrap(), times, weights, sampler["interpolation"].clone())
     };
-    // A key at rest at 0 s, unless the first pose is there. Each key has two weights; cubic splines add two tangents.
+    // There is a key at rest at 0 s, unless the first pose is at 0 s. Each key has two weights; with cubic splines,
+    // each weight has two tangents.
     assert_eq!(animation("--times 0.5,1.25"), (1.25, 3, 6, "LINEAR".into()));
     assert_eq!(animation("--times 0,1.25 --interpolation step"), (1.25, 2, 4, "STEP".into()));
     assert_eq!(animation("--interpolation cubic"), (3.0, 4, 24, "CUBICSPLINE".into()));

@@ -7,7 +7,7 @@ use cagework_io::write_mesh_glb;
 
 use crate::support::Sandbox;
 
-/// A folder with the files that the documents name. The humanoid sample stands for every model.
+/// A folder with the files that the documents name. The humanoid sample stands for every mesh.
 fn files() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();

@@ -3,10 +3,11 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, obj_positions};
 
-/// The field is interpolated in `f32`.
+/// Tolerance of positions: the field is stored and interpolated in `f32`.
 const TOLERANCE: f64 = 1e-5;
 
-/// A cage whose pose is an affine map, and points inside it.
+/// A folder with a sphere in a box cage, `posed.obj`, the cage moved by [`affine`], and `probes.csv`, two points inside
+/// the cage and one far outside.
 fn posed() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("posed.obj", box_obj(&CORNERS.map(affine)));
@@ -50,7 +51,7 @@ fn vertices_of_models_and_clouds_are_mapped() {
     sandbox.run("map mesh.obj --cage cage.obj --pose posed.obj -o out.obj").success();
     let expected: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(affine).collect();
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
-    // Z up: the pose is the same map in the axes of the file.
+    // With --up z, cage, pose and model are turned alike, so the map in the file's axes is still `affine`.
     sandbox.run("map mesh.obj --up z --cage cage.obj --pose posed.obj -o z.obj").success();
     assert_close(&obj_positions(&sandbox.read("z.obj")), &expected, TOLERANCE);
     sandbox.run("map probes.csv --up z --cage cage.obj --pose posed.obj -o z.csv").success();
@@ -61,7 +62,7 @@ fn vertices_of_models_and_clouds_are_mapped() {
 #[test]
 fn points_without_an_inverse_are_reported_and_kept() {
     let sandbox = posed();
-    // A flat cage: no map back.
+    // A cage that is flattened to a plane has no inverse map.
     sandbox.write("flat.obj", box_obj(&CORNERS.map(|[x, _, z]| [x, 0.0, z])));
     sandbox
         .run("map probes.csv --cage cage.obj --pose flat.obj --inverse -o back.csv")

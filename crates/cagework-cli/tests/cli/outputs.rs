@@ -15,8 +15,7 @@ use crate::support::{Sandbox, sphere_obj};
 /// interrupted.
 const COMMENT: usize = 32 << 20;
 
-/// Number of times that the command is killed, each time when the output has grown by another equal share of its
-/// length.
+/// Number of runs that are killed. Run k is killed when the output has reached k / `N_KILLS` of its length.
 const N_KILLS: u64 = 10;
 
 /// A folder with a 32 MiB mesh that can be bound quickly, and an older `out.obj`.

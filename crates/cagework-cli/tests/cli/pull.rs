@@ -50,6 +50,11 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
     let posed = obj_positions(&sandbox.read("out.obj"));
     assert!((posed[top][1] - y - 0.4).abs() < 2e-3, "{:?}", posed[top]);
     assert!((posed[bottom][1] - rest[bottom][1]).abs() < 2e-3);
+
+    // The squares of such lengths are beyond the range of 32-bit floats.
+    sandbox.write("job.json", format!(r#"{{"grabs": [{{"vertex": {top}, "to": [0, 3e30, 0]}}]}}"#));
+    let far = sandbox.json(&format!("{PULL} --json"));
+    assert!(far["stretch_max"].as_f64().unwrap() > 1e25, "{far}");
 }
 
 #[test]

@@ -2,11 +2,13 @@
 
 use std::time::{Duration, SystemTime};
 
+use cagework_io::Model;
 use predicates::prelude::*;
 use predicates::str::contains;
+use serde_json::Value;
 
 use crate::rigs;
-use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
+use crate::support::{CORNERS, Sandbox, box_obj, glb_json, sphere_obj};
 
 /// A folder with the spheres `a.obj` and `b.obj`, their cage `cage.obj`, and a pose of it, `wide.obj`.
 fn spheres() -> Sandbox {
@@ -34,7 +36,7 @@ fn assert_same_as_deform(sandbox: &Sandbox, names: &[&str], bind: &str, deform: 
 
 #[test]
 fn refit_equals_bind_and_deform_of_each_model() {
-    // The models are two rigged ones, of which one is wider than the cage, and one without a rig.
+    // Two rigged models, one of them wider than the cage, and a model without a rig.
     let sandbox = rigs::bound();
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox
@@ -50,6 +52,18 @@ fn refit_equals_bind_and_deform_of_each_model() {
         let joints = &done["models"][0]["joints"];
         assert_eq!((joints == 16, joints.is_null()), (bind.is_empty(), !bind.is_empty()), "{done}");
     }
+}
+
+#[test]
+fn a_folder_stands_for_its_models() {
+    let sandbox = spheres();
+    sandbox.run(&REFIT.replace("refit", "refit .")).success().stdout(contains("refitted 3 of 3 models"));
+    let mut names: Vec<_> =
+        std::fs::read_dir(sandbox.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    // The cage and the pose are in the folder too, but are not models to refit.
+    assert_eq!(names, ["a.obj", "b.obj", "mesh.obj"]);
+    sandbox.run(&format!("{REFIT} . a.obj")).code(1).stderr(contains("would both be written to out/a.obj"));
 }
 
 #[test]
@@ -120,7 +134,7 @@ fn failed_models_are_reported_and_the_others_are_written() {
     };
     assert_eq!(names("out"), ["a.obj", "b.obj"]);
     let output = sandbox.run(&format!("{refit} --json")).code(1).get_output().stdout.clone();
-    let done: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    let done: Value = serde_json::from_slice(&output).unwrap();
     let states: Vec<_> = done["models"].as_array().unwrap().iter().map(|m| m["state"].clone()).collect();
     assert_eq!(states, ["written", "failed", "failed", "failed", "written"]);
     assert_eq!(done["models"][1]["error"], "missing.obj: there is no such file");
@@ -235,4 +249,134 @@ fn resume_skips_outputs_newer_than_their_inputs() {
     }
     sandbox.write("list.txt", "# nothing\n");
     sandbox.run(&resume).code(1).stderr(contains("list.txt: names no model"));
+}
+
+/// A GLB with its JSON and its buffer changed.
+fn edited(glb: &[u8], edit: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let (mut json, mut bin) = (glb_json(glb), glb[28 + length..].to_vec());
+    edit(&mut json, &mut bin);
+    let mut text = serde_json::to_vec(&json).unwrap();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let total = 28 + text.len() + bin.len();
+    [&glb[..8], &word(total), &word(text.len()), b"JSON", &text, &word(bin.len()), b"BIN\0", &bin].concat()
+}
+
+/// Positions of all nodes at a time of the first clip.
+fn places(glb: &[u8], seconds: f32) -> Vec<glam::Vec3> {
+    let model = Model::read_with_clips("a.glb", glb, &mut |_| None, u64::MAX).unwrap();
+    model.player().unwrap().unwrap().at(Some(0), seconds, &[]).origins
+}
+
+#[test]
+fn clips_without_a_mesh_follow_the_body() {
+    let sandbox = rigs::bound();
+    let body = sandbox.read("humanoid.glb");
+    let clips = |prefix: &str| {
+        edited(&body, |json, _| {
+            for key in ["meshes", "skins", "materials"] {
+                json.as_object_mut().unwrap().remove(key);
+            }
+            for node in json["nodes"].as_array_mut().unwrap() {
+                let node = node.as_object_mut().unwrap();
+                node.remove("mesh");
+                node.remove("skin");
+                let name = format!("{prefix}{}", node["name"].as_str().unwrap());
+                node.insert("name".into(), name.into());
+            }
+        })
+    };
+    sandbox.write("walk.glb", clips("mixamorig:"));
+    sandbox.write("other.glb", clips("x"));
+    let refit = "refit walk.glb --cage cage.obj --pose wide.obj -g 24 -o out";
+    sandbox.run(refit).code(1).stderr(contains("walk.glb: it has clips, but no triangles"));
+    let done = sandbox.json(&format!("{refit} --skeleton humanoid.glb --json"));
+    assert!(done["models"][0]["joints_moved"].as_u64().unwrap() >= 6, "{done}");
+    sandbox.run("bind humanoid.glb --cage cage.obj -g 24 --weights w.npz").success();
+    sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o alone.glb").success();
+    let [together, alone] = ["out/walk.glb", "alone.glb"].map(|name| sandbox.read(name));
+    for seconds in [0.0, 0.3, 1.1, 2.0] {
+        let pairs = places(&together, seconds).into_iter().zip(places(&alone, seconds));
+        let off = pairs.map(|(a, b)| a.distance(b)).fold(0.0, f32::max);
+        assert!(off < 1e-5, "{seconds} s: {off:e}");
+    }
+    for (args, message) in [
+        ("other.glb --skeleton humanoid.glb", "none of its nodes has the name of a joint of the skeleton"),
+        ("walk.glb --skeleton cage.obj", "cage.obj: has no skeleton"),
+        ("walk.glb --skeleton missing.glb", "missing.glb: there is no such file"),
+    ] {
+        let refit = format!("refit {args} --cage cage.obj --pose wide.obj -g 24 -o out2");
+        sandbox.run(&refit).code(1).stderr(contains(message));
+    }
+    // With --ground, a clip gets the vertical offset of the body's clip with the same name and length. Other clips are
+    // offset so that their lowest joints keep their height; the height of the soles is then approximate.
+    let taller = |line: &str| {
+        let Some(xyz) = line.strip_prefix("v ") else { return line.to_owned() };
+        let [x, y, z] = [0, 1, 2].map(|k| xyz.split(' ').nth(k).unwrap().parse::<f64>().unwrap());
+        format!("v {x} {} {z}", 1.3 * y - 0.2)
+    };
+    let cage = String::from_utf8(sandbox.read("cage.obj")).unwrap();
+    sandbox.write("tall.obj", cage.lines().map(taller).collect::<Vec<_>>().join("\n"));
+    let renamed =
+        edited(&sandbox.read("walk.glb"), |json, _| json["animations"][0]["name"] = "Stroll".into());
+    sandbox.write("stroll.glb", renamed);
+    let tall = "--cage cage.obj --pose tall.obj -g 24 --skeleton humanoid.glb";
+    sandbox.run(&format!("refit humanoid.glb walk.glb stroll.glb {tall} -o free")).success();
+    sandbox.run(&format!("refit humanoid.glb walk.glb stroll.glb {tall} --ground -o stands")).success();
+    sandbox
+        .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose tall.obj --ground -o alone.glb")
+        .success();
+    assert!(sandbox.read("stands/humanoid.glb") == sandbox.read("alone.glb"));
+    let heights = |name: &str| -> Vec<f32> {
+        let glb = sandbox.read(name);
+        places(&glb, 0.7).iter().map(|p| p.y).collect()
+    };
+    let largest = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let body = heights("stands/humanoid.glb");
+    assert!(largest(&heights("free/humanoid.glb"), &body) > 0.1);
+    assert!(largest(&heights("stands/walk.glb"), &body) < 1e-5);
+    let stroll = largest(&heights("stands/stroll.glb"), &body);
+    assert!(stroll < 0.02, "ankles and soles are not parallel in all poses: {stroll}");
+    sandbox
+        .run("refit humanoid.glb walk.glb --ground --cage cage.obj --pose wide.obj -g 24 -o out2")
+        .code(1)
+        .stderr(contains("--ground would lift each model by a different height"));
+}
+
+#[test]
+fn garments_of_one_rig_get_the_same_joints() {
+    let sandbox = rigs::bound();
+    let body = sandbox.read("humanoid.glb");
+    // All vertices of the garment are skinned to the hips, as if the rest of the body were cut away.
+    let garment = edited(&body, |json, bin| {
+        let accessor = &json["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"];
+        let accessor = &json["accessors"][accessor.as_u64().unwrap() as usize];
+        let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+        let [start, length] =
+            ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap_or(0) as usize);
+        bin[start..start + length].fill(0);
+    });
+    sandbox.write("garment.glb", garment);
+    // The cage encloses the upper half: the joints of the legs are outside.
+    let corners = CORNERS.map(|[x, y, z]| [x, 1.45 + 0.55 * y, z]);
+    sandbox.write("half.obj", box_obj(&corners));
+    sandbox.write("bent.obj", box_obj(&corners.map(|[x, y, z]| [x + 0.2 * y, 1.2 * y, z])));
+    let joints = |name: &str| {
+        let json = glb_json(&sandbox.read(name));
+        json["nodes"].as_array().unwrap().iter().map(|node| node["translation"].clone()).collect::<Vec<_>>()
+    };
+    let refit = |models: &str, out: &str| {
+        sandbox.run(&format!("refit {models} --cage half.obj --pose bent.obj -g 16 -o {out}")).success();
+    };
+    refit("humanoid.glb garment.glb", "together");
+    refit("garment.glb", "alone");
+    assert_eq!(joints("together/garment.glb"), joints("together/humanoid.glb"));
+    assert_ne!(
+        joints("alone/garment.glb"),
+        joints("together/humanoid.glb"),
+        "the joints of the legs are outside"
+    );
+    refit("garment.glb --skeleton humanoid.glb", "by-name");
+    assert_eq!(joints("by-name/garment.glb"), joints("together/humanoid.glb"));
 }

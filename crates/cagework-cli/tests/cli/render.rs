@@ -66,11 +66,23 @@ fn invalid_arguments_are_rejected_before_the_work() {
         ("render mesh.obj --size 9000x10 -o p.png", "8192"),
         ("render mesh.obj --view sideways -o p.png", "YAW,PITCH"),
         ("render mesh.obj --show weights -o p.png", "--cage"),
+        ("render mesh.obj --turntable 1 -o p.png", "2..=36"),
+        ("render mesh.obj --clip Walk --cage cage.obj -o p.png", "cannot be used with"),
     ] {
         sandbox.run(args).code(2).stderr(contains(message));
     }
     let args = "render mesh.obj --cage cage.obj --show weights --column 8 -o p.png";
     sandbox.run(args).code(1).stderr(contains("the weights have 8 columns"));
+    for (args, message) in [
+        (
+            "render mesh.obj --turntable 36 -o p.png",
+            "36 pictures of 480 pixels are 17352 pixels wide, above the limit of 16384",
+        ),
+        ("render mesh.obj --at 0.1,0.2 -o p.png", "--at has 2 numbers"),
+        ("render mesh.obj --clip Walk -o p.png", "there is no clip 'Walk'; the model has none"),
+    ] {
+        sandbox.run(args).code(1).stderr(contains(message));
+    }
 }
 
 /// A software adapter would take minutes for 20,000 triangles that each fill the picture, so the command rejects them.
@@ -87,8 +99,8 @@ fn too_many_overlapping_triangles_are_rejected() {
     }
 }
 
-/// A C-shaped solid as OBJ: two arms along x with a gap between them. `room`: distance by which it is offset outwards;
-/// `lift`: motion of the upper arm's tip.
+/// A C-shaped solid as OBJ: two arms along x with a gap between them. `room`: distance by which the surface is offset
+/// outwards; `lift`: motion of the upper arm's tip in y.
 fn clamp_obj(room: f64, lift: f64) -> String {
     // x and y of each corner, its outward direction, and its share of `lift`.
     const OUTLINE: [([f64; 2], [f64; 2], f64); 8] = [
@@ -170,4 +182,102 @@ fn compare_draws_both_coordinates_side_by_side() {
         let args = format!("render mesh.obj --cage cage.obj --compare {more} -o p.png");
         sandbox.run(&args).code(1).stderr(contains(message));
     }
+}
+
+/// For each of the `n` parts of a strip, the pixel columns in which something is drawn: a pixel differs from the
+/// background, whose colour is that of the upper left corner.
+fn drawn_columns(picture: &image::RgbImage, part: u32, n: u32) -> Vec<Vec<u32>> {
+    let differs = |x: u32| {
+        (0..picture.height()).any(|y| {
+            picture.get_pixel(x, y).0.iter().zip(picture.get_pixel(1, 1).0).any(|(a, b)| a.abs_diff(b) > 40)
+        })
+    };
+    (0..n).map(|k| (0..part).filter(|x| differs(k * (part + 2) + x)).collect()).collect()
+}
+
+#[test]
+fn clips_and_turns_are_drawn_side_by_side() {
+    // A cube that a clip moves by three units in x, with a WebP texture of one blue pixel.
+    let sandbox = Sandbox::new();
+    sandbox.write("cube.gltf", moving_cube().to_string());
+    let plain = "--size 60x60 --view front --orthographic --no-floor --theme light -o p.png";
+    let strip = |args: &str, n: u32| {
+        let drawn = sandbox.json(&format!("render cube.gltf {args} {plain} --json"));
+        assert_eq!(drawn["size"], serde_json::json!([62 * n - 2, 60]));
+        assert_eq!(drawn["notices"], serde_json::json!([]));
+        image::load_from_memory(&sandbox.read("p.png")).unwrap().into_rgb8()
+    };
+    let picture = strip("--clip slide --at 0,0.5,1", 3);
+    let columns = drawn_columns(&picture, 60, 3);
+    let middles: Vec<f32> = columns.iter().map(|all| 0.5 * (all[0] + all[all.len() - 1]) as f32).collect();
+    // The cube moves by two equal steps, in total by three times its own width.
+    let width = columns[0].len() as f32;
+    assert!((middles[1] - middles[0] - 1.5 * width).abs() <= 2.0, "{middles:?} {width}");
+    assert!((middles[2] - middles[1] - 1.5 * width).abs() <= 2.0, "{middles:?} {width}");
+    let [r, g, b] = picture.get_pixel(middles[0] as u32, 30).0;
+    assert!(b > 2 * r.max(g), "the texture is blue: {r} {g} {b}");
+    // From the front and from the side the cube has the same width; at 45 degrees it is wider by the square root of 2.
+    let columns = drawn_columns(&strip("--turntable 8", 8), 60, 8);
+    let widths: Vec<f32> = columns.iter().map(|all| all.len() as f32).collect();
+    for k in 0..8 {
+        let expected = if k % 2 == 0 { widths[0] } else { 2.0_f32.sqrt() * widths[0] };
+        assert!((widths[k] - expected).abs() <= 2.0, "{widths:?}");
+    }
+    sandbox
+        .run("render cube.gltf --clip slide --at 1.5 -o p.png")
+        .code(1)
+        .stderr(contains("--at: 1.5 s is outside of the clip 'slide', which lasts 1 s"));
+}
+
+/// A glTF document of a cube with texture coordinates, a clip, and a texture that Pillow 12 encoded as WebP.
+fn moving_cube() -> serde_json::Value {
+    use serde_json::json;
+    const BLUE: &[u8] = b"RIFF\x1c\x00\x00\x00WEBPVP8L\x0f\x00\x00\x00/\x00\x00\x00\x00\x07\x10\xd1\xff\xfe\x07\x22\xa2\xff\x01\x00";
+    let mut bytes: Vec<u8> = Vec::new();
+    for [x, y, z] in CORNERS {
+        bytes.extend([0.5 * x as f32, 0.5 * y as f32, 0.5 * z as f32].into_iter().flat_map(f32::to_le_bytes));
+    }
+    bytes.extend([0.5_f32; 16].into_iter().flat_map(f32::to_le_bytes));
+    for quad in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+        bytes.extend([0, 1, 2, 0, 2, 3].map(|k: usize| quad[k]));
+    }
+    bytes.extend([0.0_f32, 1.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0].into_iter().flat_map(f32::to_le_bytes));
+    let image_at = bytes.len();
+    bytes.extend_from_slice(BLUE);
+    let view =
+        |offset: usize, length: usize| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
+    let accessor = |view: usize, component: u32, count: usize, kind: &str| json!({ "bufferView": view, "componentType": component, "count": count, "type": kind });
+    let mut times = accessor(3, 5126, 2, "SCALAR");
+    (times["min"], times["max"]) = (json!([0.0]), json!([1.0]));
+    let mut positions = accessor(0, 5126, 8, "VEC3");
+    (positions["min"], positions["max"]) = (json!([-0.5, -0.5, -0.5]), json!([0.5, 0.5, 0.5]));
+    json!({
+        "asset": { "version": "2.0" },
+        "extensionsUsed": ["EXT_texture_webp"],
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }] }],
+        "materials": [{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+        "textures": [{ "extensions": { "EXT_texture_webp": { "source": 0 } } }],
+        "images": [{ "bufferView": 5, "mimeType": "image/webp" }],
+        "animations": [{
+            "name": "slide",
+            "samplers": [{ "input": 3, "output": 4 }],
+            "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }],
+        }],
+        "accessors": [
+            positions, accessor(1, 5126, 8, "VEC2"), accessor(2, 5121, 36, "SCALAR"), times, accessor(4, 5126, 2, "VEC3"),
+        ],
+        "bufferViews": [
+            view(0, 96), view(96, 64), view(160, 36), view(196, 8), view(204, 24), view(image_at, BLUE.len()),
+        ],
+        "buffers": [{ "byteLength": bytes.len(), "uri": data_uri(&bytes) }],
+    })
+}
+
+/// Bytes as a `data:` URI, percent-encoded.
+fn data_uri(bytes: &[u8]) -> String {
+    let encoded: String = bytes.iter().map(|b| format!("%{b:02x}")).collect();
+    format!("data:application/octet-stream,{encoded}")
 }

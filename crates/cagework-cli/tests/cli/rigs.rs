@@ -3,8 +3,9 @@
 use cagework_cage::samples;
 use cagework_io::{Model, write_mesh_glb};
 use predicates::str::contains;
+use serde_json::{Value, json};
 
-use crate::support::Sandbox;
+use crate::support::{Sandbox, glb_json};
 
 /// A folder with the humanoid bound to a cage, and `wide.obj`: the cage scaled by 1.3 in x above the hips.
 pub(crate) fn bound() -> Sandbox {
@@ -68,7 +69,7 @@ fn missing_parts_clips_and_rig_points_are_reported() {
         .failure()
         .stderr(contains("there is no clip 'Run'; the model has Walk"));
     sandbox.run("cage humanoid.glb --around-clip Walk -o walk.obj").success();
-    // These weights lack the rows of the rig's points.
+    // The bound model has no rig, so the weights lack the rows of the rig's points.
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox.run("bind shape.obj --cage cage.obj -g 24 --weights w.npz").success();
     sandbox
@@ -76,6 +77,27 @@ fn missing_parts_clips_and_rig_points_are_reported() {
         .failure()
         .stderr(contains("the weights have 0 points of the model's rig, but it has 112"));
     sandbox.run(&format!("{DEFORM} --pose wide.obj --static -o out.glb")).success();
+}
+
+#[test]
+fn shared_name_of_a_material_and_a_node_is_a_notice() {
+    let sandbox = bound();
+    let info = sandbox.json("info humanoid.glb --json");
+    let parts = info["parts"].as_array().unwrap();
+    assert!(
+        ["material:humanoid", "node:humanoid", "joint:hips"].iter().all(|&name| parts.contains(&name.into()))
+    );
+    sandbox
+        .run("info humanoid.glb")
+        .success()
+        .stdout(contains("parts       material:humanoid, node:humanoid, joint:hips"));
+    let mask = |name: &str, out: &str| {
+        sandbox.run(&format!("{DEFORM} --pose wide.obj --mask {name} -o {out}.glb")).success()
+    };
+    mask("humanoid", "short")
+        .stdout(contains("note: 'humanoid' means material:humanoid; for the other part write node:humanoid"));
+    mask("material:humanoid", "full");
+    assert!(sandbox.read("short.glb") == sandbox.read("full.glb"));
 }
 
 #[test]
@@ -117,7 +139,7 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
     let sandbox = bound();
     const DYNAMIC: &str = "deform humanoid.glb --cage cage.obj --dynamic";
     let done = sandbox.json(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.glb --json"));
-    // At 30 frames per second, the maximum, the clip of 2 s has 60 frames and the last one.
+    // At 30 frames per second, the maximum, the clip of 2 s has 60 frames and one at its end.
     assert_eq!((&done["frames"], &done["clip"]), (&61.into(), &"Walk".into()));
     let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
     let (model, bent) = (read("humanoid.glb"), read("bent.glb"));
@@ -143,4 +165,155 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
         .run(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.obj"))
         .failure()
         .stderr(contains("cannot store a clip"));
+}
+
+/// The humanoid with an extension in its document, such as VRM data.
+fn with_extension(sandbox: &Sandbox, name: &str, extension: &Value) -> Vec<u8> {
+    let glb = sandbox.read("humanoid.glb");
+    let mut json = glb_json(&glb);
+    json["extensionsUsed"] = json!([name]);
+    json["extensions"] = json!({ name: extension });
+    let mut text = serde_json::to_vec(&json).unwrap();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let old = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let total = (glb.len() - old + text.len()) as u32;
+    let header = [&glb[..8], &total.to_le_bytes(), &(text.len() as u32).to_le_bytes(), b"JSON"].concat();
+    [&header, text.as_slice(), &glb[20 + old..]].concat()
+}
+
+#[test]
+fn poses_are_morph_targets_with_the_given_names() {
+    let sandbox = bound();
+    let poses = format!("{DEFORM} --pose wide.obj --pose cage.obj");
+    sandbox.run(&format!("{poses} --name wide --name rest -o poses.glb")).success();
+    let targets = |name: &str| glb_json(&sandbox.read(name))["meshes"][0]["extras"]["targetNames"].clone();
+    assert_eq!(targets("poses.glb"), json!(["wide", "rest"]));
+    for (names, message) in [
+        ("--name wide", "--name: 1 name for 2 files of poses"),
+        ("--name wide --name wide", "--name: 'wide' is given twice"),
+        ("--name wide --name rest --expression", "humanoid.glb has no VRM data"),
+    ] {
+        sandbox.run(&format!("{poses} {names} -o out.glb")).code(1).stderr(contains(message));
+    }
+    sandbox.run(&format!("{poses} --name wide --name rest --expression --static -o out.glb")).code(2);
+}
+
+/// The expected fields of expressions are those that VRMC_vrm-1.0 ("Expressions") and VRM 0.x (`vrm.blendshape.group`)
+/// specify.
+#[test]
+fn poses_become_expressions_of_a_vrm() {
+    let sandbox = bound();
+    let vrm_1 = json!({ "specVersion": "1.0", "expressions": { "preset": { "aa": {} }, "custom": 3 } });
+    sandbox.write("one.vrm", with_extension(&sandbox, "VRMC_vrm", &vrm_1));
+    let vrm_0 = json!({ "blendShapeMaster": { "blendShapeGroups": [{ "name": "A", "presetName": "a" }] } });
+    sandbox.write("zero.vrm", with_extension(&sandbox, "VRM", &vrm_0));
+    let node = glb_json(&sandbox.read("humanoid.glb"))["nodes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .position(|n| n.get("mesh").is_some());
+    let deform = |model: &str, poses: &str| {
+        format!("deform {model} --cage cage.obj --weights w.npz --expression {poses} -o out.vrm")
+    };
+    let both = "--pose wide.obj --name happy --pose wide.obj --name smirk --pose cage.obj --name still";
+    sandbox
+        .run(&deform("one.vrm", both))
+        .success()
+        .stdout(contains("3 poses as VRM expressions (happy, smirk, still)"));
+    let json = glb_json(&sandbox.read("out.vrm"));
+    let expressions = &json["extensions"]["VRMC_vrm"]["expressions"];
+    let binds = |k: usize| json!([{ "node": node, "index": k, "weight": 1.0 }]);
+    assert_eq!(expressions["preset"]["happy"]["morphTargetBinds"], binds(0));
+    assert_eq!(expressions["custom"]["smirk"]["morphTargetBinds"], binds(1));
+    assert_eq!(expressions["custom"]["still"]["morphTargetBinds"], json!([]), "it moves nothing");
+    assert_eq!(expressions["preset"]["aa"], json!({}));
+    assert_eq!(json["animations"].as_array().unwrap().len(), 1, "the model's own clip alone");
+    let info = sandbox.json("info out.vrm --json");
+    assert_eq!(info["vrm"]["version"], "1.0");
+    assert_eq!(info["vrm"]["expressions"], json!(["aa", "happy", "smirk", "still"]));
+
+    // A single pose is also written as an expression, and the model remains at rest.
+    let one = "--pose wide.obj --name Joy";
+    sandbox.run(&deform("zero.vrm", one)).success();
+    let json = glb_json(&sandbox.read("out.vrm"));
+    let groups = &json["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"];
+    let bind = json!([{ "mesh": 0, "index": 0, "weight": 100.0 }]);
+    assert_eq!((&groups[0]["name"], &groups[1]["name"]), (&"A".into(), &"Joy".into()));
+    assert_eq!((&groups[1]["presetName"], &groups[1]["binds"]), (&"joy".into(), &bind));
+    let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
+    assert_eq!(read("out.vrm").positions, read("zero.vrm").positions);
+    sandbox
+        .run(&deform("one.vrm", "--pose wide.obj --name aa"))
+        .code(1)
+        .stderr(contains("the file has an expression 'aa' already"));
+    sandbox
+        .run(&format!("{} --times 0.5", deform("one.vrm", one)))
+        .success()
+        .stdout(contains("1 pose as VRM expressions (Joy) and an animation of 0.5 s"));
+}
+
+#[test]
+fn written_glb_can_be_quantised_and_compressed() {
+    let sandbox = bound();
+    let posed = format!("{DEFORM} --pose wide.obj");
+    sandbox.run(&format!("{posed} -o plain.glb")).success();
+    sandbox.run(&format!("{posed} --quantize --compress meshopt -o small.vrm")).success();
+    let [plain, small] = ["plain.glb", "small.vrm"].map(|name| sandbox.read(name));
+    assert!(small.len() < plain.len() / 2, "{} and {} bytes", small.len(), plain.len());
+    let refit =
+        "refit humanoid.glb --cage cage.obj --pose wide.obj -g 24 -o out --quantize --compress meshopt";
+    sandbox.run(refit).success();
+    assert!(sandbox.read("out/humanoid.glb") == small);
+    sandbox
+        .run(&format!("{posed} --compress meshopt -o out.obj"))
+        .code(1)
+        .stderr(contains("out.obj: quantize and compress are for .glb and .vrm, but this is obj"));
+    sandbox.run(&format!("{posed} --compress zip -o out.glb")).code(2).stderr(contains("none, meshopt"));
+}
+
+#[test]
+fn ground_and_feet_are_options_of_one_pose() {
+    let sandbox = bound();
+    // Lower the cage, and with it the model, by half a unit.
+    let sunk = |line: &str| match line.strip_prefix("v ") {
+        None => format!("{line}\n"),
+        Some(xyz) => {
+            let [x, y, z] = [0, 1, 2].map(|k| xyz.split(' ').nth(k).unwrap().parse::<f64>().unwrap());
+            format!("v {x} {} {z}\n", y - 0.5)
+        }
+    };
+    let cage = String::from_utf8(sandbox.read("cage.obj")).unwrap();
+    sandbox.write("low.obj", cage.lines().map(sunk).collect::<String>());
+    let low = |name: &str| {
+        let model = Model::read(name, &sandbox.read(name), &mut |_| None).unwrap();
+        model.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min)
+    };
+    for name in ["out.glb", "out.obj"] {
+        sandbox.run(&format!("{DEFORM} --pose low.obj --ground -o {name}")).success();
+        assert!((low(name) - low("humanoid.glb")).abs() < 1e-5, "{name}");
+    }
+    let held = sandbox.json(&format!("{DEFORM} --pose wide.obj --feet lock -o out.glb --json"));
+    assert_eq!(held["feet"][0], 2, "{held}");
+    for (args, message) in [
+        (
+            "--pose low.obj --pose wide.obj --ground",
+            "--ground and --feet lock take one pose, but there are 2",
+        ),
+        (
+            "--pose low.obj --pose wide.obj --feet lock",
+            "--ground and --feet lock take one pose, but there are 2",
+        ),
+    ] {
+        sandbox.run(&format!("{DEFORM} {args} -o out.glb")).code(1).stderr(contains(message));
+    }
+    sandbox
+        .run(&format!("{DEFORM} --pose low.obj --feet glue -o out.glb"))
+        .code(2)
+        .stderr(contains("free, lock"));
+    sandbox.run(&format!("{DEFORM} --pose low.obj --ground --static -o out.glb")).code(2);
+    sandbox.run("bind out.obj --cage cage.obj -g 16 --weights v.npz").success();
+    sandbox
+        .run("deform out.obj --cage cage.obj --weights v.npz --pose low.obj --feet lock -o held.obj")
+        .code(1)
+        .stderr(contains("out.obj: has no skeleton whose feet could be held"));
 }

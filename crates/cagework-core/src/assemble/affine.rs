@@ -1,10 +1,11 @@
-//! Restores `sum w = 1` and `sum w c = v` for a row of weights after some were dropped or rounded.
+//! Restores `sum w = 1` and `sum w c = v` for a row w of weights after some were dropped or rounded. c: rest positions
+//! of the controls; v: rest position of the row's vertex.
 //!
-//! Of all corrections d of the row w that restore these four sums, the correction minimises `sum d_i^2 / w_i`. With
+//! Of all corrections d of the row that restore these four sums, the correction minimises `sum d_i^2 / w_i`. With
 //! `phi_i = (1, (c_i - v) / s)` and s the cage's diagonal, it is `d_i = w_i phi_i . lambda`, where lambda solves the 4
 //! x 4 system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`. Zero weights stay zero. Each weight is multiplied
 //! by a factor that is linear in the control's position, and near 1 if the sums are nearly right. The factors are not
-//! bounded: callers that drop weights must check them.
+//! bounded: callers that drop weights must check the corrected row.
 
 use glam::{DMat4, DVec3, DVec4};
 
@@ -12,15 +13,16 @@ use crate::controls::Controls;
 use crate::solve::rows::{LANES, Row, ZERO};
 
 /// Tikhonov term on the diagonal of the 4 x 4 system, relative to its trace. On a face of the cage all controls with
-/// weights lie in a plane, and the system is singular in its normal direction, where no correction is needed.
+/// weights lie in a plane. The system is then singular in the direction normal to the plane, in which no correction is
+/// needed.
 const RIDGE: f64 = 1e-7;
 
 /// Sums over a row of weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sums {
-    /// `sum w`.
+    /// Sum of the weights, `sum w`, which should be 1.
     pub sum: f64,
-    /// Distance of `sum w c` from a target, as a fraction of the cage's diagonal.
+    /// Distance of `sum w c` from the position that the row should reproduce, as a fraction of the cage's diagonal.
     pub miss: f64,
 }
 
@@ -32,7 +34,7 @@ impl Sums {
     }
 }
 
-/// Rest positions of the controls in rows of lanes, laid out like batches of columns.
+/// Rest positions of the controls in the layout of a row of weights: batches of [`LANES`] controls.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// Positions relative to the cage's centre, divided by its diagonal. `[3][n_batches]`
@@ -47,7 +49,7 @@ pub struct Columns {
 type Moments = [f64; 10];
 
 impl Columns {
-    /// From the controls' rest positions.
+    /// Arranges the controls' rest positions in batches of lanes, in scaled coordinates.
     #[must_use]
     pub fn new(controls: Controls<'_>) -> Self {
         let surface = controls.surface();
@@ -81,7 +83,8 @@ impl Columns {
         (point - self.center) / self.diagonal
     }
 
-    /// Sums of a row, `[n_batches]`, against a scaled target.
+    /// Sum of the weights of a row, `[n_batches]`, and distance of `sum w c` from the scaled `target`
+    /// ([`Self::scale`]).
     #[inline(always)]
     #[must_use]
     pub fn sums(&self, row: &[Row], target: DVec3) -> Sums {

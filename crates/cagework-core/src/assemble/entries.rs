@@ -2,9 +2,9 @@
 
 use crate::solve::rows::{LANES, Row};
 
-/// Destination of a run's column indices and weights.
+/// Destination of the column indices and weights of a run of consecutive rows.
 pub(super) enum Entries<'a> {
-    /// The rest of the run's range in the matrix, which is not written yet.
+    /// The part of the run's range in the matrix that has not been written yet.
     Part { indices: &'a mut [u32], data: &'a mut [f32] },
     /// A whole matrix, to which entries are appended.
     All { indices: Vec<u32>, data: Vec<f32> },

@@ -9,8 +9,8 @@ use super::affine::Sums;
 /// Statistics of one row of weights.
 #[derive(Clone, Copy, Debug)]
 pub struct RowFacts {
-    /// Distance of `sum w c` from the vertex, as a fraction of the cage's diagonal; `None` until the row's offset is
-    /// known.
+    /// Distance of `sum w c` from the vertex, as a fraction of the cage's diagonal; `None` for a row whose offset is
+    /// not known yet.
     pub error: Option<f32>,
     /// Distance of the row's sum from 1.
     pub sum_error: f32,
@@ -18,22 +18,21 @@ pub struct RowFacts {
     pub low: f32,
     /// Largest weight of the row.
     pub high: f32,
-    /// The row before correction; `None` if it is not corrected.
+    /// Statistics of the sampled row before any correction; `None` if an offset compensates the row's error.
     pub raw: Option<RawRow>,
 }
 
-/// A sampled row before correction.
+/// Statistics of a sampled row before correction.
 #[derive(Clone, Copy, Debug)]
 pub struct RawRow {
-    /// Sums of the row.
+    /// Sum of the row's weights, and distance of `sum w c` from the vertex.
     pub sums: Sums,
     /// Smallest value of the row, before negative values are clamped to 0.
     pub lowest: f32,
 }
 
 impl RowFacts {
-    /// Statistics of a row (`[n_batches]`) with the given `sums`. `raw`: the row before correction, for vertices
-    /// inside.
+    /// Statistics of a row (`[n_batches]`) with the given `sums`. `raw`: as in [`Self::raw`].
     // wasm keeps one copy for all callers to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
@@ -59,7 +58,7 @@ impl RowFacts {
 }
 
 impl AssembledWeights {
-    /// Rest error of vertices inside after correction, their error before it, and statistics of the weights.
+    /// Rest error after correction, error before correction of the rows without offsets, and statistics of the weights.
     /// `diagonal`: diagonal of the cage, object units.
     #[must_use]
     pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {

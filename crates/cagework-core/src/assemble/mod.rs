@@ -1,4 +1,4 @@
-//! Assembles batches of sampled columns into one sparse row per vertex, with statistics.
+//! Assembles sampled columns, in batches of [`LANES`], into one sparse row of weights per vertex, with statistics.
 
 pub mod affine;
 mod entries;
@@ -20,16 +20,16 @@ use crate::weights::Weights;
 
 use affine::{Columns, Sums};
 
-/// A row whose error (over the cage's diagonal) is below this needs no further correction: about two units in the last
-/// place of an f32 near 1.
+/// A row whose error, as a fraction of the cage's diagonal, is at most this needs no further correction: about two
+/// units in the last place of an f32 near 1.
 const SUM_TOLERANCE: f64 = 2e-7;
 
-/// Limit on repeated corrections of a row. One suffices unless the threshold dropped a large share of the weight.
+/// Limit on the corrections of a row. One suffices unless the threshold dropped a large share of the weight.
 const MAX_CORRECTIONS: usize = 3;
 
-/// A row keeps its small weights if its error without them (over the cage's diagonal) stays above this after
-/// correction. Next to a face, the many small weights of cage vertices off the face determine the vertex's distance
-/// from the face.
+/// A row keeps its small weights if its error without them, as a fraction of the cage's diagonal, is above this even
+/// after correction. Next to a face, the many small weights of cage vertices off the face determine the vertex's
+/// distance from the face.
 const MAX_ERROR: f64 = 1e-6;
 
 /// A row keeps its small weights if correction would scale any of its weights by a factor outside this range.
@@ -39,14 +39,14 @@ const FACTOR_RANGE: RangeInclusive<f32> = 0.5..=2.0;
 /// threshold.
 const MAX_CHANGE: f32 = 5.0;
 
-/// Options of assembly.
+/// Options of [`assemble`].
 #[derive(Clone, Copy, Debug)]
 pub struct RowOptions {
     /// Drops the smallest weights of a row while their sum is at most this; 0 keeps all non-zero weights. Correction
-    /// then restores the row's sum and rest position.
+    /// then restores the row's sum and rest position. If that would change the row too much, it keeps its weights.
     pub threshold: f32,
-    /// Restores sum and rest position of every row. Off for the classic method, which keeps the errors of the published
-    /// method.
+    /// Restores sum and rest position of every row. Off for the classic method, which reproduces the method of K. Smith
+    /// (`docs/method.md`, sources) with its errors.
     pub preserve_affine: bool,
 }
 
@@ -71,8 +71,8 @@ struct VertexRun<'a> {
 }
 
 /// Assembles the weight matrix. `blocks[batch][vertex]`: sampled values, overwritten as scratch; `points`: rest
-/// positions; `has_offset(vertex)`: whether a constant offset compensates the row's error, so that the row is not
-/// corrected.
+/// positions; `has_offset(vertex)`: whether an offset in [`Frames`](crate::frames::Frames) compensates the row's error,
+/// so that the row is not corrected.
 pub fn assemble(
     controls: Controls<'_>,
     blocks: &mut [Vec<Row>],
@@ -203,13 +203,15 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) ->
 }
 
 impl VertexRun<'_> {
-    /// Copies a vertex's sampled values that are positive and at least `least`. Returns the smallest value.
+    /// Copies a vertex's sampled values to `row`, with 0 for values that are negative or below `least`. Returns the
+    /// smallest sampled value.
     #[inline(always)]
     fn load(&self, v: usize, least: f32, row: &mut [Row]) -> f32 {
         let mut lows = [f32::INFINITY; LANES];
         for (row, block) in row.iter_mut().zip(&self.blocks) {
             *row = block[v];
-            // Solver and rounding leave values near -1e-8: harmonic coordinates are not negative.
+            // Set negative values to zero: harmonic coordinates are not negative, but solver and rounding leave values
+            // near -1e-8.
             for (w, low) in row.iter_mut().zip(&mut lows) {
                 *low = if *w < *low { *w } else { *low };
                 *w = if *w > 0.0 && *w >= least { *w } else { 0.0 };
@@ -249,8 +251,8 @@ impl VertexRun<'_> {
             let (raw, stored) = if options.preserve_affine && !has_offset {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
-                // The offset compensates the row's error, so it is not corrected. Dropping weights must not change the
-                // position that the row reproduces.
+                // The offset compensates the row's error, so the row is not corrected. Dropping weights must not change
+                // the position that the row reproduces.
                 let raw = columns.sums(&row, target);
                 let goal = columns.combined(&row).1;
                 self.restore_row(v, columns, options.threshold, &mut row, goal);
@@ -311,8 +313,8 @@ impl VertexRun<'_> {
     }
 }
 
-/// Largest weight such that all smaller weights sum to at most `most`. Bisects over the bit patterns of f32, which have
-/// the order of the numbers if these are positive.
+/// Largest threshold such that the weights below it sum to at most `most`. Bisects over the bit patterns of f32, which,
+/// for positive numbers, have the order of the numbers.
 fn least_kept(row: &[Row], most: f32) -> f32 {
     let (mut low, mut high) = (0, most.to_bits() + 1);
     while high - low > 1 {

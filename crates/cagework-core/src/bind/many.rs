@@ -1,5 +1,5 @@
-//! Binds many models to one cage with a single solve. The solved fields depend only on the cage, the samples on the
-//! model.
+//! Binds many models to one cage with a single solve. The solved fields depend only on the cage. Each model only
+//! samples them at its vertices.
 
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl<'a> SolvedCage<'a> {
         let grid = Voxelization::grid(controls.surface(), &options);
         let none = VertexCounts { rows: 0, points: 0 };
         let solving = estimate(controls, &grid, none, team.n_threads(), &options).bytes;
-        // Jacobi holds the fields of all batches in any case, so `solving` includes them.
+        // The Jacobi solver keeps the fields of all batches in memory, so `solving` already includes them.
         let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
         let (needed, limit) = (solving + kept, options.memory_limit / 2);
         if needed > limit {
@@ -65,7 +65,7 @@ impl<'a> SolvedCage<'a> {
         Ok(Self { controls, options, voxelized, fields, solved, elapsed_ms: watch.now_ms() - began })
     }
 
-    /// Time of voxelization and solve, milliseconds.
+    /// Time that [`Self::new`] took for voxelization and solve, milliseconds.
     #[must_use]
     pub fn elapsed_ms(&self) -> f64 {
         self.elapsed_ms

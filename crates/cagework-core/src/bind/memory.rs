@@ -1,8 +1,9 @@
 //! Estimates memory before it is allocated.
 //!
 //! The number of unknowns follows from the cage's volume, and the number of cut cells from its area; all other sizes
-//! are proportional to these two or to the number of vertices. Compared with the peak memory of the command's process,
-//! the estimate is within 25 % on models with repeated positions, with many nodes, and on many threads.
+//! are proportional to these two or to the number of vertices. A test of the command (`cagework-cli/tests/hostile.rs`)
+//! compares the estimate with the peak memory of the process, for repeated positions, many glTF nodes and many threads.
+//! The estimate must be 0.75 to 1.35 times the peak.
 
 use std::f64::consts::PI;
 
@@ -25,7 +26,7 @@ use crate::voxelize::lines::Hit;
 /// Size of all coarser levels together relative to that of the finest: 1/8 + 1/64 + ...
 const COARSE_LEVELS_SHARE: f64 = 1.0 / 7.0;
 
-/// Cut cells per area of the cage's surface, in units of a cell's face: 1.5 on average over all orientations.
+/// Number of cut cells per part of the cage's surface with the area of one cell face; the mean over all orientations.
 const CUT_PER_AREA: f64 = 1.5;
 
 /// Bytes per mesh vertex: the entry of its position in the hash table of positions, and its index.
@@ -35,21 +36,21 @@ const ROW_BYTES: f64 = 44.0;
 /// exists twice while threads' results are joined, and statistics of its row.
 const POINT_BYTES: f64 = 470.0;
 
-/// Bytes per row of offsets: three entries of 8 bytes for each of four holds. (The bind of the joints to the cage
-/// without inner controls uses an eighth of the cells and starts after the fields have been freed.)
+/// Bytes per offset: three f64 for each of up to four matrices of [`Frames`](crate::frames::Frames).
 const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 
 /// Bytes per grid cell while lines and levels are built.
 const CELL_BYTES: f64 = 30.0;
 
-/// Bytes of the weights of `n_rows` vertices if none is dropped. The share of small weights is unknown before the
+/// Bytes of the weights of `n_rows` vertices if no weight is dropped. The share of small weights is unknown before the
 /// solve: a threshold of 1e-5 keeps a third of the weights with 110 columns, and all of them with 8.
 #[must_use]
 pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
     n_rows as u64 * (n_columns as u64 * 8 + 4)
 }
 
-/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions and are not corrected.
+/// Whether all rows have offsets: near inner controls with a radius (balls and tubes), the weights do not reproduce
+/// positions and are not corrected.
 pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
     options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
 }
@@ -58,7 +59,7 @@ pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MemoryEstimate {
     pub(super) bytes: u64,
-    /// Share of `bytes` that grows with the number of points rather than with the grid, bytes.
+    /// Part of `bytes` that grows with the number of points rather than with the grid, bytes.
     of_points: u64,
 }
 
@@ -66,7 +67,7 @@ impl MemoryEstimate {
     /// Checks the estimate against a limit, bytes.
     ///
     /// # Errors
-    /// [`BindError`] with the main use of the memory, if it exceeds the limit.
+    /// [`BindError`] with the main use of the memory, if the estimate exceeds the limit.
     pub(super) fn check(self, vertices: VertexCounts, n_columns: usize, limit: u64) -> Result<(), BindError> {
         let needed = self.bytes;
         if needed <= limit {
@@ -79,7 +80,8 @@ impl MemoryEstimate {
     }
 }
 
-/// Estimates the peak memory of a bind. `threads`: 0 if the fields are not in memory of this process or already exist.
+/// Estimates the peak memory of a bind. `threads`: number of threads that solve; 0 if the fields are not in memory of
+/// this process or already exist.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
@@ -135,13 +137,14 @@ pub(super) fn estimate(
     MemoryEstimate { bytes: bytes as u64, of_points: of_points as u64 }
 }
 
-/// Estimated number of updates of one value.
+/// Estimated number of updates of single values in a solve: unknowns times columns times sweeps.
 pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions) -> f64 {
     /// Work of a multigrid solve, in sweeps of the finest level (benches/README.md).
     const MULTIGRID_SWEEPS: f64 = 18.0;
     let Bounds { min, max } = controls.surface().bounds();
     let widths = ((max - min).as_dvec3() / grid.cell).max(DVec3::ONE).to_array();
-    // Jacobi sweeps of a box multiply the error by 1 - decay: its slowest mode is one half-wave along each axis.
+    // In a box, a Jacobi sweep multiplies the slowest mode of the error by 1 - decay. This mode is one half-wave along
+    // each axis.
     let decay = widths.iter().map(|w| (PI / w).powi(2) / 6.0).sum::<f64>().min(1.0);
     let digits = (1.0 / f64::from(options.tau)).max(1.0).ln();
     let sweeps = match options.solver {
@@ -190,11 +193,12 @@ mod tests {
         let bounds = Bounds { min: Vec3::new(1.0, 2.0, 3.0), max: Vec3::new(3.0, 5.0, 7.0) };
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [2, 2, 2])).unwrap();
         let (volume, area) = volume_and_area(&cage);
-        // 2 x 3 x 4
+        // A box with edges of 2, 3 and 4 has the volume 24 and the area 2 (6 + 8 + 12) = 52.
         assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
     }
 
-    /// Measured by the solvers on the cube, whose slowest mode the estimate assumes. Most solves take fewer sweeps.
+    /// Compares the estimate with the sweeps of the solvers on a cube, whose slowest mode the estimate assumes. Most
+    /// solves take fewer sweeps.
     #[test]
     fn sweeps_stay_below_their_estimate() {
         let cage =

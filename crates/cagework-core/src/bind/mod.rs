@@ -33,7 +33,8 @@ pub struct Binding {
     /// One row per mesh vertex in the caller's order. One column per control, then the columns of `frames` if offsets
     /// are needed.
     pub weights: Weights,
-    /// Frames that carry the offsets of vertices outside the cage and near controls inside.
+    /// Local frames that define the weights' columns after those of the controls. They carry the offsets of vertices
+    /// outside the cage and near inner controls, whose positions the weights do not reproduce.
     pub frames: Frames,
     /// Vertices outside the cage, ascending.
     pub outside: Vec<OutsideVertex>,
@@ -53,7 +54,7 @@ pub enum BindError {
     /// A coordinate of a mesh vertex is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
-        /// Index of the vertex.
+        /// Index of the vertex that is not finite.
         vertex: u32,
     },
     /// The bind exceeds the memory limit.
@@ -89,12 +90,12 @@ pub enum BindError {
         /// Number of cells along the cage's longest side.
         grid: u32,
     },
-    /// Vertices are outside, and the policy is to fail.
+    /// Vertices are outside the cage, and the policy is to fail.
     #[error("{} outside the cage, the first is vertex {first}: enlarge the cage", counted(*count as usize, "mesh vertex is", "mesh vertices are"))]
     Outside {
         /// Number of vertices outside.
         count: u32,
-        /// Index of the first of these vertices.
+        /// Index of the first vertex outside.
         first: u32,
     },
     /// All vertices are outside the cage.
@@ -112,7 +113,7 @@ pub enum BindError {
 
 /// Binds mesh vertices to a cage, or other controls, by harmonic coordinates.
 ///
-/// `positions`: `[n_vertices]`, object units, in any order. Equal positions are solved once.
+/// `positions`: `[n_vertices]`, object units, in any order. Vertices at equal positions are sampled once.
 ///
 /// # Errors
 /// [`BindError`]: an option is out of range, the mesh is empty or not finite, the memory exceeds the limit, no vertex
@@ -126,8 +127,8 @@ pub fn bind<'a>(
     pipeline::run(positions, controls.into(), options, progress)
 }
 
-/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU. Allocates nothing. The estimate is 5
-/// to 40 % too high, more if the threshold drops most of the weights.
+/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU. Allocates nothing. The actual peak
+/// may be a third lower or higher, and lower still if [`BindOptions::sparsify`] drops most of the weights.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.
@@ -143,8 +144,8 @@ pub fn estimate_memory<'a>(
     Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }
 
-/// Estimated work of a solve: updates of one value, which are cells times columns times sweeps. A thread does about
-/// 10^9 per second. Allocates nothing.
+/// Estimated work of a solve: number of updates of single values, which is unknowns times columns times sweeps. A
+/// thread does about 10^9 per second. Allocates nothing.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.

@@ -1,4 +1,5 @@
-//! Constant offsets that compensate errors of the weights, for points outside the cage and around balls and tubes.
+//! Offsets: parts of positions that the weights do not reproduce, for points outside the cage and around balls and
+//! tubes. [`Frames`] carry them.
 
 use glam::{DVec3, Vec3};
 
@@ -14,7 +15,8 @@ const MIN_OFFSET: f64 = 1e-7;
 
 pub(super) struct Offsets<'a> {
     controls: Controls<'a>,
-    /// Points outside the cage, the share with which each follows the cage, and its sampled row, `[n_batches]`.
+    /// Points outside the cage: index, share of the cage's motion that the point follows, and sampled row,
+    /// `[n_batches]`.
     outside: Vec<(u32, f64, Vec<Row>)>,
     frames: Frames,
     /// Rest lengths of the bones, object units.
@@ -126,7 +128,7 @@ pub(super) struct JointPoints<'a> {
 }
 
 impl<'a> JointPoints<'a> {
-    /// `None` without balls and tubes.
+    /// Collects the joints of all balls and tubes. `None` if there are no balls and tubes.
     pub(super) fn new(controls: Controls<'a>) -> Option<Self> {
         let inner = controls.inner().filter(|inner| inner.has_radius())?;
         let joints = (0..inner.positions.len()).filter(|&i| inner.is_rounded(i)).map(|i| i as u32).collect();

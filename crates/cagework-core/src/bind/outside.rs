@@ -1,4 +1,5 @@
-//! Vertices outside the cage: rejects binds without any vertex inside, with the likely cause.
+//! Checks how cage and model fit: rejects binds without any vertex inside, with the likely cause, and notices a cage
+//! that is far too large.
 
 use std::fmt;
 
@@ -18,16 +19,16 @@ use crate::weights::Weights;
 /// is rarely twice as large as its model.
 const MIN_UNIT_RATIO: f64 = 3.0;
 
-/// If no weight differs by more than this over the enclosed part of the model, this part hardly bends.
+/// If no weight varies by more than this over the enclosed part of the model, this part hardly bends.
 const MIN_WEIGHT_SPREAD: f32 = 1e-3;
 
 /// Ratio of sizes from which the cage may have another unit: metres and centimetres differ by 100, and a cage is up to
-/// twice as large as its model. Over a model that is smaller than a coarse cage by this ratio, each weight differs by
+/// twice as large as its model. Over a model that is smaller than a coarse cage by this ratio, each weight varies by
 /// less than the inverse of the ratio.
 const MIN_OVERSIZE_RATIO: f64 = 50.0;
 
-/// If a weight differs by more than this over the model, the cage is not oversized. It is the larger of
-/// [`MIN_WEIGHT_SPREAD`] and the inverse of [`MIN_OVERSIZE_RATIO`].
+/// If a weight varies by more than this over the enclosed part of the model, the cage is not oversized. This limit is
+/// the larger of [`MIN_WEIGHT_SPREAD`] and the inverse of [`MIN_OVERSIZE_RATIO`].
 const MAX_OVERSIZE_SPREAD: f32 = 0.02;
 
 /// Relative position and size of a cage and a model.
@@ -143,7 +144,7 @@ pub(super) fn oversized(
     for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
-        // In most models, the weights of the first few vertices already differ by more than this.
+        // Return early: in most models, the weights of the first few vertices already differ by more than this limit.
         if *high - low.max(0.0) > MAX_OVERSIZE_SPREAD {
             return None;
         }
@@ -180,14 +181,14 @@ mod tests {
             .to_string()
     }
 
-    /// All vertices outside: the bind fails with the likely cause.
+    /// If all vertices are outside the cage, the bind fails, and the error names the likely cause.
     #[test]
     fn cage_without_enclosed_vertices_is_rejected_with_the_cause() {
         let elsewhere = said(Vec3::new(10_001.0, 0.0, -0.5), 1.0);
         let expected =
             "none of the model's 15,002 vertices is inside the cage; the cage is 1e4 away from it: move";
         assert!(elsewhere.starts_with(expected), "{elsewhere}");
-        // Diagonal of the points, sqrt(2), over sqrt(3) times 0.01.
+        // 82 is the ratio of the diagonals of the points, sqrt(2), and of the cage, sqrt(3) times 0.01.
         let small = said(Vec3::new(0.2, 0.3, -0.005), 0.01);
         assert!(
             small.ends_with("; the cage is 82 times smaller than the model: bring both into the same unit"),
@@ -195,7 +196,7 @@ mod tests {
         );
         let both = said(Vec3::new(3.0, 0.0, 0.0), 100.0);
         assert!(both.contains("the cage is 2 away from it and 120 times larger than the model: "), "{both}");
-        // 100 times larger and around the model: bound, with a notice.
+        // A cage that encloses the model and is 100 times larger can be bound, with a notice.
         let bound = |size: f32| {
             let bounds = Bounds { min: Vec3::splat(-0.4 * size), max: Vec3::splat(0.6 * size) };
             let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
@@ -204,12 +205,13 @@ mod tests {
             binding.report.notices.into_iter().find(|said| said.starts_with("The cage is "))
         };
         let large = bound(100.0).unwrap();
-        // sqrt(3) times 100 over sqrt(2).
+        // 120 is the ratio of the diagonals of the cage, sqrt(3) times 100, and of the model, sqrt(2).
         let large_by =
             "The cage is 120 times larger than what it encloses of the model, and weights differ by ";
         let rest = large.strip_prefix(large_by);
         let spread: f64 = rest.and_then(|rest| rest.split(' ').next()?.parse().ok()).unwrap();
-        // Trilinear: the corner at (1, 0, 0) has 0.41 * 0.6 * 0.6 at X and 0.4 * 0.59 * 0.6 at Y.
+        // Weights are trilinear: the corner with the largest x and the smallest y and z has 0.41 * 0.6 * 0.6 at X and
+        // 0.4 * 0.59 * 0.6 at Y, which differ by 6e-3.
         assert!((spread - 6e-3).abs() < 2e-3, "{large}");
         assert_eq!(bound(20.0), None);
         let beside = said(Vec3::new(0.1, 0.1, -0.4), 0.8);

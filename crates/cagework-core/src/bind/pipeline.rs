@@ -1,7 +1,7 @@
 //! The stages of a bind: voxelize; per batch, solve and sample; assemble.
 //!
-//! All back ends share [`PreparedBind::new`] and [`PreparedBind::finish`]. Between them, the solver of the back end
-//! produces a [`Solution`].
+//! All back ends share [`PreparedBind::new`] and [`PreparedBind::finish`]. Between these two calls, the solver of the
+//! back end produces a [`Solution`].
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl<'a> PreparedBind<'a> {
         Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.voxelized.team, watch)?)
     }
 
-    /// Solves and samples all columns in this process, as a fallback if the device cannot.
+    /// Solves and samples all columns in this process, as a fallback if the GPU cannot.
     ///
     /// # Errors
     /// If the memory exceeds the limit, or the bind is cancelled.
@@ -261,7 +261,7 @@ fn bound_joints<'a>(
 ) -> Result<Option<(JointPoints<'a>, Weights)>, BindError> {
     let Some(joints) = JointPoints::new(controls) else { return Ok(None) };
     let points = joints.points();
-    // Half the resolution takes an eighth of the work.
+    // Bind at half the resolution, which takes an eighth of the work.
     let options = BindOptions {
         grid: (options.grid / 2).max(8),
         sparsify: 0.0,
@@ -278,7 +278,7 @@ fn bound_joints<'a>(
     Ok(Some((joints, bound.weights)))
 }
 
-/// Progress of an inner bind: polls for cancellation but reports nothing.
+/// Progress of the bind in [`bound_joints`]: polls for cancellation but reports nothing.
 struct PollOnly<'a>(&'a Watch<'a>);
 
 impl Progress for PollOnly<'_> {
@@ -308,7 +308,7 @@ fn sampling_stencils(
         runs.len(),
         || (),
         |(), run| {
-            // Poll for cancellation: faces of hundreds of corners make this slow.
+            // Poll for cancellation, because faces with hundreds of corners make the stencils slow.
             let is_wanted = watch.report(Stage::Voxelize, 1.0, 0, None).is_ok();
             let points = if is_wanted { runs[run] } else { &[][..] };
             sampler.stencils(points.iter().map(|p| p.as_dvec3()))
@@ -344,7 +344,8 @@ fn outside_of(
     (outside, n_held)
 }
 
-/// Notices about inner controls whose radius is too small for a grid of `cells` cells along the longest side.
+/// Notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side, and
+/// vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let Some(inner) = controls.inner() else { return Vec::new() };
     let mut notices = Vec::new();

@@ -1,14 +1,14 @@
-//! Vertices of the model to bind, welded.
+//! The vertices to bind. Vertices at equal positions are joined.
 
 use glam::Vec3;
 
 use super::BindError;
 use crate::mesh::{Weld, weld};
 
-/// Numbers of vertices.
+/// Numbers of vertices and of distinct positions to bind, from which the memory of a bind is estimated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VertexCounts {
-    /// Number of vertices in the file.
+    /// Number of vertices, including those at equal positions.
     pub(super) rows: usize,
     /// Number of distinct positions.
     pub(super) points: usize,

@@ -16,7 +16,8 @@ use crate::team::Team;
 
 use super::watch::Watch;
 
-/// Rough number of decades by which delta falls from the first Jacobi sweep to tau, for the progress bar only.
+/// Rough number of decades by which delta, the change of the values per sweep, falls from the first Jacobi sweep to
+/// the tolerance. For the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
 
 /// Sampled columns with statistics of the solve.
@@ -26,15 +27,15 @@ pub struct Solution {
     pub blocks: Vec<Vec<Row>>,
     /// Report of the solve of all columns.
     pub report: SolveReport,
-    /// Number of sweeps, V-cycles or steps.
+    /// Number of iterations of the solver: Jacobi sweeps, V-cycles or steps of conjugate gradients.
     pub iterations: u32,
-    /// Iterations per delta of the report: 1 except for Jacobi sweeps on the GPU.
+    /// Number of iterations per delta of the report: 1 except for Jacobi sweeps on the GPU.
     pub delta_interval: u32,
     /// Peak size of the fields, bytes.
     pub field_bytes: usize,
     /// Bytes planned for fields on a device, which the host's estimate excludes; 0 if the fields are in host memory.
     pub planned_bytes: u64,
-    /// Share of the stage's time spent solving rather than sampling.
+    /// Time spent solving divided by the time spent solving and sampling.
     pub solve_share: f64,
     /// Name of the GPU; `None` for the CPU.
     pub adapter: Option<String>,
@@ -43,7 +44,7 @@ pub struct Solution {
 /// Solves all columns and samples them.
 ///
 /// # Errors
-/// [`Cancelled`] if a progress report is answered by a cancellation.
+/// [`Cancelled`] if the progress callback cancels the bind.
 pub(super) fn solve_and_sample(
     hierarchy: &Hierarchy,
     stencils: &Stencils,
@@ -69,7 +70,7 @@ pub(super) fn solve_and_sample(
 /// Solves all columns and returns their fields, `[n_batches][n_rows]`, for [`sample_fields`].
 ///
 /// # Errors
-/// [`Cancelled`] if a progress report is answered by a cancellation.
+/// [`Cancelled`] if the progress callback cancels the bind.
 pub(super) fn solve_fields(
     hierarchy: &Hierarchy,
     options: &BindOptions,
@@ -82,7 +83,7 @@ pub(super) fn solve_fields(
     solve_batches(hierarchy, options, team, watch, |_, field: &[Row]| field.to_vec())
 }
 
-/// Samples of all batches. `[n_batches][n_points]`
+/// Samples the `fields` of all batches at the points of the stencils. `[n_batches][n_points]`
 pub(super) fn sample_fields(stencils: &Stencils, fields: &[Vec<Row>], team: &Team) -> Vec<Vec<Row>> {
     team.share(fields.len(), || (), |(), batch| sample(stencils, batch, &fields[batch]))
 }
@@ -102,7 +103,8 @@ fn solve_batches<T: Send>(
         n_batches,
         || batch_solver(hierarchy, options),
         |solver, batch| {
-            // The first progress report of a batch comes after the most expensive part of its solve, so poll before it.
+            // The first progress report of a batch comes after the most expensive part of its solve, so poll for
+            // cancellation first.
             if watch.is_cancelled() {
                 return None;
             }

@@ -25,7 +25,7 @@ use crate::voxelize::{CellKind, voxelize_classic};
 pub(super) struct Voxelization {
     pub(super) hierarchy: Hierarchy,
     pub(super) counts: CellCounts,
-    /// Cells that lines along different axes classify differently.
+    /// Number of cells that lines along different axes classify differently.
     pub(super) ambiguous: u64,
     /// Notices about the cage in this grid.
     pub(super) notices: Vec<String>,

@@ -65,7 +65,7 @@ impl<'a> Watch<'a> {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Counts a finished piece of `total` and reports.
+    /// Counts a finished piece of the stage's work, and reports the share of finished pieces of `total`.
     ///
     /// # Errors
     /// [`Cancelled`], if this or an earlier report was cancelled.
@@ -80,7 +80,7 @@ impl<'a> Watch<'a> {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Clock of the progress, milliseconds.
+    /// Time on the clock of the progress, milliseconds.
     #[must_use]
     pub fn now_ms(&self) -> f64 {
         self.progress.now_ms()

@@ -7,7 +7,8 @@ use thiserror::Error;
 use super::{MAX_DIAGONAL, MAX_FACES, MIN_DIAGONAL};
 use crate::words::{counted, grouped};
 
-/// Largest number of corners of a face. Triangulation takes at least the square, at worst the cube, of this number.
+/// Largest allowed number of corners of a face. The time of triangulation grows with at least the square and at most
+/// the cube of this number.
 pub(super) const MAX_CORNERS: usize = 1000;
 
 /// Why a polygon mesh is not a cage. Indices start at 0.
@@ -19,7 +20,7 @@ pub enum CageError {
     /// A face has one or two corners.
     #[error("cage face {face} has {}; it needs at least 3", counted(*corners, "corner", "corners"))]
     TooFewCorners {
-        /// Index of the face.
+        /// Index of the face with too few corners.
         face: u32,
         /// Number of the face's corners.
         corners: usize,
@@ -27,17 +28,17 @@ pub enum CageError {
     /// A face has the index of a vertex that does not exist.
     #[error("cage face {face} names vertex {vertex}, but there are only {n} vertices (0 to {})", n - 1)]
     Index {
-        /// Index of the face.
+        /// Index of the face with the invalid index.
         face: u32,
-        /// The invalid index.
+        /// The vertex index that does not exist.
         vertex: u32,
-        /// Number of vertices.
+        /// Number of vertices of the mesh.
         n: usize,
     },
     /// A coordinate is infinite or not a number.
     #[error("cage vertex {vertex} has a coordinate that is not a finite number")]
     NotFinite {
-        /// Index of the vertex.
+        /// Index of the vertex that is not finite.
         vertex: u32,
     },
     /// The cage is too small or too large for f32 and f64 arithmetic.
@@ -45,29 +46,29 @@ pub enum CageError {
         "cage has a bounding box with a diagonal of {diagonal:e}; it must be from {MIN_DIAGONAL:e} to {MAX_DIAGONAL:e}: scale it"
     )]
     Size {
-        /// The diagonal, object units.
+        /// Diagonal of the cage's bounding box, object units.
         diagonal: f64,
     },
     /// A face is not a simple polygon with an area.
     #[error("cage face {face} is degenerate: {why}")]
     DegenerateFace {
-        /// Index of the face.
+        /// Index of the degenerate face.
         face: u32,
-        /// The defect.
+        /// What is wrong with the face.
         why: FaceDefect,
     },
     /// Two faces have the same outline.
     #[error("cage faces {first} and {second} have the same corners: delete one of them")]
     DuplicateFace {
-        /// Index of the first of the two faces.
+        /// Index of the first face with the outline.
         first: u32,
-        /// Index of the second of the two faces.
+        /// Index of the second face with the outline.
         second: u32,
     },
     /// Two components coincide face by face.
     #[error("cage component {second} lies on component {first}, face on face: delete one of them")]
     DoubledPart {
-        /// Index of the first component, in the order of first faces.
+        /// Index of the first component, in the order of their first faces.
         first: u32,
         /// Index of the second component.
         second: u32,
@@ -114,7 +115,7 @@ pub enum CageError {
         "cage component {component} (with face {face}) encloses no volume: it is flat or folded onto itself"
     )]
     Flat {
-        /// Index of the component, in the order of first faces.
+        /// Index of the component, in the order of their first faces.
         component: u32,
         /// Index of the component's first face.
         face: u32,
@@ -127,16 +128,16 @@ pub enum FaceDefect {
     /// A vertex occurs more than once.
     #[error("vertex {vertex} is a corner of it more than once")]
     RepeatedVertex {
-        /// Index of the vertex.
+        /// Index of the repeated vertex.
         vertex: u32,
     },
-    /// All corners lie on a line, or areas cancel.
+    /// All corners lie on a line, or parts of the face with opposite orientations cancel.
     #[error("it has no area")]
     NoArea,
     /// Triangulation would take too long.
     #[error("it has {corners} corners, more than {MAX_CORNERS}; cut it into triangles")]
     TooManyCorners {
-        /// Number of corners.
+        /// Number of corners of the face.
         corners: usize,
     },
     /// Two edges cross.
@@ -151,12 +152,12 @@ pub enum CageNotice {
     Welded {
         /// Number of vertices that were replaced by the first vertex at the same position.
         vertices: usize,
-        /// The first replaced vertex.
+        /// Index of the first replaced vertex.
         first: u32,
     },
     /// Inverted faces were flipped.
     Flipped {
-        /// Index of the component, in the order of first faces.
+        /// Index of the component, in the order of their first faces.
         component: u32,
         /// Number of flipped faces.
         faces: usize,
@@ -165,21 +166,21 @@ pub enum CageNotice {
     },
     /// A component lies inside another one.
     Cavity {
-        /// Index of the component, in the order of first faces.
+        /// Index of the component, in the order of their first faces.
         component: u32,
     },
     /// Vertices without faces: their weights are zero.
     UnusedVertices {
-        /// Number of vertices.
+        /// Number of vertices without faces.
         vertices: usize,
-        /// Index of the first of these vertices.
+        /// Index of the first vertex without faces.
         first: u32,
     },
     /// Parts of the surface meet only in a vertex.
     TouchingVertices {
-        /// Number of such vertices.
+        /// Number of vertices in which parts of the surface meet.
         vertices: usize,
-        /// Index of the first of these vertices.
+        /// Index of the first vertex in which parts of the surface meet.
         first: u32,
     },
 }

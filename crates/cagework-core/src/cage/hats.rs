@@ -5,9 +5,10 @@
 //! coordinates); Gordon and Wixom 1974, "Pseudo-harmonic interpolation on convex domains"; Manson, Li and Schaefer
 //! 2011, "Positive Gordon-Wixom coordinates".
 //!
-//! Changes: Meyer's quotients are multiplied by all distances, which avoids division by zero on a side. Chords end at
-//! the nearest sides, which a sweep finds, and have weights other than in the sources. The mean over chords is taken by
-//! quadrature; each chord keeps sum, sign and linear precision, so the mean keeps them.
+//! Changes: the quotients of Meyer et al. are multiplied by the areas of the triangles of the point and all sides,
+//! which avoids division by zero on a side. Chords end at the nearest sides, which a sweep finds, and have weights
+//! other than in the sources. The mean over chords is taken by quadrature; on each chord, values sum to 1, are not
+//! negative and reproduce linear functions, so their mean does, too.
 
 use std::f64::consts::PI;
 
@@ -40,7 +41,7 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     }
     for (k, value) in values.iter_mut().enumerate() {
         let (first, next) = (before(k), after(k));
-        // Multiply the areas of all sides except the two that meet in the corner.
+        // Weight of corner k: area of the triangle at the corner, times the areas of all sides that do not end there.
         let mut product = cross(outline[first], outline[k], outline[next]);
         let mut side = next;
         while side != first {
@@ -80,7 +81,8 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
     if nearest.0 <= OUTLINE_TOLERANCE * extent {
         return on_side(values);
     }
-    // Rotate a line about the point by half a turn. Between two corners, the line crosses the same sides.
+    // Rotate a line about the point by half a turn. While the line turns from one corner to the next, it crosses the
+    // same sides.
     let is_above = |k: usize| to(k).y > 0.0 || to(k).y == 0.0 && to(k).x > 0.0;
     let angle = |k: usize| if is_above(k) { to(k).y.atan2(to(k).x) } else { (-to(k).y).atan2(-to(k).x) };
     let mut corners: Vec<(f64, usize)> = (0..n).map(|k| (angle(k), k)).collect();

@@ -7,11 +7,11 @@ use super::polygon::{MIN_FACE_HEIGHT, Polygon};
 use super::topology::Surface;
 use crate::geometry::winding_number;
 
-/// Number of sample points of a component in the test whether it lies inside another one. It is odd, for a majority,
-/// and large, because components may touch or overlap.
+/// Number of sample points of a component in the test whether it lies inside another one. Odd, so that inside or
+/// outside has the majority; large, because samples disagree where components touch or overlap.
 const NESTING_SAMPLES: usize = 31;
 
-/// Winding numbers below this mean outside, rather than on the surface.
+/// A point with a winding number of at most this is outside a component, not on its surface.
 const MAX_OUTSIDE_WINDING: f64 = 0.25;
 
 /// Orients the faces of every component away from the solid (outward, or into a cavity) and projects all faces to their
@@ -81,7 +81,8 @@ impl Solid {
         let corners = || triangles.iter().flatten();
         let min = corners().fold(DVec3::INFINITY, |m, &p| m.min(p));
         let max = corners().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p));
-        // Sum tetrahedra with a nearby apex: with the origin as apex, volumes would cancel far away from it.
+        // Sum tetrahedra with a nearby apex: with the origin as apex, the volumes of a component far from the origin
+        // would cancel.
         let center = 0.5 * (min + max);
         let (mut volume, mut area) = (0.0, 0.0);
         for t in &triangles {

@@ -1,9 +1,10 @@
 //! A bent face as a patch: the planar coordinates of the face's outline, applied to its corners in space.
 //!
-//! Over each point of the face's best-fitting plane, the patch is `sum hat_k c_k` with the planar coordinates of the
-//! projected outline. Values on a face therefore depend continuously on its corners, whether flat or bent, and
-//! reproduce the patch; over a parallelogram it is the bilinear patch. The patch is cut into *facets* along rings
-//! around its centre. The sides of the face are not divided, so that any neighbouring face meets it without gaps.
+//! Over each point of the face's best-fitting plane, the patch is `sum hat_k c_k`, where `hat_k` are the planar
+//! coordinates of the projected outline and `c_k` the corners in space. Values on a face therefore depend continuously
+//! on its corners, whether flat or bent, and reproduce the patch. The patch over a parallelogram is bilinear. Each
+//! patch is cut into *facets* along rings around its centre. The sides of the face are not divided, so that
+//! neighbouring faces meet without gaps.
 
 use glam::DVec2;
 

@@ -7,21 +7,25 @@ use super::hats;
 use super::patch::{self, Facets};
 use super::triangulate::{cross, ear_clip};
 
-/// Height of a face, as a fraction of the cage's diagonal, below which the face has no area: rounding of f32
-/// coordinates (6e-8 relative).
+/// Height of a face, as a fraction of the cage's diagonal, below which the face has no area. It is slightly above the
+/// relative rounding of f32 coordinates, 6e-8.
 pub(super) const MIN_FACE_HEIGHT: f64 = 1e-7;
 
 /// Distance of the corners from the face's plane, as a fraction of the cage's diagonal, up to which a face is planar.
-/// The six decimals of OBJ files move the corners of a model of unit size by that much. This distance bounds the rest
-/// error on the face.
+/// Rounding to the six decimals of OBJ files moves the corners of a model of size 1 by up to 0.9e-6, less than half of
+/// this. This distance bounds the rest error on the face.
 pub(super) const PLANE_TOLERANCE: f64 = 2e-6;
 
 /// Smallest sine of the exterior angle at the corners of an outline that counts as convex.
 const MIN_CONVEX_SINE: f64 = 1e-3;
 
-/// Smallest sine of the exterior angles (14 degrees) for which a quad has Meyer's coordinates alone. At a straight
-/// corner Meyer's hat vanishes, so below this sine they are blended with pseudo-harmonic coordinates.
+/// Smallest sine of the exterior angles (14 degrees) for which a quad has Meyer's coordinates ([`hats::wachspress`])
+/// alone. At a straight corner Meyer's hat vanishes, so below this sine Meyer's coordinates are blended with
+/// pseudo-harmonic ones.
 const MIN_MEYER_SINE: f64 = 0.25;
+
+/// Shortest side of a projected face, as a fraction of the face's size: a few roundings of f64.
+const MIN_PROJECTED_SIDE: f64 = 1e-14;
 
 /// Shares of Meyer's coordinates below this are set to 0, because at a straight corner the coordinates are 0 / 0.
 const MIN_SHARE: f64 = 1e-6;
@@ -66,6 +70,8 @@ impl Polygon {
         let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
         let (is_bent, is_convex) = (height > PLANE_TOLERANCE * diagonal, is_convex(&outline));
         let crosses = !is_convex && crosses_itself(&outline);
+        // A side along the normal projects to nearly a point: the angles at its ends would be rounding errors.
+        let is_flattened = is_bent && shortest_side(&outline) < MIN_PROJECTED_SIDE * extent;
         if crosses && !is_bent {
             return Err(FaceDefect::CrossesItself);
         }
@@ -74,7 +80,7 @@ impl Polygon {
             _ if is_convex && !is_bent => (2..n as u32).map(|k| [0, k - 1, k]).collect(),
             _ => ear_clip(&outline)?,
         };
-        if crosses {
+        if crosses || is_flattened {
             return Ok(Self::linear(triangles));
         }
         let Facets { inner: points, facets } = match (is_bent, is_convex) {
@@ -120,7 +126,7 @@ fn meyer_share(quad: &[DVec2]) -> f64 {
         let [before, after] =
             [quad[k] - quad[(k + 3) % 4], quad[(k + 1) % 4] - quad[k]].map(DVec2::normalize_or_zero);
         let sine = before.perp_dot(after);
-        // Exterior angles above 90 degrees are far from straight.
+        // A corner with an exterior angle above 90 degrees is far from straight, even if the sine is small: use 1.
         if sine > 0.0 && before.dot(after) < 0.0 { 1.0 } else { sine }
     });
     let x = (turns.fold(1.0, f64::min) / MIN_MEYER_SINE).clamp(0.0, 1.0);
@@ -170,6 +176,11 @@ fn crosses_itself(outline: &[DVec2]) -> bool {
             cross(a, b, c) * cross(a, b, d) < 0.0 && cross(c, d, a) * cross(c, d, b) < 0.0
         })
     })
+}
+
+fn shortest_side(outline: &[DVec2]) -> f64 {
+    let n = outline.len();
+    (0..n).map(|k| outline[k].distance(outline[(k + 1) % n])).fold(f64::INFINITY, f64::min)
 }
 
 /// Splits a non-planar quad along its shorter diagonal (the first one if equal), unless that diagonal lies outside the

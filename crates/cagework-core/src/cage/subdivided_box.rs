@@ -7,12 +7,11 @@ use crate::mesh::{Bounds, PolygonMesh};
 /// Minimum thickness of the box, as a fraction of the model's diagonal, so that a flat model gets a cage with a volume.
 const MIN_THICKNESS: f32 = 0.01;
 
-/// A box around `bounds` with shared vertices and outward faces. Each side is divided into quads by `divisions` along
-/// x, y and z (at least one). `margin`: distance from the bounds, as a fraction of their diagonal; negative values
-/// count as 0.
+/// A box around `bounds` with shared vertices and outward faces. `divisions`: number of quads along x, y and z, at
+/// least one. `margin`: distance from the bounds, as a fraction of their diagonal; negative values count as 0.
 #[must_use]
 pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> PolygonMesh {
-    // A single point has no size: use the unit of length.
+    // A single point has no diagonal: use one object unit.
     let diagonal = if bounds.diagonal() > 0.0 { bounds.diagonal() } else { 1.0 };
     let half = (0.5 * bounds.extent() + Vec3::splat(margin.max(0.0) * diagonal))
         .max(Vec3::splat(0.5 * MIN_THICKNESS * diagonal));
@@ -24,7 +23,7 @@ pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> Polyg
     let slot = |p: UVec3| (p.x + (n.x + 1) * (p.y + (n.y + 1) * p.z)) as usize;
     let mut faces = Vec::new();
     for axis in 0..3 {
-        // (u, v, axis) is right-handed: counter-clockwise in u and v is a normal along the axis.
+        // (u, v, axis) is right-handed, so a face that is counter-clockwise in u and v has its normal along the axis.
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for at in [0, n[axis]] {
             for j in 0..n[v] {
@@ -60,7 +59,7 @@ mod tests {
 
     #[test]
     fn box_is_a_valid_cage_at_the_margin() {
-        // Diagonal 7: a margin of 0.1 is 0.7.
+        // The model's diagonal is 7, so a margin of 0.1 is a distance of 0.7.
         for [x, y, z] in [[1, 1, 1], [2, 3, 4], [5, 1, 2]] {
             let mesh = subdivided_box(MODEL, 0.1, [x, y, z]);
             let cage = Cage::new(&mesh).unwrap();

@@ -48,8 +48,8 @@ fn hats_reproduce_points_on_every_kind_of_face() {
     }
 }
 
-/// The facets of a bent face lie within 2 % of the bend from its patch. The bend is the distance of corner 7 from the
-/// planes through the other corners of its faces.
+/// The facets of a bent face deviate from its patch by at most 2 % of the bend, which is the distance of corner 7 from
+/// the planes through the other corners of its faces.
 #[test]
 fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
     for by in [0.5, 0.01, 1e-4] {
@@ -148,13 +148,13 @@ fn rotated_faces_count_as_planar() {
     }
     let cage = Cage::new(&mesh).unwrap();
     assert!(cage.polygons.iter().all(|p| p.inner.is_empty()), "a planar face was treated as bent");
-    // f32 rounding moves corners out of their planes; hats reproduce only the projection.
+    // f32 rounding moves corners out of their planes; hats reproduce only the projection to the plane.
     assert_linear_reproduction(&cage, 2.0 * polygon::PLANE_TOLERANCE * f64::from(cage.diagonal()));
 }
 
-/// On the caps of the C, the hats of the vertices at the end of one arm are below 1e-3 in the other arm (harmonic
-/// coordinates: 2e-4), because chords past the re-entrant corner end on the back of the C. They are 0 at the other
-/// arm's end, and no hat is negative.
+/// On the caps of the C, the hats of the vertices at the end of one arm are below 1e-3 in the other arm, where harmonic
+/// coordinates are up to 2e-4. The hats are small because chords past the re-entrant corner end on the back of the C.
+/// At the end of the other arm they are 0, and no hat is negative.
 #[test]
 fn hats_of_a_concave_face_are_positive_and_small_across_the_gap() {
     let cage = Cage::new(&c_shape()).unwrap();
@@ -306,8 +306,9 @@ proptest! {
     fn wachspress_is_positive_and_linear_on_convex_polygons(
         outline in outlines(1.0..1.0001), r in 0.0..0.9f64, angle in 0.0..6.3f64,
     ) {
-        // Angles are at least 0.09 apart, and an arc rises by 1e-3 between them, so all corners are convex. The origin
-        // may be outside: start from the mean of the corners.
+        // Neighbouring corners are at least 0.09 radians apart, and such an arc of the unit circle rises 1e-3 above its
+        // chord. Distances from the origin differ by only 1e-4, so all corners are convex. The origin may be outside:
+        // start from the mean of the corners.
         let center = outline.iter().sum::<DVec2>() / outline.len() as f64;
         let toward = outline[(angle * 100.0) as usize % outline.len()];
         let point = center + r * (toward - center);
@@ -346,4 +347,13 @@ proptest! {
         prop_assert!(areas.iter().all(|&a| a > 0.0));
         prop_assert!((areas.iter().sum::<f64>() - twice_area).abs() <= ROUNDING);
     }
+}
+
+/// In projection along the normal, the first two corners of this face coincide. Found by fuzzing.
+#[test]
+fn hats_are_finite_on_a_quad_with_a_side_along_its_normal() {
+    let corners = [[0.5, 0.5, 1.0], [1.0, 1.0, 0.5], [1.0, 0.0, 1.0], [0.5, 1.0, 0.0]].map(DVec3::from);
+    let polygon = Polygon::new(&corners, 1.7).unwrap();
+    assert!(polygon.outline.is_empty(), "hats are linear on each triangle: {polygon:?}");
+    assert_eq!(polygon.triangles.len(), 2);
 }

@@ -11,9 +11,9 @@ use crate::mesh::{PolygonMesh, weld};
 /// A side of a face: an edge with the direction in which the face traverses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Side {
-    /// The smaller vertex index.
+    /// The smaller of the edge's two vertex indices.
     pub lo: u32,
-    /// The larger vertex index.
+    /// The larger of the edge's two vertex indices.
     pub hi: u32,
     /// Index of the face.
     pub face: u32,
@@ -24,7 +24,8 @@ pub struct Side {
 /// Sides of the faces with the indices `some`, sorted by edge.
 #[must_use]
 pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
-    // The crate also sorts `[u32; 3]` elsewhere; sorting another key type would add 2 kB to the wasm module.
+    // Sort `[u32; 3]`, as other code of the crate does: the sort of another type would be compiled separately and add
+    // 2 kB to the wasm module.
     let mut keys: Vec<[u32; 3]> = Vec::new();
     for f in some {
         let face = &faces[f as usize];
@@ -76,7 +77,7 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
         Err(open @ CageError::Open { .. }) => {
             let notice = weld_seams(&mesh.positions, &mut faces).ok_or(open.clone())?;
             let sides = check_repeats(&faces).and_then(|()| check_edges(&faces)).map_err(|welded| {
-                // Welding created any other fault: report the open edges of the input instead.
+                // If welding caused a fault of another kind, report the open edges of the input instead.
                 if matches!(welded, CageError::Open { .. }) { welded } else { open }
             })?;
             notices.push(notice);
@@ -152,8 +153,8 @@ pub(super) fn check_doubled(positions: &[Vec3], surface: &Surface) -> Result<(),
     Ok(())
 }
 
-/// Joins vertices at equal positions on open edges. Elsewhere, vertices at the same position are separate handles by
-/// intention. `None` if there is nothing to join.
+/// Joins vertices at equal positions on open edges. Leaves other vertices at equal positions apart, because they are
+/// meant as separate handles. `None` if there is nothing to join.
 fn weld_seams(positions: &[Vec3], faces: &mut [Vec<u32>]) -> Option<CageNotice> {
     let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
     let edge = |face: &[u32], k: usize| {

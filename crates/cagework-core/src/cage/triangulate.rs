@@ -9,7 +9,8 @@ use super::defects::FaceDefect;
 /// because the search costs `n^3`.
 const MAX_CORNERS_FOR_SEARCH: usize = 128;
 
-/// An ear is straight if twice its area is below this fraction of the squared extent: rounding of f32 coordinates.
+/// An ear counts as degenerate (its corners are collinear) if twice its area is below this fraction of the polygon's
+/// squared extent. The fraction is the rounding of f32 coordinates.
 const MIN_EAR_AREA: f64 = 1e-7;
 
 /// Twice the signed area of a triangle; positive if counter-clockwise.
@@ -42,7 +43,7 @@ fn ear(left: &[usize], k: usize) -> [usize; 3] {
 }
 
 /// Position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no other corner.
-/// A corner on its boundary also counts unless straight ears are allowed.
+/// A corner on the ear's boundary counts as contained, unless straight ears are allowed.
 fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
     let rim = -min_area;
     let mut best: Option<(f64, usize)> = None;

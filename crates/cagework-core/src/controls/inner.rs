@@ -11,11 +11,11 @@ use crate::cage::{CageError, MAX_FACES};
 use crate::options::OutOfRange;
 use crate::words::grouped;
 
-/// Largest radius of balls and tubes, as a fraction of the cage's longest side.
+/// Largest allowed radius of balls and tubes, as a fraction of the cage's longest side.
 pub const MAX_RADIUS: f32 = 0.25;
 
-/// Smallest radius of balls and tubes, as a fraction of the cage's longest side. No grid resolves such a ball, and in
-/// f32 the faces of smaller balls have no area.
+/// Smallest allowed radius of balls and tubes, as a fraction of the cage's longest side. No grid resolves a ball of
+/// this radius. The faces of smaller balls would have no area in f32.
 const MIN_RADIUS: f32 = 1e-4;
 
 /// Default radius of balls and tubes, as a fraction of the cage's longest side: two cells of a grid of 64.
@@ -26,7 +26,7 @@ const DEFAULT_RADIUS: f32 = 2.0 / 64.0;
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum InnerElement {
-    /// A ball.
+    /// A ball around the control with this index.
     Point(u32),
     /// A polyline of tubes, at least two corners.
     Line(Vec<u32>),
@@ -35,7 +35,7 @@ pub enum InnerElement {
 }
 
 impl InnerElement {
-    /// Corner indices.
+    /// Indices of its controls in [`InnerControls::positions`].
     #[must_use]
     pub fn corners(&self) -> &[u32] {
         match self {
@@ -44,7 +44,7 @@ impl InnerElement {
         }
     }
 
-    /// Name for messages.
+    /// Kind of the element in messages: "point", "line" or "face".
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -71,13 +71,13 @@ pub struct InnerControls {
 /// Why controls cannot be used. Indices start at 0.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ControlError {
-    /// Subdivision steps out of range.
+    /// The number of subdivision steps is out of range.
     #[error(transparent)]
     Option(#[from] OutOfRange),
     /// The subdivided surface is not a valid cage.
-    #[error("the smooth surface of the cage cannot be used: {0}; take fewer steps, or a simpler cage")]
+    #[error("the smooth surface of the cage cannot be used: {0}; use fewer steps or a simpler cage")]
     Smooth(CageError),
-    /// Inner controls without elements.
+    /// The inner controls have no elements.
     #[error("there is no control inside: give points (p), polylines (l) or faces (f)")]
     Empty,
     /// A coordinate is not a finite number.
@@ -91,29 +91,29 @@ pub enum ControlError {
     Index {
         /// Kind of element.
         what: &'static str,
-        /// Index of the element.
+        /// Index of the element with the invalid index.
         element: u32,
-        /// The invalid index.
+        /// The vertex index that does not exist.
         vertex: u32,
         /// Number of vertices of the inner controls.
         n: usize,
     },
-    /// An element without extent.
+    /// An element has too few corners, a repeated corner, or no area.
     #[error("{what} {element} inside the cage has {why}")]
     Degenerate {
         /// Kind of element.
         what: &'static str,
-        /// Index of the element.
+        /// Index of the degenerate element.
         element: u32,
         /// Description of the defect.
         why: &'static str,
     },
-    /// A radius out of range.
+    /// The radius of balls and tubes is out of range.
     #[error(
         "the radius of controls inside is {radius}; it must be from {least} to {most}, a quarter of the cage's longest side"
     )]
     Radius {
-        /// The radius, object units.
+        /// The rejected radius, object units.
         radius: f32,
         /// The smallest allowed radius, object units.
         least: f32,
@@ -126,7 +126,7 @@ pub enum ControlError {
         grouped(*elements), grouped(*faces), grouped(MAX_FACES)
     )]
     TooMany {
-        /// Number of elements.
+        /// Number of elements inside the cage.
         elements: usize,
         /// Number of faces that the surface would have.
         faces: usize,
@@ -143,9 +143,9 @@ pub enum ControlError {
     #[error("{} {} and {} {} inside the cage overlap: move them apart, join them at a vertex, or use a smaller radius",
         what[0], elements[0], what[1], elements[1])]
     Overlap {
-        /// Kinds of the elements.
+        /// Kinds of the two overlapping elements.
         what: [&'static str; 2],
-        /// Indices of the two elements.
+        /// Indices of the two overlapping elements.
         elements: [u32; 2],
     },
 }

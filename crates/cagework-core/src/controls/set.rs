@@ -17,8 +17,8 @@ use crate::options::SMOOTH;
 use crate::smooth::subdivide;
 use crate::weights::Weights;
 
-/// Distance by which corners of a sheet may lie outside the cage, as a fraction of the cage's diagonal. A sheet that is
-/// drawn slightly beyond the cage leaves no gap to it.
+/// Largest distance from the cage at which a corner of a sheet may lie outside, as a fraction of the cage's diagonal.
+/// Users draw sheets slightly beyond the cage, to leave no gap between the sheet and the cage.
 const MAX_PROTRUSION: f64 = 0.02;
 
 /// Owned [`Controls`] of a subdivided cage or with inner controls.
@@ -82,7 +82,7 @@ impl ControlSet {
         Ok(set)
     }
 
-    /// The cage.
+    /// The cage, without subdivision and inner controls.
     #[must_use]
     pub fn cage(&self) -> &Cage {
         &self.cage
@@ -94,7 +94,7 @@ impl ControlSet {
         self.smooth
     }
 
-    /// The inner controls.
+    /// The inner controls; empty if the set has none.
     #[must_use]
     pub fn inner(&self) -> &InnerControls {
         &self.inner
@@ -127,7 +127,8 @@ impl ControlSet {
         let mut walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
         let meeting = walls.meeting(&inner);
         if !meeting.is_empty() {
-            // Circumscribed meshes may intersect although balls and tubes do not: retry with inscribed ones.
+            // Meshes of equal volume exceed the radius, so they may intersect although balls and tubes do not: retry
+            // with inscribed meshes.
             meeting.iter().flatten().for_each(|&element| sizes[element as usize] = Size::Inscribed);
             walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
             if let Some(&elements) = walls.meeting(&inner).first() {
@@ -163,7 +164,7 @@ impl ControlSet {
         Ok(())
     }
 
-    /// Checks that all inner controls are inside; corners of sheets may be up to `MAX_PROTRUSION` outside.
+    /// Checks that all inner controls are inside. Corners that only sheets use may be up to `MAX_PROTRUSION` outside.
     fn check_inside(&self, inner: &InnerControls) -> Result<(), ControlError> {
         let near = MAX_PROTRUSION * f64::from(self.surface.diagonal());
         let mut may_stick_out = vec![true; inner.positions.len()];
@@ -207,8 +208,9 @@ type ControlShares = [(u32, f64); 2];
 struct Walls {
     points: Vec<(DVec3, ControlShares)>,
     faces: Vec<Vec<u32>>,
-    /// Element, and connected part, to which each face belongs. `[n_faces]`
+    /// Element to which each face belongs. `[n_faces]`
     element_of: Vec<u32>,
+    /// Connected part to which each face belongs. `[n_faces]`
     part_of: Vec<u32>,
     /// Surface vertex of each control that is a corner of a sheet.
     corners: BTreeMap<u32, u32>,
@@ -302,7 +304,7 @@ impl Walls {
 fn parts(inner: &InnerControls) -> Vec<u32> {
     let mut part_of_vertex = vec![u32::MAX; inner.positions.len()];
     let mut parts: Vec<u32> = (0..inner.elements.len() as u32).collect();
-    // Iterate to a fixed point: there are few elements, and chains of them are mostly in order.
+    // Repeat until no label changes. Chains of elements are mostly in order, so a few passes suffice.
     loop {
         let before = parts.clone();
         for (part, element) in parts.iter_mut().zip(&inner.elements) {

@@ -5,9 +5,9 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DQuat, DVec3};
 
-/// Sides of a tube.
+/// Number of sides of a tube's cross-section.
 const SIDES: usize = 16;
-/// Rings of a tube's hemispherical end, excluding its equator and pole.
+/// Number of rings of vertices on a tube's hemispherical end, excluding its equator and pole.
 const RINGS: usize = 4;
 
 /// Number of faces of one tube segment with both of its ends.
@@ -32,7 +32,7 @@ pub(super) fn ball_faces(steps: u32) -> usize {
 pub(super) enum Size {
     /// The mesh has the same volume (ball) or cross-section (tube); its corners exceed the radius by a few per cent.
     EqualVolume,
-    /// The mesh is inscribed, for neighbours that would intersect meshes of equal volume.
+    /// The mesh is inscribed. Used for neighbours whose meshes of equal volume would intersect.
     Inscribed,
 }
 

@@ -1,4 +1,4 @@
-//! Closed forms of coordinates, for comparison with harmonic coordinates, evaluated at many points.
+//! Evaluates closed forms of coordinates at many points, for comparison with harmonic coordinates.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -27,16 +27,16 @@ impl ClosedForm {
 /// Why closed-form coordinates cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ClosedFormError {
-    /// Harmonic coordinates need a bind.
+    /// Harmonic coordinates have no closed form: they need a bind.
     #[error("{kind} coordinates have no closed form: use bind instead")]
     NoForm {
-        /// Name of the kind.
+        /// Name of the kind of coordinates.
         kind: &'static str,
     },
-    /// A point is not a finite number.
+    /// A coordinate of a point is not a finite number.
     #[error("mesh vertex {vertex} is not a finite number")]
     NotFinite {
-        /// Index of the point.
+        /// Index of the point that is not finite.
         vertex: u32,
     },
     /// A point outside the cage has no coordinates.
@@ -44,9 +44,9 @@ pub enum ClosedFormError {
         "{kind} coordinates are not defined at mesh vertex {vertex}, which is outside the cage: enlarge the cage"
     )]
     Undefined {
-        /// Name of the kind.
+        /// Name of the kind of coordinates.
         kind: &'static str,
-        /// The point.
+        /// Index of the point outside the cage.
         vertex: u32,
     },
     /// The weights exceed the memory limit.
@@ -69,7 +69,7 @@ pub enum ClosedFormError {
     TooMany {
         /// Number of points.
         rows: usize,
-        /// Number of controls.
+        /// Number of columns of the weights.
         columns: usize,
     },
 }

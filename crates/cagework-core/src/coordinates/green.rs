@@ -15,15 +15,16 @@ use glam::DVec3;
 use super::closed_form::ClosedForm;
 use crate::cage::Cage;
 
-/// Sine, or distance over the cage's diagonal, below which directions are coplanar: square root of f64 rounding.
+/// Sine below which directions count as coplanar, and distance, as a fraction of the cage's diagonal, below which a
+/// point counts as in a triangle's plane: the square root of f64 rounding.
 const PLANE_TOLERANCE: f64 = 1e-8;
 
 /// Smallest sum of a point's vertex weights inside the cage. The sum is 1 inside, 0 outside, and the enclosed share of
 /// a small ball on the surface.
 const MIN_SUM: f64 = 0.99;
 
-/// Columns: the cage's vertices, then its triangles, with the scaled normals `s n` (section 3.1 of the paper) as
-/// controls. Defined inside the cage.
+/// Green coordinates, with one column for each cage vertex, then one for each triangle. The controls of the triangles
+/// are the scaled normals `s n` (Lipman et al., section 3.1). The coordinates are defined inside the cage.
 pub(super) const FORM: ClosedForm = ClosedForm {
     row: coordinates,
     triangles: Some(|cage, positions| {
@@ -76,7 +77,7 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
 }
 
 /// Integral over the triangle (`foot`, `a`, `b`) of the Green's function `-1 / (4 pi r)`, where r is the distance from
-/// the origin. `foot` must be the projection of the origin to the triangle's plane. At most 0.
+/// the origin. `foot` must be the projection of the origin to the triangle's plane. The integral is at most 0.
 fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (edge, to_a, to_b) = (b - a, foot - a, foot - b);
     let product = edge.cross(to_a).length();
@@ -110,7 +111,7 @@ mod tests {
     use crate::coordinates::{ClosedFormError, Coordinates};
     use crate::progress::Silent;
 
-    /// Error of the midpoint rule below for points a tenth of the cage's size from its faces.
+    /// Largest error of the midpoint rule below for points a tenth of the cage's size from its faces.
     const MIDPOINT_ERROR: f64 = 2e-5;
 
     fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
@@ -128,7 +129,7 @@ mod tests {
         assert!(combined.distance(point) <= within, "{combined} is not {point}");
     }
 
-    /// The definition (equations 4 and 5 of the paper) by the midpoint rule over many small triangles.
+    /// The defining integrals (Lipman et al., equations 4 and 5) by the midpoint rule over many small triangles.
     fn integrated(cage: &Cage, point: DVec3) -> Vec<f64> {
         const STEPS: usize = 200;
         let mut row = vec![0.0; cage.n_vertices() + cage.triangles().len()];
@@ -137,7 +138,7 @@ mod tests {
             let area = 0.5 * (b - a).cross(c - a);
             let small = area.length() / (STEPS * STEPS) as f64;
             for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS - i).map(move |j| (i, j))) {
-                // Upright and inverted small triangles.
+                // Centroids of the small triangles: an upright one and, except in the last row, an inverted one.
                 for third in [1.0 / 3.0, 2.0 / 3.0].into_iter().take(if i + j + 1 < STEPS { 2 } else { 1 }) {
                     let (v, w) = ((i as f64 + third) / STEPS as f64, (j as f64 + third) / STEPS as f64);
                     let to = (1.0 - v - w) * a + v * b + w * c - point;
@@ -152,8 +153,8 @@ mod tests {
         row
     }
 
-    /// A similarity of the cage acts as the same similarity on the interior (section 3 of the paper). In f64, because
-    /// f32 storage alone would cause errors of 4e-6.
+    /// A similarity of the cage acts as the same similarity on the interior (Lipman et al., section 3). The test
+    /// computes in f64, because f32 storage alone would cause errors of 4e-6.
     #[test]
     fn a_similarity_of_the_cage_is_one_of_its_interior() {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
@@ -179,7 +180,7 @@ mod tests {
         );
         let memory =
             Coordinates::Green.weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
-        // A cube has 8 vertices and 12 triangles.
+        // 100 points have a weight of 8 bytes for each of 20 columns: the cube's 8 vertices and 12 triangles.
         assert_eq!(memory, ClosedFormError::Memory { needed: 16_000, limit: 15_999 });
         let cancel = |_: crate::progress::ProgressEvent| std::ops::ControlFlow::Break(());
         let cancelled = Coordinates::Green.weights(&[inside], &cage, u64::MAX, &cancel).unwrap_err();
@@ -190,7 +191,7 @@ mod tests {
 
     #[test]
     fn points_in_the_planes_of_faces_and_on_lines_through_edges_are_reproduced() {
-        // The inner edge of the L extends into both of its arms.
+        // The planes of the two faces at the inner edge of the L pass through its interior.
         let cage = Cage::new(&shapes::l_shape()).unwrap();
         let positions: Vec<DVec3> = cage.positions().iter().map(|p| p.as_dvec3()).collect();
         let centre = cage.bounds().center().as_dvec3();
@@ -213,7 +214,7 @@ mod tests {
         fn points_inside_are_reproduced(
             x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
         ) {
-            // Points in the back of the C.
+            // The points lie in the back of the C.
             assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z), 1e-6);
         }
     }

@@ -15,15 +15,16 @@ use super::closed_form::ClosedForm;
 use crate::cage::Cage;
 
 /// Sine below which directions are coplanar or collinear, and distance, as a fraction of the cage's diagonal, below
-/// which a point is on the surface. It is the square root of f64 rounding. The errors of the formula and of omitting
-/// the triangle are both 1e-8 here.
+/// which a point is on the surface: the square root of f64 rounding. At this sine, the rounding error of a triangle's
+/// term and the error of omitting the term are both about 1e-8.
 const SURFACE_TOLERANCE: f64 = 1e-8;
 
-/// Tolerance of the sum of a triangle's three angles against a full turn, at which a point lies on the triangle: ten
-/// times [`SURFACE_TOLERANCE`], whose effect grows near an edge.
+/// If the angles that a triangle's three sides span at a coplanar point sum to a full turn up to this tolerance, the
+/// point lies on the triangle. Ten times [`SURFACE_TOLERANCE`], because near an edge a small height above the plane
+/// changes the sum more.
 const FULL_TURN_TOLERANCE: f64 = 1e-7;
 
-/// Columns: the cage's vertices. Defined inside and outside the cage.
+/// Mean value coordinates, with one column for each cage vertex. They are defined inside and outside the cage.
 pub(super) const FORM: ClosedForm = ClosedForm { row: coordinates, triangles: None };
 
 /// Mean value coordinates at a point; returns whether they are defined. `row`: `[n_cage]`, zero on entry.
@@ -38,7 +39,8 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
             return true;
         }
         let directions = [0, 1, 2].map(|k| arms[k] / lengths[k]);
-        // Side k is opposite corner k; its normal has the length of the sine of its angle.
+        // Side k is opposite corner k. The length of its normal is the sine of the angle that the side spans at the
+        // point.
         let normals = [0, 1, 2].map(|k| directions[(k + 1) % 3].cross(directions[(k + 2) % 3]));
         let sines = normals.map(DVec3::length);
         let angles = [0, 1, 2].map(|k| sines[k].atan2(directions[(k + 1) % 3].dot(directions[(k + 2) % 3])));
@@ -80,7 +82,7 @@ mod tests {
     use crate::coordinates::{ClosedFormError, Coordinates};
     use crate::progress::Silent;
 
-    /// [`SURFACE_TOLERANCE`] with a margin for cosines below 1.
+    /// Ten times the error of about 1e-8 that omitting a triangle's term causes at a sine of [`SURFACE_TOLERANCE`].
     const TOLERANCE: f64 = 1e-7;
 
     fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
@@ -134,7 +136,7 @@ mod tests {
 
     #[test]
     fn weights_go_negative_across_the_gap_of_a_c() {
-        // In the lower arm, next to the gap: the far wall of the gap is seen from behind.
+        // The point lies in the lower arm, next to the gap. It sees the far wall of the gap from outside the upper arm.
         let cage = Cage::new(&shapes::c_shape()).unwrap();
         let row = at(&cage, DVec3::new(2.5, 0.9, 0.5));
         assert!(row.iter().any(|&w| w < -1e-3), "{row:?}");
@@ -155,7 +157,7 @@ mod tests {
         fn weights_sum_to_1_and_reproduce_points_inside(
             x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
         ) {
-            // Points in the back of the C.
+            // The points lie in the back of the C.
             assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z));
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! The winding number is the number of crossings at which the ray leaves the closed surface minus those at which it
 //! enters. Faces are sorted into columns, so that each ray is tested against few of them. If rounding could matter,
-//! because the ray passes near an edge or the point lies near a face, callers use [`super::winding_number`] instead.
+//! because the ray passes near an edge or the point lies near a face, callers use
+//! [`winding_number`](crate::geometry::winding_number) instead.
 
 use glam::{DVec2, DVec3};
 
@@ -10,14 +11,15 @@ use glam::{DVec2, DVec3};
 /// rounding.
 const TOLERANCE: f64 = 1e-9;
 
-/// Largest number of columns along x and along y, for which the table stays in the cache.
+/// Largest number of columns along x and along y. A table of this size fits in the processor's cache.
 const MAX_COLUMNS: f64 = 64.0;
 
 /// Faces of a closed surface, sorted into columns along z.
 pub(super) struct Columns<'a> {
     triangles: &'a [[DVec3; 3]],
-    /// Corner of the first column, and columns per unit of length.
+    /// Corner of the first column in x and y, object units.
     low: DVec2,
+    /// Number of columns per object unit along x and y.
     per_unit: DVec2,
     side: usize,
     extent: f64,

@@ -1,10 +1,11 @@
 //! Comparison of geometric functions with independent computations.
 
+use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::cage::Cage;
-use crate::cage::shapes;
+use crate::cage::{Cage, shapes, subdivided_box};
+use crate::mesh::Bounds;
 
 /// Tolerance for f64 rounding of coordinates of size 1 to 4.
 const ROUNDING: f64 = 1e-13;
@@ -106,5 +107,32 @@ fn winding_number_separates_inside_from_outside() {
         ([0.0, 0.0, 0.0], 0.125),
     ] {
         assert!((at(p).abs() - winding).abs() < ROUNDING, "{} is not {winding} at {p:?}", at(p));
+    }
+}
+
+/// The expected numbers are sums of one arc tangent per triangle.
+#[test]
+fn product_of_angles_is_the_sum_of_angles() {
+    /// Tolerance for f64 rounding of sums of thousands of angles.
+    const ROUNDING: f64 = 1e-10;
+    let half_angle = |point: DVec3, triangle: [DVec3; 3]| {
+        let [a, b, c] = triangle.map(|p| p - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(x)
+    };
+    let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [3, 3, 3])).unwrap();
+    let closed: Vec<_> = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)).collect();
+    // An open part of the surface, whose winding number is not an integer, and many nested surfaces.
+    let scaled = |size: f64| closed.iter().map(move |t| t.map(|p| size * p));
+    let nested = (0..60).flat_map(|k| scaled(1.0 + 0.01 * f64::from(k))).collect();
+    for triangles in [closed[..20].to_vec(), closed.clone(), nested] {
+        let steps = || (-7..=7).map(|k| 0.19 * f64::from(k) + 0.013);
+        for p in steps().flat_map(|x| steps().map(move |y| DVec3::new(x, y, 0.3 - y))) {
+            let expected = triangles.iter().map(|&t| half_angle(p, t)).sum::<f64>() / TAU;
+            let actual = winding_number(p, triangles.iter().copied());
+            assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! Sampling as published: a mesh vertex takes the weights of the cell that contains it.
+//! Sampling as in K. Smith's paper (`docs/method.md`, sources): a mesh vertex takes the weights of the cell that
+//! contains it.
 //!
 //! The paper does not define weights in exterior cells: a vertex there counts as outside the cage.
 
@@ -14,7 +15,7 @@ use crate::voxelize::classic::{CellKind, ClassicCells};
 use super::outside::OutsideSampler;
 use super::{Stencil, Stencils};
 
-/// Stencils of points (object units). Each inside point takes one cell.
+/// Stencils of points (object units). A point in an interior or boundary cell takes the weights of this cell.
 #[must_use]
 pub fn stencils(
     controls: Controls<'_>,

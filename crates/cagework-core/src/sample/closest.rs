@@ -15,7 +15,7 @@ pub struct ClosestOnCage<'a> {
 }
 
 impl<'a> ClosestOnCage<'a> {
-    /// Boxes of the faces of a cage in its rest pose.
+    /// Computes the bounding box of each face of a cage in its rest pose.
     #[must_use]
     pub fn new(cage: &'a Cage) -> Self {
         let mut first = 0;

@@ -1,9 +1,10 @@
-//! Re-entrant edges of the cage, next to which some rays end at a wall and others pass.
+//! Re-entrant edges of the cage, next to which some of the axis-parallel rays of [`super::embedded`] end at a wall and
+//! others pass.
 //!
 //! Sampled weights would jump there by a few per cent, because a ray that just misses the edge continues to the next
-//! centres. A ray that passes an edge at less than [`REACH`] is therefore split. The closer it passes, the larger the
-//! share that ends beside the edge, with a value that tends to the value on the edge. Both shares have values inside
-//! the cage that reproduce linear functions, and their weighted mean is continuous.
+//! centres. A ray that passes an edge at less than [`REACH`] cells is therefore split. The closer it passes, the larger
+//! the share that ends beside the edge, with a value that tends to the value on the edge. The values of both parts
+//! reproduce linear functions, and their mean, weighted by the shares, is continuous.
 
 use glam::DVec3;
 
@@ -14,12 +15,13 @@ use crate::grid::Grid;
 /// Distance, in cells, up to which an edge splits a passing ray.
 pub(super) const REACH: f64 = 0.25;
 
-/// Squared distance from the centre of a cube, in cells, within which an edge can split rays in or beyond the cube:
-/// half the cube's diagonal plus [`REACH`] along two axes.
+/// Squared distance from the centre of a cube, in cells, within which an edge can split rays in or beyond the cube. The
+/// distance is half the cube's diagonal plus the diagonal of a square of side [`REACH`]; its square, 1.49, is rounded
+/// up.
 const MAX_SQUARED_DISTANCE: f64 = 1.5;
 
-/// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge. At flatter edges values hardly
-/// jump.
+/// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge. At flatter edges, sampled weights
+/// hardly jump.
 const MIN_REENTRANT_SINE: f64 = 0.25;
 
 /// Components of a unit normal that are smaller than this are rounding errors.
@@ -32,8 +34,9 @@ pub(super) const EDGE_TOLERANCE: f64 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     ends: [DVec3; 2],
-    /// One of the two facets at the edge, and the corners of that facet at the edge's ends.
+    /// One of the two facets at the edge.
     facet: u32,
+    /// Indices, 0 to 2, of the corners of `facet` at the edge's ends.
     corners: [usize; 2],
     /// For each axis of a ray, the axis along which the edge is nearest to the ray. `None` if the edge's faces do not
     /// stop rays along that axis.
@@ -48,10 +51,11 @@ pub(super) struct Passage {
     /// Offset from the ray to the edge as two steps `(axis, signed length)`. The second length is 0 unless the ray
     /// passes beyond an end of the edge.
     pub(super) steps: [(usize, f64); 2],
-    /// Share that ends at this edge, of the ray's weight that nearer edges let pass.
+    /// Fraction of the ray that ends beside this edge, relative to the part of the ray that passes all nearer edges.
     pub(super) share: f64,
-    /// Facet and barycentric coordinates of the nearest point on the edge.
+    /// Facet on which the nearest point of the edge lies.
     pub(super) facet: u32,
+    /// Barycentric coordinates in `facet` of the nearest point of the edge.
     pub(super) barycentric: [f64; 3],
 }
 
@@ -60,7 +64,7 @@ fn fade(x: f64) -> f64 {
     if x < 1.0 { 1.0 - x * x * (3.0 - 2.0 * x) } else { 0.0 }
 }
 
-/// Re-entrant edges by blocks of cells.
+/// Re-entrant edges of a cage, indexed by blocks of cells.
 #[derive(Clone, Debug)]
 pub(super) struct EdgeLists {
     edges: Vec<Edge>,
@@ -110,9 +114,9 @@ impl EdgeLists {
         });
     }
 
-    /// Passages of a ray from `p` along `axis` by the edges `some`, nearest first. `up`: direction of the ray; `end`:
-    /// distance at which it ends. If it does not end at a wall, edges beyond its end also count, with a share that
-    /// decreases with their distance from the end.
+    /// Passages of a ray from `p` along `axis` by the edges with the indices `some`, nearest first. `up`: whether the
+    /// ray points up the axis; `end`: distance at which the ray ends. If it does not end at a wall, edges beyond its
+    /// end also count, with a share that decreases with their distance from the end.
     pub(super) fn passed(
         &self,
         some: &[u32],
@@ -133,8 +137,8 @@ impl EdgeLists {
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
-            // Of the two opposite rays from a point that is level with an edge, only the upward one passes it, and none
-            // does if the ray's wall ends at the edge.
+            // If the edge lies at distance 0, of the two opposite rays only the upward one passes it. That ray does not
+            // pass the edge either if it ends at a wall there.
             let ahead = distance > 0.0 || up && distance == 0.0;
             let steps = [across, along].map(|axis| (axis, beside[axis]));
             let apart = beside[across].hypot(beside[along]);
@@ -164,7 +168,7 @@ fn is_sheet(cage: &Cage, f: u32, g: u32) -> bool {
     cage.facets()[g as usize].iter().all(|i| cage.facets()[f as usize].contains(i))
 }
 
-/// A boundary edge of an inner sheet, which is open on all sides.
+/// A boundary edge of an inner sheet: the cage's interior surrounds it.
 fn edge_of_sheet(lists: &TriangleLists, f: u32, k: usize) -> Edge {
     let corners = [k, (k + 1) % 3];
     let triangle = lists.triangle(f);

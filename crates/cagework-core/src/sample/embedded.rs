@@ -29,15 +29,17 @@ use super::{Stencil, Stencils};
 /// error against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
 const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 
-/// Weight of ray ends outside the cage above which a vertex's winding number decides whether the vertex is outside.
-/// Such ends also occur by rounding, next to edges.
+/// If the total weight of ray ends outside the cage lies between this and 1 minus this, the winding number decides
+/// whether a vertex is outside. Rounding next to edges also causes such ends.
 const MAX_OUTSIDE_WEIGHT: f64 = 1e-6;
 
-/// Threshold of the winding number at a point of a facet, computed without that facet. It is the mean of the winding
-/// numbers on both sides: 0.5 on an outer wall, 1 on a wall shared by two parts, at least 1.5 inside another part.
+/// A point of a facet lies inside another part of the cage if its winding number, computed without that facet, exceeds
+/// this threshold. That number is the mean of the winding numbers on both sides: 0.5 on an outer wall, 1 on a wall
+/// shared by two parts, and at least 1.5 inside another part. The threshold is halfway between 1 and 1.5.
 const MIN_INNER_WINDING: f64 = 1.25;
 
-/// Fraction of the way to the facet's centroid by which points on its sides are moved.
+/// Fraction of the way to the facet's centroid by which a point is moved before its winding number is computed, because
+/// winding numbers are ambiguous on the sides of facets.
 const SIDE_OFFSET: f64 = 1e-6;
 
 /// Computes sampling stencils of vertices in an embedded grid.
@@ -59,8 +61,10 @@ pub struct Sampler<'a> {
 struct Scratch {
     near: Vec<u32>,
     edges: Vec<u32>,
-    /// Facets in the cube that contains a point beside an edge, and facets in the cube across the edge.
+    /// Facets in the cube of a point beside an edge.
     here: Vec<u32>,
+    /// Facets in a second cube: that of the point one cell from the edge, or, for an edge beyond the cube of the ray,
+    /// that of the ray's point beside the edge.
     other: Vec<u32>,
     stencil: Stencil,
     /// Total weight of ray ends that lie outside the cage.
@@ -73,7 +77,7 @@ type Wall = (u32, [f64; 3], bool);
 /// An end of a segment: distance from the start, and the point on the cage if it ends there.
 type End = (f64, Option<Wall>);
 
-/// A point in a cube between centres that is to be interpolated.
+/// A point, in a cube between eight centres, whose value is to be interpolated.
 #[derive(Clone, Copy)]
 struct Query<'a> {
     /// The cube's lowest corner.
@@ -142,7 +146,7 @@ impl<'a> Sampler<'a> {
         self.lists.bytes() + self.edges.bytes()
     }
 
-    /// Computes `scratch.stencil`; false if the point is outside the cage.
+    /// Computes the stencil of a point in `scratch.stencil`. Returns false if the point is outside the cage.
     fn stencil(&self, point: DVec3, scratch: &mut Scratch) -> bool {
         scratch.stencil.clear();
         scratch.outside = 0.0;
@@ -180,8 +184,9 @@ impl<'a> Sampler<'a> {
         inside && scratch.outside < 1.0
     }
 
-    /// The triangle on which a point lies, within the resolution of f32, and the point's barycentric coordinates.
-    /// Rounding decides whether rays from such a point hit the triangle, and they may leave the cage through an edge.
+    /// The triangle on which a point lies, within the resolution of f32, and the point's barycentric coordinates. Such
+    /// a point takes the triangle's values, because rounding decides whether rays from it hit the triangle, and rays
+    /// that miss may leave the cage.
     fn touching(&self, p: DVec3, near: &[u32]) -> Option<(u32, [f64; 3])> {
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
@@ -239,14 +244,14 @@ impl<'a> Sampler<'a> {
     /// axis.
     fn descend_past(&self, at: Query<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
         let (p, axis) = (at.p, at.order[0]);
-        // Share of the ray, length and end of each part.
+        // For each part of the ray: its share of the ray, its length, and where it ends.
         let parts = [0, 1].map(|side| {
             let mut left = 1.0;
             let mut parts = Vec::new();
             for passage in &passed[side] {
                 let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
-                    // The edge lies beyond the cube, and a wall between them may stop the ray.
+                    // The edge lies beyond the cube, and a wall between `p` and the edge may stop the ray.
                     let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
@@ -303,7 +308,7 @@ impl<'a> Sampler<'a> {
         self.lists.in_cube(low, &mut scratch.other);
         self.lists.in_cube(self.cube_of(p), &mut scratch.here);
         let mut reach = [1.0 - offset.abs(); 2];
-        // The faces that meet at the edge must not occlude it.
+        // Stop the ray just before the edge, so that it does not end on a face that meets there.
         reach[side] = offset.abs() - EDGE_TOLERANCE;
         let ends = self.ends(p, axis, reach, [&scratch.here, &scratch.other]);
         let t = share(ends[side].0, ends[1 - side].0);
@@ -366,8 +371,8 @@ impl<'a> Sampler<'a> {
             .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
     }
 
-    /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If faces
-    /// coincide, as between two parts, the face seen from behind is taken.
+    /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If two faces
+    /// coincide, as where two parts touch, the segment ends at the face whose back it hits.
     fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near.into_iter().flatten() {

@@ -20,13 +20,13 @@ pub use closest::ClosestOnCage;
 /// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsidePoint {
-    /// Index of the vertex.
+    /// Index of the vertex in the mesh.
     pub vertex: u32,
     /// Facet of the cage with the closest point.
     pub triangle: u32,
-    /// Barycentric coordinates of the closest point.
+    /// Barycentric coordinates of the closest point in `triangle`.
     pub barycentric: [f64; 3],
-    /// Distance of the vertex from this point, object units.
+    /// Distance of the vertex from the closest point of the cage, object units.
     pub distance: f64,
     /// Share of the cage's motion that the vertex follows, 0 to 1.
     pub share: f64,
@@ -43,7 +43,7 @@ pub struct Stencils {
     pub outside: Vec<OutsidePoint>,
 }
 
-/// Nodes or hats of a vertex: `(key, weight)`.
+/// Nodes, `(row of the field, weight)`, or hats, `(control, weight)`, of a vertex.
 pub type Entries<'a> = &'a [(u32, f32)];
 
 /// Stencil of a vertex under construction.
@@ -87,7 +87,7 @@ impl Stencils {
         Self { node_start: vec![0], hat_start: vec![0], ..Self::default() }
     }
 
-    /// Number of vertices.
+    /// Number of vertices whose stencils are stored.
     #[must_use]
     pub fn len(&self) -> usize {
         self.node_start.len() - 1
@@ -128,7 +128,8 @@ impl Stencils {
 
     /// Weights of all vertices for the columns of one batch.
     ///
-    /// `field`: the batch's solution. Writes `[n_vertices]` rows of lanes to `out`. GPU twin: `sample_weights`.
+    /// `field`: the batch's solution. Writes `[n_vertices]` rows of lanes to `out`. GPU kernel:
+    /// `shaders/sample_weights.wgsl`.
     pub fn sample_weights(&self, batch: usize, field: &[Row], out: &mut Vec<Row>) {
         dispatch(
             #[inline(always)]

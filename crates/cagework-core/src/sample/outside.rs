@@ -1,10 +1,11 @@
 //! Weights of points outside the cage.
 //!
-//! Near the cage, weights are extrapolated linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t
-//! w(q)`, with t = 1 and q the mirror image of x about p. Both rows reproduce positions, so the result does. If the
-//! cage is thin, q moves at most to the middle of it. If q is not inside, at an edge sharper than the angle towards x,
-//! the row is w(p), and an offset that moves with the whole cage adds the rest (`bind/offsets.rs`). The weights and the
-//! offset fade out with distance from the cage.
+//! Near the cage, the weights of a point x are extrapolated linearly through the closest point p of the cage:
+//! `w(x) = (1 + t) w(p) - t w(q)`, with t = 1 and q the mirror image of x about p. The rows w(p) and w(q) reproduce
+//! positions, and therefore so does w(x). If the cage is thin, q moves at most to the middle of the cage. Beside a
+//! sharp edge, q may lie outside the cage. The row is then w(p), and an offset that moves with the whole cage
+//! (`bind/offsets.rs`) accounts for the displacement from p to x. The weights and the offset fade out with distance
+//! from the cage.
 
 use glam::DVec3;
 
@@ -72,8 +73,8 @@ impl<'a> OutsideSampler<'a> {
         let step = distance.min(0.5 * open);
         let (at, mut other) = (at + step * inwards, Stencil::default());
         if inside(at, &mut other) {
-            // If q is close to another wall, reduce t: q then has the values of that wall, as at an edge that is too
-            // sharp.
+            // If q (the point `at`) is close to another wall, its weights are those of that wall. Reduce t in that
+            // case. With t = 0, the row is w(p), as at an edge that is too sharp.
             let depth = self.closest.find(at).distance;
             let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
             for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
@@ -88,7 +89,7 @@ impl<'a> OutsideSampler<'a> {
         found
     }
 
-    /// Share of the cage's motion that a point follows. `distance`: fraction of the cage's diagonal.
+    /// Share of the cage's motion that a point at a `distance` from the cage (fraction of the cage's diagonal) follows.
     fn share(&self, distance: f64) -> f64 {
         if self.policy == OutsidePolicy::Stay {
             return 0.0;

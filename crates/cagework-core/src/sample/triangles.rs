@@ -5,8 +5,8 @@ use glam::DVec3;
 use crate::cage::Cage;
 use crate::grid::Grid;
 
-/// Number of cells along a block's side. Candidates of a block are filtered per cell, so a block may list too many
-/// boxes.
+/// Number of cells along a block's side. The list of a block is filtered for each cell, so it may contain boxes that do
+/// not meet the cell.
 const BLOCK: u32 = 8;
 
 /// Tolerance of the overlap tests, in cells, against rounding of cell coordinates (up to 512 in f64).
@@ -15,14 +15,14 @@ const TOLERANCE: f64 = 1e-9;
 /// A facet of the cage in cell coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct CellTriangle {
-    /// Corners.
+    /// Corners, in cell coordinates.
     pub corners: [DVec3; 3],
     low: DVec3,
     high: DVec3,
     normal: DVec3,
 }
 
-/// Numbers of the boxes that meet each block of `BLOCK`^3 cells.
+/// For each block of `BLOCK`^3 cells, the indices of the boxes that meet the block.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     n_blocks: [u32; 3],
@@ -153,7 +153,7 @@ impl TriangleLists {
         &self.triangles
     }
 
-    /// The triangle of a facet.
+    /// The triangle of the facet with index `number`.
     #[must_use]
     pub fn triangle(&self, number: u32) -> &CellTriangle {
         &self.triangles[number as usize]
@@ -171,7 +171,7 @@ impl TriangleLists {
 pub struct Crossing {
     /// Signed distance from the point along the axis, in cells.
     pub distance: f64,
-    /// Barycentric coordinates.
+    /// Barycentric coordinates of the intersection in the triangle.
     pub barycentric: [f64; 3],
     /// Whether the triangle faces up the axis.
     pub faces_up: bool,

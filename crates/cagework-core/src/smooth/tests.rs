@@ -68,8 +68,8 @@ fn rows_equal_those_of_the_factored_scheme() {
     }
 }
 
-/// Corner of a cube of edge 2, in units of the half diagonal: three face centres at 1/3 and three edge midpoints at 2/3
-/// give (1/3 + 2 2/3) / 3 = 5/9.
+/// Positions along the diagonal of a cube, with the corner at 1: face centres are at 1/3 and edge midpoints at 2/3. The
+/// corner, of valence 3, moves to (F + 2 R) / 3 = (1/3 + 4/3) / 3 = 5/9.
 #[test]
 fn corner_of_a_cube_moves_to_five_ninths() {
     let mesh = PolygonMesh { positions: cube().positions.iter().map(|p| 2.0 * p - 1.0).collect(), ..cube() };
@@ -79,16 +79,16 @@ fn corner_of_a_cube_moves_to_five_ninths() {
     assert_eq!(made.face_of, (0..24).map(|k| k / 4).collect::<Vec<u32>>());
 }
 
-/// The rules on triangles, evaluated by hand: a vertex of valence three is the mean of itself, of its neighbours' mean
-/// and of its faces' centroids; an edge point is the mean of two ends and two centroids.
+/// The Catmull-Clark rules on triangles, evaluated by hand. A vertex of valence three moves to the mean of itself, of
+/// its neighbours' mean and of its faces' centroids' mean. An edge point is the mean of two ends and two centroids.
 #[test]
 fn rows_of_a_tetrahedron_are_simple_fractions() {
     let rows = subdivide(&tetrahedron(), 1).rows;
     let expected = [
         (0, [12.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0]),
-        // Row 4: the edge of vertices 0 and 1 comes first.
+        // Row 4 is the first edge point, on the edge of vertices 0 and 1.
         (4, [5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0, 1.0 / 12.0]),
-        // Row 10: the first face does not contain vertex 3.
+        // Row 10 is the first face point; its face does not contain vertex 3.
         (10, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0]),
     ];
     for (row, expected) in expected {

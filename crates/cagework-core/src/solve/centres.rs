@@ -71,8 +71,8 @@ impl Centres {
     }
 
     /// Writes the coarse right-hand side `out`, `[n_rows]` of the coarse level, from the residual of `u` at the
-    /// centres. Returns half the mean squared residual at the centres, which are red cells: after a sweep over black
-    /// cells, half of all cells, residuals there are 0. For smooth residuals this estimates the mean over all cells.
+    /// centres. Returns half the mean squared residual at the centres, which are red cells. Half of all cells are black
+    /// and have no residual after a black half sweep, so for smooth residuals this estimates the mean over all cells.
     #[inline(always)]
     pub fn inject(&self, fine: &Level, coarse: &Level, u: &mut [Row], rhs: Rhs<'_>, out: &mut [Row]) -> f64 {
         let (own, other) = split(fine, u, 0);

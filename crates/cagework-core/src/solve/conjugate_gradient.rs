@@ -1,10 +1,11 @@
 //! Conjugate gradients on a batch of columns, optionally preconditioned by a V-cycle.
 //!
-//! Each lane is a separate system with its own step lengths; the batch ends when all lanes have converged. Directions
-//! are updated by the Polak-Ribiere formula, which allows an unsymmetric preconditioner such as a V(2,1) cycle.
+//! Each lane is a separate system with its own step lengths; delta is common to all lanes. Directions are updated by
+//! the Polak-Ribiere formula, which allows an unsymmetric preconditioner such as a V(2,1) cycle.
 //!
 //! Delta estimates the remaining error. Changes of the solution decrease geometrically up to a ripple, so the remaining
-//! error is the latest change times `rate / (1 - rate)`, with the rate over the last `WINDOW` steps.
+//! error is the latest change times `rate / (1 - rate)`. The rate compares the last `WINDOW` steps with as many before
+//! them.
 //!
 //! A V-cycle that diverges for some errors may be an indefinite preconditioner. If the preconditioned residual is not a
 //! descent direction, the step uses the residual itself.
@@ -18,17 +19,18 @@ use super::stop::{SolveReport, StopRule};
 use super::{BatchSolver, Preconditioner};
 use crate::simd::dispatch;
 
-/// Largest number of steps over which the convergence rate is measured: longer than the ripple of the changes, 5 to 8
-/// steps.
+/// Largest number of steps in each of the two windows from which the convergence rate is measured. Changes of the
+/// solution ripple with a period of 5 to 8 steps, and a window must be longer than that.
 const WINDOW: usize = 10;
 
-/// Upper bound on the measured rate.
+/// Upper bound on the measured convergence rate. The error estimate divides by 1 - rate.
 const RATE_BOUND: f64 = 0.99;
 
-/// A preconditioned solve counts as converged after this many steps without a smaller delta near the resolution of f32.
+/// Near the resolution of f32, a preconditioned solve counts as converged after this many steps without a smaller
+/// delta.
 const MAX_STALLED_STEPS: usize = 8;
 
-/// Rows whose products are summed in f32 before they are added in f64.
+/// Number of rows whose products are summed in f32; these partial sums are added in f64.
 const ROWS_PER_SUM: usize = 1024;
 
 /// One number per lane.
@@ -64,7 +66,7 @@ impl ConjugateGradient {
         }
     }
 
-    /// Continues from `u`, where cycles of the preconditioner stalled, and stores the solution there. `rhs`: one row
+    /// Continues from `u`, the latest iterate of V-cycles that stalled, and stores the solution in `u`. `rhs`: one row
     /// per cut cell; `report`: the report of the cycles, which count towards the limit on iterations.
     pub(super) fn resume(
         &mut self,
@@ -81,7 +83,7 @@ impl ConjugateGradient {
         report
     }
 
-    /// Applies the preconditioner to the residual. Returns `r . z` and `r . r`.
+    /// Applies the preconditioner to the residual. Returns the dot products `r . z` and `r . r` of each lane.
     fn precondition(
         &mut self,
         hierarchy: &Hierarchy,
@@ -116,7 +118,8 @@ impl ConjugateGradient {
         let level = &hierarchy.levels[0];
         let n_unknowns = level.n_unknowns().max(1) as f64;
         let (is_preconditioned, mut changes) = (cycle.is_some(), Vec::new());
-        // After diverged cycles, the first step removes the errors that they amplified: exclude it from the rate.
+        // After cycles that diverged, the first step removes the errors that they amplified: exclude its change from
+        // the rate.
         let unlike = usize::from(report.stalled);
         let [mut descent, mut squares] = self.precondition(hierarchy, &mut cycle);
         self.direction.copy_from_slice(&self.z);
@@ -145,7 +148,7 @@ impl ConjugateGradient {
             let before = descent;
             [descent, squares] = self.precondition(hierarchy, &mut cycle);
             let overlap = products(&self.z, &self.image);
-            // z . (r - r_before), where r - r_before = -step image.
+            // Dot product z . (r - r_before), in which r - r_before = -step image.
             let conjugate: Lanes = std::array::from_fn(|k| -step[k] * overlap[k]);
             let share = quotients(&conjugate, &before);
             scale(&mut self.direction, &share);
@@ -206,13 +209,14 @@ fn expected_error(squares: &[f64]) -> f64 {
         return 0.0;
     }
     let rate = (now / before).powf(0.5 / window as f64).min(RATE_BOUND);
-    // Change expected from the window's mean. The latest change alone may be smaller by the ripple.
+    // Latest change, estimated from the RMS change over the window: changes ripple, so the measured latest change may
+    // be unusually small.
     let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
     // Weights lie between 0 and 1.
     (usual.max(latest) * rate / (1.0 - rate)).min(1.0)
 }
 
-/// `a . b` per lane.
+/// Dot product of `a` and `b` in each lane.
 fn products(a: &[Row], b: &[Row]) -> Lanes {
     dispatch(
         #[inline(always)]
@@ -239,7 +243,7 @@ fn quotients(a: &Lanes, b: &Lanes) -> Lanes {
     std::array::from_fn(|k| if b[k] > 0.0 { a[k] / b[k] } else { 0.0 })
 }
 
-/// `u += factor v`
+/// Adds `factor * v` to `u`, with a factor per lane.
 fn add(u: &mut [Row], factor: &Lanes, v: &[Row]) {
     let factor = factor.map(|f| f as f32);
     dispatch(
@@ -254,7 +258,7 @@ fn add(u: &mut [Row], factor: &Lanes, v: &[Row]) {
     );
 }
 
-/// `u *= factor`
+/// Multiplies `u` by a factor per lane.
 fn scale(u: &mut [Row], factor: &Lanes) {
     let factor = factor.map(|f| f as f32);
     for row in u {
@@ -270,7 +274,8 @@ mod tests {
     use crate::levels::plain::hierarchy;
     use crate::solve::multigrid::Workspace;
 
-    /// Changes that decrease by 0.8 per step leave 0.8 + 0.64 + ... = 0.8 / (1 - 0.8), four times the latest.
+    /// After changes that decrease by 0.8 per step, the remaining error is 0.8 + 0.64 + ... = 0.8 / (1 - 0.8) = 4 times
+    /// the latest change.
     #[test]
     fn remaining_error_of_geometric_changes_is_their_sum() {
         let squares: Vec<f64> = (0..40).map(|k| 0.8f64.powi(2 * k)).collect();

@@ -1,15 +1,16 @@
-//! The paper's solver: Jacobi sweeps (Algorithm 3), with Eq. 2 as stopping rule.
+//! The solver of K. Smith's paper (`docs/method.md`, sources): Jacobi sweeps (Algorithm 3), with Eq. 2 as stopping
+//! rule.
 //!
-//! Every sweep replaces each unknown by the average of its neighbours' old values, until the mean change of a cell's
-//! weight vector falls below tau.
+//! Every sweep replaces each unknown by the average of its neighbours' old values, until delta, the mean change of a
+//! cell's weight vector, falls below the tolerance tau.
 //!
 //! Changes versus the paper:
 //! - Two buffers are swapped instead of copied.
-//! - Each thread owns whole batches of columns, so no two threads write the same cell. This avoids the paper's locks
-//!   and queue of cells, which made its threads slower than one.
-//! - A batch runs several sweeps while it is in the cache. The changes of each sweep are stored separately and summed
-//!   over batches afterwards, so delta is known after every sweep. The number of sweeps per round is predicted from
-//!   delta's decay, so that the last round ends at the sweep at which the rule holds.
+//! - Each thread owns whole batches of columns, so no two threads write the same value. This avoids the paper's locks
+//!   and queue of cells, which made several threads slower than one.
+//! - A batch runs a round of several sweeps while it is in the cache. The changes of each sweep are stored separately
+//!   and summed over batches afterwards, so delta is known after every sweep. The number of sweeps per round is
+//!   predicted from delta's decay, so that the last round hardly runs past the sweep at which the rule holds.
 //!
 //! Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, unlike in
 //! multigrid.
@@ -29,7 +30,7 @@ const MAX_ROUND: usize = 8;
 /// Fraction of the predicted remaining sweeps that the next round runs.
 const PREDICTION_SHARE: f64 = 0.8;
 
-/// Cells per task when changes are summed.
+/// Number of cells per task when changes are summed.
 const CELLS_PER_PIECE: usize = 4096;
 
 /// Old and new values of a batch, with its right-hand side.
@@ -56,7 +57,7 @@ pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) ->
         + threads * MAX_ROUND as u64 * 4 * (n_unknowns + 2)
 }
 
-/// Stop after this many sweeps without progress: the rest is rounding noise.
+/// Stop after this many sweeps without a smaller delta: further changes are rounding noise.
 pub const STALLED_SWEEPS: usize = 128;
 
 /// Solves all columns on the finest level. Returns the fields of the batches in order.
@@ -101,8 +102,8 @@ pub fn solve(
     Ok((fields, report))
 }
 
-/// Number of sweeps of the next round, so that it ends before the sweep at which delta, extrapolated geometrically,
-/// meets tau.
+/// Number of sweeps of the next round, chosen so that the round ends before the sweep at which delta, extrapolated
+/// geometrically, meets tau.
 fn next_round(history: &[f64], tau: f64) -> usize {
     let n = history.len();
     if n < 4 {

@@ -19,11 +19,8 @@ use stop::{SolveReport, StopRule};
 
 /// Solves batches of columns one after another on the finest level, in fields allocated once.
 pub trait BatchSolver {
-    /// Solves a batch from an initial guess of its own. Calls `done(iteration, delta)` after each iteration; returning
-    /// false cancels.
-    ///
-    /// # Errors
-    /// `None` if cancelled.
+    /// Solves a batch from an initial guess that the solver chooses. Calls `done(iteration, delta)` after each
+    /// iteration; if it returns false, the solve stops and returns `None`.
     fn solve(
         &mut self,
         hierarchy: &Hierarchy,
@@ -41,7 +38,7 @@ pub trait BatchSolver {
 
 /// Preconditioner of conjugate gradients.
 pub trait Preconditioner: std::fmt::Debug + Send {
-    /// An approximate solution `z` of `A z = r`. Both `[n_rows]`.
+    /// Writes an approximate solution of `A z = r` to `z`. `r` and `z` are `[n_rows]`.
     fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>);
 
     /// Size of all fields, bytes.

@@ -3,14 +3,15 @@
 //! Solves the discrete Laplace equation of the embedded boundary for [`LANES`] right-hand sides at once, with red-black
 //! Gauss-Seidel as smoother; each coarse level is discretised from the cage itself. The first black half sweep of a
 //! cycle is over-relaxed by `OMEGA` (Yavneh 1996). At no additional cost, V(2,1) then converges as fast as V(2,2) does
-//! without over-relaxation. RMS error of a cell's weights on the Armadillo, g = 64, with 16 columns per batch: 5.7e-4
-//! after full multigrid, then 3.1e-5, 2.5e-6 and 2.3e-7 after one, two and three more cycles. The initial guess of a
-//! level is the mean of the coarse solution at the neighbouring unknowns. Trilinear interpolation with zeros outside
-//! would be worse (error 7.5e-2 instead of 2.9e-2), since the solution is not zero on the cage.
+//! without over-relaxation. RMS error of a cell's weights on the Armadillo at g = 64, measured with batches of 16
+//! columns: 5.7e-4 after full multigrid, then 3.1e-5, 2.5e-6 and 2.3e-7 after one, two and three more cycles. The
+//! initial guess of a level is the mean of the coarse solution at the neighbouring unknowns. Trilinear interpolation
+//! with zeros outside would be worse (error 7.5e-2 instead of 2.9e-2), since the solution is not zero on the cage.
 //!
-//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)), which makes cycles
-//! cheaper: the Armadillo's 14 batches take 42 cycles instead of 43, and end at an error of 4e-6 instead of 7e-6 (5e-6
-//! with the shorter last cycle, see [`Convergence::is_nearly_done`]).
+//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)) instead of
+//! averaged. That makes a cycle cheaper without slowing the convergence: the Armadillo's 14 batches take 42 cycles
+//! instead of 43, and end at an error of 4e-6 instead of 7e-6 (5e-6 with the shorter last cycle, see
+//! [`Convergence::is_nearly_done`]).
 //!
 //! Coarse grids do not resolve balls and cavities smaller than their cells, and overcorrect there. If cycles converge
 //! slowly or diverge ([`Convergence::stalls`]), conjugate gradients preconditioned by the cycles continue from the
@@ -35,14 +36,14 @@ use crate::simd::dispatch;
 
 use stream::{BETWEEN, BETWEEN_SHORT, DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, stream};
 
-/// Over-relaxation of the first black half sweep: values from 1.1 to 1.3 all reduce the error 1.5 to 2 times per cycle
-/// (Armadillo).
+/// Over-relaxation of the first black half sweep: values from 1.1 to 1.3 all reduce the error by a further factor of
+/// 1.5 to 2 per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;
 
 /// If the last cycle is predicted to land this factor below tolerance, it skips one of its sweeps.
 const SHORT_CYCLE_MARGIN: f64 = 1.5;
 
-/// Sweeps on the coarsest level, which has at most a few hundred unknowns, about six across.
+/// Number of sweeps on the coarsest level, which usually has at most 200 unknowns and is about six cells across.
 pub const COARSEST_SWEEPS: usize = 8;
 
 /// Over-relaxation factor of the sweeps on the coarsest level. For six cells across, Jacobi contracts by 0.90, for
@@ -52,7 +53,8 @@ pub const COARSEST_OMEGA: f32 = 1.4;
 /// Fields of a batch on every level; allocated once per thread and reused for all its batches.
 #[derive(Debug)]
 pub struct Workspace {
-    /// `u[0]`: the solution; on coarser levels, `u[k]` is the correction. `[n_rows]`
+    /// `u[0]`: the solution; on coarser levels, `u[k]` is the correction or, while full multigrid computes the initial
+    /// guess, the level's solution. `[n_rows]`
     u: Vec<Vec<Row>>,
     /// `f[0]`: right-hand side, one row per cut cell or, in [`Self::precondition`], per cell; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
@@ -103,8 +105,9 @@ impl Workspace {
         if k == 0 && !is_finest_dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
     }
 
-    /// Pre-smoothing of level k by the passes `start`, and cycles on all coarser levels. Returns the squared norm of
-    /// the coarse correction (on level 0) and the mean squared residual.
+    /// Smooths level k by the passes `start`, then runs a cycle on the coarser levels; solves the coarsest level by
+    /// sweeps. The caller for level 0 uses both results: the mean squared correction that level 1 computes, and the
+    /// mean squared residual of level 0.
     fn down(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) -> (f64, f64) {
         let level = &hierarchy.levels[k];
         if k + 1 == hierarchy.levels.len() {
@@ -123,7 +126,7 @@ impl Workspace {
         let mean_square = dispatch(
             #[inline(always)]
             || {
-                // Passes after a coarse correction do not compute a residual: inject it.
+                // Passes after a coarse correction compute no residual: compute it only at the centres of coarse cells.
                 if start.last() != Some(&Pass::Residual) {
                     return hierarchy.centres.inject(level, coarse, &mut u[0], rhs, &mut coarse_f[0]);
                 }
@@ -149,7 +152,7 @@ impl Workspace {
 }
 
 impl Preconditioner for Workspace {
-    /// One V(2,1) cycle from zero.
+    /// Applies one V(2,1) cycle to `A z = r`, starting from `z = 0`.
     fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
         self.is_finest_dense = true;
         std::mem::swap(&mut self.f[0], r);
@@ -223,7 +226,7 @@ impl BatchSolver for Workspace {
     }
 }
 
-/// A red-black Gauss-Seidel sweep.
+/// Runs a red-black Gauss-Seidel sweep over a level.
 fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     dispatch(
         #[inline(always)]

@@ -1,16 +1,16 @@
 //! The discrete Laplace operator of a level.
 //!
-//! Each unknown has an arm to each of its six neighbours. A whole arm has weight a = 1. An arm that the cage cuts ends
-//! there and has weight a >= 1, the inverse of its length in cells. For cell c,
+//! Each unknown has an arm towards each of its six neighbours. A whole arm has weight a = 1. An arm that the cage cuts
+//! ends there and has weight a >= 1, the inverse of its length in cells. For cell c,
 //! `(A u)_c = (sum of a over all arms) u_c - sum of u over the neighbours at the ends of whole arms`. Arms that end on
-//! the cage contribute to the right-hand side. A is symmetric positive definite for both methods. Source: Gibou et al.
-//! 2002.
+//! the cage contribute to the right-hand side. A is symmetric positive definite, both with the cut arms of the embedded
+//! method and with the whole arms of the classic one. Source: Gibou et al. 2002.
 
 use super::rows::{Rhs, Row, ZERO, residual_plane};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-/// `out = A u`. `u`, `out`: `[n_rows]`; the zero rows of `u` must be zero.
+/// Computes `out = A u`. `u`, `out`: `[n_rows]`; the placeholder rows of `u` for cells outside must contain zeros.
 pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
     residual(level, u, Rhs::Zero, out);
     for row in out {
@@ -18,8 +18,8 @@ pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
     }
 }
 
-/// Writes `out = f - A u` and returns the sum of squares of `out` per lane. `u`, `out`: `[n_rows]`; the zero rows of
-/// `u` must be zero.
+/// Writes `out = f - A u` and returns the sum of squares of `out` per lane. `u`, `out`: `[n_rows]`; the placeholder
+/// rows of `u` for cells outside must contain zeros.
 pub fn residual(level: &Level, u: &[Row], f: Rhs<'_>, out: &mut [Row]) -> Row {
     dispatch(
         #[inline(always)]

@@ -1,4 +1,4 @@
-//! Fields and streaming kernels: optimised versions of the plain loops in `stencil`.
+//! Fields and streaming kernels: optimised versions of the plain loops in [`crate::stencil`].
 //!
 //! A field holds one *batch* of controls: a row of [`LANES`] values per cell, in the level's order (`[red .., 0, black
 //! .., 0]`). Every kernel works on one z-plane of one colour, so that callers can run several half sweeps a plane apart
@@ -13,8 +13,8 @@ mod rhs;
 use rhs::ColourRhs;
 pub use rhs::Rhs;
 
-/// Columns per batch: one AVX register, two of SSE, NEON or wasm. With 16, the Armadillo's solve takes 25 % less time
-/// at g = 64, where a batch fits into the second-level cache, and 40 % more at g = 128, where it does not.
+/// Number of columns per batch: one AVX register, two of SSE, NEON or wasm. With 16, the Armadillo's solve takes 25 %
+/// less time at g = 64, where a batch fits into the second-level cache, and 40 % more at g = 128, where it does not.
 pub const LANES: usize = 8;
 
 /// Values of a cell for the columns of a batch.
@@ -23,10 +23,11 @@ pub type Row = [f32; LANES];
 /// A row of zeros.
 pub const ZERO: Row = [0.0; LANES];
 
-/// Smaller changes of a weight count as zero: their squares would be denormal.
+/// Changes of a weight below this count as zero. The limit has a margin over 1e-19, below which the square of a change
+/// is denormal in f32.
 const MIN_CHANGE: f32 = 1e-18;
 
-/// Splits a field by colour: (`colour`, the other one).
+/// Splits a field by colour. Returns the rows of `colour`, then the rows of the other colour.
 #[inline(always)]
 pub fn split<'a>(level: &Level, field: &'a mut [Row], colour: usize) -> (&'a mut [Row], &'a mut [Row]) {
     let (red, black) = field.split_at_mut(level.first_row(1));
@@ -72,14 +73,14 @@ struct Visit {
 struct Halves<'a> {
     /// Values of the visited colour; may be empty if old values are not requested.
     own: &'a [Row],
-    /// Values of the other colour.
+    /// Values of the neighbours' colour.
     other: &'a [Row],
 }
 
-/// Calls `each(row of out, visit)` for each cell of a colour's plane. With `OLD`, [`Visit::old`] is read from the
-/// field's own colour, which may otherwise be empty.
+/// Calls `each` for each cell of one colour in a plane, with the cell's row of `out` and the values that a kernel reads
+/// there. With `OLD`, these include the cell's own value ([`Visit::old`]); otherwise [`Halves::own`] may be empty.
 ///
-/// Slices are cut once per run, so that cells need no bounds checks.
+/// Takes slices once per run of cells, so that the loop over the cells needs no bounds checks.
 #[inline(always)]
 fn visit_plane<const OLD: bool>(
     level: &Level,
@@ -133,14 +134,15 @@ fn visit_plane<const OLD: bool>(
 
 /// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 ///
-/// Divides, like all relaxation kernels: f32 rounds 1/6 up by 3e-8, so a product would bias each cell in the same
-/// direction, and column sums would be off by 2.7e-5 at g = 128 ([`BindReport::raw_error`](crate::BindReport)).
+/// The kernel divides instead of multiplying by the inverse: f32 rounds 1/6 up by 3e-8, so a product would bias each
+/// cell in the same direction, and the sum of the weights of a point would differ from 1 by 2.7e-5 at g = 128
+/// ([`BindReport::raw_error`](crate::BindReport)).
 #[inline(always)]
 pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
 }
 
-/// [`over_relax_plane`] with zeros in this colour, whose stored values are ignored.
+/// As [`over_relax_plane`], with zeros for the cells of this colour instead of their stored values.
 #[inline(always)]
 pub fn over_relax_zeros_plane(
     level: &Level,
@@ -165,7 +167,7 @@ pub fn over_relax_zeros_plane(
     );
 }
 
-/// [`relax_plane`] of red cells with zeros in both colours, whose stored values are ignored: `u = f / diagonal`.
+/// As [`relax_plane`] for red cells, with zeros for all cells instead of their stored values: `u = f / diagonal`.
 #[inline(always)]
 pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
@@ -193,7 +195,7 @@ pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_
     }
 }
 
-/// Gauss-Seidel with the over-relaxation factor `omega`.
+/// Gauss-Seidel on one plane of one colour, with the over-relaxation factor `omega`.
 #[inline(always)]
 pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, u: &mut [Row], rhs: Rhs<'_>) {
     let (own, other) = split(level, u, colour);
@@ -252,7 +254,7 @@ pub fn residual_plane(
 /// Sums of the changes of cells in one sweep.
 #[derive(Debug)]
 pub struct Changes<'a> {
-    /// Selects what is summed over the lanes: squares of the changes, or their absolute values for the literal Eq. 2.
+    /// Selects what is summed over the lanes: squares of the changes, or absolute values for [`DeltaNorm::Literal`].
     pub norm: DeltaNorm,
     /// Sum for each cell of the colour, to which the kernel adds.
     pub of_cells: &'a mut [f32],
@@ -284,8 +286,9 @@ pub fn jacobi_plane(
             for k in 0..LANES {
                 new[k] = sum[k] / diagonal;
                 let d = (new[k] - old[k]).abs();
-                // Values decay by a factor of 6 per cell from the cage, and squares below 1e-38 are denormal, which
-                // makes sweeps three times slower for changes without effect on delta.
+                // Each sweep spreads values from the cage by one cell, and at the front they decay by a factor of 6 per
+                // cell. Squares below 1e-38 are denormal, which makes sweeps three times slower for changes without
+                // effect on delta.
                 let d = if d > MIN_CHANGE { d } else { 0.0 };
                 change[k] = d * if is_literal { 1.0 } else { d };
             }
@@ -336,7 +339,7 @@ fn gather_edges(residual: &[Row], around: &RestrictRow) -> Row {
 /// How prolongation combines the interpolated value with a black cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prolong {
-    /// Adds the coarse correction, zero outside the cage.
+    /// Adds the coarse correction, which is zero outside the cage.
     Correct,
     /// Replaces the value by the mean of those coarse cells that are unknowns, if any.
     Replace,

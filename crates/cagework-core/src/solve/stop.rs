@@ -1,18 +1,20 @@
 //! Stopping rule and report, shared by all solvers and back ends.
 //!
-//! The rule compares delta with a tolerance. Jacobi: delta is Eq. 2, the mean change of a cell per sweep. Multigrid and
-//! conjugate gradients: delta is the estimated remaining error, RMS over cells, so that tau bounds the error itself.
+//! The rule compares *delta* with a tolerance. Jacobi: delta is the mean change of a cell per sweep (Eq. 2 in
+//! K. Smith's paper; `docs/method.md`, sources). Multigrid and conjugate gradients: delta is the estimated remaining
+//! error, RMS over cells, so that the tolerance bounds the error itself.
 
-/// Stopping rule of a solve.
+/// Tolerance and limit on iterations at which a solve stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopRule {
-    /// Converged if delta is at most this. Dimensionless, like weights.
+    /// The solve has converged if delta is at most this. Dimensionless, like weights.
     pub tolerance: f64,
     /// Limit on iterations: sweeps, V-cycles, or steps of conjugate gradients.
     pub max_iterations: u32,
 }
 
-/// Limit on V-cycles of a batch, alone or as preconditioner: halving the error 60 times exceeds the precision of f32.
+/// Limit on V-cycles of a batch, alone or as preconditioner. Even cycles that only halve the error reach the precision
+/// of f32 before this limit.
 pub const MAX_CYCLES: u32 = 60;
 
 impl StopRule {
@@ -30,7 +32,7 @@ impl StopRule {
     }
 }
 
-/// Report of a solve.
+/// History and outcome of a solve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolveReport {
     /// Delta after each iteration.
@@ -45,8 +47,8 @@ pub struct SolveReport {
     pub stalled: bool,
 }
 
-/// Delta below which f32 precision may be exhausted. The remaining changes are then rounding noise (3e-8 to 1e-7 on a
-/// C-shaped cage, g = 16 to 40).
+/// Delta below which f32 precision may be exhausted. Rounding noise alone causes deltas of 3e-8 to 1e-7 (measured on a
+/// C-shaped cage, g = 16 to 40); the threshold is ten times the largest of them.
 pub const ROUND_OFF: f64 = 1e-6;
 
 impl SolveReport {
@@ -114,7 +116,7 @@ mod tests {
     #[test]
     fn batches_add_in_squares_and_finished_ones_keep_their_last_value() {
         let rule = StopRule { tolerance: 5.0, max_iterations: 9 };
-        // sqrt(3^2 + 4^2) = 5: if two batches meet their shares of the tolerance, both together meet the tolerance.
+        // Four batches that each meet a tolerance of 2.5 together meet the tolerance sqrt(4 * 2.5^2) = 5.
         assert_eq!(rule.of_batch(4).tolerance, 2.5);
         let batch = |deltas: &[f64]| SolveReport {
             deltas: deltas.to_vec(),

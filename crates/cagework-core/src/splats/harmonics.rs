@@ -49,7 +49,7 @@ pub fn harmonic_basis(direction: Vec3) -> [f32; N] {
     ]
 }
 
-/// As many directions as a band has coefficients.
+/// `n` directions on a spiral over the upper hemisphere.
 fn directions(n: usize) -> impl Iterator<Item = Vec3> {
     (0..n).map(move |k| {
         let z = 1.0 - (k as f32 + 0.5) / n as f32;
@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
 
-    /// f32 rounding, times the condition number of the sample matrices.
+    /// Tolerance for f32 rounding, which the condition numbers of the sample matrices amplify.
     const TOLERANCE: f32 = 2e-6;
 
     #[test]
@@ -155,7 +155,7 @@ mod tests {
         }
         for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             let expected = f64::from(u8::from(i == j));
-            // Error of the sum over the spiral.
+            // The tolerance covers the error of replacing the integral by a sum over the spiral.
             assert!((sums[i][j] - expected).abs() <= 1e-2, "{i} {j}: {}", sums[i][j]);
         }
     }

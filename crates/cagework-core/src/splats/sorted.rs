@@ -1,23 +1,28 @@
 //! Positions and covariances of splats, sorted by lattice cell, and the kernel that deforms them.
 
-use glam::{Vec3, Vec4};
+use glam::{Mat3, Vec3};
 
 use super::{SplatPose, Splats};
 use crate::field::{Field, Lattice};
 use crate::simd::dispatch;
 use crate::team::Team;
 
-/// Splats that a thread deforms at a time.
+/// Number of splats that a thread deforms at a time.
 const RUN: usize = 8192;
-/// Components of the field at a node: displacement and the columns of F - I, with a fourth component each.
-const LANES: usize = 16;
+/// Number of splats that are deformed at once. Their components are stored in rows, one entry per splat, so that the
+/// compiler vectorizes the loop over the splats.
+const BATCH: usize = 8;
+/// Number of components of the field at a node: the displacement and the three columns of F - I.
+const COMPONENTS: usize = 12;
+/// Number of components of a splat's pose: position and covariance.
+const ROWS: usize = 9;
 
-/// Splats at rest, sorted by lattice cell, so that those of a cell share the field's values at its corners.
+/// Splats at rest, sorted by lattice cell, so that the splats of a cell share the field's values at the cell's corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SortedSplats {
-    /// Number of each splat in [`Splats`].
+    /// Index in [`Splats`] of each splat, in sorted order.
     pub order: Vec<u32>,
-    /// Positions and covariances in this order.
+    /// Positions and covariances of the splats in sorted order.
     pub rest: SplatPose,
     /// First node of the cell of each run of splats, and the run's first splat; ascending. Splats outside the lattice
     /// are at the end, without a cell.
@@ -55,13 +60,13 @@ impl SortedSplats {
 
 /// The field in one cell as polynomials of the coordinates in the cell, 0 to 1: coefficients of
 /// 1, x, y, z, xy, xz, yz, xyz.
-struct CellPolynomial([[f32; LANES]; 8]);
+struct CellPolynomial([[f32; COMPONENTS]; 8]);
 
 impl CellPolynomial {
     #[inline(always)]
     fn new(field: &Field, first: usize) -> Self {
-        let mut c = field.lattice.corners(first).map(|node| field.lanes(node));
-        // Differences along x, y and z.
+        let mut c = field.lattice.corners(first).map(|node| field.components(node));
+        // Replace the values at the corners by their differences along x, then y, then z: these are the coefficients.
         for (low, high) in
             [(0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7)]
         {
@@ -72,7 +77,7 @@ impl CellPolynomial {
     }
 
     #[inline(always)]
-    fn at(&self, Vec3 { x, y, z }: Vec3) -> [f32; LANES] {
+    fn at(&self, Vec3 { x, y, z }: Vec3) -> [f32; COMPONENTS] {
         let factors = [x, y, z, x * y, x * z, y * z, x * y * z];
         let mut sum = self.0[0];
         for (factor, of_term) in factors.into_iter().zip(&self.0[1..]) {
@@ -82,10 +87,11 @@ impl CellPolynomial {
     }
 }
 
-/// Positions and covariances of splats in a field whose lattice they were sorted by: x + u and F S F^T. Splats outside
-/// the lattice stay. `posed` is overwritten.
+/// Moves the centres of splats by the displacement u of a field, and turns their covariances S into F S F^T with the
+/// field's gradient F. `splats` must be sorted by the lattice of the field; splats outside the lattice stay in place.
+/// Overwrites `posed`.
 ///
-/// The twin of `deform_splats.wgsl`.
+/// GPU kernel: `shaders/deform_splats.wgsl`.
 pub fn deform_splats(splats: &SortedSplats, field: &Field, team: &Team, posed: &mut SplatPose) {
     posed.positions.resize(splats.order.len(), Vec3::ZERO);
     posed.covariances.resize(splats.order.len(), [0.0; 6]);
@@ -99,7 +105,7 @@ pub fn deform_splats(splats: &SortedSplats, field: &Field, team: &Team, posed: &
     });
 }
 
-/// Deforms the splats from number `start` on.
+/// Deforms the splats of one run, from index `start` in sorted order.
 #[inline(always)]
 fn deform_run(
     splats: &SortedSplats,
@@ -127,23 +133,38 @@ fn deform_run(
         };
         let polynomial = CellPolynomial::new(field, cell as usize);
         let (corner, per_cell) = (field.lattice.position(cell), field.lattice.cell.recip());
-        let rest = rest_positions.iter().zip(rest_covariances);
-        for ((to, out), (&from, rest)) in positions.iter_mut().zip(covariances).zip(rest) {
-            let lanes = polynomial.at((from - corner) * per_cell);
-            *to = from + Vec3::new(lanes[0], lanes[1], lanes[2]);
-            let column = |k: usize| Vec4::new(lanes[4 * k], lanes[4 * k + 1], lanes[4 * k + 2], 0.0);
-            *out = bent([column(1) + Vec4::X, column(2) + Vec4::Y, column(3) + Vec4::Z], rest);
+        let rest = rest_positions.chunks(BATCH).zip(rest_covariances.chunks(BATCH));
+        let posed = positions.chunks_mut(BATCH).zip(covariances.chunks_mut(BATCH));
+        for ((positions, covariances), (rest_positions, rest_covariances)) in posed.zip(rest) {
+            let (mut from, mut to) = ([[0.0; BATCH]; ROWS], [[0.0; BATCH]; ROWS]);
+            for (k, (p, s)) in rest_positions.iter().zip(rest_covariances).enumerate() {
+                (0..3).for_each(|row| from[row][k] = p[row]);
+                (0..6).for_each(|row| from[3 + row][k] = s[row]);
+            }
+            for k in 0..BATCH {
+                let [x, y, z, s @ ..]: [f32; ROWS] = std::array::from_fn(|row| from[row][k]);
+                let p = Vec3::new(x, y, z);
+                let [ux, uy, uz, f @ ..] = polynomial.at((p - corner) * per_cell);
+                let p = p + Vec3::new(ux, uy, uz);
+                let s = bent(Mat3::from_cols_array(&f) + Mat3::IDENTITY, &s);
+                (0..3).for_each(|row| to[row][k] = p[row]);
+                (0..6).for_each(|row| to[3 + row][k] = s[row]);
+            }
+            for (k, (p, s)) in positions.iter_mut().zip(covariances).enumerate() {
+                (0..3).for_each(|row| p[row] = to[row][k]);
+                (0..6).for_each(|row| s[row] = to[3 + row][k]);
+            }
         }
     }
 }
 
-/// F S F^T.
+/// Covariance F S F^T of a deformed splat, from the covariance S at rest.
 #[inline(always)]
-fn bent(f: [Vec4; 3], &[xx, xy, xz, yy, yz, zz]: &[f32; 6]) -> [f32; 6] {
-    let column = |x: f32, y: f32, z: f32| f[0] * x + f[1] * y + f[2] * z;
-    let s = [column(xx, xy, xz), column(xy, yy, yz), column(xz, yz, zz)];
-    let x = s[0] * f[0].x + s[1] * f[1].x + s[2] * f[2].x;
-    let y = s[0] * f[0].y + s[1] * f[1].y + s[2] * f[2].y;
-    let z = s[0].z * f[0].z + s[1].z * f[1].z + s[2].z * f[2].z;
-    [x.x, x.y, x.z, y.y, y.z, z]
+fn bent(f: Mat3, &[xx, xy, xz, yy, yz, zz]: &[f32; 6]) -> [f32; 6] {
+    let s = Mat3::from_cols(Vec3::new(xx, xy, xz), Vec3::new(xy, yy, yz), Vec3::new(xz, yz, zz));
+    let [a, b, c] = [f * s.x_axis, f * s.y_axis, f * s.z_axis];
+    let x = a * f.x_axis.x + b * f.y_axis.x + c * f.z_axis.x;
+    let y = a * f.x_axis.y + b * f.y_axis.y + c * f.z_axis.y;
+    let z = a * f.x_axis.z + b * f.y_axis.z + c * f.z_axis.z;
+    [x.x, x.y, x.z, y.y, y.z, z.z]
 }

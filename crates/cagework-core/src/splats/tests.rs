@@ -17,7 +17,7 @@ fn cage() -> Cage {
     Cage::new(&subdivided_box(bounds, 0.0, [2; 3])).unwrap()
 }
 
-/// The field of a map of the cage's vertices.
+/// The field that results when `map` moves the cage's vertices.
 fn field_of(map: impl Fn(Vec3) -> Vec3) -> Field {
     let cage = cage();
     let options = BindOptions { grid: 32, ..BindOptions::default() };
@@ -89,9 +89,8 @@ fn rotation_of_the_cage_equals_rotation_of_the_capture() {
     let field = field_of(|p| rotation * p);
     let splats = splats(300);
     let (deformed, expected) = (splats.deformed(&field), splats.rotated(rotation));
-    let value = |of: &Splats, splat: usize, d: Vec3| -> Vec3 {
-        harmonic_basis(d).iter().zip(of.harmonics_of(splat)).map(|(&y, &c)| y * c).sum()
-    };
+    let value =
+        |of: &Splats, splat: usize, d: Vec3| -> Vec3 { color_along(Vec3::ZERO, of.harmonics_of(splat), d) };
     for splat in 0..splats.len() {
         assert!(deformed.positions[splat].distance(expected.positions[splat]) <= TOLERANCE);
         let [a, b] = [&deformed, &expected].map(|of| splat_covariance(of.axes(splat)));
@@ -117,7 +116,7 @@ fn rest_pose_keeps_every_bit() {
 fn sorted_kernel_equals_the_definition_for_each_splat() {
     let bend = |p: Vec3| Quat::from_rotation_z(0.4 * p.y) * p;
     let (field, mut splats) = (field_of(bend), splats(20_000));
-    // Outside the lattice, splats stay.
+    // Splats outside the lattice stay in place.
     splats.positions[5] = Vec3::new(50.0, 0.0, 0.0);
     splats.positions[6].y = -9.0;
     let pose = posed(&splats, &field);
@@ -144,7 +143,7 @@ fn decomposition_restores_the_covariance_and_small_scales() {
         let (scale, rotation) = decompose(axes);
         let again = splat_covariance(Mat3::from_quat(rotation) * Mat3::from_diagonal(scale));
         assert!(error(&again, &splat_covariance(axes)) <= COVARIANCE_TOLERANCE, "{splat}");
-        // A product of scales is the volume, which a squared matrix would lose.
+        // The product of the scales is the volume. Scales derived from a squared matrix would lose it to rounding.
         let volume = axes.determinant().abs();
         assert!((scale.element_product() - volume).abs() <= 1e-4 * volume, "{splat}");
         assert!(rotation.is_normalized());
@@ -186,7 +185,8 @@ fn shells_leave_out_haze_and_the_largest_splats() {
     splats.opacities[3] = 0.05;
     splats.scales[8] = Vec3::new(0.1, 40.0, 0.1);
     let (positions, triangles) = splats.shells();
-    // Rank 0.99 * 199, rounded up, is 198: one of 200 splats is larger.
+    // Splat 3 is left out because it is transparent. The size limit is the size with rank 198 of 0 to 199 (0.99 * 199,
+    // rounded up), so only the largest splat, number 8, is left out as well.
     assert_eq!((positions.len(), triangles.len()), (6 * 198, 8 * 198));
     let outwards = triangles[..8].iter().all(|t| {
         let [a, b, c] = t.map(|v| positions[v as usize] - splats.positions[0]);

@@ -1,8 +1,8 @@
 //! Reductions in the fixed order of the GPU's workgroups.
 
-/// Invocations per reducing workgroup.
+/// Number of invocations per reducing workgroup.
 pub const REDUCE_LANES: usize = 256;
-/// Values that a workgroup reduces to a partial sum.
+/// Number of values that a workgroup reduces to a partial sum.
 pub const REDUCE_VALUES: usize = 4096;
 
 /// Lane k sums the values k, k + 256, ...; then the lanes are summed as a tree.
@@ -21,7 +21,7 @@ fn tree_sum(values: impl Iterator<Item = f32>) -> f32 {
     sums[0]
 }
 
-/// Partial sums of squares of a field, one per 4096 quads of values. GPU twin: `shaders/sum_squares.wgsl`.
+/// Partial sums of squares of a field, one per 4096 quads of values. GPU kernel: `shaders/sum_squares.wgsl`.
 #[must_use]
 pub fn sum_squares(field: &[f32]) -> Vec<f32> {
     field
@@ -30,13 +30,13 @@ pub fn sum_squares(field: &[f32]) -> Vec<f32> {
         .collect()
 }
 
-/// Partial sums of square roots, one per 4096 values. GPU twin: `shaders/sum_roots.wgsl`.
+/// Partial sums of square roots, one per 4096 values. GPU kernel: `shaders/sum_roots.wgsl`.
 #[must_use]
 pub fn sum_roots(changes: &[f32]) -> Vec<f32> {
     changes.chunks(REDUCE_VALUES).map(|part| tree_sum(part.iter().map(|x| x.sqrt()))).collect()
 }
 
-/// Sum of partial sums. GPU twin: `shaders/reduce_sum.wgsl`.
+/// Sum of partial sums. GPU kernel: `shaders/reduce_sum.wgsl`.
 #[must_use]
 pub fn reduce_sum(partials: &[f32]) -> f32 {
     tree_sum(partials.iter().copied())

@@ -8,14 +8,16 @@ use crate::sample::Stencils;
 use crate::transfer::{ProlongRow, RestrictRow, Transfer};
 use crate::weights::Weights;
 
-/// Numbers at the start of an entry of a prolongation table, before the coarse rows.
+/// Number of values at the start of an entry of a prolongation table, before the coarse rows.
 pub const ENTRY_HEAD: usize = 2;
 
-/// Vertices per invocation in deformation, so that each control is read once for all of them. Fastest frame on lavapipe
-/// with 50,000 vertices, 112 weights each and normals: 16.3 ms with one vertex per invocation, 9.0 ms with four.
+/// Number of vertices that one invocation of the deformation kernel computes. The invocation reads each control once
+/// for all of these vertices. Shortest measured frame time on lavapipe with 50,000 vertices, 112 weights each and
+/// normals: 16.3 ms with one vertex per invocation, 9.0 ms with four.
 pub const BUNDLE: usize = 4;
 
-/// Bundles per slice of [`SlicedWeights`]. Eight fill a memory transaction of 128 bytes with little padding.
+/// Number of bundles per slice of [`SlicedWeights`]. The weights of eight bundles at one list position, 16 bytes each,
+/// fill a memory transaction of 128 bytes; more bundles would need more padding.
 pub const SLICE: usize = 8;
 
 /// Stencils of a level as arrays with one entry per row, including zero rows.
@@ -35,11 +37,11 @@ pub struct LevelTable {
 pub struct TransferTable {
     /// Fine rows around each coarse row. `[n coarse rows]`
     pub around: Vec<RestrictRow>,
-    /// Black cells between two coarse cells, one entry each: fine row, bits of the inverse number of coarse unknowns, 2
-    /// coarse rows.
+    /// Black cells between two coarse cells. An entry consists of the fine row, 1 / (number of these coarse cells that
+    /// are unknowns) as the bits of an f32, and the 2 coarse rows.
     pub faces: Vec<u32>,
-    /// Black cells between eight coarse cells, one entry each: fine row, bits of the inverse number of coarse unknowns,
-    /// 8 coarse rows.
+    /// Black cells between eight coarse cells. An entry consists of the fine row, 1 / (number of these coarse cells
+    /// that are unknowns) as the bits of an f32, and the 8 coarse rows.
     pub corners: Vec<u32>,
 }
 
@@ -67,7 +69,7 @@ pub struct SlicedWeights {
     pub weights: Vec<[f32; BUNDLE]>,
 }
 
-/// Triangles of each vertex.
+/// For each vertex, the triangles around it, from which its normal is computed.
 #[derive(Clone, Debug, Default)]
 pub struct NormalTable {
     /// First triangle of each vertex in `others`. `[n_vertices + 1]`
@@ -161,7 +163,7 @@ impl SlicedWeights {
         Self::of_rows(weights, 0..weights.n_rows())
     }
 
-    /// Slices of a range of rows.
+    /// Slices of a range of rows of a matrix of weights.
     #[must_use]
     pub fn of_rows(weights: &Weights, range: Range<usize>) -> Self {
         let n_slices = range.len().div_ceil(BUNDLE * SLICE);

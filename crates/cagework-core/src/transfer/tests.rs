@@ -81,8 +81,8 @@ fn prolongation_is_trilinear_on_black_cells() {
     }
 }
 
-/// Away from the cage, a constant residual on red cells alone is restricted with half the weight: `1/2 (1 + 12 / 4) =
-/// 2`. A constant on all 27 cells would give `8 / 2`.
+/// Away from the cage, a constant residual of 1 on the red cells alone gives `1/2 (1 + 12 / 4) = 2`. This is half of
+/// the `8 / 2` that a constant on all 27 cells would give.
 #[test]
 fn restriction_of_a_constant_is_two() {
     assert_eq!(RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE, 2.0);

@@ -1,4 +1,4 @@
-//! Cell kinds and boundary values as published: cells that the cage touches take its values.
+//! Cell kinds and boundary values of the classic method: cells that the cage touches take the cage's values.
 //!
 //! Source: Smith, "CSC 473 Harmonic Coordinates", section 3.1, Algorithms 1 and 2.
 //!
@@ -30,7 +30,7 @@ const PADDING: f64 = 1e-3;
 /// Enlargement of ranges of cells against rounding, in cells. An exact overlap test follows.
 const RANGE_WIDENING: f64 = 1e-6;
 
-/// Kind of a cell.
+/// Position of a cell relative to the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum CellKind {
@@ -76,13 +76,13 @@ impl BoundaryValues {
 /// Cell kinds and boundary values of the classic method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassicCells {
-    /// Cells along x, y, z.
+    /// Numbers of cells along x, y and z.
     pub dims: [u32; 3],
     /// Centre of cell (0, 0, 0), object units.
     pub origin: DVec3,
     /// Edge lengths of a cell, object units.
     pub cell_size: DVec3,
-    /// Kinds, x fastest, then y, z; none is untyped. `[nz, ny, nx]`
+    /// Kinds, x fastest, then y, z; no cell is untyped. `[nz, ny, nx]`
     pub kinds: Vec<CellKind>,
     /// Values of the boundary cells.
     pub boundary: BoundaryValues,
@@ -121,7 +121,7 @@ pub fn voxelize_classic(controls: Controls<'_>, grid: u32, shape: CellShape) -> 
     ClassicCells { dims: dims.into(), origin, cell_size, kinds, boundary }
 }
 
-/// Dimensions, centre of the first cell, and cell size.
+/// Dimensions of the classic grid, centre of its first cell, and cell size.
 pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DVec3, DVec3) {
     let (min, max) = (cage.bounds().min.as_dvec3(), cage.bounds().max.as_dvec3());
     let extent = max - min;
@@ -130,7 +130,7 @@ pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DV
         CellShape::Box => (UVec3::splat(grid), extent / inner),
         CellShape::Cubic => {
             let size = extent.max_element() / inner;
-            // Subtract a rounding error, so that the longest axis gets exactly `grid` cells.
+            // Subtract a tolerance for rounding, so that the longest axis gets exactly `grid` cells.
             let needed = (extent / size + 2.0 * PADDING - 1e-9).ceil();
             (needed.as_uvec3().clamp(UVec3::ONE, UVec3::splat(grid)), DVec3::splat(size))
         }
@@ -246,7 +246,7 @@ fn clip(polygon: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>, axis: usize, at: u32
     }
 }
 
-/// Smallest and largest coordinate; `None` without points.
+/// Smallest and largest coordinate along `axis`; `None` without points.
 fn range(points: &[DVec3], axis: usize) -> Option<(f64, f64)> {
     let coordinates = || points.iter().map(|p| p[axis]);
     (!points.is_empty()).then(|| {

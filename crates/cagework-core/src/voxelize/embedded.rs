@@ -2,7 +2,7 @@
 //!
 //! Lines through the centres are intersected with the cage once, on the finest grid. Parity along a line classifies
 //! each centre. Where the three axes disagree (because of rounding, or in a self-intersecting cage) the majority
-//! decides, and the cell is counted. An *arm* of an inside centre has length 1 if it reaches the neighbouring centre
+//! decides, and the cell counts as ambiguous. An *arm* of an inside centre has length 1 if it reaches the next centre
 //! without crossing the cage; otherwise it ends on the cage at a distance theta, in cells. Two centres on either side
 //! of a wall are never neighbours, however thin the wall. Coarser grids keep every second centre, so they reuse a
 //! subset of the lines.
@@ -35,7 +35,7 @@ pub struct Cells {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedding {
     lines: [Lines; 3],
-    /// Number of cells that the axes classify differently.
+    /// Number of cells for which lines along x, y and z disagree about inside and outside the cage.
     pub ambiguous: u64,
     /// Levels, finest first; at least one.
     levels: Vec<Cells>,
@@ -57,13 +57,13 @@ impl Embedding {
         Self { lines, ambiguous, levels }
     }
 
-    /// Boundary of each level, finest first.
+    /// The embedded cage on each level, finest first, with the controls that give its boundary values.
     #[must_use]
     pub fn boundaries<'a>(&'a self, controls: Controls<'a>) -> Vec<EmbeddedCells<'a>> {
         self.levels.iter().map(|cells| cells.with(controls, &self.lines)).collect()
     }
 
-    /// Notices about the cage in this grid. `cells`: along the cage's longest side.
+    /// Notices about the cage in this grid. `cells`: number of cells along the cage's longest side.
     #[must_use]
     pub fn notices(&self, controls: Controls<'_>, cells: u32) -> Vec<String> {
         let grid = &self.levels[0].grid;
@@ -110,7 +110,7 @@ pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
         for (iu, iv, hits) in lines.crossing() {
             let first = grid.line_start(axis, [iu, iv]);
             for pair in hits.chunks_exact(2) {
-                // Centres s with t0 <= s < t1 lie between an odd and an even crossing.
+                // Centres s with t0 <= s < t1 lie between an odd crossing and the next, even one, hence inside.
                 let [start, end] = [pair[0].t, pair[1].t].map(|t| t.ceil().clamp(0.0, n as f64) as usize);
                 if axis == 0 {
                     votes[first + start..first + end].iter_mut().for_each(|vote| *vote += 1);
@@ -149,13 +149,13 @@ fn is_ambiguous(votes: u8) -> bool {
 }
 
 impl Cells {
-    /// The finest level.
+    /// Classifies the cells of the finest level.
     #[must_use]
     pub fn finest(lines: &[Lines; 3], grid: Grid, votes: &[u8]) -> Self {
         Self::with_walls(lines, grid, 1, votes.iter().map(|&votes| is_inside(votes)).collect())
     }
 
-    /// The next coarser level.
+    /// Classifies the cells of the next coarser level, which keeps every second centre.
     #[must_use]
     pub fn coarsened(&self, lines: &[Lines; 3]) -> Self {
         let grid = self.grid.coarsened();

@@ -20,9 +20,9 @@ use crate::grid::Grid;
 pub struct Hit {
     /// Position along the line, in cells; cell centres are integers.
     pub t: f64,
-    /// Facet of the cage.
+    /// Index of the facet that the line intersects.
     pub triangle: u32,
-    /// Barycentric coordinates of the first two corners.
+    /// First two barycentric coordinates of the hit; all three sum to 1.
     pub barycentric: [f64; 2],
     /// Whether the triangle faces up the axis, so that a line going up leaves the cage.
     pub faces_up: bool,
@@ -37,7 +37,7 @@ pub struct Lines {
     start: Vec<u32>,
     hits: Vec<Hit>,
     overlaps: Overlaps,
-    /// Whether a line meets each face. `[n_faces]`
+    /// Whether any of the lines meets each face. `[n_faces]`
     met: Vec<bool>,
 }
 
@@ -48,7 +48,7 @@ pub struct Overlaps {
     pub parts: Vec<[u32; 2]>,
     /// Lowest corner of the bounding box of all walls inside other parts, in cells.
     pub low: DVec3,
-    /// Highest corner of this box, in cells.
+    /// Highest corner of the bounding box of all walls inside other parts, in cells.
     pub high: DVec3,
 }
 
@@ -119,8 +119,8 @@ impl Lines {
         lines
     }
 
-    /// Keeps only the hits at which a line enters or leaves the union of all parts. Hits within `same` cells coincide:
-    /// there a line leaves one part before it enters another.
+    /// Keeps only the hits at which a line enters or leaves the union of all parts. Hits at most `same` cells
+    /// apart count as coincident: the line leaves one part before it enters another.
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
@@ -173,7 +173,7 @@ impl Lines {
         self.hits.truncate(kept);
     }
 
-    /// Whether a line meets a face of the cage, including faces inside other parts.
+    /// Whether any of the lines meets a face of the cage, including faces inside other parts.
     #[must_use]
     pub fn meets_face(&self, face: usize) -> bool {
         self.met[face]
@@ -220,7 +220,9 @@ fn cover(
         (low.ceil().max(0.0) as u32, high.floor().min(f64::from(grid.dims[a]) - 1.0) as i64)
     };
     let ((u_low, u_high), (v_low, v_high)) = (range(u), range(v));
-    // Twice the signed area of (edge from `a` to `b`, point), from the lower vertex index to the higher.
+    // Edge function of the point `c`: twice the signed area of the triangle (a, b, c), and whether `c` is to the left
+    // of the edge. It is evaluated from the lower vertex index to the higher, so that both triangles at the edge get
+    // the same number up to its sign.
     let edge = |a: usize, b: usize, c: (f64, f64)| {
         let (lo, hi, sign) = if corners[a] < corners[b] { (p[a], p[b], 1.0) } else { (p[b], p[a], -1.0) };
         let (du, dv) = (hi[u] - lo[u], hi[v] - lo[v]);

@@ -1,7 +1,8 @@
 //! Levels of unknowns of the classic method: boundary cells are neighbours with fixed values.
 //!
-//! The finest level is the paper's: all six arms are one cell long, and each cell is the average of its neighbours.
-//! Coarser levels, used only by multigrid, keep every second cell; there, an arm ends at the first boundary cell.
+//! The finest level is that of K. Smith's paper (`docs/method.md`, sources): all six arms are one cell long, and each
+//! cell is the average of its neighbours. Coarser levels, used only by multigrid, keep every second cell; there, an arm
+//! ends at the first boundary cell.
 
 use crate::grid::Grid;
 use crate::levels::Boundary;
@@ -20,14 +21,14 @@ pub struct PublishedCells<'a> {
 }
 
 impl<'a> PublishedCells<'a> {
-    /// The finest level.
+    /// Creates the finest level, which consists of all cells.
     #[must_use]
     pub fn finest(cells: &'a ClassicCells) -> Self {
         let grid = Grid { dims: cells.dims, origin: cells.origin, cell: cells.cell_size };
         Self::on(cells, grid, grid, 1)
     }
 
-    /// The next coarser level.
+    /// Creates the next coarser level, which keeps every second cell.
     #[must_use]
     pub fn coarsened(&self) -> Self {
         Self::on(self.cells, self.fine, self.grid.coarsened(), 2 * self.step)

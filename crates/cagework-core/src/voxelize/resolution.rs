@@ -1,8 +1,9 @@
-//! Detection of parts of a cage that the grid does not resolve: faces without grid lines, and parts thinner than a
+//! Detection of parts of a cage that the grid does not resolve: faces that no grid line meets, and parts thinner than a
 //! cell.
 //!
-//! Values on such faces reach the grid by chance. Weights then depend on the cage's orientation, and a vertex whose
-//! faces meet no grid line has no influence. The weights are still valid; a finer grid gives better ones.
+//! Whether values on such faces reach the grid depends on where grid lines happen to run. Weights then depend on the
+//! cage's orientation, and a vertex whose faces meet no grid line has no influence. The weights are still valid; a
+//! finer grid gives better ones.
 
 use glam::DVec3;
 
@@ -12,7 +13,8 @@ use crate::options::MAX_GRID;
 
 use super::lines::Lines;
 
-/// Largest dot product of the normals of two faces that are opposite sides of a thin part rather than of a corner.
+/// Two faces are opposite sides of a thin part, rather than of a corner, if the dot product of their normals is at most
+/// this.
 const MAX_NORMAL_DOT: f64 = -0.5;
 
 /// Smallest thickness of a part that counts as resolved, in cells.
@@ -30,10 +32,10 @@ struct FaceLines {
     lines: u32,
     /// Number of lines that leave the cage within one cell through a roughly opposite face.
     thin: u32,
-    /// Sum of the cage's thickness along those lines, in cells.
+    /// Sum of the cage's thickness along the lines that `thin` counts, in cells.
     thickness: f64,
     /// Largest depth of the cage below the face along any line, in cells. For a bar, whose lines may leave through any
-    /// side, it is at most its thickness.
+    /// side, the depth is at most the bar's thickness.
     depth: f64,
 }
 

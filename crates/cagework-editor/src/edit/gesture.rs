@@ -6,19 +6,21 @@ use cagework_core::view::View;
 
 use super::pull::Pull;
 
-/// Minimum sine of the angle between the view direction and a constraint plane. Below it, the gesture uses the view
-/// plane, because a pixel would move vertices too far in a plane seen almost edge-on.
+/// Minimum sine of the angle between the pointer's ray and a constraint axis or plane. Below it, the gesture uses the
+/// pointer's movement in the view plane, because a pixel would move vertices too far along an axis that almost points
+/// at the eye, or in a plane that is seen almost edge-on.
 const MIN_PLANE_SINE: f32 = 0.05;
 
-/// Minimum start distance of a scale gesture from the centre, pixels: below, a pixel would change the factor too much.
+/// Minimum distance between the start of a scale gesture and the centre, pixels. Shorter distances count as this one,
+/// because otherwise moving by a pixel would change the factor too much.
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
-/// Kind of gesture.
+/// What a gesture does with the selection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Gesture"))]
 pub enum GestureKind {
-    /// Translation.
+    /// Translation of the selection.
     Grab,
     /// Rotation about the centre of the selection.
     Rotate,
@@ -34,7 +36,7 @@ pub enum Constraint {
     Free,
     /// One axis: 0 is x, 1 is y, 2 is z.
     Axis(usize),
-    /// The plane normal to an axis, 0 to 2; for a rotation, the axis.
+    /// The plane normal to an axis, 0 to 2. Rotations turn about this axis.
     Plane(usize),
 }
 
@@ -42,11 +44,11 @@ pub enum Constraint {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct GestureView {
-    /// Kind of the gesture.
+    /// Whether the gesture translates, rotates or scales, which determines the unit of `amounts`.
     pub kind: GestureKind,
     /// Movement along the axis or along x, y and z, object units; the angle in degrees; or the factor.
     pub amounts: Vec<f32>,
-    /// Axis of the restriction, 0 to 2.
+    /// Axis of the constraint, 0 to 2; null if the gesture is free.
     pub axis: Option<usize>,
     /// Whether the gesture is restricted to the plane normal to `axis`.
     pub plane: bool,
@@ -66,20 +68,20 @@ pub struct Gesture {
 }
 
 impl Gesture {
-    /// Starts at `pointer`. `start`: current positions, `[n_cage]`; `pivot`: centre of the selection.
+    /// Starts a gesture at `pointer`. `start`: current positions, `[n_cage]`; `pivot`: centre of rotation and scaling.
     #[must_use]
     pub fn new(kind: GestureKind, start: Vec<Vec3>, pull: Pull, pivot: Vec3, pointer: Vec2) -> Self {
         let constraint = Constraint::Free;
         Self { kind, constraint, start, pull, pivot, pointer_start: pointer, pointer, typed: None }
     }
 
-    /// Kind of the gesture.
+    /// Whether the gesture translates, rotates or scales.
     #[must_use]
     pub fn kind(&self) -> GestureKind {
         self.kind
     }
 
-    /// Positions at the start. `[n_cage]`
+    /// Positions of the cage's vertices at the start of the gesture. `[n_cage]`
     #[must_use]
     pub fn start(&self) -> &[Vec3] {
         &self.start
@@ -91,12 +93,12 @@ impl Gesture {
         self.pivot
     }
 
-    /// Restricts the gesture.
+    /// Restricts the gesture to the directions of `constraint`.
     pub fn constrain(&mut self, constraint: Constraint) {
         self.constraint = constraint;
     }
 
-    /// The constraint of the gesture.
+    /// Directions to which the gesture is restricted.
     #[must_use]
     pub fn constraint(&self) -> Constraint {
         self.constraint
@@ -107,7 +109,7 @@ impl Gesture {
         self.pull = pull;
     }
 
-    /// Moves the pointer.
+    /// Sets the current position of the pointer, pixels.
     pub fn drag(&mut self, pointer: Vec2) {
         self.pointer = pointer;
     }
@@ -117,7 +119,7 @@ impl Gesture {
         self.typed = amount.filter(|a| a.is_finite());
     }
 
-    /// Current cage positions. `[n_cage]`
+    /// Positions to which the gesture moves the cage's vertices. `[n_cage]`
     #[must_use]
     pub fn positions(&self, view: &dyn View) -> Vec<Vec3> {
         match self.kind {
@@ -176,7 +178,8 @@ impl Gesture {
                 let from = along_axis(view, self.pointer_start, self.pivot, axis);
                 match from.zip(along_axis(view, self.pointer, self.pivot, axis)) {
                     Some((from, to)) => (to - from) * axis,
-                    // The axis points at the eye, so moving the pointer up moves vertices away from the eye.
+                    // The axis is almost parallel to the pointer's ray: moving the pointer up moves vertices away from
+                    // the eye.
                     None => -free.dot(view.up()) * axis.dot(view.backward()).signum() * axis,
                 }
             }

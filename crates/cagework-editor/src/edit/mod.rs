@@ -5,7 +5,6 @@
 
 mod gesture;
 mod pick;
-mod playback;
 mod pull;
 mod selection;
 
@@ -13,8 +12,7 @@ pub use gesture::{Constraint, Gesture, GestureKind, GestureView};
 pub use pick::{
     Element, Topology, pick_edge, pick_face, pick_middle, pick_surface, pick_vertex, vertices_in_box,
 };
-pub use playback::{PoseError, blend, reblend};
 pub use pull::{Pull, SharedPull};
 pub use selection::{Pivot, SelectMode, Selection};
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

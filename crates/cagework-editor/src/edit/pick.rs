@@ -4,20 +4,20 @@ use glam::{Vec2, Vec3};
 
 use cagework_core::view::View;
 
-/// Ray hits count as one hit if their distance is below this fraction of the distance from the eye.
+/// Two ray hits count as one if the distance between them is at most this fraction of their distance from the eye.
 const HIT_TOLERANCE: f32 = 1e-5;
 
 /// Element type that a click selects.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Element {
-    /// A vertex.
+    /// A single vertex.
     #[default]
     Vertex,
-    /// An edge, by both of its ends.
+    /// An edge: both of its ends are selected.
     Edge,
-    /// A face, by all of its corners.
+    /// A face: all of its corners are selected.
     Face,
 }
 
@@ -48,8 +48,8 @@ impl Topology {
 }
 
 /// The vertex within `radius` pixels of the pointer. Vertices of front faces take precedence over vertices of back
-/// faces, which are picked only `with_hidden`. Among vertices at about the same depth (within the radius), the one
-/// nearest to the pointer is picked, otherwise the one in front.
+/// faces, which are picked only `with_hidden`. Among vertices at about the depth of the frontmost one (within twice the
+/// radius), the one nearest to the pointer is picked.
 #[must_use]
 pub fn pick_vertex(
     positions: &[Vec3],
@@ -64,7 +64,7 @@ pub fn pick_vertex(
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    // Inner controls have no face and are drawn on top: nothing occludes them.
+    // Interior controls have no face and are drawn on top: nothing occludes them.
     let (of_faces, inside): (Vec<_>, Vec<_>) =
         near.partition(|near| topology.faces.iter().any(|face| face.contains(&near.0)));
     let inside = inside.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
@@ -117,8 +117,8 @@ pub fn pick_middle(
     origin + along * direction
 }
 
-/// The edge within `radius` pixels of the pointer, as index into [`Topology::edges`]. If there are several, the one
-/// whose nearest point is in front, unless the pointer is much nearer to another edge.
+/// The edge within `radius` pixels of the pointer, as index into [`Topology::edges`]. If there are several: the one
+/// nearest to the pointer among those at about the depth of the frontmost one (within twice the radius).
 #[must_use]
 pub fn pick_edge(
     positions: &[Vec3],
@@ -140,8 +140,8 @@ pub fn pick_edge(
     in_front(near)
 }
 
-/// Chooses from (index, depth, distance from the pointer, size of the radius at that depth): the nearest to the pointer
-/// among those at about the depth of the front one.
+/// Chooses from (index, depth, distance from the pointer, size of the radius at that depth) the item nearest to the
+/// pointer, among those at about the depth of the frontmost one.
 fn in_front(near: impl Iterator<Item = (u32, f32, f32, f32)>) -> Option<u32> {
     let near: Vec<_> = near.collect();
     let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
@@ -227,14 +227,14 @@ mod tests {
 
     #[test]
     fn inner_control_is_picked_through_faces() {
-        // Seen along -z, the faces at the cube's vertex 0 are back-facing or edge-on.
+        // Control 8 is at the centre of the cube, behind the front face.
         let mut cube = cube();
         let topology = Topology::new(&cube.faces);
         cube.positions.push(Vec3::splat(0.5));
         let pick = |at, with_hidden| pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, with_hidden);
         assert_eq!(pick(pixel(0.5, 0.5), false), Some(8));
         assert_eq!(pick(pixel(0.5, 0.5), true), Some(8));
-        // A vertex of a front face and the control inside: the click picks the nearer one on the screen.
+        // Of a vertex of a front face and a control inside the cube, the click picks the one nearer to the pointer.
         cube.positions[8] = Vec3::new(0.97, 1.0, 0.5);
         let pick = |x| pick_vertex(&cube.positions, &topology, &Flat, pixel(x, 1.0), 5.0, false);
         assert_eq!((pick(0.975), pick(0.995)), (Some(8), Some(7)));
@@ -270,8 +270,9 @@ mod tests {
 
     #[test]
     fn front_vertices_are_picked_before_hidden_ones() {
-        // A thin plate with a back smaller than its front: within a wide finger's radius the back is about as near as
-        // the front, and its corner is at the finger.
+        // The back of this thin plate is smaller than its front, and the pointer is exactly at a corner of the back.
+        // The depth tolerance is twice the pick radius; with the 24 pixels of touch input it exceeds the plate's
+        // thickness.
         let mut plate = cube();
         for (i, p) in plate.positions.iter_mut().enumerate() {
             p.z *= 0.05;

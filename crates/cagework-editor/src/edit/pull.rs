@@ -9,14 +9,14 @@ use super::selection::Selection;
 /// Options for the vertices that move together with the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPull<'a> {
-    /// Radius of proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for
-    /// none.
+    /// Radius of proportional editing, object units. Vertices nearer than this to a selected vertex make a share of its
+    /// movement; 0 turns proportional editing off.
     pub radius: f32,
     /// Mirror images of the vertices; `None` if movements are not mirrored.
     pub symmetry: Option<&'a Symmetry>,
 }
 
-/// Share of a gesture that each vertex follows, 0 to 1, directly or as a mirror image.
+/// Share of a gesture's movement that each vertex makes, 0 to 1, directly or as a mirror image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pull {
     share: Vec<f32>,
@@ -27,9 +27,10 @@ pub struct Pull {
 }
 
 impl Pull {
-    /// Shares for a selection at `positions`.
+    /// Shares for a selection in the pose `positions`.
     ///
-    /// With symmetry, if both vertices of a pair are selected, the side of the vertex selected last leads.
+    /// With symmetry, if both vertices of a pair are selected, the side of the vertex selected last leads. `rest`, the
+    /// cage at rest, determines on which side of the mirror plane a vertex is.
     #[must_use]
     pub fn new(selection: &Selection, positions: &[Vec3], rest: &[Vec3], shared: SharedPull<'_>) -> Self {
         let n = positions.len();
@@ -69,7 +70,8 @@ impl Pull {
         self.share.iter().all(|&s| s == 0.0)
     }
 
-    /// Positions after moving every vertex to `moved(position, share)`, mirrored where necessary.
+    /// Positions after the gesture. `moved(position, share)` is the position to which a vertex with this share moves;
+    /// mirror images make the reflected movement of their leading vertex.
     #[must_use]
     pub fn apply(&self, start: &[Vec3], moved: &dyn Fn(Vec3, f32) -> Vec3) -> Vec<Vec3> {
         (0..start.len())

@@ -9,28 +9,28 @@ use super::pick::Topology;
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum SelectMode {
-    /// Selects only the set.
+    /// Selects the vertices of the set and no others.
     #[default]
     Replace,
-    /// Adds the set.
+    /// Adds the set to the selection.
     Add,
-    /// Removes the set.
+    /// Removes the set from the selection.
     Remove,
-    /// Removes the set if all of it is selected; otherwise adds the set.
+    /// Removes the set if all of its vertices are selected, otherwise adds it.
     Toggle,
 }
 
 /// Centre of rotation and scaling.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Pivot {
-    /// Mean of the selection.
+    /// Mean of the selected vertices.
     #[default]
     Middle,
     /// Mean of the selected vertices that share an edge with unselected ones, such as a knee for a lower leg.
     Border,
-    /// The vertex selected last.
+    /// The vertex that was selected last.
     Last,
 }
 
@@ -106,7 +106,7 @@ impl Selection {
 
     /// Extends the selection to whole connected parts.
     pub fn linked(&mut self, topology: &Topology) {
-        // Iterate over all edges to a fixed point: a cage has a few hundred edges.
+        // Extend the selection along all edges until nothing changes. A cage has only a few hundred edges.
         loop {
             let mut changed = false;
             for [a, b] in topology.edges.iter().map(|e| e.map(|i| i as usize)) {
@@ -134,7 +134,7 @@ impl Selection {
         (0..topology.faces.len() as u32).filter(whole).collect()
     }
 
-    /// Mean of the selected positions.
+    /// Mean of the selected positions; `None` if nothing is selected.
     #[must_use]
     pub fn center(&self, positions: &[Vec3]) -> Option<Vec3> {
         let vertices = self.vertices();
@@ -142,7 +142,8 @@ impl Selection {
         (!vertices.is_empty()).then(|| sum / vertices.len() as f32)
     }
 
-    /// Position of a pivot. A selection without a border uses the mean of the selection.
+    /// Position of a pivot; `None` if nothing is selected. Without a border or a last selected vertex, the mean of the
+    /// selection.
     #[must_use]
     pub fn pivot(&self, positions: &[Vec3], topology: &Topology, pivot: Pivot) -> Option<Vec3> {
         let only = |vertices: &[u32]| {

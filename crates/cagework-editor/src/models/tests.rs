@@ -1,8 +1,8 @@
-//! Adding and removing models.
+//! Tests of adding and removing models, and of their settings in projects.
 
 use super::*;
 
-/// A tetrahedron translated by `at` along x, with one material on two triangles and another on the rest.
+/// Three faces of a tetrahedron translated by `at` along x: one with the material `skin`, two with `cloth`.
 fn model(name: &str, at: f32) -> Model {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut text = String::new();

@@ -1,9 +1,9 @@
 //! Editing of the rest cage: each operation takes a mesh and returns a new one, or an error if the result would be
 //! invalid.
 //!
-//! Nothing changes in place, so callers implement undo by keeping the meshes. Every result is a cage ([`Cage::new`]
-//! accepts it without flipping a face) with no more self-intersections than the input. Vertices keep their order;
-//! [`CageEdit::vertex_of`] maps old to new indices for selections and poses.
+//! Nothing changes in place, so callers implement undo by keeping the meshes. [`Cage::new`] accepts every result, flips
+//! its faces only if it also flips those of the input, and the result has no more self-intersections than the input.
+//! Vertices keep their order; [`CageEdit::vertex_of`] maps old to new indices for selections and poses.
 
 mod operations;
 #[cfg(test)]
@@ -17,14 +17,14 @@ use cagework_core::{Cage, CageError, CageNotice, PolygonMesh};
 
 pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
 
-/// Result of an edit.
+/// Mesh after an edit, and its relation to the mesh before the edit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CageEdit {
     /// The new mesh.
     pub mesh: PolygonMesh,
     /// New index of every old vertex; `None` for removed vertices. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
-    /// New or moved vertices, to be selected next.
+    /// New and moved vertices, and vertices around filled holes. The editor selects them after the edit.
     pub touched: Vec<u32>,
 }
 
@@ -62,9 +62,9 @@ pub enum RestEditError {
     Meets {
         /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
-        /// A face of the result.
+        /// Index of a face in the result.
         first: u32,
-        /// A face of the result that intersects face `first`.
+        /// Index of a face in the result that intersects face `first`.
         second: u32,
     },
     /// The hole has too many edges.
@@ -78,7 +78,8 @@ pub enum RestEditError {
     NothingLeft,
 }
 
-/// Checks a result against the mesh before the edit.
+/// Returns the edit if its mesh is a valid cage that is not turned inside out and has no more self-intersections than
+/// `before`.
 fn finish(
     operation: &'static str,
     before: &PolygonMesh,

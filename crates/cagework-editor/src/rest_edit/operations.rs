@@ -57,8 +57,8 @@ pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Cage
     finish("splitting", mesh, edited)
 }
 
-/// Merges the ends of an edge into the first one, at `share` of the edge's length from it. Faces left with two corners
-/// are removed.
+/// Merges the ends of an edge into the first one, at `share` of the edge's length from it (clamped to 0 to 1). Faces
+/// left with two corners are removed.
 ///
 /// # Errors
 /// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.
@@ -116,7 +116,7 @@ pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Cage
     finish("extruding", mesh, edited)
 }
 
-/// Deletes faces, fills the holes by minimum-area triangulations, and drops vertices without faces.
+/// Deletes faces, fills the holes by minimum-area triangulations, and drops vertices that lose their last face.
 ///
 /// # Errors
 /// [`RestEditError`]: a face does not exist, a hole has more than 64 edges, or the cage would become invalid.

@@ -5,7 +5,7 @@ use super::{CageEdit, RestEditError, collapse_edge, delete_faces, extrude_face, 
 use cagework_core::crossing::{crossings_of, notices};
 use cagework_core::{Bounds, Cage, PolygonMesh, subdivided_box};
 
-/// f32 rounding of positions of size 1.
+/// Tolerance for f32 rounding of positions of size 1.
 const ROUNDING: f32 = 1e-6;
 
 fn cube() -> PolygonMesh {
@@ -125,7 +125,7 @@ fn extruding_a_face_adds_a_box() {
 fn holes_of_deleted_faces_are_filled() {
     let cube = cube();
     let tower = extrude_face(&cube, 0, 1.0).unwrap().mesh;
-    // Deletes the top and four sides of the tower: the open cube gets a lid.
+    // Delete the top and the four sides of the tower. Filling the hole restores the cube.
     let edited = delete_faces(&tower, &[0, 6, 7, 8, 9]).unwrap();
     assert_eq!(edited.mesh.positions, cube.positions);
     assert!((volume(&edited.mesh) - 8.0).abs() < 1e-6);

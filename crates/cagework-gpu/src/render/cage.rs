@@ -20,7 +20,7 @@ use crate::table::{Entry, Table};
 #[derive(Debug)]
 pub(super) struct CageView {
     pub(super) positions: Table,
-    /// Number of cage vertices; controls inside follow in `positions`.
+    /// Number of cage vertices, which precede the controls inside the cage in `positions`.
     n_vertices: usize,
     n_controls: usize,
     edges: Vec<[u32; 2]>,
@@ -30,7 +30,7 @@ pub(super) struct CageView {
     pub(super) lines: Overlay,
     pub(super) handles: Overlay,
     pub(super) faces: Overlay,
-    /// Lines and handles of the controls inside.
+    /// Lines between the controls inside the cage. The handles of these controls are in `inner`.
     pub(super) bones: Overlay,
     pub(super) inner: Overlay,
     pub(super) surface: Option<SurfaceView>,
@@ -84,7 +84,8 @@ impl CageView {
         surface.chain([&self.bones, &self.lines])
     }
 
-    /// Updates overlays from the selection.
+    /// Updates overlays from the selection. If `is_faint`, vertices that are neither selected, hovered nor unmatched
+    /// have no handle.
     pub(super) fn select(
         &mut self,
         context: &GpuContext,

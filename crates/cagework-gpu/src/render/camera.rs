@@ -1,7 +1,7 @@
 //! Orbit camera, perspective or orthographic. Does not use the GPU.
 //!
-//! y is up. Pixels are in units of [`Camera::set_viewport`], from the top left corner, x right, y down. A
-//! page uses CSS pixels, so pointer events need no conversion.
+//! y is up. Pixel coordinates are in the units of [`Camera::set_viewport`] and start at the top left corner, x right, y
+//! down. A page uses CSS pixels, so pointer events need no conversion.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -11,13 +11,13 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 /// Vertical field of view, radians: 35 degrees, a short telephoto lens with little distortion.
 const FOV_Y: f32 = 35.0 * PI / 180.0;
 
-/// Distance factor of [`Camera::frame`], for a margin around the scene.
+/// Factor by which [`Camera::frame`] enlarges the distance, for a margin around the scene.
 const FRAME_MARGIN: f32 = 1.12;
 
-/// Distance factor of [`Camera::fit`], for a margin around the points.
+/// Factor by which [`Camera::fit`] enlarges the distance, for a margin around the points.
 const FIT_MARGIN: f32 = 1.06;
 
-/// Steps of the iteration that centres points.
+/// Number of steps of the iteration that centres points.
 const CENTERING_STEPS: usize = 4;
 
 /// Range of the distance from the eye to the target, as multiples of the scene's radius.
@@ -27,21 +27,21 @@ const DISTANCE_RANGE: [f32; 2] = [1e-3, 1e3];
 /// visible.
 const FAR_REACH: f32 = 24.0;
 
-/// Distance of the near plane from the eye, as a fraction of the distance to the target. A 32-bit float depth buffer is
-/// precise enough.
+/// Distance of the near plane from the eye, as a fraction of the distance to the target. A depth buffer of 32-bit
+/// floats is precise enough for such a near plane.
 const NEAR_FRACTION: f32 = 0.02;
 
 /// Kind of projection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
-    /// Size decreases with depth.
+    /// Objects appear smaller with increasing distance from the eye.
     #[default]
     Perspective,
-    /// Size is independent of depth.
+    /// The apparent size of objects does not depend on their distance from the eye.
     Orthographic,
 }
 
-/// Axis-aligned views.
+/// Views along an axis of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisView {
     /// View from +z, with x to the right.
@@ -85,7 +85,7 @@ pub struct CameraPlace {
     distance: f32,
 }
 
-/// An orbit camera.
+/// A camera that orbits around a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Centre of the orbit, world space; drawn in the middle of the free part of the picture.
@@ -98,7 +98,7 @@ pub struct Camera {
     pub distance: f32,
     /// Vertical field of view, radians. An orthographic picture has the same height at the target as a perspective one.
     pub fov_y: f32,
-    /// Kind of projection.
+    /// Whether the projection is perspective or orthographic.
     pub projection: Projection,
     viewport: Vec2,
     /// Widths of the picture's margins under overlays: left, top, right, bottom, pixels.
@@ -156,7 +156,8 @@ impl Camera {
         true
     }
 
-    /// Makes what is visible now stay visible when the size of the picture changes.
+    /// Stores the current width and height at the target, which [`Self::set_free_part`] keeps visible when the size of
+    /// the picture changes.
     pub fn keep_visible(&mut self) {
         self.kept = self.visible();
     }
@@ -188,7 +189,7 @@ impl Camera {
         self.scene_radius = if radius > 0.0 { radius } else { 1.0 };
     }
 
-    /// Position and direction.
+    /// Position and direction of the camera.
     #[must_use]
     pub fn place(&self) -> CameraPlace {
         let &Self { target, yaw, pitch, distance, .. } = self;
@@ -278,7 +279,8 @@ impl Camera {
         }
     }
 
-    /// Scale of overlay offsets: decrease of clip depth (before division by w) per relative decrease of view depth.
+    /// Decrease of clip z (before division by w) per relative decrease of view depth. Overlay shaders multiply it by
+    /// `Style::lift` to move positions towards the eye.
     #[must_use]
     pub(crate) fn lift(&self) -> f32 {
         let [near, far] = self.depths();
@@ -369,7 +371,7 @@ impl Camera {
         if self.projection == Projection::Orthographic {
             return;
         }
-        // Nearer points move faster as the eye steps back: centre the points as they are seen from there.
+        // As the eye moves back, near points shift more in the picture: centre the points as seen from the new eye.
         let (eye, backward) = (self.eye(), self.backward());
         for across in [self.right(), self.up()] {
             let mut shift = 0.0;
@@ -384,7 +386,7 @@ impl Camera {
 
     /// Sets the distance. `needed`: smallest distances at which everything fits horizontally and vertically.
     fn step_back(&mut self, needed: Vec2) {
-        // A single vertex has no size: limit the distance to a twentieth of the scene's radius.
+        // A single vertex has no size: keep the distance above a twentieth of the scene's radius.
         let needed = needed.max(Vec2::splat(0.05 * self.scene_radius));
         self.distance = needed.max_element();
         self.kept = 2.0 * self.tangents() * needed;
@@ -401,8 +403,8 @@ impl Camera {
         };
         let mut needed = [0.0_f32; 2];
         for ((tan, across), needed) in tangents.to_array().into_iter().zip(across).zip(&mut needed) {
-            // Distance from which this side of the picture touches the outermost point. Shifting the target sideways
-            // makes the distances of both sides equal.
+            // Distance of the eye at which one side of the picture touches the outermost point. The shift of the target
+            // below makes the distances of both sides equal.
             let from_side = |sign: f32| {
                 let from =
                     |p: &Vec3| sign * (*p - self.target).dot(across) / tan + (*p - self.target).dot(depth);

@@ -1,4 +1,4 @@
-//! Draws a cage's smooth surface, and controls inside with their radius.
+//! Draws a cage's smooth surface, and the controls inside the cage with their radius.
 
 use cagework_core::{ControlSet, Controls, InnerElement};
 use glam::Vec3;
@@ -12,7 +12,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// Lines on the smooth surface and around balls and tubes, at positions computed from the controls.
+/// Lines on the smooth surface and on balls, tubes and sheets, at positions computed from the controls.
 #[derive(Debug)]
 pub(super) struct SurfaceView {
     set: ControlSet,

@@ -1,4 +1,4 @@
-//! [`Camera`] as the editing code's [`View`].
+//! Implements [`View`], which picking and dragging use, for [`Camera`].
 
 use cagework_core::view::View;
 use glam::{Vec2, Vec3};

@@ -167,7 +167,7 @@ impl Renderer {
         }
     }
 
-    /// Sets which splats are floaters.
+    /// Sets the indices of the floaters, splats that the scene options can hide.
     pub(crate) fn set_floaters(&mut self, context: &GpuContext, floaters: &[u32]) {
         if let Some(splats) = &mut self.splats {
             splats.mover.set_floaters(context, floaters);
@@ -192,7 +192,7 @@ impl Renderer {
         mesh.set_style(context, self.scene.mesh, range, self.scene.overlay());
     }
 
-    /// Draws the shadow again with the next frame, because the model has moved.
+    /// Makes the next frame draw the shadow map again, because the model has moved.
     pub(crate) fn touch_shadow(&mut self) {
         self.shadow.is_stale = true;
     }
@@ -203,7 +203,7 @@ impl Renderer {
         self.floor = bounds;
     }
 
-    /// Sets the scene.
+    /// Replaces the scene options, and updates what depends on options that changed.
     pub(crate) fn set_scene(&mut self, context: &GpuContext, scene: SceneOptions, model: Option<&DrawModel>) {
         let before = std::mem::replace(&mut self.scene, scene);
         self.apply(context, model, Some(&before));
@@ -212,11 +212,11 @@ impl Renderer {
     /// Applies the members of the scene that differ from `before`; all members if `before` is `None`.
     fn apply(&mut self, context: &GpuContext, model: Option<&DrawModel>, before: Option<&SceneOptions>) {
         let scene = &self.scene;
-        let theme_changed = before.is_none_or(|b| b.theme != scene.theme);
+        let theme_changed = before.is_none_or(|b| b.view.theme != scene.view.theme);
         if let Some(cage) = &mut self.cage {
             let steps = before.is_none_or(|b| b.cage_faint != scene.cage_faint);
             if theme_changed || steps {
-                cage.set_theme(context, scene.theme, scene.cage_faint);
+                cage.set_theme(context, scene.view.theme, scene.cage_faint);
             }
             if steps || before.is_none_or(|b| b.selection != scene.selection) {
                 cage.select(context, &self.layouts, &scene.selection, scene.cage_faint);
@@ -231,21 +231,21 @@ impl Renderer {
                 self.wires = None;
                 self.shadow.is_stale = true;
             }
-            if (scene.base_wireframe || scene.mesh_edges)
+            if (scene.view.base_wireframe || scene.mesh_edges)
                 && self.wires.is_none()
                 && let Some(model) = model
             {
                 let wires = Wires::new(context, &self.layouts, mesh, model, &scene.hidden);
-                wires.set_theme(context, scene.theme);
+                wires.set_theme(context, scene.view.theme);
                 self.wires = Some(wires);
             }
         }
         if let Some(wires) = self.wires.as_ref().filter(|_| theme_changed) {
-            wires.set_theme(context, scene.theme);
+            wires.set_theme(context, scene.view.theme);
         }
         if theme_changed || before.is_none_or(|b| b.slice != scene.slice) {
             self.slice =
-                scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.theme));
+                scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.view.theme));
         }
         let is_same = |b: &SceneOptions| {
             (&b.marks, &b.held, &b.joints, &b.draft)
@@ -262,7 +262,7 @@ impl Renderer {
         self.marks = MarksView::all(context, &self.layouts, &self.scene, mesh, cage);
     }
 
-    /// Records a frame.
+    /// Records the commands that draw a frame.
     pub(crate) fn draw(
         &mut self,
         context: &GpuContext,
@@ -289,10 +289,10 @@ impl Renderer {
         };
         if let Some(splats) = self.splats.as_mut().filter(|_| self.scene.mesh == MeshStyle::Solid) {
             let pipeline = pipelines.get(Kind::Splats);
-            let hides = self.scene.floaters_hidden;
+            let hides = !self.scene.view.floaters;
             splats.encode(context, &self.layouts, encoder, pipeline, &self.camera_group, &uniform, hides);
         }
-        if self.shadow.is_stale && self.scene.floor {
+        if self.shadow.is_stale && self.scene.view.floor {
             let mut pass = self.shadow.pass(encoder);
             if let Some(mesh) = self.mesh.as_ref().filter(|_| self.scene.mesh != MeshStyle::Hidden) {
                 pass.set_bind_group(0, &self.camera_group, &[]);
@@ -343,7 +343,7 @@ impl Renderer {
             pass.draw(0..3, 0..1);
         }
         let floor = |pass: &mut wgpu::RenderPass<'_>| {
-            if scene.floor {
+            if scene.view.floor {
                 pass.set_pipeline(pipelines.get(Kind::Floor));
                 pass.set_bind_group(1, &self.shadow.group, &[]);
                 pass.draw(0..6, 0..1);
@@ -376,7 +376,7 @@ impl Renderer {
             if scene.mesh_edges && mesh.is_some() {
                 wires.edges.draw(pass, false);
             }
-            if scene.base_wireframe {
+            if scene.view.base_wireframe {
                 wires.base.draw(pass, false);
             }
         }
@@ -420,7 +420,7 @@ impl Renderer {
 
     fn uniform(&self, target: Target<'_>, camera: &Camera) -> Uniform {
         let Target { format, size, scale, .. } = target;
-        let palette = self.scene.theme.palette();
+        let palette = self.scene.view.theme.palette();
         let viewport = size.map(|s| s as f32);
         let radius = (0.5 * self.floor.diagonal()).max(f32::MIN_POSITIVE);
         let middle = self.floor.center().with_y(self.floor.min.y);

@@ -20,8 +20,8 @@ pub const GIZMO_PX: f32 = 84.0;
 /// Pick radius of axes and rings, CSS pixels.
 const PICK_RADIUS_PX: f32 = 8.0;
 
-/// Distance from the gizmo's centre to the start of an axis, as a fraction of the axis length. The centre handle is
-/// inside.
+/// Distance from the gizmo's centre to the start of an axis, as a fraction of the axis length. The centre handle lies
+/// within this distance.
 const AXIS_START: f32 = 0.16;
 
 /// Extent of a plane handle along both of its axes, as fractions of the axis length.
@@ -33,16 +33,16 @@ const VIEW_RING_RADIUS: f32 = 1.16;
 /// Tube radius of a ring, as a fraction of the axis length.
 const TUBE_RADIUS: f32 = 0.014;
 
-/// Segments of a ring.
+/// Number of segments along a ring.
 const RING_SEGMENTS: u32 = 64;
 
-/// Vertices of the largest gizmo: four rings of 64 x 8 quads.
+/// Number of vertices of the largest gizmo: four rings of 64 x 8 quads.
 const MAX_VERTICES: u64 = 4 * 64 * 8 * 6;
 
 type Vertex = [f32; 10];
 
-/// Handle of the gizmo under the pointer, or the nearest one within `radius`, for touch input. `cursor` and
-/// `radius` are in pixels of the camera's viewport.
+/// Handle of the gizmo under the pointer or, for touch input, the nearest one within `radius`. `cursor` and `radius`
+/// are in pixels of the camera's viewport.
 #[must_use]
 pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2, radius: f32) -> Option<GizmoPart> {
     let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
@@ -174,7 +174,7 @@ impl GizmoShape {
         Self { vertices, counts: [0; 2], transforms, shape: None }
     }
 
-    /// Updates the geometry, if it changed, and the transforms.
+    /// Updates the transforms and, if mode or active handle changed, the geometry.
     pub(super) fn update(&mut self, context: &GpuContext, gizmo: &Gizmo, camera: &Camera) {
         if self.shape != Some((gizmo.mode, gizmo.active)) {
             let mut vertices = shape(gizmo.mode, gizmo.active);
@@ -219,7 +219,7 @@ fn facing_shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     out
 }
 
-/// Triangles in the gizmo's frame.
+/// Triangles of the handles that are drawn in the gizmo's frame: all except the view ring.
 fn shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     let mut out = Vec::new();
     let color = |part, own, alpha| color(active, part, own, alpha);

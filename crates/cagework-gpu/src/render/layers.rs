@@ -6,15 +6,15 @@ use super::camera::Camera;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. At the limit, a
-/// picture takes 10 s of one core in llvmpipe, and a frame of the page takes about 1 s in SwiftShader.
+/// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. At the native limit,
+/// a picture takes 10 s of one core in llvmpipe; at the page's limit, a frame takes about 1 s in SwiftShader.
 const MAX_SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 2.5e7 } else { 1e8 };
 
 /// Cost of a triangle per pixel of its longest side, in addition to its area, because slivers have almost no
 /// area. Measured with a fan of 100,000 slivers in SwiftShader (browsers) and llvmpipe.
 const SIDE_COST: f64 = if cfg!(target_family = "wasm") { 10.0 } else { 0.5 };
 
-/// Rejects a picture of `size` pixels that a software rasteriser would draw for minutes.
+/// Rejects a picture of `size` pixels if it would take a software rasteriser too long.
 ///
 /// # Errors
 /// [`GpuError::Layers`] if the overdraw exceeds the limit.

@@ -48,10 +48,11 @@ pub struct Surface {
     pub mode: u32,
     /// Fragments with less alpha are discarded.
     pub alpha_cutoff: f32,
-    /// Value of the first colour of the colour map. With materials: 1 to paint by the vertices' values instead of
-    /// greying.
+    /// In the modes with a colour map, value of the map's first colour. In the other modes, 1 to blend towards the
+    /// colour of paint, 0 to blend towards grey.
     pub low: f32,
-    /// Value of the last colour. With materials: strength of greying or paint, 0 or 1.
+    /// In the modes with a colour map, value of the map's last colour. In the other modes, 1 to blend by the vertices'
+    /// values, 0 to leave colours unchanged.
     pub high: f32,
 }
 
@@ -61,7 +62,7 @@ pub mod surface_mode {
     pub const MATERIAL: u32 = 0;
     /// The colour map of the weights of a control.
     pub const WEIGHTS: u32 = 1;
-    /// The colour map of errors, which are base 10 logarithms.
+    /// The colour map of errors, applied to their base 10 logarithms. The vertices' values are the errors.
     pub const ERRORS: u32 = 2;
     /// A single colour, without texture and vertex colours.
     pub const CLAY: u32 = 3;
@@ -77,11 +78,11 @@ pub struct Style {
     pub colors: [[f32; 4]; 8],
     /// Width of lines or diameter of points in each state, CSS pixels.
     pub widths: [[f32; 4]; 2],
-    /// Rim of points, linear, straight alpha.
+    /// Colour of the rim of points, linear, straight alpha.
     pub rim_color: [f32; 4],
     /// Width of the rim, CSS pixels.
     pub rim: f32,
-    /// Offset towards the eye, as a fraction of the depth: draws lines on a surface in front of it.
+    /// Offset towards the eye, as a fraction of the view depth, so that lines on a surface appear in front of it.
     pub lift: f32,
     /// Factor of the alpha of all colours.
     pub opacity: f32,
@@ -116,7 +117,7 @@ pub struct SliceView {
     pub n_v: u32,
     /// Colour of each cell type (untyped, boundary, interior, exterior), linear, straight alpha.
     pub kinds: [[f32; 4]; 4],
-    /// Lines between cells, linear, straight alpha.
+    /// Colour of the lines between cells, linear, straight alpha.
     pub line_color: [f32; 4],
 }
 

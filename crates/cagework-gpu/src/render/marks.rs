@@ -13,7 +13,7 @@ use super::scene::{Marks, SceneOptions, Theme};
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
-/// State of segments, and index of their line width in [`Style::widths`].
+/// State of segments. Their line width is `widths[1][0]` of the [`Style`].
 const SEGMENT_STATE: u32 = 4;
 
 /// GPU data of [`Marks`].
@@ -24,7 +24,7 @@ pub(super) struct MarksView {
 }
 
 impl MarksView {
-    /// A previewed cage, problems, grabbed points and joints, topmost last.
+    /// Overlays of a previewed cage, problems, grabbed points and joints, topmost last.
     pub(super) fn all(
         context: &GpuContext,
         layouts: &Layouts,
@@ -32,7 +32,7 @@ impl MarksView {
         mesh: Option<&Table>,
         cage: Option<&Table>,
     ) -> Vec<Self> {
-        let palette = scene.theme.palette();
+        let palette = scene.view.theme.palette();
         let view = |(marks, styles): (&Marks, [Style; 2])| {
             let view = Self::new(context, layouts, marks, mesh, cage);
             view.segments.iter().chain(&view.points).for_each(|o| o.set_styles(context, styles));
@@ -97,7 +97,7 @@ pub(super) struct Wires {
 }
 
 impl Wires {
-    /// Omits edges that only belong to `hidden` triangles.
+    /// Creates wireframes without the edges that belong only to `hidden` triangles.
     pub(super) fn new(
         context: &GpuContext,
         layouts: &Layouts,

@@ -22,7 +22,8 @@ pub(super) struct Mesh {
     pub(super) rest: Table,
     /// Normals at rest.
     pub(super) rest_normals: Table,
-    /// Value of each vertex: its weight, its error, or how grey it is.
+    /// Value of each vertex, depending on the [`MeshStyle`]: the weight of the shown control, the reproduction error,
+    /// or the strength, 0 to 1, of the blend towards grey or paint.
     pub(super) values: Table,
     /// Bind group of the vertices' positions, normals and values.
     vertices: wgpu::BindGroup,
@@ -91,7 +92,7 @@ impl Mesh {
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }
 
-    /// Draws with these tables of positions and normals from now on.
+    /// Sets the tables of positions and normals that are drawn.
     pub(super) fn set_vertices(
         &mut self,
         context: &GpuContext,
@@ -103,14 +104,14 @@ impl Mesh {
         self.positions = positions.clone();
     }
 
-    /// Draws the rest pose from now on.
+    /// Makes subsequent frames draw the rest pose.
     pub(super) fn set_rest(&mut self, context: &GpuContext, layouts: &Layouts) {
         let (rest, normals) = (self.rest.clone(), self.rest_normals.clone());
         self.set_vertices(context, layouts, &rest, &normals);
     }
 
-    /// Sets the source of colours, and the values of the first and last colour. `overlay`: [`Surface::low`] and
-    /// [`Surface::high`] with materials.
+    /// Sets the style from which shaders compute the mesh's colours. `[low, high]`: values of the colour map's first
+    /// and last colour. `overlay`: [`Surface::low`] and [`Surface::high`] for styles without a colour map.
     pub(super) fn set_style(
         &self,
         context: &GpuContext,
@@ -134,14 +135,14 @@ impl Mesh {
         }
     }
 
-    /// Binds vertices and indices.
+    /// Binds the mesh's vertex tables, corners and indices.
     fn begin(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(1, &self.vertices, &[]);
         pass.set_vertex_buffer(0, self.corners.slice(..));
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 
-    /// Draws all groups without materials, except groups of `hidden` triangles.
+    /// Draws the triangles of all groups, except groups of `hidden` triangles. Does not bind materials.
     pub(super) fn draw_plain(&self, pass: &mut wgpu::RenderPass<'_>, hidden: &[Range<u32>]) {
         self.begin(pass);
         for group in self.groups.iter().filter(|group| !group.is_among(hidden)) {
@@ -187,7 +188,7 @@ fn bind_vertices(
 }
 
 impl Group {
-    /// Whether its triangles are in one of these ranges.
+    /// Whether the group's triangles are in one of the ranges `hidden`.
     fn is_among(&self, hidden: &[Range<u32>]) -> bool {
         hidden.iter().any(|range| range.contains(&(self.indices.start / 3)))
     }

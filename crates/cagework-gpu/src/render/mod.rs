@@ -5,13 +5,14 @@
 //! linear, blended premultiplied, with 4x multisampling. Data that rarely changes (selection, styles, heat map) is
 //! uploaded on change.
 //!
-//! Drawing order: background, splats (the mesh then only fills the depth buffer), opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
-//! mesh, fainter), controls inside the cage, handles, marks, gizmo.
+//! Drawing order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first its parts behind the
+//! mesh, fainter), controls inside the cage, handles, marks, gizmo. If there are splats, the floor and then the splats
+//! are drawn before the mesh, which then only fills the depth buffer.
 //!
-//! **Target format.** To sRGB formats (`rgba8unorm-srgb`), shaders write linear colours and the GPU encodes.
-//! Canvases have no sRGB format: configure the preferred format, list its sRGB variant in `view_formats`, and
-//! draw into a view of the latter. If that is not possible, use any 8-bit format: shaders then encode, and
-//! blending differs slightly.
+//! **Target format.** To sRGB formats (`rgba8unorm-srgb`), shaders write linear colours, which the GPU converts to
+//! sRGB. Canvases have no sRGB format: configure the preferred format, list its sRGB variant in `view_formats`, and
+//! draw into a view with this variant. If that is not possible, use any 8-bit format: shaders then convert colours to
+//! sRGB, and blending differs slightly.
 
 mod cage;
 pub mod camera;
@@ -42,5 +43,7 @@ pub use gizmo::{GIZMO_PX, pick_gizmo};
 pub use layers::check_layers;
 pub use model::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 pub use part::PartPainter;
-pub use scene::{Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, SceneOptions, Selection, SliceView, Theme};
+pub use scene::{
+    Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, SceneOptions, Selection, SliceView, Theme, ViewOptions,
+};
 pub(crate) use theme::divide_by_alpha;

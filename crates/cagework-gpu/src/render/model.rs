@@ -10,15 +10,15 @@ use glam::Vec3;
 /// Default base colour, linear: light, slightly warm grey.
 pub const CLAY: [f32; 4] = [0.52, 0.505, 0.485, 1.0];
 
-/// Base colours of models without materials that are drawn together, linear: of the same lightness, the first is
-/// [`CLAY`].
+/// Base colours of models without materials that are drawn together, linear. All have about the same lightness. None is
+/// blue, the colour of the cage's lines and of painted vertices. The first is [`CLAY`].
 const TINTS: [[f32; 4]; 6] = [
     CLAY,
-    [0.337, 0.456, 0.604, 1.0],
-    [0.610, 0.456, 0.262, 1.0],
-    [0.367, 0.515, 0.328, 1.0],
-    [0.584, 0.367, 0.392, 1.0],
-    [0.434, 0.381, 0.584, 1.0],
+    [0.217, 0.528, 0.523, 1.0],
+    [0.577, 0.427, 0.242, 1.0],
+    [0.358, 0.502, 0.317, 1.0],
+    [0.654, 0.376, 0.388, 1.0],
+    [0.575, 0.387, 0.524, 1.0],
 ];
 
 /// A drawable model.
@@ -32,15 +32,15 @@ pub struct DrawModel {
     /// Duplicated vertices with normals of their own, for hard edges of an OBJ. Each entry is the vertex whose position
     /// the duplicate takes. Duplicates are numbered after `positions`. `[n_copies]`
     pub copies: Vec<u32>,
-    /// Corners of triangles. `[n_corners]`
+    /// Corners of the triangles, which `triangles` indexes. `[n_corners]`
     pub vertices: Vec<DrawVertex>,
     /// Indices into `vertices`, counter-clockwise seen from outside. `[n_triangles]`
     pub triangles: Vec<[u32; 3]>,
     /// Materials of ranges of triangles. The other triangles have the base colour [`CLAY`].
     pub groups: Vec<DrawGroup>,
-    /// Textures of the groups.
+    /// Textures, to which [`DrawGroup::texture`] refers by index.
     pub textures: Vec<Arc<DrawTexture>>,
-    /// Splats, drawn instead of the triangles, which then stand for them in depth tests.
+    /// Splats, drawn instead of the triangles, which then only fill the depth buffer.
     pub splats: Option<Arc<Splats>>,
 }
 
@@ -59,7 +59,7 @@ pub struct DrawVertex {
 /// A range of triangles with one material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawGroup {
-    /// Range of [`DrawModel::triangles`].
+    /// Range of indices into [`DrawModel::triangles`].
     pub triangles: std::ops::Range<u32>,
     /// Base colour factor, linear RGBA.
     pub base_color: [f32; 4],
@@ -99,9 +99,9 @@ pub enum Wrap {
 /// A decoded image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DrawTexture {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: u32,
-    /// Number of rows.
+    /// Number of rows of pixels.
     pub height: u32,
     /// sRGB with straight alpha, rows from the top. `[height, width, 4]`
     pub rgba: Vec<u8>,
@@ -161,10 +161,10 @@ impl DrawModel {
         all
     }
 
-    /// The groups, and groups of this base colour for the other triangles.
+    /// The groups, and further groups with `base_color` for the triangles that belong to no group.
     pub(super) fn whole_groups(&self, base_color: [f32; 4]) -> Vec<DrawGroup> {
         let gap = |triangles| DrawGroup { triangles, base_color, ..DrawGroup::default() };
-        // Sorts number pairs, as other code does: another instance of sort would enlarge the page's module.
+        // Sort pairs of numbers. Sorting another type would add an instance of `sort_unstable` to the page's module.
         let mut order: Vec<[u32; 2]> =
             (0u32..).zip(&self.groups).map(|(k, g)| [g.triangles.start, k]).collect();
         order.sort_unstable();
@@ -309,7 +309,7 @@ mod tests {
         assert_eq!(all.fault(), None);
         assert_eq!(all.copies, [0, 2, 4, 7]);
         let sources: Vec<u32> = all.vertices.iter().map(|v| v.source).collect();
-        // The sources are nine vertices, then copies: two of the first model, and one of each of the other two models.
+        // Sources 0 to 8 are vertices, 9 to 12 are copies: two of the first model, and one of each of the other two.
         assert_eq!(sources, [0, 1, 2, 9, 10, 3, 4, 5, 11, 6, 7, 8, 12]);
         assert_eq!(all.triangles[2..], [[5, 6, 7], [9, 10, 11]]);
         let groups: Vec<_> = all.groups.iter().map(|g| (g.triangles.clone(), g.texture)).collect();

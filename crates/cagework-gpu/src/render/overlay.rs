@@ -9,7 +9,7 @@ use crate::table::{Entry, Table};
 /// Opacity factor of overlays behind a surface.
 pub(super) const BEHIND_OPACITY: f32 = 0.22;
 
-/// An item in two words: its state and first position index, then its second position index.
+/// An item as two u32: its state and first position index, then its second position index.
 pub(super) type Item = [u32; 2];
 
 /// Packs an item from its state and its two position indices.
@@ -17,7 +17,7 @@ pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
     [state << STATE_SHIFT | a, b]
 }
 
-/// A hidden item.
+/// An item that is not drawn.
 pub(super) const HIDDEN_ITEM: Item = [HIDDEN << STATE_SHIFT, 0];
 
 /// Items of one kind with a table of positions.
@@ -60,7 +60,7 @@ impl Overlay {
         self.items.write(context, bytemuck::cast_slice(items));
     }
 
-    /// Replaces the items. Allocates only if there are more than before.
+    /// Replaces the items. Allocates a new table only if they do not fit into the current one.
     pub(super) fn set_items(&mut self, context: &GpuContext, layouts: &Layouts, items: &[Item]) {
         if size_of_val(items) as u64 > self.items.bytes() {
             self.items = Table::unchecked(context, "items", Entry::Pair, items.len());

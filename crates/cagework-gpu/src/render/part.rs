@@ -1,4 +1,4 @@
-//! Composes pictures on a WebGL2 canvas, which does not support copying.
+//! Composes pictures on a WebGL2 canvas by drawing them, because textures cannot be copied to such a canvas.
 
 use super::pipelines::layout_of;
 use super::shaders::PART;

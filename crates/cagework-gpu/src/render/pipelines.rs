@@ -8,18 +8,18 @@ use super::model::DrawVertex;
 use super::shaders::{self, DrawBinding, DrawShader};
 use crate::device::GpuContext;
 
-/// Multisampling samples per pixel.
+/// Number of samples per pixel, for multisampling.
 pub(super) const SAMPLES: u32 = 4;
 
 /// Depth format: 32-bit floats, so that distant handles are still separated from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Format of the layer of splats: sRGB values that are blended as they are.
+/// Format of the layer of splats. Its sRGB values are blended without conversion to linear values.
 pub(super) const LAYER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Format of the map of the shadow.
+/// Format of the shadow map.
 pub(super) const SHADOW_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
-/// Keeps the larger of two values.
+/// Blending that keeps the larger of the old and the new value.
 const MAXIMUM: wgpu::BlendComponent = wgpu::BlendComponent {
     src_factor: wgpu::BlendFactor::One,
     dst_factor: wgpu::BlendFactor::One,
@@ -46,7 +46,7 @@ pub(super) enum Kind {
     Background,
     Mesh,
     MeshBlended,
-    /// The mesh, into the depth buffer alone.
+    /// The mesh, drawn only into the depth buffer.
     MeshDepth,
     Splats,
     Layer,
@@ -114,7 +114,7 @@ const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true
 const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
 /// Depth test of overlays behind surfaces.
 const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
-/// No depth test.
+/// No depth test: nothing is hidden.
 const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {

@@ -1,10 +1,11 @@
-//! What is drawn and how: plain values, set by the page or a command.
+//! Contents and display options of a picture: plain values, set by the page or by a command.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::slice::Slice;
 use glam::{Quat, Vec3};
+use serde::{Deserialize, Serialize};
 
 cagework_core::choice! {
     /// Colours of background and overlays.
@@ -17,7 +18,30 @@ cagework_core::choice! {
     }
 }
 
-/// Display of the mesh.
+/// Display options that the user chooses, for the view and for exported pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct ViewOptions {
+    /// Colours of background and overlays.
+    pub theme: Theme,
+    /// Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of K. Smith's paper (`docs/method.md`,
+    /// sources).
+    pub base_wireframe: bool,
+    /// Whether the floor grid is drawn.
+    pub floor: bool,
+    /// Whether splats outside the cage are drawn.
+    pub floaters: bool,
+    /// Whether colours of weights span 0 to 1 instead of 0 to the maximum.
+    pub weights_to_one: bool,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self { theme: Theme::Dark, base_wireframe: false, floor: true, floaters: true, weights_to_one: false }
+    }
+}
+
+/// How the mesh is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeshStyle {
     /// The mesh is not drawn.
@@ -30,10 +54,10 @@ pub enum MeshStyle {
     /// Weights of a control in the colours of [`super::colormap`], from 0 to the mesh's maximum or to 1;
     /// negative weights in a warning colour. Legend: [`crate::Session::value_range`].
     Weights {
-        /// Index of the control.
+        /// Index of the control whose weights are drawn.
         column: u32,
     },
-    /// Reproduction error of the weights at rest, over the cage diagonal, on a logarithmic scale:
+    /// Reproduction error of the weights at rest, as a fraction of the cage's diagonal, on a logarithmic scale:
     /// [`super::colormap::ERROR_RANGE`].
     Errors,
 }
@@ -41,44 +65,36 @@ pub enum MeshStyle {
 /// Contents and display options of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneOptions {
-    /// Colours of background and overlays.
-    pub theme: Theme,
+    /// Theme, wireframe, floor, floaters and colour scale.
+    pub view: ViewOptions,
     /// Whether the background is drawn. Otherwise it is transparent.
     pub backdrop: bool,
-    /// Display of the mesh.
+    /// How the mesh is drawn.
     pub mesh: MeshStyle,
-    /// Whether colours of weights span 0 to 1 instead of 0 to the maximum.
-    pub weights_to_one: bool,
-    /// How grey or painted each vertex is in [`MeshStyle::Solid`] and [`MeshStyle::Clay`], from 0 to 1; shows which
-    /// vertices stay in place. `[n_vertices]`
+    /// Strength, 0 to 1, with which each vertex is blended towards grey or, if [`Self::painted`], towards the colour of
+    /// paint, in [`MeshStyle::Solid`] and [`MeshStyle::Clay`]. It shows which vertices stay in place. `[n_vertices]`
     pub greyed: Option<Arc<Vec<f32>>>,
     /// Whether `greyed` is shown as paint.
     pub painted: bool,
     /// Whether the mesh's edges are drawn.
     pub mesh_edges: bool,
-    /// Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of the paper.
-    pub base_wireframe: bool,
     /// Whether the cage's edges are drawn.
     pub cage_lines: bool,
     /// Whether handles are drawn at the cage's vertices.
     pub handles: bool,
-    /// Whether the cage is drawn fainter, with only selected and hovered handles.
+    /// Whether the cage is drawn fainter, with handles only at selected, hovered and unmatched vertices.
     pub cage_faint: bool,
-    /// Hidden ranges of [`super::DrawModel::triangles`], each of whole groups.
+    /// Ranges of [`super::DrawModel::triangles`] that are not drawn. Each consists of whole groups.
     pub hidden: Vec<Range<u32>>,
-    /// Whether splats outside the cage are hidden.
-    pub floaters_hidden: bool,
-    /// Whether the floor grid is drawn.
-    pub floor: bool,
     /// Selected and hovered elements of the cage.
     pub selection: Selection,
-    /// Transform gizmo.
+    /// Transform gizmo; `None` if it is not drawn.
     pub gizmo: Option<Gizmo>,
-    /// Slice of the grid.
+    /// Slice of the solver's grid; `None` if it is not drawn.
     pub slice: Option<SliceView>,
-    /// Marked places with a problem.
+    /// Marks at the places of problems.
     pub marks: Marks,
-    /// Grabbed points, with lines to targets that they cannot reach.
+    /// Grabbed points, and for each point that cannot reach its target a line to the target.
     pub held: Marks,
     /// Joints of a skeleton, visible through surfaces.
     pub joints: Marks,
@@ -89,20 +105,16 @@ pub struct SceneOptions {
 impl Default for SceneOptions {
     fn default() -> Self {
         Self {
-            theme: Theme::Dark,
+            view: ViewOptions::default(),
             backdrop: true,
             mesh: MeshStyle::Solid,
-            weights_to_one: false,
             greyed: None,
             painted: false,
             mesh_edges: false,
-            base_wireframe: false,
             cage_lines: true,
             handles: true,
             cage_faint: false,
             hidden: Vec::new(),
-            floaters_hidden: false,
-            floor: true,
             selection: Selection::default(),
             gizmo: None,
             slice: None,
@@ -115,7 +127,8 @@ impl Default for SceneOptions {
 }
 
 impl SceneOptions {
-    /// Whether the mesh is painted instead of greyed, and the strength of either, 0 or 1.
+    /// [`Surface::low`](super::layout::Surface::low) and `high` for styles without a colour map, each 0 or 1: whether
+    /// vertices are painted instead of greyed, and whether they are painted or greyed at all.
     pub(super) fn overlay(&self) -> [f32; 2] {
         [self.painted, self.greyed.is_some()].map(|on| f32::from(u8::from(on)))
     }
@@ -124,36 +137,39 @@ impl SceneOptions {
 /// Selected and hovered elements of the cage. Invalid indices are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// Selected vertices.
+    /// Indices of the selected controls: the cage's vertices, then the controls inside the cage.
     pub vertices: Vec<u32>,
-    /// Selected edges, as vertices in any order.
+    /// Selected edges, each as its two ends in any order.
     pub edges: Vec<[u32; 2]>,
-    /// Selected faces.
+    /// Indices of the selected faces of the cage.
     pub faces: Vec<u32>,
-    /// Hovered vertex.
+    /// Index of the control under the pointer, if there is one.
     pub hovered_vertex: Option<u32>,
-    /// Hovered edge.
+    /// Ends of the edge under the pointer, if there is one.
     pub hovered_edge: Option<[u32; 2]>,
-    /// Hovered face.
+    /// Index of the face under the pointer, if there is one.
     pub hovered_face: Option<u32>,
     /// Vertices without a mirror image, in symmetric editing.
     pub unmatched: Vec<u32>,
 }
 
-/// Operation of a gizmo, with the shape of its handles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum GizmoMode {
-    /// Move the selection; handles are arrows.
-    #[default]
-    Move,
-    /// Rotate the selection; handles are rings.
-    Rotate,
-    /// Scale the selection; handles are boxes.
-    Scale,
+cagework_core::choice! {
+    /// Operation of a gizmo, with the shape of its handles.
+    GizmoMode {
+        /// Move the selection; handles are arrows.
+        #[default]
+        Move = "move",
+        /// Rotate the selection; handles are rings.
+        Rotate = "rotate",
+        /// Scale the selection; handles are boxes.
+        Scale = "scale",
+    }
 }
 
 /// A handle of a gizmo.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum GizmoPart {
     /// Moves or scales along an axis of the gizmo, or rotates about it: 0 is x, 1 is y, 2 is z.
     Axis(u8),
@@ -170,13 +186,13 @@ pub struct Gizmo {
     pub mode: GizmoMode,
     /// Origin of the gizmo, world space.
     pub center: Vec3,
-    /// Orientation of the axes.
+    /// Rotation from the world's axes to the gizmo's axes.
     pub rotation: Quat,
     /// Hovered or dragged handle.
     pub active: Option<GizmoPart>,
 }
 
-/// Display of a slice.
+/// A slice of the grid, and how it is coloured.
 #[derive(Clone, Debug)]
 pub struct SliceView {
     /// The slice. Shared, so that setting a scene is cheap; compared by identity.
@@ -194,14 +210,14 @@ impl PartialEq for SliceView {
 /// Marked places on or near the model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
-    /// Points, world space.
+    /// Centres of filled points, world space.
     pub points: Vec<Vec3>,
-    /// Points drawn as rings, world space.
+    /// Centres of points drawn as rings, world space.
     pub rings: Vec<Vec3>,
-    /// Segments, world space.
+    /// Ends of line segments, world space.
     pub segments: Vec<[Vec3; 2]>,
-    /// Vertices of the mesh, which follow the deformation.
+    /// Indices of mesh vertices to mark. The marks follow the deformation.
     pub mesh_vertices: Vec<u32>,
-    /// Vertices of the cage, which follow its pose.
+    /// Indices of cage vertices to mark. The marks follow the cage's pose.
     pub cage_vertices: Vec<u32>,
 }

@@ -21,7 +21,7 @@ pub enum DrawBinding {
 /// A draw shader with entry points `vertex` and `fragment`.
 #[derive(Debug)]
 pub struct DrawShader {
-    /// Name of the file.
+    /// Name of the WGSL file in `shaders/`, without its extension.
     pub name: &'static str,
     /// Complete source, with tables in buffers.
     pub wgsl: &'static str,

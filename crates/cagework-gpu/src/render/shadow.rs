@@ -3,13 +3,14 @@
 use super::pipelines::{Layouts, SHADOW_FORMAT};
 use crate::device::GpuContext;
 
-/// Pixels along a side. The floor interpolates the map by cubic splines, which blur it over about two pixels.
+/// Number of pixels along a side of the map. The floor interpolates the map by cubic splines, which blur it over about
+/// two pixels.
 const SIDE: u32 = 96;
 
 #[derive(Debug)]
 pub(super) struct ShadowMap {
     pub(super) view: wgpu::TextureView,
-    /// Bind group of the floor.
+    /// Bind group with which the floor reads the map.
     pub(super) group: wgpu::BindGroup,
     /// Whether the model has moved since the map was drawn.
     pub(super) is_stale: bool,

@@ -1,6 +1,7 @@
 //! Draws Gaussian splats into a layer of their own. The layer is kept until pose, camera or size change.
 //!
-//! The layer has one sample per pixel, and its colours are blended in sRGB: captures are trained that way.
+//! The layer has one sample per pixel, and its colours are blended in sRGB, as in the optimisation that produces
+//! captures.
 
 use cagework_core::splats::Splats;
 use glam::Vec3;
@@ -11,7 +12,7 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::splats::SplatMover;
 
-/// Splats, and the picture of them.
+/// Splats, and the layer that they are drawn into.
 #[derive(Debug)]
 pub(super) struct SplatLayer {
     pub(super) mover: SplatMover,
@@ -52,7 +53,7 @@ impl SplatLayer {
         Ok(Self { mover, group, layer: None, drawn: None })
     }
 
-    /// Records the drawing of the layer, if it has changed.
+    /// Records the drawing of the layer, unless it is up to date.
     #[expect(clippy::too_many_arguments, reason = "all belong to the renderer")]
     pub(super) fn encode(
         &mut self,
@@ -64,7 +65,7 @@ impl SplatLayer {
         camera: &Camera,
         hides: bool,
     ) {
-        // Colours of the theme do not change the layer.
+        // Ignore the theme's colours, which do not affect the layer.
         let view = Camera {
             background_top: [0.0; 4],
             background_bottom: [0.0; 4],
@@ -80,7 +81,9 @@ impl SplatLayer {
         }
         let Some(layer) = &self.layer else { return };
         let [x, y, z, _] = camera.view_from_world.map(|column| column[2]);
-        self.mover.encode(context, encoder, Vec3::new(x, y, z), hides);
+        let backward = Vec3::new(x, y, z);
+        let viewer = if camera.perspective > 0.0 { Vec3::from(camera.eye) } else { backward };
+        self.mover.encode(context, encoder, backward, viewer.extend(camera.perspective).to_array(), hides);
         let target = layer.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("splats"),

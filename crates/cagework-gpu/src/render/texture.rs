@@ -4,8 +4,8 @@ use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 
-/// Number of entries of the table for encoding sRGB. Adjacent entries differ by at most 1 (0.4 before rounding at sRGB's
-/// steepest slope), so that no byte value is missing.
+/// Number of intervals of the table for encoding sRGB. Adjacent entries differ by at most 1 (0.4 before rounding at
+/// sRGB's steepest slope), so that no byte value is missing.
 const ENCODE_STEPS: usize = 8192;
 
 /// Lookup tables for decoding and encoding sRGB bytes.
@@ -68,7 +68,7 @@ fn levels(image: &DrawTexture, most: u32) -> Vec<DrawTexture> {
     levels
 }
 
-/// Uploads an image: sRGB, straight alpha.
+/// Uploads an image and its mip levels, in sRGB with straight alpha.
 pub(super) fn upload(
     context: &GpuContext,
     allocator: &mut Allocator<'_>,

@@ -51,7 +51,7 @@ pub(super) type Color = (u32, f32);
 pub(super) const AXES: [Color; 5] =
     [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0), (0x8a94a6, 1.0)];
 
-/// Colour of the active handle.
+/// Colour of the gizmo's handle that is hovered or dragged.
 pub(super) const ACTIVE: Color = (0xffc53d, 1.0);
 
 const DARK: Palette = Palette {
@@ -125,7 +125,7 @@ fn srgb_from_linear(c: f32) -> u8 {
     (255.0 * srgb).round() as u8
 }
 
-/// Converts premultiplied to straight alpha, which image files use. sRGB bytes.
+/// Converts a pixel of sRGB bytes from premultiplied to straight alpha, which image files use.
 pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
     if (1..=254).contains(alpha) {
         for value in rgb {
@@ -168,7 +168,7 @@ impl Palette {
         Style { colors: [linear(self.curves); 8], widths: [[1.25; 4]; 2], opacity, ..self.cage_lines() }
     }
 
-    /// Style of the outlines of balls and tubes around controls inside the cage.
+    /// Style of the edges of balls, tubes and sheets around controls inside the cage.
     pub(super) fn shells(&self) -> Style {
         Style { colors: self.states(self.inner), widths: [[0.9; 4]; 2], opacity: 0.6, ..self.cage_lines() }
     }
@@ -274,7 +274,7 @@ mod tests {
             let product = srgb_from_linear(linear_from_srgb(shown) * f32::from(alpha) / 255.0);
             let mut pixel = [product, 0, product, alpha];
             divide_by_alpha(&mut pixel);
-            // The product was rounded to a byte.
+            // `product` was rounded to a byte, so the quotient differs from `shown` by up to 2.
             assert!(pixel[0].abs_diff(shown) <= 2 && pixel[0] == pixel[2], "{pixel:?}");
             assert_eq!([pixel[1], pixel[3]], [0, alpha]);
         }

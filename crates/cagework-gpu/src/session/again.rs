@@ -30,7 +30,8 @@ impl Session {
     /// Copies this session to another device after its own device was lost. `self` stays unchanged, so the call can be
     /// repeated if the new device is out of memory.
     ///
-    /// # Errors As the calls that set model, cage, weights and parts.
+    /// # Errors
+    /// As the calls that set model, cage, weights and parts.
     pub async fn recover(&self, context: GpuContext) -> Result<Self, GpuError> {
         let mut session = Self::new(context);
         session.camera = self.camera;

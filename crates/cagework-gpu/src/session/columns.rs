@@ -10,7 +10,7 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Uses weights of [`Coordinates::weights`].
+    /// Replaces the weights by those that [`Coordinates::weights`] has computed for the session's model and cage.
     ///
     /// # Errors
     /// As [`Self::adopt`].
@@ -20,7 +20,7 @@ impl Session {
         self.bound(kind, weights.into(), Arc::default(), None).await
     }
 
-    /// Positions for the columns of weights: [`Coordinates::columns`] of the session's cage.
+    /// Vectors that the columns of the weights multiply: [`Coordinates::columns`] of the session's cage.
     pub(super) fn columns<'a>(&self, kind: Coordinates, positions: &'a [Vec3]) -> Cow<'a, [Vec3]> {
         self.cage().map_or(positions.into(), |cage| kind.columns(cage, positions))
     }

@@ -20,10 +20,10 @@ use crate::render::DrawModel;
 use crate::skin::Skinner;
 use crate::table::{Entry, Table};
 
-/// Deforms one mesh repeatedly. `[positions, normals]` are drawn.
+/// Deforms one mesh repeatedly. `tables`: positions and normals that are drawn.
 #[derive(Debug)]
 pub(super) enum Mover {
-    /// On the GPU: only the cage is uploaded.
+    /// Deforms on the GPU and uploads only the cage.
     Kernels { deformer: Box<Deformer>, tables: [Table; 2] },
     /// Deforms on the CPU and uploads all vertices.
     Processor { model: Arc<DrawModel>, triangles: Vec<[u32; 3]>, tables: [Table; 2] },
@@ -38,8 +38,8 @@ impl Mover {
         frames: &Frames,
         on_gpu: Option<GpuWeights>,
     ) -> Result<Self, GpuError> {
-        let triangles = model.shading_triangles();
         if context.draws_only() {
+            let triangles = model.shading_triangles();
             let n = model.positions.len() + model.copies.len();
             let mut allocator = Allocator::new(context, "the deformed mesh");
             let positions = Table::new(context, &mut allocator, "positions", Entry::Point, n)?;
@@ -52,13 +52,13 @@ impl Mover {
             (None, Some(on_gpu)) => on_gpu,
             (None, None) => GpuWeights::new(context, weights, frames).await?,
         };
-        let deformer = Deformer::new(context, &on_gpu, &triangles).await?;
+        let deformer = Deformer::new(context, &on_gpu, &model.shading_triangles()).await?;
         let tables = [deformer.positions(), deformer.normals()].map(|b| Table::Buffer(b.clone()));
         Ok(Self::Kernels { deformer: Box::new(deformer), tables })
     }
 
-    /// Sets or removes parts that stay in place or are rigid; they take effect with the next pose. Does nothing on the
-    /// CPU, where each deformation is given the parts.
+    /// Sets or removes fixed and rigid parts, which take effect with the next pose. Does nothing on the CPU, where the
+    /// caller computes the positions of the parts, too.
     pub(super) async fn hold(
         &mut self,
         context: &GpuContext,
@@ -119,7 +119,7 @@ impl Mover {
         }
     }
 
-    /// Prepares the playback of a clip. `skin` is that of the model's vertices.
+    /// Prepares the playback of a clip. `skin` has the model's vertices, without their copies.
     pub(super) async fn skinner(
         &self,
         context: &GpuContext,
@@ -143,7 +143,7 @@ impl Mover {
         }
     }
 
-    /// Current positions, object units: `[n_vertices]`, on the GPU followed by copies.
+    /// Current positions, object units: `[n_vertices]`. On the GPU, the copies of vertices follow.
     pub(super) async fn read_positions(
         &self,
         context: &GpuContext,
@@ -151,7 +151,7 @@ impl Mover {
     ) -> Result<Vec<Vec3>, GpuError> {
         match self {
             Self::Kernels { deformer, .. } => {
-                // Always deform again, which takes 1 ms, because the pose may not have been drawn yet.
+                // Deform first, which takes 1 ms: the current pose may not have been drawn yet.
                 deformer.run(context).await?;
                 deformer.read_positions(context).await
             }

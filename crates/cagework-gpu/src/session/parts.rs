@@ -11,7 +11,7 @@ use super::Session;
 use crate::error::GpuError;
 
 impl Session {
-    /// Sets the parts of the model that stay in place or are rigid. New weights do not change the parts.
+    /// Sets the parts of the model that stay in place or are rigid. The parts also apply to weights that are set later.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without a model, [`GpuError::Model`] if a vertex does not exist; otherwise as

@@ -7,7 +7,7 @@ use crate::buffers::Allocator;
 use crate::error::GpuError;
 use crate::render::{Target, divide_by_alpha};
 
-/// Format of pictures.
+/// Format of pictures: the GPU converts linear colours to sRGB.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
 /// Maximum side of a picture, pixels: the texture size of WebGPU's baseline. A GPU may support less.

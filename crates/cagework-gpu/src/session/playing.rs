@@ -9,7 +9,7 @@ use crate::error::GpuError;
 
 impl Session {
     /// Makes the mesh follow a skin instead of the cage until [`Self::stop_playing`]. [`Self::play`] sets the pose of
-    /// the skin. `skin`: of the model's vertices. `field`: displacements added after skinning.
+    /// the skin. `skin` has one entry per vertex of the model; `field`: displacements added after skinning.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] if the skin's size does not match; otherwise
@@ -34,7 +34,13 @@ impl Session {
         }
     }
 
-    /// Makes the mesh follow the cage again.
+    /// If `on`, makes the mesh follow the cage although a clip plays; otherwise, makes it follow the skin again.
+    pub fn interrupt_playing(&mut self, on: bool) {
+        self.moved |= self.interrupted != on;
+        self.interrupted = on;
+    }
+
+    /// Ends playback: the mesh follows the cage again.
     pub fn stop_playing(&mut self) {
         self.moved |= self.playing.take().is_some();
     }

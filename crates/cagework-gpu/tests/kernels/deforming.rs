@@ -1,4 +1,4 @@
-//! Kernels of each frame: deformation, including vertices outside the cage, skinning, and normals.
+//! Tests of the kernels that run in each frame: deformation (also of vertices outside the cage), skinning, and normals.
 
 use cagework_core::field::{Field, Lattice, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
@@ -12,10 +12,10 @@ use glam::{Mat4, Quat, Vec3, Vec4};
 use super::support::{Rng, assert_close, egg, flat};
 use super::{ROWS, bytes, run};
 
-/// Rounding of sums of dozens of products near 1.
+/// Tolerance for rounding of sums of dozens of products near 1.
 const POINT_TOLERANCE: f32 = 2e-6;
 
-/// Rounding of unit vectors: `inverseSqrt` has an error of 2 ulp.
+/// Tolerance for rounding of unit vectors: `inverseSqrt` has an error of 2 ulp.
 const NORMAL_TOLERANCE: f32 = 2e-6;
 
 /// Random weights; rows have different lengths, some are empty.
@@ -122,7 +122,8 @@ fn bend_vertices_matches_cpu() {
     let (table, moved) = (field_table(&field), padded(&points, 1.0));
     let result = run(&kernels::BEND_VERTICES, ROWS, points.len() as u32, &[bytes(&table), bytes(&moved)]);
     bend_vertices(&field, &mut points);
-    // Values differ strongly between nodes, which amplifies rounding of positions a hundredfold.
+    // Random displacements of neighbouring nodes differ by up to 1. Such a gradient amplifies the rounding of positions
+    // up to a hundredfold.
     assert_close(&unpadded(&result), &flat(&points), 100.0 * POINT_TOLERANCE);
 }
 
@@ -130,7 +131,8 @@ fn bend_vertices_matches_cpu() {
 fn hold_parts_matches_cpu() {
     let mut rng = Rng(17);
     let n = 131;
-    // Some vertices are partly held, every third is in one of four pieces; some are both, some neither.
+    // Half of the vertices are partly or fully held in place, and every third vertex belongs to one of four rigid
+    // pieces.
     let rest: Vec<Vec4> = (0..n).map(|v| rng.point().extend([0.0, 0.0, 0.4, 1.0][v as usize % 4])).collect();
     let piece_of: Vec<u32> = (0..n).map(|v| if v % 3 == 0 { 1 + v / 3 % 4 } else { 0 }).collect();
     let motions: Vec<PieceMotion> =

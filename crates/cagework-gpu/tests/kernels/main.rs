@@ -31,11 +31,12 @@ const ROW_TOLERANCE: f32 = 8e-6;
 /// order, but products may be fused.
 const SUM_TOLERANCE: f32 = 2e-6;
 
-/// Columns of a batch: an odd number of quads, so that rows do not align with workgroups.
+/// Number of columns of a batch. It is an odd number of quads, so that rows do not align with workgroups.
 const N_LANES: usize = 12;
+/// Number of quads of a batch; a quad is four columns.
 const N_QUADS: u32 = 3;
 
-/// Cells along the longest side. Rows have odd and even lengths.
+/// Number of cells along the cage's longest side.
 const GRID: u32 = 13;
 
 fn hierarchy_of<T>(use_it: impl FnOnce(&Hierarchy, &Stencils) -> T) -> T {
@@ -86,7 +87,7 @@ fn bytes<T: bytemuck::Pod>(data: &[T]) -> &[u8] {
     bytemuck::cast_slice(data)
 }
 
-/// A random field; zero rows of the level are zero.
+/// A random field, with zeros in the row of zeros that follows the rows of each colour.
 fn field(rng: &mut Rng, level: &Level) -> Vec<f32> {
     let mut values = rng.values(level.n_rows() * N_LANES);
     for row in [level.zero_row() as usize, level.n_rows() - 1] {
@@ -186,7 +187,7 @@ fn residual_matches_cpu() {
             let n_rhs = if k == 0 { level.n_cut() } else { level.n_rows() };
             let mut rhs = rng.values(n_rhs * N_LANES);
             if k > 0 {
-                // The zero row of coarse right-hand sides is zero.
+                // Coarse right-hand sides also have a row of zeros.
                 let zero = level.zero_row() as usize;
                 rhs[zero * N_LANES..(zero + 1) * N_LANES].fill(0.0);
             }
@@ -253,7 +254,7 @@ fn prolong_correction_matches_cpu() {
     });
 }
 
-/// Compares relative to the largest value.
+/// Asserts that the results of GPU and CPU are close, relative to the largest value.
 #[track_caller]
 fn assert_sums_close(gpu: &[f32], cpu: &[f32]) {
     let largest = cpu.iter().fold(0.0f32, |m, x| m.max(x.abs()));

@@ -1,16 +1,16 @@
 //! Kernels of splats: deformation by a field, and sorting by depth.
 
 use cagework_core::field::{Field, Lattice};
-use cagework_core::splats::{SortedSplats, SplatPose, Splats, deform_splats};
+use cagework_core::splats::{SortedSplats, SplatPose, Splats, color_along, deform_splats, n_harmonics};
 use cagework_core::team::Team;
 use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
 use cagework_gpu::kernels;
 use cagework_gpu::skin::field_table;
-use cagework_gpu::splats::{BINS, Depths, sort_splats, splat_rows};
-use glam::{Quat, Vec3};
+use cagework_gpu::splats::{BINS, Depths, sort_splats, splat_colors, splat_harmonics, splat_rows};
+use glam::{Mat3, Quat, Vec3, Vec4};
 
 use super::support::{Rng, assert_close, egg};
-use super::{ROWS, bytes, run};
+use super::{ROWS, Work, bytes, mode, run};
 
 fn random_splats(rng: &mut Rng, n: usize, at: impl Fn(&mut Rng) -> Vec3) -> Splats {
     Splats {
@@ -31,16 +31,18 @@ fn deform_splats_matches_cpu() {
     let TriMesh { positions, triangles } = egg(5, 6);
     let faces = triangles.iter().map(|t| t.to_vec()).collect();
     let lattice = Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap(), 24);
-    // Displacements of neighbouring nodes differ by up to a third of a cell. Bound and other nodes alternate in layers.
+    // Displacements of neighbouring nodes differ by up to a third of a cell along each axis. Runs of seven nodes with
+    // the fourth component 0 alternate with runs of seven with 1.
     let n = lattice.dims.element_product();
     let values = (0..n).map(|k| (0.3 * lattice.cell * rng.point()).extend((k / 7 % 2) as f32)).collect();
     let size = lattice.cell * (lattice.dims - 1).as_vec3();
     let (origin, field) = (lattice.origin, Field::of_values(lattice, values));
-    // The splats are inside the lattice and outside it.
+    // Some splats are inside the lattice, others outside of it.
     let splats = random_splats(&mut rng, 131, |rng| origin + size * (1.2 * rng.point() - 0.1));
     let rest = splats.rest_pose();
     let (table, rows) = (field_table(&field), splat_rows(&rest, &[]));
-    let result = run(&kernels::DEFORM_SPLATS, ROWS, 131, &[bytes(&table), bytes(&rows), bytes(&rows)]);
+    let result =
+        run(&kernels::DEFORM_SPLATS, ROWS, 131, &[bytes(&table), bytes(&rows), &[0; 16], bytes(&rows)]);
     let sorted = SortedSplats::new(&splats, &field.lattice);
     let (mut posed, mut expected) = (SplatPose::default(), rest);
     deform_splats(&sorted, &field, &Team::new(1), &mut posed);
@@ -48,16 +50,63 @@ fn deform_splats_matches_cpu() {
         expected.positions[splat as usize] = posed.positions[k];
         expected.covariances[splat as usize] = posed.covariances[k];
     }
-    // Rounding of a point's place in its cell, 1e-6 of a cell, times gradients near 1.
+    // Rounding changes a point's place in its cell by about 1e-6 of a cell. Results differ by about as much, because
+    // gradients are near 1 and change by at most about 1 per cell; the tolerance leaves a margin.
     assert_close(&result, splat_rows(&expected, &[]).as_flattened(), 4e-6);
 }
 
-/// Centres and the axis are multiples of powers of two, so that bins have no rounding.
+/// The direction from which a splat is seen is rotated into the axes of the splat. All splats are at one place, so the
+/// kernel keeps their order.
+#[test]
+fn seen_colours_match_cpu() {
+    let mut rng = Rng(23);
+    let n = 131;
+    for degree in 1..=3 {
+        let mut splats = random_splats(&mut rng, n, |_| Vec3::ONE);
+        splats.degree = degree;
+        splats.harmonics = (0..n * n_harmonics(degree)).map(|_| rng.point() - 0.5).collect();
+        let (harmonics, unit) = splat_harmonics(&splats, degree);
+        let turns: Vec<Mat3> = splats.rotations.iter().map(|&q| Mat3::from_quat(q)).collect();
+        let row = |m: &Mat3| [m.x_axis.extend(m.y_axis.x), Vec4::new(m.y_axis.y, m.y_axis.z, 0.0, 0.0)];
+        let rows: Vec<Vec4> = turns.iter().flat_map(row).collect();
+        let eye = Vec3::new(3.0, -1.0, 2.0);
+        let within = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let depths = Depths {
+            viewer: eye.extend(1.0).to_array(),
+            degree: u32::from(degree),
+            unit,
+            ..Depths::new(n, within, Vec3::Z, false)
+        };
+        let (splat_rows, colors) = (splat_rows(&splats.rest_pose(), &[]), splat_colors(&splats));
+        let (places, empty) = (vec![0_u32; BINS as usize], vec![[0_u32; 2]; n]);
+        let work = Work { mode: mode::LOWER_DIGIT, ..ROWS };
+        let depths = bytes(std::slice::from_ref(&depths));
+        let [rows, colors, source] = [bytes(&rows), bytes(&colors), bytes(&empty)];
+        let inputs =
+            [depths, bytes(&splat_rows), colors, source, bytes(&places), bytes(&harmonics), rows, source];
+        let seen = run(&kernels::SCATTER_SPLATS, work, 1, &inputs);
+        for (splat, entry) in seen.as_chunks::<2>().0.iter().enumerate() {
+            assert_eq!(entry[0].to_bits() as usize, splat);
+            let direction = turns[splat].transpose() * (Vec3::ONE - eye).normalize();
+            let expected = color_along(splats.colors[splat], splats.harmonics_of(splat), direction);
+            let [r, g, b, _] = entry[1].to_bits().to_le_bytes().map(|byte| f32::from(byte) / 255.0);
+            let error = (Vec3::new(r, g, b) - expected.clamp(Vec3::ZERO, Vec3::ONE)).abs().max_element();
+            // The kernel rounds colours to 8 bits and up to 16 coefficients to 16 bits each.
+            assert!(error < 0.5 / 255.0 + 16.0 * unit / 65534.0, "{error}");
+        }
+    }
+}
+
+/// Coordinates are multiples of powers of two, and the view is along an axis, so depths are computed without rounding.
+/// Half of the centres share the lower digit of their depths.
 #[test]
 fn sorting_kernels_match_cpu() {
     let mut rng = Rng(19);
     let n = 5003;
-    let grid = |rng: &mut Rng| (1024.0 * rng.point()).floor() / 1024.0;
+    let grid = |rng: &mut Rng| {
+        let steps = if rng.unit() < 0.5 { 1024.0 } else { 4_194_304.0 };
+        (steps * rng.point()).floor() / steps
+    };
     let splats = random_splats(&mut rng, n, grid);
     let within = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     for backward in [Vec3::Z, Vec3::NEG_X] {
@@ -67,13 +116,21 @@ fn sorting_kernels_match_cpu() {
         let rows = splat_rows(&splats.rest_pose(), &hidden);
         let (colors, none) = (vec![7_u32; n], vec![9_u32; (BINS * depths.n_blocks) as usize]);
         let depths_bytes = bytes(std::slice::from_ref(&depths));
-        let inputs = [depths_bytes, bytes(&rows), bytes(&none)];
-        let counts = run(&kernels::COUNT_SPLATS, ROWS, depths.n_blocks, &inputs);
-        let places = run(&kernels::SCAN_SPLATS, ROWS, 128, &[depths_bytes, bytes(&counts)]);
         let empty = vec![[0_u32; 2]; n];
-        let inputs = [depths_bytes, bytes(&rows), bytes(&colors), bytes(&places), bytes(&empty)];
-        let order = run(&kernels::SCATTER_SPLATS, ROWS, depths.n_blocks, &inputs);
-        let order: Vec<u32> = order.iter().map(|x| x.to_bits()).collect();
+        let mut order = empty.as_flattened().to_vec();
+        for mode in [mode::LOWER_DIGIT, mode::HIGHER_DIGIT] {
+            let work = Work { mode, ..ROWS };
+            let source = order;
+            let inputs = [depths_bytes, bytes(&rows), bytes(&source), bytes(&none)];
+            let counts = run(&kernels::COUNT_SPLATS, work, depths.n_blocks, &inputs);
+            let places = run(&kernels::SCAN_SPLATS, work, 128, &[depths_bytes, bytes(&counts)]);
+            let [rows, colors] = [bytes(&rows), bytes(&colors)];
+            let none = &[0; 16][..];
+            let inputs =
+                [depths_bytes, rows, colors, bytes(&source), bytes(&places), none, none, bytes(&empty)];
+            let sorted = run(&kernels::SCATTER_SPLATS, work, depths.n_blocks, &inputs);
+            order = sorted.iter().map(|x| x.to_bits()).collect();
+        }
         let expected = sort_splats(&splats.positions, &depths);
         let entry = |splat: u32| [splat, if splat.is_multiple_of(3) { 7 } else { 0 }];
         assert_eq!(order.as_chunks().0, expected.into_iter().map(entry).collect::<Vec<_>>());

@@ -14,7 +14,7 @@ pub(crate) fn gpu() -> GpuContext {
     gpu_with(&ContextOptions::default())
 }
 
-/// [`gpu`] with options.
+/// Like [`gpu`], with the given options.
 pub(crate) fn gpu_with(options: &ContextOptions) -> GpuContext {
     match pollster::block_on(GpuContext::new(options)) {
         Ok(context) => context,
@@ -48,7 +48,8 @@ impl Rng {
     }
 }
 
-/// Fails if a value differs by more than `tolerance` and by more than 2 ulp; reports the value that exceeds this the most.
+/// Fails if a value differs by more than `tolerance` and by more than 2 ulp. Reports the value that exceeds both by the
+/// largest amount.
 #[track_caller]
 pub(crate) fn assert_close(gpu: &[f32], cpu: &[f32], tolerance: f32) {
     assert_eq!(gpu.len(), cpu.len(), "lengths");

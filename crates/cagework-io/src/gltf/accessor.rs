@@ -6,12 +6,13 @@
 use std::sync::Arc;
 
 use ::gltf::json::Root;
-use ::gltf::json::accessor::{ComponentType, Type};
+use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::validation::Checked;
 
 use super::{GltfError, get};
 
-/// Limit on the elements of an accessor and on the vertices of a model: about 1 GB to read and weld.
+/// Limit on the elements of an accessor and on the vertices of a model. A model of this size takes about 1 GB to read
+/// and weld.
 pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 
 /// Limit on implicit zeros: elements of an accessor without buffer view that sparse values do not set.
@@ -32,7 +33,7 @@ struct Component {
 }
 
 impl Component {
-    /// Decodes a component from bytes of its size. Normalisation follows glTF 2.0, section 3.6.2.2.
+    /// Decodes a component from its bytes. Normalisation follows glTF 2.0, section 3.6.2.2.
     fn float(self, bytes: &[u8]) -> f32 {
         let (value, unit): (f32, f32) = match (self.kind, bytes) {
             (ComponentType::I8, &[a]) => (f32::from(a as i8), 127.0),
@@ -55,7 +56,7 @@ fn unsigned(kind: ComponentType, bytes: &[u8]) -> u32 {
     }
 }
 
-/// Bytes of `count` elements, at intervals of `stride` bytes in a buffer.
+/// Bytes of an accessor's elements: `size` bytes each, at intervals of `stride` bytes.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -101,10 +102,7 @@ impl<'a> Source<'a> {
     /// If the accessor does not exist or has too many implicit zeros.
     pub(crate) fn count(self, accessor: u32) -> Result<u64, GltfError> {
         let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
-        let absent = match a.buffer_view {
-            Some(_) => 0,
-            None => a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)),
-        };
+        let absent = self.count_absent(accessor);
         if absent > MAX_IMPLICIT_ZEROS {
             return Err(fault(
                 accessor,
@@ -116,7 +114,18 @@ impl<'a> Source<'a> {
         Ok(a.count.0)
     }
 
-    /// Upper bound on the number of non-zero elements, without allocating.
+    /// Number of implicit zeros; 0 if the accessor does not exist.
+    pub(crate) fn count_absent(self, accessor: u32) -> u64 {
+        let without_view = |a: &&Accessor| a.buffer_view.is_none();
+        self.root
+            .accessors
+            .get(accessor as usize)
+            .filter(without_view)
+            .map_or(0, |a| a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)))
+    }
+
+    /// Upper bound on the number of non-zero elements. Reads the stored bytes and allocates nothing; every sparse value
+    /// counts.
     pub(crate) fn count_nonzero(self, accessor: u32) -> Result<u64, GltfError> {
         let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
         let sparse = a.sparse.as_ref().map_or(0, |sparse| sparse.count.0);

@@ -15,7 +15,7 @@ pub(crate) struct Pose<'a> {
     pub(crate) positions: &'a [Vec3],
 }
 
-/// Where an exported document has the mesh of an instance.
+/// Mesh and node that show an instance in an exported document.
 pub(crate) struct MeshPlacement {
     pub(super) mesh: usize,
     pub(super) node: usize,
@@ -59,7 +59,7 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
     }
 }
 
-/// The animation of an export's poses.
+/// The animation that plays an export's poses as morph targets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PoseClip<'a> {
     pub(crate) name: &'a str,
@@ -69,7 +69,7 @@ pub(crate) struct PoseClip<'a> {
 }
 
 impl<'a> PoseClip<'a> {
-    /// A clip beside those of the document.
+    /// A clip named "poses", added to the animations of the document.
     pub(crate) fn of(timeline: &'a Timeline) -> Self {
         Self { name: "poses", timeline, is_alone: false }
     }

@@ -193,7 +193,7 @@ fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Va
 
     // glTF requires joint 0 if the weight is 0.
     let of_vertex = |all: &[(u32, f32); 4]| all.map(|(j, w)| if w > 0.0 { j as u16 } else { 0 });
-    let bytes = rig.influences.iter().flat_map(of_vertex).flat_map(u16::to_le_bytes).collect();
+    let bytes: Vec<u8> = rig.influences.iter().flat_map(of_vertex).flat_map(u16::to_le_bytes).collect();
     let view = pack.push_view(json, bytes, Some(VERTICES));
     let count = rig.influences.len();
     let accessor = json!({ "bufferView": view, "componentType": U16, "count": count, "type": "VEC4" });

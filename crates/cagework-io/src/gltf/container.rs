@@ -25,6 +25,10 @@ const MAX_ITEMS: u64 = 1 << 18;
 /// Lists of a document whose lengths are not limited by the size of the buffers.
 const LISTS: [&str; 9] =
     ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
+/// Limit on the values of a document's JSON; larger texts may have one for each 4 bytes. A value takes up to 200 bytes
+/// while it is read.
+const MAX_JSON_VALUES: u64 = 1 << 22;
+const BYTES_PER_JSON_VALUE: u64 = 4;
 /// Size of the GLB header, bytes.
 const GLB_HEADER_BYTES: usize = 12;
 pub(crate) struct GltfContents {
@@ -131,11 +135,14 @@ fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
 }
 
 /// Approximate memory of parsed JSON: its text twice, and per value a `serde_json::Value` and a typed copy.
-fn bytes_of_json(text: &[u8]) -> u64 {
+pub(super) fn bytes_of_json(text: &[u8]) -> u64 {
     const VALUE_BYTES: u64 = 140;
-    // Separators inside strings, which are rare, are counted too.
-    let values = text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64;
-    2 * text.len() as u64 + VALUE_BYTES * values
+    2 * text.len() as u64 + VALUE_BYTES * values_of_json(text)
+}
+
+/// Approximate number of values. Separators inside strings, which are rare, are counted too.
+fn values_of_json(text: &[u8]) -> u64 {
+    text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64
 }
 
 /// Total size of the document's base64 data URIs after decoding, bytes.
@@ -165,7 +172,8 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
             "it has version {version}, but only version 2 is supported: export it as glTF 2.0"
         )));
     }
-    // `Glb::from_slice` subtracts the header's length unchecked and rejects trailing bytes.
+    // `Glb::from_slice` subtracts the header's length without a check and rejects trailing bytes. Check the declared
+    // length and remove trailing bytes first.
     let length = length as usize;
     if length < GLB_HEADER_BYTES {
         return Err(fault(format!(
@@ -184,7 +192,7 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
             _ => "a chunk extends beyond the end of the file: it is cut off or damaged".to_owned(),
         })
     })?;
-    // Some exporters pad the JSON chunk with zeros instead of spaces.
+    // Some exporters pad the JSON chunk with zeros instead of spaces. Remove them, because they are invalid in JSON.
     let json = match glb.json {
         Cow::Borrowed(json) => Cow::Borrowed(unpadded(json)),
         Cow::Owned(json) => unpadded(&json).to_vec().into(),
@@ -200,6 +208,11 @@ fn unpadded(json: &[u8]) -> &[u8] {
 }
 
 fn parsed(json: &[u8]) -> Result<Value, GltfError> {
+    let (count, limit) =
+        (values_of_json(json), MAX_JSON_VALUES.max(json.len() as u64 / BYTES_PER_JSON_VALUE));
+    if count > limit {
+        return Err(GltfError::TooLarge { what: "values in the JSON", count, limit });
+    }
     serde_json::from_slice(json).map_err(|e| GltfError::Json(json_fault(json, &e)))
 }
 
@@ -251,7 +264,7 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Rewrites integers written as floats, such as 24.0, which glTF 2.0 allows (section 2.7).
+/// Replaces integers written as floats, such as 24.0, by integers. glTF 2.0 allows such floats (section 2.7).
 fn write_integers(value: &mut Value, is_integer: bool) {
     const MEMBERS: [&str; 26] = [
         "attributes",

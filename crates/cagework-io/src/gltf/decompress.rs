@@ -20,7 +20,8 @@ use super::root::{DRACO, MESHOPT, typed};
 /// Limit on the decompressed size of all streams, bytes. A file of a few hundred bytes can claim any size.
 const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
 
-/// A sum of four joint weights that differs from 1 by less is only rounded to f32.
+/// If the joint weights of a vertex sum to 1 within this tolerance, they are not rescaled, because the difference comes
+/// from rounding to f32.
 const MAX_WEIGHT_SUM_ERROR: f64 = 1e-6;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
@@ -70,7 +71,8 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
     Ok(())
 }
 
-/// Accessors with decoded values, in buffers from index `first` on, and without sparse values.
+/// Indices and accessors of the decoded values, which are in buffers from index `first` on. Excludes accessors with
+/// sparse values.
 fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)> {
     let is_decoded = move |accessor: &Accessor| {
         let view = accessor.buffer_view.and_then(|view| root.buffer_views.get(view.value()));
@@ -79,8 +81,8 @@ fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)
     root.accessors.iter().enumerate().filter(move |(_, accessor)| is_decoded(accessor))
 }
 
-/// Recomputes min and max, which described the values before quantisation and with Draco's vertex order. glTF
-/// requires bounds for positions and times.
+/// Recomputes the bounds `min` and `max`, because decoding a quantised stream does not return exactly the values that
+/// they were computed from. glTF requires bounds for positions and times.
 fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize) {
     let mut plain = root.clone();
     plain.accessors.iter_mut().for_each(|accessor| accessor.normalized = false);
@@ -101,8 +103,8 @@ fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize
     }
 }
 
-/// Scales joint weights to a sum of 1 and sets joints with weight 0 to joint 0, because the encoder's rounding can
-/// change both.
+/// Scales joint weights to a sum of 1, and sets joints with weight 0 to joint 0, as glTF requires. The encoder's
+/// rounding can change the sums and make small weights 0.
 fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first: usize) {
     let decoded: Vec<usize> = decoded(root, first).map(|(number, _)| number).collect();
     let mut done = Vec::new();
@@ -151,7 +153,8 @@ fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first
     }
 }
 
-/// Replaces the values of a four-component accessor of `n` vertices.
+/// Replaces the values of a four-component accessor of `n` vertices. `bytes`: the new values, little-endian, of the
+/// glTF type `component_type`.
 fn put_vertices(
     json: &mut Value,
     buffers: &mut Buffers,

@@ -110,9 +110,6 @@ pub(crate) fn read(
         "node {node}{others} draws instances of its mesh (EXT_mesh_gpu_instancing): only one of them is bound"
         ));
     }
-    if geometry.positions.is_empty() {
-        return Err(GltfError::NoTriangles);
-    }
     if skipped > 0 {
         notices
             .push(format!("{} of points or lines: not shown", counted(skipped, "primitive", "primitives")));
@@ -301,7 +298,8 @@ pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Opti
     let (frame, _) = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &n)| {
         let m = DMat3::from_mat4(frame.world(v));
-        // The cofactor matrix is the inverse transpose times the determinant, and also defined for singular transforms.
+        // The cofactor matrix is the inverse transpose times the determinant. It is also defined for singular
+        // transforms.
         let cofactor =
             DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
         let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };

@@ -22,7 +22,8 @@ struct Images<'a> {
     /// Index in `found` of each image, by the address and length of its bytes.
     numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
-    /// Bytes of buffers that are not yet copied to `found`. Views of images can overlap.
+    /// Limit on the bytes that may still be copied from buffers to `found`: the size of all buffers, minus the bytes
+    /// copied so far. Image views can overlap, and copies of all of them could exceed the memory limit.
     left: usize,
 }
 
@@ -165,8 +166,8 @@ fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], 
 }
 
 impl Images<'_> {
-    /// Index of an image in the output; `None` if it is missing or not an image. An image that overlaps others in the
-    /// file gets no bytes.
+    /// Index of an image in the output; `None` if the image is missing or not an image. If image views overlap so much
+    /// that their copies would exceed the size of the buffers, images whose copies no longer fit get no bytes.
     fn number(&mut self, image: usize) -> Option<u32> {
         let document = self.document;
         let is_view = document.images.get(image)?.is_none();

@@ -9,6 +9,8 @@
 mod accessor;
 mod animate;
 mod build;
+#[cfg(feature = "compress")]
+mod compact;
 mod container;
 #[cfg(feature = "decompress")]
 mod decompress;
@@ -40,17 +42,24 @@ use crate::siblings::{Image, Resolve};
 use crate::splats::{RawSplats, SplatError};
 use scene::{Instance, Worlds};
 
+pub(crate) use accessor::MAX_ELEMENTS;
 pub(crate) use animate::{Pose, PoseClip};
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
+#[cfg(feature = "compress")]
+pub use compact::{CompactOptions, Compression, compact};
 pub(crate) use container::{glb_of, glb_parts, named_files};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Rest, embed_images, patch};
-pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
-pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape};
+pub(crate) use rig::joints_with_vertices;
+pub use rig::{
+    Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
+};
+pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm};
+pub(crate) use size::{MAX_PRIMITIVES, MAX_TRIANGLES};
 pub(crate) use splats::write as write_splats;
 
 /// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
@@ -89,11 +98,11 @@ pub enum GltfError {
         shown(output)
     )]
     Compressed {
-        /// Name of the extension.
+        /// Name of the compression extension, such as `EXT_meshopt_compression`.
         extension: String,
         /// Why decoding failed.
         problem: String,
-        /// Name of the file.
+        /// Name of the file, for the command that the message suggests.
         name: String,
         /// Suggested name for the converted file.
         output: String,
@@ -109,7 +118,7 @@ pub enum GltfError {
     /// A buffer is shorter than declared.
     #[error("buffer {buffer} is cut off: it has {}. Export or download it again", size_of_total(*.found, *.declared))]
     Buffer {
-        /// Buffer index.
+        /// Index in the document's list of buffers.
         buffer: usize,
         /// Declared size in bytes.
         declared: u64,
@@ -131,7 +140,7 @@ pub enum GltfError {
     /// An accessor cannot be decoded, for the reason given.
     #[error("accessor {accessor} {problem}")]
     Accessor {
-        /// Accessor index.
+        /// Index in the document's list of accessors.
         accessor: u32,
         /// Problem, as a predicate.
         problem: String,
@@ -141,9 +150,9 @@ pub enum GltfError {
         "accessor {accessor} has {count} elements for {what}, but there are {expected} {of}: export the model again"
     )]
     Count {
-        /// Accessor index.
+        /// Index in the document's list of accessors.
         accessor: u32,
-        /// What the accessor stores, such as the name of an attribute.
+        /// Name of the attribute, or of the other data, that the accessor stores.
         what: String,
         /// Number of elements.
         count: u64,
@@ -155,15 +164,15 @@ pub enum GltfError {
     /// A position is NaN or infinite.
     #[error("accessor {accessor}: the position of vertex {vertex} is not finite")]
     NotFinite {
-        /// Accessor index.
+        /// Index in the document's list of accessors.
         accessor: u32,
-        /// Element index.
+        /// Index of the element, counted from 0: the vertex.
         vertex: usize,
     },
     /// The nodes do not form a forest.
     #[error("node {node} {problem}")]
     Node {
-        /// Node index.
+        /// Index in the document's list of nodes.
         node: u32,
         /// Problem, as a predicate.
         problem: &'static str,
@@ -174,17 +183,23 @@ pub enum GltfError {
     /// The default scene shows no triangles.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
+    /// The default scene shows no triangles, but the file contains clips.
+    #[error(
+        "it has clips, but no triangles: open the model that they move, then fit them to its skeleton (command: \
+         refit --skeleton; page: step Export, Clips in other files)"
+    )]
+    OnlyClips,
     /// The memory limit is exceeded.
     #[error(transparent)]
     Memory(#[from] MemoryError),
     /// A count exceeds its limit.
     #[error("{what}: {count}, more than the limit of {limit}: use a smaller model")]
     TooLarge {
-        /// Kind of the counted elements.
+        /// What is counted, such as "vertices".
         what: &'static str,
         /// Number of elements.
         count: u64,
-        /// Maximum number of these elements.
+        /// Largest allowed number of these elements.
         limit: u64,
     },
 }
@@ -204,7 +219,7 @@ pub(crate) struct GltfDocument {
     pub(crate) text: Option<Vec<u8>>,
     /// The compressed file that the caller decoded to get this document, if that file is a self-contained GLB.
     pub(crate) packed: Option<Vec<u8>>,
-    /// Whether the document contains decoded geometry, in further buffers. The first buffer is still that of the file.
+    /// Whether compressed geometry was decoded. The decoded values are in buffers after those of the file.
     pub(crate) is_decoded: bool,
     /// Instances of meshes in the default scene, in vertex order.
     instances: Vec<Instance>,
@@ -228,6 +243,64 @@ struct Slot {
     triangles: std::ops::Range<usize>,
 }
 
+/// The members of a [`GltfDocument`] to store: its JSON, and those that cannot be recomputed from it.
+pub(crate) struct GltfParts {
+    pub(crate) json: Value,
+    /// Instance, primitive, range of vertices and range of triangles of each slot: starts and counts.
+    pub(crate) slots: Vec<[u32; 6]>,
+    pub(crate) buffers: Vec<Arc<Vec<u8>>>,
+    pub(crate) images: Vec<Option<Image>>,
+    pub(crate) text: Option<Vec<u8>>,
+    pub(crate) packed: Option<Vec<u8>>,
+    pub(crate) is_decoded: bool,
+    pub(crate) bytes: u64,
+}
+
+impl GltfDocument {
+    pub(crate) fn into_parts(self) -> GltfParts {
+        let Self { json, buffers, images, text, packed, is_decoded, bytes, slots, .. } = self;
+        let slots = slots.into_iter().map(|s| {
+            let (first, n) = (s.triangles.start as u32, s.triangles.len() as u32);
+            [s.instance, s.primitive, s.start, s.count, first, n]
+        });
+        GltfParts { json, slots: slots.collect(), buffers, images, text, packed, is_decoded, bytes }
+    }
+
+    /// Rebuilds a document from the result of [`Self::into_parts`].
+    ///
+    /// # Errors
+    /// If the JSON is not that of a readable document.
+    pub(crate) fn of_parts(parts: GltfParts) -> Result<Self, GltfError> {
+        let GltfParts { json, slots, buffers, images, text, packed, is_decoded, bytes } = parts;
+        let root = root::typed(&json)?;
+        let worlds = Worlds::new(&root)?;
+        let [instances, elsewhere] = scene::instances(&root, &worlds, &mut Vec::new())?;
+        let slots = slots.into_iter().map(|[instance, primitive, start, count, first, n]| Slot {
+            instance,
+            primitive,
+            start,
+            count,
+            triangles: first as usize..(first + n) as usize,
+        });
+        let mut document = Self {
+            json,
+            root,
+            buffers,
+            images,
+            text,
+            packed,
+            is_decoded,
+            instances,
+            elsewhere,
+            joints: Vec::new(),
+            bytes,
+            slots: slots.collect(),
+        };
+        document.joints = skin::shown_joints(&document, &worlds)?;
+        Ok(document)
+    }
+}
+
 /// Result of reading a glTF file.
 pub(crate) struct GltfModel {
     /// Point in world space to which `positions` are relative.
@@ -242,33 +315,19 @@ pub(crate) struct GltfModel {
 }
 
 /// Reads a glTF or GLB file using at most `memory_limit` bytes. `resolve` returns external files by decoded
-/// relative URI. `origin`: origin of the positions; `None` chooses one near the model.
+/// relative URI. `origin`: origin of the positions; `None` chooses one near the model. With `clips_alone`, a file without
+/// triangles is accepted if it has clips.
 pub(crate) fn read(
     name: &str,
     bytes: &[u8],
     resolve: &mut Resolve<'_>,
     memory_limit: u64,
-    origin: Option<DVec3>,
+    (origin, clips_alone): (Option<DVec3>, bool),
 ) -> Result<GltfModel, GltfError> {
     let mut notices = Vec::new();
-    let loaded = container::load(name, bytes, resolve, memory_limit, &mut notices)?;
-    let worlds = Worlds::new(&loaded.root)?;
-    let [instances, elsewhere] = scene::instances(&loaded.root, &worlds, &mut notices)?;
-    let mut document = GltfDocument {
-        json: loaded.json,
-        root: loaded.root,
-        buffers: loaded.buffers,
-        images: loaded.images,
-        text: loaded.text,
-        packed: None,
-        is_decoded: loaded.is_decoded,
-        instances,
-        elsewhere,
-        joints: Vec::new(),
-        bytes: loaded.bytes,
-        slots: Vec::new(),
-    };
-    if let Some(splats) = splats::read(&document, loaded.bytes, memory_limit)? {
+    let (mut document, worlds) = parse(name, bytes, resolve, memory_limit, &mut notices)?;
+    let loaded_bytes = document.bytes;
+    if let Some(splats) = splats::read(&document, loaded_bytes, memory_limit)? {
         return Ok(GltfModel {
             origin: DVec3::ZERO,
             positions: Vec::new(),
@@ -280,11 +339,19 @@ pub(crate) fn read(
         });
     }
     // The caller frees the file after reading, so the document's memory does not include it.
-    let model = size::check(&document, loaded.bytes, memory_limit)?;
-    document.bytes = loaded.bytes - bytes.len() as u64 + model;
+    let model = size::check(&document, loaded_bytes, memory_limit)?;
+    document.bytes = loaded_bytes - bytes.len() as u64 + model;
     document.joints = skin::shown_joints(&document, &worlds)?;
     let n_before = notices.len();
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
+    if geometry.positions.is_empty() {
+        let has_clips = document.json["animations"].as_array().is_some_and(|all| !all.is_empty());
+        match (has_clips, clips_alone) {
+            (true, true) => {}
+            (true, false) => return Err(GltfError::OnlyClips),
+            (false, _) => return Err(GltfError::NoTriangles),
+        }
+    }
     let mut near = origin.unwrap_or_default();
     if origin.is_none() {
         near = origin_near(&geometry.positions);
@@ -304,6 +371,49 @@ pub(crate) fn read(
         notices,
         splats: None,
     })
+}
+
+/// Parses a file without reading its geometry. [`GltfDocument::bytes`] counts only the file and its buffers.
+fn parse(
+    name: &str,
+    bytes: &[u8],
+    resolve: &mut Resolve<'_>,
+    memory_limit: u64,
+    notices: &mut Vec<String>,
+) -> Result<(GltfDocument, Worlds), GltfError> {
+    let loaded = container::load(name, bytes, resolve, memory_limit, notices)?;
+    let worlds = Worlds::new(&loaded.root)?;
+    let [instances, elsewhere] = scene::instances(&loaded.root, &worlds, notices)?;
+    let document = GltfDocument {
+        json: loaded.json,
+        root: loaded.root,
+        buffers: loaded.buffers,
+        images: loaded.images,
+        text: loaded.text,
+        packed: None,
+        is_decoded: loaded.is_decoded,
+        instances,
+        elsewhere,
+        joints: Vec::new(),
+        bytes: loaded.bytes,
+        slots: Vec::new(),
+    };
+    Ok((document, worlds))
+}
+
+/// The joints that carry vertices in a file; none if it cannot be read.
+pub(crate) fn joints_with_vertices_in(
+    name: &str,
+    bytes: &[u8],
+    resolve: &mut Resolve<'_>,
+    memory_limit: u64,
+) -> Skeleton {
+    match parse(name, bytes, resolve, memory_limit, &mut Vec::new()) {
+        Ok((document, _)) if size::check(&document, document.bytes, memory_limit).is_ok() => {
+            joints_with_vertices(&document)
+        }
+        _ => Skeleton::default(),
+    }
 }
 
 /// Returns `list[index]`, or an error that names the object that contains the index.

@@ -11,12 +11,12 @@ use super::root::view_bytes;
 use crate::error::WriteError;
 
 pub(super) const F32: u32 = 5126;
-const U32: u32 = 5125;
-const U16: u32 = 5123;
+pub(super) const U32: u32 = 5125;
+pub(super) const U16: u32 = 5123;
 // Targets of buffer views, as glTF numbers them.
 pub(super) const VERTICES: u32 = 34962;
 pub(super) const INDICES: u32 = 34963;
-/// Multiple of all component sizes, bytes.
+/// Alignment of accessors and buffer views, bytes: a multiple of the sizes of all component types.
 const ALIGN: usize = 4;
 
 /// Name of the glTF extension that stores a project.
@@ -24,7 +24,8 @@ pub const PROJECT_EXTENSION: &str = "CAGEWORK_project";
 
 /// Extensions whose accessor references [`each_accessor`] visits. If a document uses others, unused items are
 /// kept, since renumbering could break unknown references.
-const KNOWN_EXTENSIONS: [&str; 9] = [
+const KNOWN_EXTENSIONS: [&str; 10] = [
+    "VRM",
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -69,12 +70,18 @@ impl<'a> Pack<'a> {
     }
 
     /// Adds a buffer view with these bytes; returns its index.
-    pub(crate) fn push_view(&mut self, json: &mut Value, bytes: Vec<u8>, target: Option<u32>) -> usize {
+    pub(crate) fn push_view(
+        &mut self,
+        json: &mut Value,
+        bytes: impl Into<Cow<'a, [u8]>>,
+        target: Option<u32>,
+    ) -> usize {
+        let bytes = bytes.into();
         let mut view = json!({ "buffer": 0, "byteLength": bytes.len() });
         if let Some(target) = target {
             view["target"] = target.into();
         }
-        self.views.push(Some((bytes.into(), 0)));
+        self.views.push(Some((bytes, 0)));
         push(json, "bufferViews", view)
     }
 
@@ -87,7 +94,7 @@ impl<'a> Pack<'a> {
         attribute: bool,
         bounds: bool,
     ) -> usize {
-        let bytes = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.push_view(json, bytes, attribute.then_some(VERTICES));
         let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"].get(components - 1).unwrap_or(&"MAT4");
         let count = values.len() / components;

@@ -5,7 +5,8 @@
 //! * A mesh shown by several nodes is duplicated, since each node deforms it differently.
 //! * A skinned mesh loses its skin and moves to a new root node, because the deformed vertices are already in
 //!   world space. The same applies to a mesh under a singular transform.
-//! * Morph targets were bound at default weights. They and the animations of their weights are removed.
+//! * The deformed positions include the morph targets at their default weights. The targets and the animations of
+//!   their weights are removed.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -42,7 +43,7 @@ impl From<GltfError> for WriteError {
 
 /// Writes the document with `base` as its shape and `poses` as morph targets with an animation.
 ///
-/// Positions are in world space, relative to the origin, in the model's vertex order. The caller checks their counts.
+/// Positions are in world space minus the document's origin, in the model's vertex order. The caller checks their counts.
 pub(crate) fn patch(
     document: &GltfDocument,
     rest: Rest<'_>,
@@ -185,7 +186,7 @@ fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usi
 
 struct Normals {
     shading: Shading,
-    /// Whether the file has normals for each slot.
+    /// For each slot, whether the file has normals.
     present: Vec<bool>,
 }
 
@@ -262,7 +263,7 @@ fn tangents(
     Ok(Some(out))
 }
 
-/// Whether the reader has reversed the triangles, because the transform mirrors them.
+/// Whether [`super::geometry::read`] reversed the triangles, because the transform mirrors them.
 fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError> {
     let (instance, primitive) = document.primitive(slot);
     let (frame, _) = Frame::of(document, instance, primitive, slot.count as usize)?;
@@ -297,22 +298,21 @@ fn patch_primitive(
 }
 
 /// Embeds external images in the GLB.
-pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
+pub(crate) fn embed_images<'a>(document: &'a GltfDocument, json: &mut Value, pack: &mut Pack<'a>) {
     embed_images_by(document, json, &mut |json, bytes| pack.push_view(json, bytes, None));
 }
 
 /// Like [`embed_images`]; `push_view` adds a buffer view and returns its index.
-pub(crate) fn embed_images_by(
-    document: &GltfDocument,
+pub(crate) fn embed_images_by<'a>(
+    document: &'a GltfDocument,
     json: &mut Value,
-    push_view: &mut dyn FnMut(&mut Value, Vec<u8>) -> usize,
+    push_view: &mut dyn FnMut(&mut Value, &'a [u8]) -> usize,
 ) {
     // Images from the same file share one buffer view.
     let mut views = HashMap::new();
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };
-        let view =
-            *views.entry(Arc::as_ptr(&image.bytes)).or_insert_with(|| push_view(json, image.bytes.to_vec()));
+        let view = *views.entry(Arc::as_ptr(&image.bytes)).or_insert_with(|| push_view(json, &image.bytes));
         let Some(object) = json["images"][number].as_object_mut() else { continue };
         object.shift_remove("uri");
         object.insert("mimeType".into(), image.mime.into());

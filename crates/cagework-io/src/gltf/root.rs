@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use ::gltf::json::Root;
+use serde::Deserialize as _;
 use serde_json::{Map, Value, json};
 
 use super::GltfError;
 use crate::shown::shown;
 
-/// Names of compression extensions, which need a decoder. Both names of meshopt mean the same streams.
+/// Names of compression extensions, which need a decoder. Both meshopt names denote the same stream format.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /// Members of the document that geometry does not need. They are not parsed, so that errors in them have no effect.
@@ -25,14 +26,14 @@ pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
     let mut geometry: Map<String, Value> =
         of_geometry.map(|(key, value)| (key.clone(), strict(value))).collect();
     geometry.insert("asset".into(), json!({ "version": "2.0" }));
-    // `nodes` of a scene is optional in glTF but required by the crate.
+    // `nodes` of a scene is optional in glTF but required by the crate `gltf`.
     for scene in geometry.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| json!([]));
         }
     }
     let whole = Value::Object(geometry);
-    serde_json::from_value(whole.clone()).map_err(|_| {
+    Root::deserialize(&whole).map_err(|_| {
         let lists =
             whole.as_object().into_iter().flatten().filter_map(|(key, list)| Some((key, list.as_array()?)));
         let mut items =
@@ -45,7 +46,8 @@ pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
     })
 }
 
-/// A value in the form that the crate accepts, without `null`, extensions and `extras`, which can have any type.
+/// Copy of a value that the crate `gltf` can parse: without `null` members, and without `extensions` and `extras`,
+/// whose values can have any type.
 fn strict(value: &Value) -> Value {
     let is_read = |key: &str, value: &Value| !matches!(key, "extras" | "extensions") && !value.is_null();
     match value {

@@ -11,7 +11,8 @@ use serde_json::Value;
 use super::{GltfDocument, GltfError, get};
 use crate::counts::Counts;
 
-/// World transforms of all nodes, in f64 so that transforming back and forth preserves f32.
+/// World transforms of all nodes. They are in f64, so that transforming a position to another space and back preserves
+/// its f32 value.
 #[derive(Clone, Debug)]
 pub(crate) struct Worlds {
     pub(crate) world: Vec<DMat4>,
@@ -156,7 +157,7 @@ pub(crate) fn instances(
             counted(elsewhere.len(), "node with a mesh is", "nodes with a mesh are")
         ));
     }
-    // Sorting integer arrays uses code that the wasm module has anyway, which keeps the module small.
+    // Sort arrays of integers: the wasm module contains the sort for this type anyway, so it does not grow.
     let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
     Ok([shown, elsewhere].map(|list| {
         let mut order: Vec<[u32; 3]> = (0u32..).zip(&list).map(key).collect();
@@ -189,5 +190,14 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
 
 /// Name of an object, or its kind and index if it has none.
 pub(crate) fn name_of(json: &Value, list: &str, index: u32, kind: &str) -> String {
-    json[list][index as usize]["name"].as_str().map_or_else(|| format!("{kind} {index}"), str::to_owned)
+    stored_name(json, list, index).map_or_else(|| format!("{kind} {index}"), str::to_owned)
+}
+
+/// Whether [`name_of`] the object is `name`. Compares without copying, because names can be megabytes long.
+pub(crate) fn is_called(name: &str, json: &Value, list: &str, index: u32, kind: &str) -> bool {
+    stored_name(json, list, index).map_or_else(|| name == format!("{kind} {index}"), |of| of == name)
+}
+
+fn stored_name<'a>(json: &'a Value, list: &str, index: u32) -> Option<&'a str> {
+    json[list][index as usize]["name"].as_str()
 }

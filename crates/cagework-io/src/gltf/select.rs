@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::scene::{Worlds, name_of};
+use super::scene::{Worlds, is_called, name_of};
 use super::skin::each_influence;
 use super::{GltfDocument, GltfError, Slot};
 use crate::part_kind::PartKind;
@@ -10,8 +10,11 @@ use crate::part_kind::PartKind;
 impl GltfDocument {
     /// Names of the materials, nodes and joints that have vertices.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
-        let (mut names, mut seen) = (Vec::new(), HashSet::new());
+        let (mut names, mut seen, mut known) = (Vec::new(), HashSet::new(), HashSet::new());
         let mut add = |kind: PartKind, list, number: usize| {
+            if !known.insert((kind as u8, number)) {
+                return;
+            }
             let named = (kind, name_of(&self.json, list, number as u32, kind.word()));
             if seen.insert(named.clone()) {
                 names.push(named);
@@ -34,7 +37,7 @@ impl GltfDocument {
 
     /// Vertices of all parts of this kind and name, unsorted.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Result<Vec<u32>, GltfError> {
-        let named = |list: &str, number: u32| name_of(&self.json, list, number, kind.word()) == name;
+        let named = |list: &str, number: u32| is_called(name, &self.json, list, number, kind.word());
         let of_slot = |slot: &Slot| slot.start..slot.start + slot.count;
         match kind {
             PartKind::Group => Ok(Vec::new()),

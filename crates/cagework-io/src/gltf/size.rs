@@ -11,19 +11,34 @@ use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 
 use super::accessor::MAX_ELEMENTS;
+use super::container::bytes_of_json;
 use super::geometry::surface;
 use super::scene::Instance;
 use super::{GltfDocument, GltfError};
 use crate::memory::MemoryError;
 
 /// Limit on the triangles of all instances.
-const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
+pub(crate) const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
-/// Limit on primitives, and limit on morph targets, summed over all nodes. Each takes several KB in an export.
-const MAX_PRIMITIVES: u64 = 1 << 17;
+/// Limit on the number of primitives, and also on the number of morph targets, each summed over all nodes. A primitive
+/// or target takes several KB in an export.
+pub(crate) const MAX_PRIMITIVES: u64 = 1 << 17;
 
-/// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Takes 1 to 2 s.
+/// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Decoding this many
+/// takes 1 to 2 s.
 const MAX_DECODED_VALUES: u64 = 1 << 28;
+
+/// Limit on the implicit zeros of all attributes and morph targets, summed over all nodes; or [`ZEROS_PER_BYTE`] per byte
+/// of the document, if that is more. Each zero takes up to 100 bytes in an export.
+const MAX_ZEROS: u64 = 1 << 21;
+const ZEROS_PER_BYTE: u64 = 8;
+
+/// Limit on the values of all channels of clips; or one per byte of the document, if that is more. An export with this
+/// many takes 0.8 GB.
+const MAX_CHANNEL_VALUES: u64 = 1 << 27;
+
+/// Bytes of JSON per primitive that the estimate of the memory for writing a model contains already.
+const PRIMITIVE_JSON_BYTES: u64 = 6000;
 
 /// Memory of a model, bytes: per vertex, per triangle, and per primitive of a node.
 const VERTEX_BYTES: u64 = 12;
@@ -58,6 +73,7 @@ struct Size {
     triangles: u64,
     targets: u64,
     decoded: u64,
+    zeros: u64,
 }
 
 impl Size {
@@ -68,6 +84,7 @@ impl Size {
         add(&mut self.triangles, other.triangles);
         add(&mut self.targets, other.targets);
         add(&mut self.decoded, other.decoded);
+        add(&mut self.zeros, other.zeros);
     }
 }
 
@@ -82,7 +99,7 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
         model.add(shown.len() as u64, of_mesh(document, shown[0].mesh)?);
     }
     for hidden in by_mesh(&document.elsewhere) {
-        // Meshes outside the scene that cannot be read count nothing.
+        // Meshes outside the scene that cannot be read have size zero.
         unseen.add(hidden.len() as u64, of_mesh(document, hidden[0].mesh).unwrap_or_default());
     }
     let keys = keys_of(document);
@@ -93,6 +110,12 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
         ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
         ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
         ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
+        ("values of all channels of clips", channel_values(document), MAX_CHANNEL_VALUES.max(held)),
+        (
+            "elements without data in the file, of all nodes",
+            model.zeros.saturating_add(unseen.zeros),
+            MAX_ZEROS.max(held.saturating_mul(ZEROS_PER_BYTE)),
+        ),
     ] {
         if count > limit {
             return Err(GltfError::TooLarge { what, count, limit });
@@ -103,12 +126,33 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     let reading = VERTEX_READ_BYTES * model.vertices + TRIANGLE_READ_BYTES * model.triangles;
     let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
     let rig = rig_bytes(document) + JOINT_BYTES * joints + KEY_BYTES * keys;
-    MemoryError::check(held + bytes + reading + rig, limit)?;
+    MemoryError::check((held + bytes + reading + rig).saturating_add(copied_bytes(document)), limit)?;
     Ok(bytes)
 }
 
 fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
     instances.chunk_by(|a, b| a.mesh == b.mesh)
+}
+
+/// Memory of the text that an export repeats for each node, bytes: the JSON of its mesh, and names for each primitive.
+fn copied_bytes(document: &GltfDocument) -> u64 {
+    let length =
+        |list: &str, n: usize| document.json[list][n]["name"].as_str().map_or(0, |name| name.len() as u64);
+    let mut sum = 0_u64;
+    for shown in by_mesh(&document.instances) {
+        let mesh = shown[0].mesh as usize;
+        let (primitives, n) = (&document.root.meshes[mesh].primitives, shown.len() as u64);
+        let n_primitives = primitives.len() as u64;
+        let json = bytes_of_json(document.json["meshes"][mesh].to_string().as_bytes());
+        let materials = primitives.iter().filter_map(|p| p.material).map(|m| length("materials", m.value()));
+        let of_mesh = (n - 1).saturating_mul(json.saturating_sub(PRIMITIVE_JSON_BYTES * n_primitives));
+        let names = n.saturating_mul(materials.sum::<u64>() + n_primitives * length("meshes", mesh));
+        let nodes =
+            shown.iter().filter_map(|instance| instance.node).map(|node| length("nodes", node as usize));
+        let nodes = n_primitives.saturating_mul(nodes.sum());
+        sum = [of_mesh, names, nodes].into_iter().fold(sum, u64::saturating_add);
+    }
+    sum
 }
 
 /// Memory of skins and morph targets, bytes. An accessor that cannot be read counts by its declared size.
@@ -135,20 +179,33 @@ fn rig_bytes(document: &GltfDocument) -> u64 {
     bytes
 }
 
-/// Numbers in the accessors of clips, each accessor counted once.
+/// Number of values in the accessors of all clips. An accessor that several clips use counts once.
 fn keys_of(document: &GltfDocument) -> u64 {
     let animations = document.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| animation["samplers"].as_array().into_iter().flatten());
     let accessors: BTreeSet<u64> =
         samplers.flat_map(|s| ["input", "output"].map(|key| s[key].as_u64())).flatten().collect();
-    let numbers = |accessor: &u64| {
-        let width = match &document.root.accessors.get(*accessor as usize)?.type_ {
-            Checked::Valid(kind) => kind.multiplicity() as u64,
-            Checked::Invalid => return None,
-        };
-        Some(document.source().count(*accessor as u32).ok()?.saturating_mul(width))
+    accessors.into_iter().filter_map(|accessor| numbers_in(document, accessor)).fold(0, u64::saturating_add)
+}
+
+/// Number of values of all channels of clips. An export adapts each channel on its own, so a shared sampler counts once
+/// per channel.
+fn channel_values(document: &GltfDocument) -> u64 {
+    let animations = document.json["animations"].as_array().into_iter().flatten();
+    let samplers = animations.flat_map(|animation| {
+        let channels = animation["channels"].as_array().into_iter().flatten();
+        channels.filter_map(move |channel| animation["samplers"].get(channel["sampler"].as_u64()? as usize))
+    });
+    let accessors = samplers.flat_map(|s| ["input", "output"].map(|key| s[key].as_u64())).flatten();
+    accessors.filter_map(|accessor| numbers_in(document, accessor)).fold(0, u64::saturating_add)
+}
+
+fn numbers_in(document: &GltfDocument, accessor: u64) -> Option<u64> {
+    let width = match &document.root.accessors.get(accessor as usize)?.type_ {
+        Checked::Valid(kind) => kind.multiplicity() as u64,
+        Checked::Invalid => return None,
     };
-    accessors.iter().filter_map(numbers).fold(0, u64::saturating_add)
+    Some(document.source().count(accessor as u32).ok()?.saturating_mul(width))
 }
 
 fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
@@ -159,11 +216,16 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
         size.targets = size.targets.max(n_targets);
         let Some((position, mode)) = surface(primitive) else { continue };
         let vertices = document.source().count(position)?;
-        let attributes = check_counts(document, primitive, vertices)?;
+        let (attributes, mut zeros) = check_counts(document, primitive, vertices)?;
         let corners = match primitive.indices {
             None => vertices,
-            Some(indices) => document.source().count(indices.value() as u32)?,
+            Some(indices) => {
+                let corners = document.source().count(indices.value() as u32)?;
+                zeros += document.source().count_absent(indices.value() as u32);
+                corners
+            }
         };
+        size.zeros = size.zeros.saturating_add(zeros);
         let triangles = if mode == Mode::Triangles { corners / 3 } else { corners };
         size.vertices = size.vertices.saturating_add(vertices);
         size.triangles = size.triangles.saturating_add(triangles);
@@ -173,25 +235,31 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
     Ok(size)
 }
 
-/// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes.
-fn check_counts(document: &GltfDocument, primitive: &Primitive, vertices: u64) -> Result<u64, GltfError> {
+/// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes, and that
+/// of implicit zeros.
+fn check_counts(
+    document: &GltfDocument,
+    primitive: &Primitive,
+    vertices: u64,
+) -> Result<(u64, u64), GltfError> {
     let check = |what: &dyn Fn() -> String, index: &Index<Accessor>| {
         let accessor = index.value() as u32;
         let count = document.source().count(accessor)?;
         if count == vertices {
-            return Ok(());
+            return Ok(document.source().count_absent(accessor));
         }
         Err(GltfError::Count { accessor, what: what(), count, expected: vertices, of: "vertices" })
     };
+    let mut zeros = 0;
     for (semantic, index) in &primitive.attributes {
-        check(&|| semantic.to_string(), index)?;
+        zeros += check(&|| semantic.to_string(), index)?;
     }
     for (number, target) in primitive.targets.iter().flatten().enumerate() {
         let named =
             [("POSITION", &target.positions), ("NORMAL", &target.normals), ("TANGENT", &target.tangents)];
         for (name, index) in named.into_iter().filter_map(|(name, index)| Some((name, index.as_ref()?))) {
-            check(&|| format!("{name} of morph target {number}"), index)?;
+            zeros += check(&|| format!("{name} of morph target {number}"), index)?;
         }
     }
-    Ok(primitive.attributes.len() as u64)
+    Ok((primitive.attributes.len() as u64, zeros))
 }

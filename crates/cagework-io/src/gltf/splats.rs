@@ -1,5 +1,5 @@
-//! Gaussian splats in glTF: point primitives with the extension KHR_gaussian_splatting. Scales and opacities are linear,
-//! rotations x, y, z, w.
+//! Gaussian splats in glTF: point primitives with the extension KHR_gaussian_splatting. Scales and opacities are
+//! linear, rotations x, y, z, w.
 
 use cagework_core::splats::{decompose, n_harmonics, rotate_harmonics};
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
@@ -7,20 +7,24 @@ use serde_json::{Value, json};
 
 use super::accessor::Source;
 use super::container::glb_of;
+use super::size::MAX_PRIMITIVES;
 use super::{GltfDocument, GltfError};
 use crate::error::WriteError;
 use crate::splats::{RawSplats, SplatError, SplatsToWrite, band_0, color_of, unit_byte};
 
 const EXTENSION: &str = "KHR_gaussian_splatting";
+/// Limit on the splats of all nodes; or [`SPLATS_PER_BYTE`] per byte of the document, if that is more.
+const MAX_SPLATS: u64 = 1 << 20;
+const SPLATS_PER_BYTE: u64 = 1;
 const FLOAT: u32 = 5126;
 const UNSIGNED_BYTE: u32 = 5121;
 const ARRAY_BUFFER: u32 = 34962;
 
 /// Splats of one primitive: a transform to world space and the accessors of its attributes.
-struct Part {
+struct SplatPrimitive<'a> {
     world: glam::DMat4,
     count: u64,
-    attributes: Value,
+    attributes: &'a Value,
     degree: u8,
 }
 
@@ -53,17 +57,28 @@ pub(crate) fn read(
                 );
                 return Err(SplatError::Unsupported(problem).into());
             }
-            let attributes = json["attributes"].clone();
+            let attributes = &json["attributes"];
             let has = |degree: u8| {
                 (0..2 * usize::from(degree) + 1).all(|k| attributes.get(harmonic(degree, k)).is_some())
             };
             let degree = (1..=3).take_while(|&degree| has(degree)).last().unwrap_or(0);
-            let count = source.count(accessor(&attributes, "POSITION")?)?;
-            parts.push(Part { world: instance.world, count, attributes, degree });
+            let count = source.count(accessor(attributes, "POSITION")?)?;
+            parts.push(SplatPrimitive { world: instance.world, count, attributes, degree });
         }
     }
     let Some(degree) = parts.iter().map(|part| part.degree).max() else { return Ok(None) };
     let count = parts.iter().map(|part| part.count).fold(0, u64::saturating_add);
+    // The size of the file does not limit this count: several nodes can show the same splats, and accessors need no
+    // data.
+    let most = MAX_SPLATS.max(held.saturating_mul(SPLATS_PER_BYTE));
+    for (what, count, limit) in [
+        ("primitives of all nodes", parts.len() as u64, MAX_PRIMITIVES),
+        ("splats of all nodes", count, most),
+    ] {
+        if count > limit {
+            return Err(GltfError::TooLarge { what, count, limit });
+        }
+    }
     let mut raw = RawSplats::new(count, degree, held, memory_limit)?;
     for part in &parts {
         part.read(source, &mut raw)?;
@@ -76,9 +91,9 @@ fn accessor(attributes: &Value, name: &str) -> Result<u32, GltfError> {
     number.ok_or_else(|| SplatError::Damaged(format!("its splats have no attribute {name}")).into())
 }
 
-impl Part {
+impl SplatPrimitive<'_> {
     fn floats<const N: usize>(&self, source: Source<'_>, name: &str) -> Result<Vec<[f32; N]>, GltfError> {
-        let accessor = accessor(&self.attributes, name)?;
+        let accessor = accessor(self.attributes, name)?;
         let values = source.floats::<N>(accessor, name)?;
         if values.len() as u64 == self.count {
             return Ok(values);
@@ -182,7 +197,7 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>) -> Result<Vec<u8>, WriteError>
     Ok(glb_of(&json, &glb.bin)?)
 }
 
-/// Arrays of a GLB with one accessor each.
+/// Builds a GLB from arrays, each of which gets an accessor.
 struct Builder {
     /// Number of splats.
     n: usize,

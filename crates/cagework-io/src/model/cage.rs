@@ -6,7 +6,7 @@ use cagework_core::PolygonMesh;
 use cagework_core::mesh::weld;
 use glam::Vec3;
 
-use super::format::Kept;
+use super::format::ModelProperty;
 use super::{Document, Model, ModelFormat};
 use crate::error::{PoseError, WriteError};
 use crate::gltf::Clip;
@@ -20,7 +20,7 @@ const MAX_STATES_BYTES: u64 = 512 << 20;
 pub struct PoseState {
     /// Name of the morph target, or the time of the key as text.
     pub name: String,
-    /// Time in the clip; `None` for a morph target.
+    /// Time of the key in the clip, seconds; `None` for a morph target.
     pub seconds: Option<f32>,
     /// Positions of the cage's vertices, object units. `[n_cage]`
     pub positions: Vec<Vec3>,
@@ -110,10 +110,10 @@ impl Model {
             posed.iter_mut().flatten().for_each(|v| *v = welded.unique_of[*v as usize]);
         }
         if let Some(edge) = foreign_edge(&self.cage_mesh().faces, &posed, first.len()) {
-            let hint = if pose.format.keeps(Kept::Order) {
+            let hint = if pose.format.keeps(ModelProperty::Order) {
                 "export it from the cage itself, with the settings of the cage's export".to_owned()
             } else {
-                format!("write it as {}, which keep the order", ModelFormat::listed(Kept::Order))
+                format!("write it as {}, which keep the order", ModelFormat::listed(ModelProperty::Order))
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }
@@ -124,7 +124,7 @@ impl Model {
     #[must_use]
     pub fn keeps_order_in(&self, format: ModelFormat) -> bool {
         // Formats that do not keep the order number vertices by their first use in a face.
-        self.format == format || format.keeps(Kept::Order)
+        self.format == format || format.keeps(ModelProperty::Order)
     }
 
     /// Positions of the file's vertices in a cage pose. Inverse of [`Self::pose_positions`]. `pose`: `[n_cage]`.
@@ -139,10 +139,10 @@ impl Model {
 
 /// Finds an edge of `pose` that cannot belong to the mesh `cage`. `n`: number of vertices of both.
 ///
-/// Exporters cut polygons along shape-dependent diagonals, so an edge missing from `pose` may only be a
-/// removed diagonal. Cage faces are joined across missing edges into regions, and an edge between two corners
-/// of a polygonal region is accepted. A connected region of T triangles is a polygon if it has T + 2
-/// vertices. With fewer, a vertex inside it lost all its edges, so the order differs.
+/// Exporters choose the diagonals of a polygon by its shape, so an edge that `cage` has and `pose` lacks can be a
+/// diagonal, which is no fault. Faces of `cage` are joined across such edges into regions, and an edge of `pose`
+/// between two corners of a polygonal region is accepted. A connected region of T triangles is a polygon if it has
+/// T + 2 vertices. With fewer, a vertex inside it lost all its edges, so the order differs.
 fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 2]> {
     let edges_of = |face: &[u32]| -> Vec<[u32; 2]> {
         let ends = face.iter().zip(face.iter().cycle().skip(1));

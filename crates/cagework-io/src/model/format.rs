@@ -1,4 +1,4 @@
-//! File formats of models. A new format is a file beside `ply.rs` and a row of [`ModelFormat`].
+//! File formats of models. To add a format, add a file beside `ply.rs` and a row of [`ModelFormat`].
 
 use glam::Vec3;
 use thiserror::Error;
@@ -6,14 +6,16 @@ use thiserror::Error;
 use super::read::Source;
 use super::{Model, ReadError};
 use crate::error::WriteError;
+#[cfg(feature = "compress")]
+use crate::gltf::CompactOptions;
 use crate::polygons::Shape;
 use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::splats::{records, spz};
 use crate::up::UpAxis;
-use crate::{gltf, obj, off, ply, stl};
+use crate::{gltf, obj, off, ply, stl, threemf};
 
-/// Facts about a format, and its functions.
+/// Extensions, MIME types and abilities of a format, and the functions that read and write it.
 #[derive(Debug)]
 pub struct FormatFacts {
     /// Extensions of readable files, lower case, without the dot. The first one is the extension of exported files.
@@ -31,25 +33,26 @@ pub struct FormatFacts {
     is: fn(&[u8]) -> bool,
     /// Whether a text looks like this format. The text has no byte order mark and no leading space.
     is_text: fn(&[u8]) -> bool,
-    /// Extensions whose files must satisfy `is` or `is_text`. Each entry is an extension, what a file that does not is,
-    /// and why.
+    /// Extensions whose files must satisfy `is` or `is_text`. Each entry has the extension, a description of a file
+    /// that does not satisfy them, such as "not a PLY", and the reason, such as "its first line is not 'ply'".
     marked: &'static [[&'static str; 3]],
     pub(super) read: fn(Source<'_, '_>) -> Result<Model, ReadError>,
     pub(super) write: fn(&Model, &[Vec3]) -> Result<Vec<u8>, WriteError>,
     /// Names of the files that a file refers to.
     pub(super) named_files: fn(&[u8], &mut Resolve<'_>, u64) -> Vec<String>,
-    /// Approximate memory for writing a model, bytes. The argument is the part that depends on vertices and triangles.
+    /// Approximate memory for writing a model, bytes. The second argument is the part of it that depends only
+    /// on the numbers of vertices and triangles.
     pub(super) bytes_to_write: fn(&Model, u64) -> u64,
     /// What a file in this format keeps of a model that was read from another format.
-    keeps: &'static [Kept],
+    keeps: &'static [ModelProperty],
     /// Whether a file is recognised by its extension alone, whatever its bytes look like.
     is_unmarked: bool,
 }
 
 /// A property of a model that files of some formats keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kept {
-    /// Meshes, and not splats alone.
+pub(crate) enum ModelProperty {
+    /// Meshes. Formats without this property store only splats.
     Faces,
     /// Gaussian splats.
     Splats,
@@ -57,7 +60,7 @@ pub(crate) enum Kept {
     Harmonics,
     /// The order of the vertices.
     Order,
-    /// All digits of positions far from the origin.
+    /// Positions far from the world origin without rounding to f32.
     Digits,
     Colors,
     Texcoords,
@@ -102,13 +105,13 @@ macro_rules! formats {
             /// All formats, in the order in which they are shown to users.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$format),+];
 
-            /// Short name, lower case.
+            /// Short name, lower case, also in serialised data: "gltf", "ply".
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Self::$format => $name,)+ }
             }
 
-            /// Facts about the format.
+            /// Extensions, abilities and functions of the format.
             #[must_use]
             pub fn facts(self) -> &'static FormatFacts {
                 match self { $(Self::$format => const { &$row },)+ }
@@ -138,15 +141,15 @@ formats! {
         // Each primitive adds about 6000 bytes of JSON for new accessors and buffer views.
         bytes_to_write: |model, shape| shape + 6000 * model.counts.primitives as u64 + model.bytes,
         keeps: &[
-            Kept::Faces,
-            Kept::Splats,
-            Kept::Harmonics,
-            Kept::Digits,
-            Kept::Colors,
-            Kept::Texcoords,
-            Kept::Materials,
-            Kept::Rig,
-            Kept::Poses,
+            ModelProperty::Faces,
+            ModelProperty::Splats,
+            ModelProperty::Harmonics,
+            ModelProperty::Digits,
+            ModelProperty::Colors,
+            ModelProperty::Texcoords,
+            ModelProperty::Materials,
+            ModelProperty::Rig,
+            ModelProperty::Poses,
         ],
         is_unmarked: false,
     };
@@ -157,9 +160,9 @@ formats! {
         naming: &["obj"],
         companions: &["mtl"],
         named_files: obj::named_files,
-        // A vertex of an OBJ without normals needs a third of the memory.
+        // `shape` is an estimate for exports with normals. An OBJ without normals needs a third of it.
         bytes_to_write: |model, shape| shape / 3 + model.bytes,
-        keeps: &[Kept::Faces, Kept::Order, Kept::Digits, Kept::Texcoords, Kept::Names],
+        keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits, ModelProperty::Texcoords, ModelProperty::Names],
         ..PLAIN
     };
     /// Stanford PLY, text or binary.
@@ -170,12 +173,12 @@ formats! {
         read: |source| source.ply(),
         write: |model, positions| model.shape(positions).map(|shape| ply::write(&shape)),
         keeps: &[
-            Kept::Faces,
-            Kept::Splats,
-            Kept::Harmonics,
-            Kept::Order,
-            Kept::Digits,
-            Kept::Colors,
+            ModelProperty::Faces,
+            ModelProperty::Splats,
+            ModelProperty::Harmonics,
+            ModelProperty::Order,
+            ModelProperty::Digits,
+            ModelProperty::Colors,
         ],
         ..PLAIN
     };
@@ -186,7 +189,7 @@ formats! {
         is: stl::is_stl,
         read: |source| source.polygons(ModelFormat::Stl, stl::read),
         write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),
-        keeps: &[Kept::Faces],
+        keeps: &[ModelProperty::Faces],
         ..PLAIN
     };
     /// Geomview OFF, text: OFF, COFF, NOFF.
@@ -198,24 +201,45 @@ formats! {
             let has_normals = model.has_normals && model.format == ModelFormat::Off;
             model.shape(positions).map(|shape| off::write(&Shape { has_normals, ..shape }))
         },
-        keeps: &[Kept::Faces, Kept::Order, Kept::Digits, Kept::Colors],
+        keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits, ModelProperty::Colors],
         ..PLAIN
     };
-    /// Gaussian splats of 32 bytes each.
+    /// 3MF, the format of slicers: a zip archive with a model in XML.
+    ThreeMf = "3mf": FormatFacts {
+        endings: &["3mf"],
+        mime_types: &["model/3mf"],
+        is: threemf::is_3mf,
+        marked: &[["3mf", "not a 3MF", "it is not a zip archive with a part '.model'"]],
+        read: |source| source.polygons(ModelFormat::ThreeMf, threemf::read),
+        write: |model, positions| {
+            let shape = model.shape(positions)?;
+            match shape.document {
+                Some(document) if model.format == ModelFormat::ThreeMf => {
+                    threemf::patch(&document.bytes, &model.positions_in_file(), &shape)
+                }
+                _ => threemf::write(&shape),
+            }
+        },
+        // The model's bytes include the archive and its unpacked text.
+        bytes_to_write: |model, shape| shape + 2 * model.bytes,
+        keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits],
+        ..PLAIN
+    };
+    /// `.splat`: Gaussian splats in uncompressed records of 32 bytes.
     Splat = "splat": FormatFacts {
         endings: &["splat"],
         read: |source| source.splats(ModelFormat::Splat, records::read),
-        keeps: &[Kept::Splats],
+        keeps: &[ModelProperty::Splats],
         is_unmarked: true,
         ..PLAIN
     };
-    /// Compressed Gaussian splats by Niantic Labs.
+    /// SPZ: Niantic Labs' compressed format for Gaussian splats.
     Spz = "spz": FormatFacts {
         endings: &["spz"],
         is: spz::is_spz,
-        marked: &[["spz", "not an SPZ", "it is not a gzip stream that begins with 'NGSP'"]],
+        marked: &[["spz", "not an SPZ", "neither it nor its gzip stream begins with 'NGSP'"]],
         read: |source| source.splats(ModelFormat::Spz, spz::read),
-        keeps: &[Kept::Splats, Kept::Harmonics],
+        keeps: &[ModelProperty::Splats, ModelProperty::Harmonics],
         ..PLAIN
     };
 }
@@ -239,36 +263,40 @@ impl ModelFormat {
         self.facts().endings[0]
     }
 
-    /// Whether a file can store several poses.
+    /// Whether a file of this format can store several poses of a model.
     #[must_use]
     pub fn holds_poses(self) -> bool {
-        self.keeps(Kept::Poses)
+        self.keeps(ModelProperty::Poses)
     }
 
-    /// Up axis that captures in this format have by convention.
+    /// Conventional up axis of captures in this format, and of all models in a 3MF.
     #[must_use]
-    pub fn up_of_captures(self) -> UpAxis {
-        if matches!(self, Self::Ply | Self::Splat) { UpAxis::YDown } else { UpAxis::Y }
+    pub fn usual_up(self) -> UpAxis {
+        match self {
+            Self::Ply | Self::Splat => UpAxis::YDown,
+            Self::ThreeMf => UpAxis::Z,
+            _ => UpAxis::Y,
+        }
     }
 
-    pub(crate) fn keeps(self, what: Kept) -> bool {
+    pub(crate) fn keeps(self, what: ModelProperty) -> bool {
         self.facts().keeps.contains(&what)
     }
 
-    /// Whether a file can store meshes, and not splats alone.
+    /// Whether a file of this format can store meshes, not only splats.
     #[must_use]
     pub fn holds_faces(self) -> bool {
-        self.keeps(Kept::Faces)
+        self.keeps(ModelProperty::Faces)
     }
 
-    /// Whether a file can store Gaussian splats.
+    /// Whether a file of this format can store Gaussian splats.
     #[must_use]
     pub fn holds_splats(self) -> bool {
-        self.keeps(Kept::Splats)
+        self.keeps(ModelProperty::Splats)
     }
 
-    /// Extensions of the formats that can be written and keep `what`, as text: "OBJ, PLY or OFF".
-    pub(crate) fn listed(what: Kept) -> String {
+    /// Extensions of the formats that can be written and keep `what`, as text: "OBJ, PLY, OFF or 3MF".
+    pub(crate) fn listed(what: ModelProperty) -> String {
         let all = Self::ALL.into_iter().filter(|format| format.keeps(what));
         let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();
         names.split_last().map_or(String::new(), |(last, others)| format!("{} or {last}", others.join(", ")))
@@ -281,17 +309,24 @@ impl ModelFormat {
         Self::of_ending(&extension).filter(|format| !format.facts().read_only.contains(&extension.as_str()))
     }
 
+    /// Whether a file name has the extension of a readable model and is not hidden.
+    #[must_use]
+    pub fn is_name_of_model(name: &str) -> bool {
+        !name.starts_with('.') && Self::of_ending(&extension(name)).is_some()
+    }
+
     fn of_ending(extension: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.facts().endings.contains(&extension))
     }
 
-    /// Detects the format of a file from its content.
+    /// Detects the format of a file from its content or, if the content identifies no format, from its extension. The
+    /// default is OBJ.
     ///
     /// # Errors
     /// [`FormatError`] if the content contradicts the file's extension or is known to be something else.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint: &str| Err(FormatError { name: name.into(), found, hint: hint.into() });
-        let export = format!("export it as {}", Self::listed(Kept::Faces));
+        let export = format!("export it as {}", Self::listed(ModelProperty::Faces));
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
         let ending = extension(name);
         if ["sog", "ksplat", "lcc"].contains(&ending.as_str()) {
@@ -307,7 +342,7 @@ impl ModelFormat {
         }
         match bytes {
             [] => return fault("empty", "the file has no bytes"),
-            [b'P', b'K', 3, 4, ..] => return fault("a zip archive", "unpack it first"),
+            [b'P', b'K', 3, 4, ..] if ending != "3mf" => return fault("a zip archive", "unpack it first"),
             [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", &export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", &export),
             [0xff, 0xfe, ..]
@@ -339,11 +374,26 @@ fn extension(name: &str) -> String {
     name.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_ascii_lowercase())
 }
 
+#[cfg(feature = "compress")]
+impl CompactOptions {
+    /// Checks that no option is set unless the format is glTF.
+    ///
+    /// # Errors
+    /// The message for the user.
+    pub fn require(self, format: ModelFormat) -> Result<(), String> {
+        if self == Self::default() || format == ModelFormat::Gltf {
+            return Ok(());
+        }
+        let name = format.name();
+        Err(format!("quantize and compress are for .glb and .vrm, but this is {name}: leave them out"))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The first two tables have a row for each format.
+    /// The first two tables of docs/formats.md have a row for each format.
     #[test]
     fn page_about_formats_has_every_format_and_extension() {
         let page = include_str!("../../../../docs/formats.md");
@@ -362,7 +412,7 @@ mod tests {
 
     #[test]
     fn lists_name_the_formats_that_keep_something() {
-        assert_eq!(ModelFormat::listed(Kept::Faces), "GLB, OBJ, PLY, STL or OFF");
-        assert_eq!(ModelFormat::listed(Kept::Order), "OBJ, PLY or OFF");
+        assert_eq!(ModelFormat::listed(ModelProperty::Faces), "GLB, OBJ, PLY, STL, OFF or 3MF");
+        assert_eq!(ModelFormat::listed(ModelProperty::Order), "OBJ, PLY, OFF or 3MF");
     }
 }

@@ -23,12 +23,15 @@ pub(super) struct Source<'a, 'b> {
     pub(super) memory_limit: u64,
     /// Whether to store positions relative to an origin near them.
     pub(super) near: bool,
+    /// Whether a glTF without triangles is accepted if it has clips.
+    pub(super) clips_alone: bool,
 }
 
 impl Source<'_, '_> {
     pub(super) fn gltf(self) -> Result<Model, ReadError> {
         let origin = (!self.near).then_some(DVec3::ZERO);
-        let mut model = gltf::read(self.name, &self.bytes, self.resolve, self.memory_limit, origin)
+        let place = (origin, self.clips_alone);
+        let mut model = gltf::read(self.name, &self.bytes, self.resolve, self.memory_limit, place)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
         if let Some(raw) = model.splats.take() {
             let mut read = raw.finish(self.near, Records::New).map_err(|e| self.splat_fault(e))?;
@@ -136,7 +139,7 @@ impl Source<'_, '_> {
         Ok(self.capture(ModelFormat::Ply, ReadSplats { origin, ..read }))
     }
 
-    /// Reads a file of polygons (PLY, STL or OFF).
+    /// Reads a file of polygons (PLY, STL, OFF or 3MF).
     pub(super) fn polygons(
         self,
         format: ModelFormat,
@@ -144,7 +147,10 @@ impl Source<'_, '_> {
     ) -> Result<Model, ReadError> {
         let fault = |source| ReadError::Polygons { name: self.name.into(), source };
         let mut read = read(&self.bytes, self.memory_limit, self.near).map_err(fault)?;
-        let document = read.document().map_err(fault)?;
+        let mut document = read.document().map_err(fault)?;
+        if format == ModelFormat::ThreeMf {
+            document.bytes = self.bytes.into_owned();
+        }
         let corner = |c: u32| document.corners[c as usize].v;
         let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);
         Ok(Model {
@@ -154,12 +160,14 @@ impl Source<'_, '_> {
                 nodes: document.groups.len().max(1),
                 meshes: 1,
                 primitives: 1,
+                materials: document.materials.len(),
                 ..Counts::default()
             },
             notices: read.notices,
             up: UpAxis::Y,
             origin: read.origin,
-            bytes: Polygons::check_memory(0, vertices, corners, u64::MAX).unwrap_or(u64::MAX),
+            bytes: Polygons::check_memory(read.bytes_of_file, vertices, corners, u64::MAX)
+                .unwrap_or(u64::MAX),
             format,
             encoding: read.encoding,
             has_normals: read.has_normals,

@@ -8,13 +8,13 @@ use cagework_core::field::{Field, bend_vertices};
 use cagework_core::splats::Splats;
 use glam::{DVec3, Quat, Vec3};
 
-use super::format::Kept;
+use super::format::ModelProperty;
 use super::{Document, Model, ModelFormat};
 use crate::error::WriteError;
 use crate::gltf::{self, Pose, PoseClip, Rest};
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
-use crate::splats::{self, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
+use crate::splats::{self, MAX_COLOR, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
 use crate::timeline::Timeline;
 use crate::up::UpAxis;
 
@@ -31,14 +31,14 @@ impl Model {
             }
             _ if format.holds_faces() => (format.facts().write)(self, positions),
             _ => {
-                let others = ModelFormat::listed(Kept::Faces);
+                let others = ModelFormat::listed(ModelProperty::Faces);
                 Err(WriteError::NoSplats { format: format.export_extension(), others })
             }
         }
     }
 
-    /// Exports the model deformed by a field, whose space is that of [`Self::positions`]: splats with their shapes and
-    /// spherical harmonics, otherwise the vertices.
+    /// Exports the model deformed by `field`, which is defined in the space of [`Self::positions`]. For a capture, the
+    /// positions, shapes and spherical harmonics of the splats are deformed; for other models, the vertices.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -55,27 +55,35 @@ impl Model {
         }
     }
 
-    /// Exports a capture with new positions, shapes and spherical harmonics. In the format of its file, splats that did
-    /// not change keep their bytes, and the others keep everything else. Between formats with y up and with y down, the
-    /// capture makes half a turn about x.
+    /// Exports a capture with new positions, shapes and spherical harmonics. If `format` is the format of the capture's
+    /// file and the file can be patched, unchanged splats are copied from the file, and changed splats keep all
+    /// properties that are not replaced. If one of the two formats has y up and the other y down, the capture is
+    /// rotated by half a turn about x.
     ///
     /// # Errors
-    /// [`WriteError`] if the model is no capture, the format stores no splats, the number of splats differs, or a number is
-    /// not finite.
+    /// [`WriteError`] if the model is not a capture, the format cannot store splats, the number of splats differs, or a
+    /// number is not finite.
     pub fn write_splats(&self, format: ModelFormat, splats: &Splats) -> Result<Vec<u8>, WriteError> {
         let Some(capture) = self.capture.as_ref().filter(|_| format.holds_splats()) else {
-            let others = ModelFormat::listed(Kept::Faces);
+            let others = ModelFormat::listed(ModelProperty::Faces);
             return Err(WriteError::NoSplats { format: format.export_extension(), others });
         };
         self.check(&splats.positions)?;
-        let fits = |scale: &Vec3| scale.max_element() <= MAX_SCALE;
-        if let Some(splat) = splats.scales.iter().position(|scale| !fits(scale)) {
-            let (value, limit) = (splats.scales[splat].to_string(), "1e15");
-            return Err(WriteError::Splat { splat, what: "the scale", value, limit });
+        let n_harmonics = splats.harmonics.len() / splats.len().max(1);
+        let tables = [
+            ("the scale", &splats.scales, 1, MAX_SCALE),
+            ("the colour", &splats.colors, 1, MAX_COLOR),
+            ("the spherical harmonic", &splats.harmonics, n_harmonics, MAX_COLOR),
+        ];
+        for (what, values, per_splat, limit) in tables {
+            if let Some(k) = values.iter().position(|value| !value.abs().cmple(Vec3::splat(limit)).all()) {
+                let (splat, value) = (k / per_splat, values[k].to_string());
+                return Err(WriteError::Splat { splat, what, value, limit: "1e15" });
+            }
         }
         let is_same = format == self.format && !capture.file.is_empty();
         let changed = is_same.then(|| changed(&capture.splats, splats));
-        // A .gltf is not a whole file.
+        // A .gltf refers to other files, so its bytes alone are not a complete export.
         let is_whole = format != ModelFormat::Gltf || capture.file.starts_with(b"glTF");
         if changed.as_ref().is_some_and(|changed| is_whole && !changed.contains(&true)) {
             return Ok(capture.file.clone());
@@ -89,7 +97,7 @@ impl Model {
             turn(to_file, &|positions| self.up.turned_back(positions).into_owned());
         }
         let mut origin = self.origin;
-        let [from, to] = [self.format, format].map(ModelFormat::up_of_captures);
+        let [from, to] = [self.format, format].map(ModelFormat::usual_up);
         if from != to {
             // Half a turn about x, in either direction.
             let half = UpAxis::YDown;
@@ -115,9 +123,9 @@ impl Model {
         let loses = |what| !is_same && !format.keeps(what);
         let (colors, texcoords, materials, names, rig) = match &self.document {
             Document::Obj(document) => (
-                !document.colors.is_empty() && loses(Kept::Colors),
-                !document.texcoords.is_empty() && loses(Kept::Texcoords),
-                !document.materials.is_empty() && loses(Kept::Materials),
+                !document.colors.is_empty() && loses(ModelProperty::Colors),
+                !document.texcoords.is_empty() && loses(ModelProperty::Texcoords),
+                !document.materials.is_empty() && loses(ModelProperty::Materials),
                 document.groups.len() > 1 && !is_same,
                 false,
             ),
@@ -129,11 +137,11 @@ impl Model {
                 };
                 (
                     has("COLOR_") && !is_same,
-                    has("TEXCOORD_") && loses(Kept::Texcoords),
-                    // An OBJ export keeps the names of materials.
-                    self.counts.materials > 0 && loses(Kept::Materials),
-                    self.counts.nodes > 1 && loses(Kept::Names),
-                    self.is_rigged() && loses(Kept::Rig),
+                    has("TEXCOORD_") && loses(ModelProperty::Texcoords),
+                    // An OBJ export of a glTF keeps only the names of the materials.
+                    self.counts.materials > 0 && loses(ModelProperty::Materials),
+                    self.counts.nodes > 1 && loses(ModelProperty::Names),
+                    self.is_rigged() && loses(ModelProperty::Rig),
                 )
             }
         };
@@ -141,14 +149,16 @@ impl Model {
         let has_harmonics = self.splats().is_some_and(|splats| splats.degree > 0) && format.holds_splats();
         let all = [
             (is_mesh_of_splats, "everything but the centres of the splats"),
-            (has_harmonics && loses(Kept::Harmonics), "spherical harmonics of the splats"),
+            (has_harmonics && loses(ModelProperty::Harmonics), "spherical harmonics of the splats"),
             (colors, "colours"),
             (texcoords, "texture coordinates"),
             (materials, "materials and textures"),
             (names, "names of parts"),
             (rig, "skeleton, morph targets and animations"),
             (
-                self.origin != DVec3::ZERO && self.encoding != Encoding::Text && !format.keeps(Kept::Digits),
+                self.origin != DVec3::ZERO
+                    && self.encoding != Encoding::Text
+                    && !format.keeps(ModelProperty::Digits),
                 "the full precision of positions, as the model is far from the origin",
             ),
         ];
@@ -185,7 +195,7 @@ impl Model {
         }
     }
 
-    /// The model with new positions, as input for the writers of PLY, STL and OFF.
+    /// The model with new positions, as input for the writers of PLY, STL, OFF and 3MF.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite position per vertex.
@@ -264,10 +274,10 @@ impl Model {
             }
             Document::Obj(document) => document,
         };
-        // A deformed GLB is a patched GLB of the rest shape: build that first.
+        // Build a GLB of the rest shape, then patch it like a glTF source.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
-        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, Some(self.origin))?;
+        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, (Some(self.origin), false))?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, origin: self.origin, triangles: &built.triangles };
@@ -285,7 +295,7 @@ impl Model {
     }
 }
 
-/// Combines the names of `poses` with converted positions.
+/// Pairs the name of each pose with its positions in the axes and vertex order of the exported document.
 fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
     poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
 }

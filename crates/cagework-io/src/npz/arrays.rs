@@ -1,7 +1,8 @@
 //! Arrays of an `.npz` archive.
 //!
-//! Written uncompressed, like `numpy.savez`, with a fixed time stamp, so equal values give equal bytes. Headers are
-//! parsed here because `npyz` parses Python literals recursively, and nested brackets would overflow its stack.
+//! Arrays are written uncompressed, like `numpy.savez`, with a fixed time stamp, so equal values give equal bytes.
+//! Headers are parsed here because `npyz` parses Python literals recursively, and nested brackets would overflow its
+//! stack.
 
 use std::io::{Cursor, Read as _, Write as _};
 
@@ -23,7 +24,8 @@ const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Preallocated bytes for all headers of an archive.
 const HEADERS_BYTES: usize = 4096;
 
-/// Arrays larger than this number of bytes, half of the 32-bit limit, get zip64 headers.
+/// Arrays with more bytes than this get zip64 headers. A zip file needs such headers only from twice this size; the
+/// margin covers the array's own header.
 const MAX_ZIP32_ARRAY_BYTES: usize = (u32::MAX / 2) as usize;
 
 /// Writes an archive of arrays.
@@ -56,7 +58,7 @@ impl NpzWriter {
         self.put(name, "<f4", &[points.len(), 3], values);
     }
 
-    /// Adds an array. Values are converted a few at a time, which avoids a second copy of the array.
+    /// Adds an array. Values are converted in blocks, which avoids a second copy of the array.
     pub(super) fn put<const N: usize>(
         &mut self,
         name: &str,
@@ -114,7 +116,7 @@ pub(super) struct Archive<'a> {
 }
 
 impl<'a> Archive<'a> {
-    /// Opens an archive. `memory_limit`: for the arrays that are read from it, bytes.
+    /// Opens an archive. `memory_limit`: limit on the memory of the arrays that are read from it, bytes.
     ///
     /// # Errors
     /// [`NpzError::Zip`] if the bytes are not a zip archive.
@@ -178,7 +180,7 @@ fn lengths(text: &str) -> Option<Vec<usize>> {
 
 impl NpyArray {
     /// Unpacks an array, up to the size of its shape: the sizes in an archive's directory are not trusted. `unpacked`:
-    /// bytes of the arrays read so far, and limit on these bytes.
+    /// bytes of the arrays read so far; `memory_limit`: limit on these bytes.
     pub(super) fn read(
         name: &'static str,
         from: &mut impl std::io::Read,

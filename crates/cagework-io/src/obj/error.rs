@@ -49,7 +49,7 @@ pub enum ObjError {
         /// Maximum number of materials.
         limit: usize,
     },
-    /// Indices exceed 32 bits.
+    /// The file has more vertices or corners than 32-bit indices can number.
     #[error("line {line}: more than {limit} vertices or corners: simplify the model")]
     TooLarge {
         /// Line number, from 1.

@@ -13,8 +13,13 @@ use crate::origin::{Coordinate, relative};
 const VERTEX_BYTES: u64 = 24;
 const ELEMENT_BYTES: u64 = 80;
 
+/// Limit on the corners of all elements. The surface of a bind, with a face for each element at least, has up to 100,000
+/// faces.
+const MAX_CORNERS: usize = 1 << 20;
+
 /// Reads controls inside a cage. Every `v` line is a control, in the file's axes, relative to `origin`; `p`, `l` and
-/// `f` lines are elements; other lines are ignored. A `p` line can list several points. The radius is not set.
+/// `f` lines are elements; other lines are ignored. A `p` line can list several points. The `radius` of the
+/// result is `None`.
 ///
 /// # Errors
 /// [`ObjError`] if a line cannot be read or an index is out of range, or the memory limit is exceeded.
@@ -55,19 +60,20 @@ pub fn read_inner_controls(
                     let vertices = inner.positions.len();
                     resolve(index, vertices).ok_or(ObjError::Vertex { line: line.number, index, vertices })
                 };
-                let corners = words.map(corner).collect::<Result<Vec<u32>, _>>()?;
+                let corners = words.map(corner).take(MAX_CORNERS + 1).collect::<Result<Vec<u32>, _>>()?;
+                if corners.is_empty() {
+                    return Err(ObjError::Corner { line: line.number, found: String::new() });
+                }
                 n_corners += corners.len();
-                check_count(n_corners, line.number)?;
-                let before = inner.elements.len();
+                if n_corners > MAX_CORNERS {
+                    return Err(ObjError::TooLarge { line: line.number, limit: MAX_CORNERS as u32 });
+                }
                 match kind {
                     b"p" => inner.elements.extend(corners.into_iter().map(InnerElement::Point)),
                     b"l" => inner.elements.push(InnerElement::Line(corners)),
                     _ => inner.elements.push(InnerElement::Face(corners)),
                 }
                 lines_of.resize(inner.elements.len(), line.number);
-                if before == inner.elements.len() {
-                    return Err(ObjError::Corner { line: line.number, found: String::new() });
-                }
             }
             _ => {}
         }
@@ -132,9 +138,20 @@ mod tests {
             ("v 0 0 0\np 2\n", "line 2: refers to vertex 2, but there are 1"),
             ("v 0 0 0\nl 1 x\n", "line 2: corner 'x' is not an index"),
             ("v 0 0 0\np\n", "line 2: corner '' is not an index"),
+            ("v 0 0 0\nf\n", "line 2: corner '' is not an index"),
         ] {
             let message = read_inner_controls(text.as_bytes(), DVec3::ZERO, LIMIT).unwrap_err().to_string();
             assert!(message.starts_with(expected), "{message}");
+        }
+        // An element takes up to 80 bytes, a corner of a `p` line 2 bytes in the file.
+        for many in ["p 1\n".repeat(MAX_CORNERS + 1), format!("p{}\n", " 1".repeat(MAX_CORNERS + 1))] {
+            let text = format!("v 0 0 0\n{many}");
+            let message =
+                read_inner_controls(text.as_bytes(), DVec3::ZERO, u64::MAX).unwrap_err().to_string();
+            assert!(
+                message.ends_with("more than 1048576 vertices or corners: simplify the model"),
+                "{message}"
+            );
         }
         let many = "v 0 0 0\n".repeat(10_000);
         assert!(

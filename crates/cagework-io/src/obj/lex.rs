@@ -39,7 +39,8 @@ fn physical_end(bytes: &[u8], at: usize) -> (usize, usize) {
     }
 }
 
-/// Whether a line may continue after a backslash: not comments and `mtllib` lines, whose paths may end in a backslash.
+/// Whether a backslash at the end of the line continues it on the next line. This holds only for lines of numbers,
+/// since comments and paths in `mtllib` lines may end in a backslash.
 fn may_continue(line: &[u8]) -> bool {
     let start = line.iter().position(|&b| !is_blank(b)).unwrap_or(line.len());
     let word = line[start..].split(|&b| is_blank(b) || b == b'\\').next().unwrap_or(&[]);

@@ -59,8 +59,8 @@ pub(crate) fn read_materials(
             }
             b"d" => material.color[3] = number().unwrap_or(1.0),
             b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
-            // A name that starts with an option such as `-s 1 1 1` is not read: where the name begins is unclear, since
-            // it may contain blanks.
+            // Skip text that starts with an option such as `-s 1 1 1`. Names may contain blanks, so it is unclear where
+            // the name begins.
             b"map_Kd" if !rest.starts_with('-') => {
                 material.image = siblings.image(&rest.replace('\\', "/"), "it is not drawn", notices);
             }
@@ -98,7 +98,7 @@ pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
     String::from_utf8_lossy(rest).into_owned()
 }
 
-/// Appearance of a document, with one corner per distinct (surface, texture coordinate) pair.
+/// Appearance of a document, with one [`LookVertex`] per distinct pair of source vertex and texture coordinate.
 pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     let mut look = Look::default();
     let sources = sources(document, positions, &mut look.copies);

@@ -5,7 +5,9 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
@@ -20,7 +22,8 @@ use crate::siblings::{Resolve, SiblingError, Siblings};
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Corner of a face. Indices from 0; `vt` and `vn` may be [`NONE`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Pod, Zeroable)]
 pub(crate) struct Corner {
     pub(crate) v: u32,
     pub(crate) vt: u32,
@@ -28,7 +31,7 @@ pub(crate) struct Corner {
 }
 
 /// An `o` or `g` line. An `o` line applies to all faces up to the next `o` line, a `g` line up to the next `g` line.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Group {
     pub(crate) is_object: bool,
     /// Text after the keyword. A `g` line can contain several names.
@@ -46,7 +49,7 @@ impl Group {
 /// The parts of an OBJ file that exports need.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObjDocument {
-    /// Bytes of the original file.
+    /// Bytes of the original file if it is an OBJ or a 3MF; otherwise empty.
     pub(crate) bytes: Vec<u8>,
     /// `vt` lines as written, v upwards.
     pub(crate) texcoords: Vec<[f32; 2]>,
@@ -105,6 +108,8 @@ impl ObjDocument {
     pub(crate) fn triangulate(&mut self, positions: &[Vec3]) -> usize {
         let mut triangulator = Triangulator::new();
         let mut polygon = Vec::new();
+        let n_faces = self.face_starts.len().saturating_sub(1);
+        self.triangles.reserve_exact(self.corners.len().saturating_sub(2 * n_faces));
         for face in self.face_starts.windows(2) {
             let corners = &self.corners[face[0] as usize..face[1] as usize];
             polygon.clear();
@@ -149,7 +154,7 @@ pub(crate) struct ObjModel {
 
 struct Reader<'a> {
     bytes: &'a [u8],
-    /// Memory of the file: the caller's bytes and, unless the document takes these, the document's copy.
+    /// Memory of the file's bytes: the size of the file, or twice the size if the document copies borrowed bytes.
     file_memory: u64,
     positions: Vec<Vec3>,
     document: ObjDocument,
@@ -175,7 +180,7 @@ struct Reader<'a> {
 const WELD_BYTES: u64 = 36;
 
 /// Limit on `usemtl` names. Each name becomes a draw call and a GLB primitive.
-const MAX_MATERIALS: usize = 1 << 14;
+pub(crate) const MAX_MATERIALS: usize = 1 << 14;
 
 /// Minimum number of corners of a face. Faces with fewer corners are ignored, as are lines and points.
 pub(super) const MIN_CORNERS: usize = 3;
@@ -383,7 +388,7 @@ impl<'a> Reader<'a> {
                 let name = shown_start(&name, MAX_NAME_CHARS);
                 self.notices.push(format!("material file '{name}' {reason}: its materials are not drawn"));
             }
-            // Material files are often missing, so that this deserves no notice.
+            // Material files are often missing, so this causes no notice.
             Some(Err(SiblingError::Missing)) | None => {}
         }
     }

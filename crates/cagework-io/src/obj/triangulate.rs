@@ -3,16 +3,16 @@
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Limit on the sum of squared corner counts of all ear-clipped polygons. Ear clipping takes quadratic time
-/// at worst: 5 s for one polygon of 60,000 corners.
+/// Limit on the sum of squared corner counts of all ear-clipped polygons, so the largest one has 16,384 corners. Ear
+/// clipping takes quadratic time at worst: a polygon of 60,000 corners, far above this limit, took 5 s.
 const MAX_CLIP_WORK: u64 = 1 << 28;
 
-/// Triangulates polygons one after the other, with reused buffers.
+/// Triangulates polygons in sequence, with reused buffers.
 pub(crate) struct Triangulator {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     corners: Vec<u32>,
-    /// What is left of [`MAX_CLIP_WORK`].
+    /// Remaining share of [`MAX_CLIP_WORK`].
     left: u64,
     /// Number of concave polygons that became fans because [`MAX_CLIP_WORK`] was used up.
     pub(crate) fans: usize,

@@ -13,9 +13,9 @@ use crate::origin::Coordinate;
 
 /// Distinct pairs (vertex, normal) at the corners of a file; without normal, (vertex, smooth surface).
 pub(crate) struct Pairs {
-    /// The pairs as vertices with normals.
+    /// The pairs as shading vertices, whose normals rotate with the surface.
     pub(crate) shading: Shading,
-    /// Pair index of each corner.
+    /// Index of the pair at each corner of the file's faces. `[n_corners]`
     pub(crate) of_corner: Vec<u32>,
     /// Index of the `vn` line of each pair, or [`NONE`].
     pub(crate) vn: Vec<u32>,

@@ -1,5 +1,5 @@
-//! 3DGS PLY files: logarithms of the scales, logarithm of the opacity's odds, rotation w, x, y, z, and spherical harmonics
-//! by channel. The table of vertices keeps properties that are not read.
+//! 3DGS PLY files: logarithms of the scales, logarithm of the opacity's odds, rotation w, x, y, z, and spherical
+//! harmonics by channel. The table of vertices keeps properties that are not read.
 
 use glam::{DVec3, Quat, Vec3};
 
@@ -9,16 +9,16 @@ use super::{
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
-/// Largest size of a header, bytes.
+/// Limit on the size of a header, bytes.
 const MAX_HEADER: usize = 1 << 20;
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const COLOR: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
 const SCALE: [&str; 3] = ["scale_0", "scale_1", "scale_2"];
-/// w, x, y, z.
+/// Quaternion in the order w, x, y, z.
 const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
 const OPACITY: &str = "opacity";
 
-/// Type of a property.
+/// Numeric type of a property.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     I8,
@@ -88,21 +88,21 @@ impl Kind {
     }
 }
 
-/// A property of the vertices.
+/// A property that the file stores for each vertex, that is, for each splat.
 #[derive(Clone, Debug)]
 struct Column {
     name: String,
     kind: Kind,
-    /// First byte in the record of a vertex.
+    /// Offset of the property in the record of a vertex, bytes.
     start: usize,
 }
 
-/// The vertices of a PLY file, and everything around them.
+/// The bytes of a PLY file, and the layout of its vertices.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     /// The file. A text file is stored as binary.
     bytes: Vec<u8>,
-    /// First byte of the vertices.
+    /// Offset of the first vertex, bytes.
     start: usize,
     count: usize,
     /// Bytes per vertex.
@@ -111,7 +111,7 @@ pub(crate) struct Table {
     columns: Vec<Column>,
 }
 
-/// A parsed header.
+/// A parsed header: its lines, its elements, and the properties of the vertices.
 struct PlyHeader<'a> {
     format: &'a str,
     /// Lines, without `ply` and `end_header`.
@@ -122,11 +122,11 @@ struct PlyHeader<'a> {
     elements: Vec<(&'a str, u64)>,
     columns: Vec<Column>,
     stride: usize,
-    /// Bytes per item of the elements before the vertices; `None` after a list.
+    /// Bytes of all elements before the vertices; `None` if one of these has a list, whose size varies.
     before: Option<u64>,
 }
 
-/// Whether the vertices of a PLY file are splats: it has one of their properties.
+/// Whether the header of a PLY file names a property that only splats have.
 pub(crate) fn is_splats(bytes: &[u8]) -> bool {
     let lines = header_lines(bytes).map(|(lines, _)| lines).unwrap_or_default();
     let mut names = lines.iter().filter_map(|line| line.strip_prefix("property ")?.split_whitespace().last());
@@ -140,7 +140,7 @@ fn header_lines(bytes: &[u8]) -> Option<(Vec<&str>, usize)> {
         let rest = bytes.get(start..MAX_HEADER.min(bytes.len()))?;
         let length = rest.iter().position(|&b| b == b'\n')?;
         start += length + 1;
-        // Comments in another encoding are of no interest.
+        // Treat a line that is not UTF-8 as a comment, since comments are ignored.
         let line = std::str::from_utf8(&rest[..length]).unwrap_or("comment").trim();
         match line {
             "end_header" => return Some((lines, start)),
@@ -202,7 +202,8 @@ impl<'a> PlyHeader<'a> {
         Ok(header)
     }
 
-    /// Adds the size of an element before the vertices.
+    /// Adds the size of the last element to `before`, unless the element is `vertex` or follows `vertex`. `size`: bytes
+    /// per item; `None` if the element has a list.
     fn close(&mut self, of_vertex: bool, size: Option<u64>) {
         let has_vertices = of_vertex || self.elements.iter().any(|(name, _)| *name == "vertex");
         if let (false, Some((_, count))) = (has_vertices, self.elements.last()) {
@@ -236,10 +237,10 @@ impl Table {
                 "its vertices follow another element: write them first".into(),
             ));
         };
-        // A number of a text takes at least two bytes, with its separator.
+        // In a text file, a number and its separator take at least two bytes.
         let each = if is_text { 2 * header.columns.len() as u64 } else { header.stride as u64 };
         let needed = before.saturating_add(count.saturating_mul(each));
-        // The last number may end the file.
+        // A text file may end directly after the last number, without a separator.
         let found = (bytes.len() - header.end) as u64 + u64::from(is_text);
         if needed > found || count > u64::from(u32::MAX) {
             return Err(SplatError::Count { count, needed, found });
@@ -374,7 +375,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     raw.finish(near, Records::Ply(table))
 }
 
-/// Writes splats over a table, or as a new file.
+/// Writes splats into a copy of `table`, or as a new file.
 pub(crate) fn write(to_write: &SplatsToWrite<'_>, table: Option<&Table>) -> Vec<u8> {
     let splats = to_write.splats;
     let n_harmonics = cagework_core::splats::n_harmonics(splats.degree);

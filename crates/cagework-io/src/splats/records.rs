@@ -1,5 +1,5 @@
-//! `.splat` files: 32 bytes per splat, without a header. Position and scale as f32, colour and opacity as bytes, rotation
-//! w, x, y, z as bytes of which 128 is 0.
+//! `.splat` files: 32 bytes per splat, without a header. Position and scale as f32, colour and opacity as bytes,
+//! rotation w, x, y, z as bytes of which 128 is 0.
 
 use glam::{DVec3, Quat, Vec3};
 
@@ -30,7 +30,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
     raw.finish(near, Records::Splat)
 }
 
-/// Writes splats over `file`, or as a new file. Spherical harmonics are dropped.
+/// Writes splats into a copy of `file`, or as a new file. Spherical harmonics are dropped.
 pub(crate) fn write(to_write: &SplatsToWrite<'_>, file: Option<&[u8]>) -> Vec<u8> {
     let splats = to_write.splats;
     let mut bytes = file.map_or_else(|| vec![0; RECORD * splats.len()], <[u8]>::to_vec);

@@ -1,4 +1,5 @@
-//! SPZ files (Niantic Labs), versions 1 to 3: a header and one array per quantity, as one gzip stream. Written as version 3.
+//! SPZ files (Niantic Labs): a header and one array per quantity. Versions 1 to 3 are one gzip stream; version 4 has a
+//! Zstandard stream for each array of version 3. Files are written as version 3.
 
 use std::io::{Read as _, Write as _};
 
@@ -7,24 +8,41 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use glam::{DVec3, Quat, Vec3};
+use ruzstd::decoding::FrameDecoder;
 
 use super::{
     RawSplats, ReadSplats, Records, SplatError, SplatsToWrite, band_0, color_of, log_scale, unit_byte,
 };
 use crate::error::WriteError;
-use crate::memory::MemoryError;
+use crate::memory::{MemoryError, check_unpacked};
 
 const MAGIC: [u8; 4] = *b"NGSP";
 const HEADER: usize = 16;
-/// Version that is written, and whose arrays an export keeps.
+/// Size of the header of version 4, whose first 15 bytes are those of the other versions.
+const HEADER_4: usize = 32;
+/// Offset of the byte of flags in the header, and the flag of files with extension records.
+const FLAGS: usize = 14;
+const HAS_EXTENSIONS: u8 = 2;
+/// Type of the extension record that names the axes of the file, and its value for the default axes: x right, y up, z
+/// back.
+const COORDINATE_SYSTEM: u32 = 0xadbe_0003;
+const RIGHT_UP_BACK: u32 = 4;
+/// Limit on the size of the extension records of a gzip stream, bytes. The known records have at most 20 bytes.
+const MAX_EXTENSIONS: u64 = 1 << 16;
+/// Largest compression ratio of the Zstandard stream of positions that the format's reference implementation accepts.
+const MAX_ZSTD_RATIO: u64 = 1024;
+/// Window size, bytes, that every Zstandard decoder should support (RFC 8878, section 3.1.1.1.2).
+const ZSTD_WINDOW: u64 = 8 << 20;
+/// Version of the files that are written. An export reuses the arrays of its source file only if the file has this
+/// version, too.
 const VERSION: u32 = 3;
-/// Scale of the bytes that store the coefficients of band 0.
+/// Factor of the coefficients of band 0 in the file: a coefficient f is stored as the byte 255 (0.15 f + 0.5).
 const COLOR_SCALE: f32 = 0.15;
 /// Largest number of fractional bits of a position.
 const MAX_FRACTION: u8 = 20;
-/// Largest integer that stores a position: 24 bits with sign.
+/// Largest integer that can store a coordinate: positions have 24 bits per axis, with sign.
 const MAX_FIXED: f64 = 8_388_607.0;
-/// Steps of the three smaller parts of a rotation, which are at most sqrt(1/2).
+/// Integer that stores a component of size sqrt(1/2), which none of the three smaller components of a rotation exceeds.
 const ROTATION_STEPS: f32 = 511.0;
 
 /// Decompressed content of a file.
@@ -34,7 +52,7 @@ pub(crate) struct Body {
     layout: Layout,
 }
 
-/// Sizes of the arrays.
+/// Numbers of the header that determine the sizes of the arrays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Layout {
     version: u32,
@@ -51,7 +69,7 @@ impl Layout {
         [position, 1, 3, 3, rotation, 3 * n_harmonics(self.degree)]
     }
 
-    /// First bytes of the arrays, and the end.
+    /// Offset of each array, and of the end of the last array, bytes.
     fn starts(self) -> [usize; 7] {
         let mut starts = [HEADER; 7];
         for (k, size) in self.sizes().into_iter().enumerate() {
@@ -72,27 +90,26 @@ pub(crate) fn is_spz(bytes: &[u8]) -> bool {
 
 /// Reads a file, using at most `memory_limit` bytes.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSplats, SplatError> {
-    let convert = "convert it with `splat-transform IN.spz OUT.ply`";
-    if bytes.starts_with(&MAGIC) {
-        let version = bytes.get(4..8).map_or(0, |v| u32::from_le_bytes([v[0], v[1], v[2], v[3]]));
-        return Err(SplatError::Unsupported(format!(
-            "it is an SPZ of version {version} (Zstandard), but versions 1 to 3 are read: {convert}"
-        )));
-    }
+    let is_zstd = bytes.starts_with(&MAGIC);
     let mut decoder = GzDecoder::new(bytes);
     let mut header = [0; HEADER];
     let cut_off = |_| SplatError::Damaged("its gzip stream is damaged or cut off".into());
-    decoder.read_exact(&mut header).map_err(cut_off)?;
-    let word = |k: usize| u32::from_le_bytes([header[k], header[k + 1], header[k + 2], header[k + 3]]);
+    if is_zstd {
+        let whole = bytes.first_chunk::<HEADER_4>().ok_or_else(|| {
+            SplatError::Damaged(format!("its header has {} bytes, not {HEADER_4}", bytes.len()))
+        })?;
+        header.copy_from_slice(&whole[..HEADER]);
+    } else {
+        decoder.read_exact(&mut header).map_err(cut_off)?;
+    }
     if header[..4] != MAGIC {
         return Err(SplatError::Damaged("its gzip stream does not begin with 'NGSP'".into()));
     }
-    let layout =
-        Layout { version: word(4), count: word(8) as usize, degree: header[12], fraction: header[13] };
-    if !(1..=3).contains(&layout.version) {
-        let version = layout.version;
+    let [version, count] = [4, 8].map(|at| word(&header, at));
+    let layout = Layout { version, count: count as usize, degree: header[12], fraction: header[13] };
+    if !(1..=4).contains(&version) {
         return Err(SplatError::Unsupported(format!(
-            "it is an SPZ of version {version}, but versions 1 to 3 are read: {convert}"
+            "it is an SPZ of version {version}, but versions 1 to 4 are read: convert it with `splat-transform IN.spz OUT.ply`"
         )));
     }
     if layout.degree > 3 || layout.fraction > 24 {
@@ -101,21 +118,41 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
             layout.degree, layout.fraction
         )));
     }
-    // Deflate compresses at most to 1/1032.
-    let each = layout.sizes().iter().sum::<usize>() as u64;
-    let (needed, most) = (u64::from(word(8)) * each, 1032 * bytes.len() as u64);
+    let [positions, each] = [layout.sizes()[0], layout.sizes().iter().sum()].map(|size| size as u64);
+    let (count, size) = (u64::from(count), bytes.len() as u64);
+    // Deflate compresses to no less than 1/1032 of the size, and Zstandard is limited as in the reference
+    // implementation. A count that needs more bytes is wrong.
+    let (needed, most) =
+        if is_zstd { (count * positions, MAX_ZSTD_RATIO * size) } else { (count * each, 1032 * size) };
     if needed > most {
-        return Err(SplatError::Count { count: word(8).into(), needed, found: bytes.len() as u64 });
+        return Err(SplatError::Count { count, needed, found: size });
     }
-    MemoryError::check(needed + 2 * bytes.len() as u64, memory_limit)?;
-    let held = needed + 2 * bytes.len() as u64;
-    let mut raw = RawSplats::new(word(8).into(), layout.degree, held, memory_limit)?;
-    let mut body = header.to_vec();
-    decoder.take(needed).read_to_end(&mut body).map_err(cut_off)?;
-    let found = (body.len() - HEADER) as u64;
-    if found < needed {
-        return Err(SplatError::Count { count: word(8).into(), needed, found });
+    let needed = count * each;
+    check_unpacked(needed, size).map_err(SplatError::Damaged)?;
+    let window = if is_zstd { ZSTD_WINDOW.max(needed) } else { 0 };
+    let held = needed + 2 * size + window;
+    MemoryError::check(held, memory_limit)?;
+    let mut raw = RawSplats::new(count, layout.degree, held, memory_limit)?;
+    let mut body = Vec::with_capacity(HEADER + needed as usize);
+    body.extend(header);
+    let mut extensions = Vec::new();
+    if is_zstd {
+        extensions.extend(read_streams(bytes, layout, window, &mut body)?);
+        body[4..8].copy_from_slice(&VERSION.to_le_bytes());
+        body[HEADER - 1] = 0;
+    } else {
+        (&mut decoder).take(needed).read_to_end(&mut body).map_err(cut_off)?;
+        let found = (body.len() - HEADER) as u64;
+        if found < needed {
+            return Err(SplatError::Count { count, needed, found });
+        }
+        if header[FLAGS] & HAS_EXTENSIONS != 0 {
+            decoder.take(MAX_EXTENSIONS).read_to_end(&mut extensions).map_err(cut_off)?;
+        }
     }
+    // The bytes are reused by exports, which have no extension records.
+    body[FLAGS] &= !HAS_EXTENSIONS;
+    let layout = Layout { version: word(&body, 4), ..layout };
     let starts = layout.starts();
     let sizes = layout.sizes();
     let unit = (-f64::from(layout.fraction)).exp2();
@@ -142,10 +179,75 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<ReadSp
         });
         raw.splats.harmonics.extend(of(5).chunks_exact(3).map(|b| (bytes_3(b) - 128.0) / 128.0));
     }
-    raw.finish(near, Records::Spz(Body { bytes: body, layout }))
+    let mut read = raw.finish(near, Records::Spz(Body { bytes: body, layout }))?;
+    read.notices.extend(axes_notice(&extensions).filter(|_| header[FLAGS] & HAS_EXTENSIONS != 0));
+    Ok(read)
 }
 
-/// Writes splats over the arrays of a file, or as a new file.
+/// Appends the arrays of a file of version 4 to `body`, and returns the file's extension records. `window`: limit on the
+/// memory of the decoder, bytes.
+fn read_streams<'a>(
+    bytes: &'a [u8],
+    layout: Layout,
+    window: u64,
+    body: &mut Vec<u8>,
+) -> Result<&'a [u8], SplatError> {
+    let damaged = |what: String| Err(SplatError::Damaged(what));
+    let (start, n_streams) = (word(bytes, 16) as usize, usize::from(bytes[HEADER - 1]));
+    let table = bytes.get(start..).and_then(|from| from.split_at_checked(16 * n_streams));
+    let Some((table, mut rest)) = table.filter(|_| start >= HEADER_4) else {
+        return damaged(format!("its table of {n_streams} streams at byte {start} is not in the file"));
+    };
+    let arrays = layout.sizes().into_iter().map(|size| (size * layout.count) as u64);
+    let mut arrays = arrays.filter(|&size| size > 0);
+    let mut decoder = FrameDecoder::new();
+    decoder.set_max_window_size(window);
+    for (k, row) in table.as_chunks::<8>().0.chunks_exact(2).enumerate() {
+        let [compressed, size] = [row[0], row[1]].map(u64::from_le_bytes);
+        let split = usize::try_from(compressed).ok().and_then(|size| rest.split_at_checked(size));
+        let Some((stream, after)) = split else {
+            return damaged(format!("its stream {k} has {compressed} bytes, but {} are left", rest.len()));
+        };
+        rest = after;
+        if size == 0 {
+            continue;
+        }
+        let expected = arrays.next().unwrap_or(0);
+        if size != expected {
+            return damaged(format!("its stream {k} holds {size} bytes, but its array has {expected}"));
+        }
+        let start = body.len();
+        body.resize(start + size as usize, 0);
+        if decoder.decode_all(stream, &mut body[start..]).ok() != Some(size as usize) {
+            return damaged(format!("its Zstandard stream {k} cannot be decompressed to {size} bytes"));
+        }
+    }
+    if let Some(size) = arrays.next() {
+        return damaged(format!("its table has no stream for an array of {size} bytes"));
+    }
+    Ok(&bytes[HEADER_4..start])
+}
+
+/// A sentence for the user if an extension record says that the file has other axes than those of the format.
+fn axes_notice(mut records: &[u8]) -> Option<String> {
+    while let Some((head, rest)) = records.split_at_checked(8) {
+        let (payload, after) = rest.split_at_checked(word(head, 4) as usize)?;
+        if word(head, 0) == COORDINATE_SYSTEM && payload.len() == 4 {
+            let axes = word(payload, 0);
+            return (![0, RIGHT_UP_BACK].contains(&axes)).then(|| format!(
+                "the file names other axes than those of its format (SPZ_ADOBE_coordinate_system {axes}), and they are ignored: the capture may be upside down or mirrored"
+            ));
+        }
+        records = after;
+    }
+    None
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+/// Writes splats into a copy of the arrays of a file, or as a new file.
 ///
 /// # Errors
 /// [`WriteError::Splat`] if a position does not fit into 24 bits.
@@ -197,12 +299,13 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, body: Option<&Body>) -> Result
         }
     }
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-    const TO_VEC: &str = "a Vec takes all bytes";
+    const TO_VEC: &str = "writing to a Vec cannot fail";
     encoder.write_all(&bytes).expect(TO_VEC);
     Ok(encoder.finish().expect(TO_VEC))
 }
 
-/// Decodes a rotation: the index of its largest part in two bits, then sign and size of the others in ten bits each.
+/// Decodes a rotation: two bits for the index of the largest component, then sign and size of each other component in
+/// ten bits.
 fn rotation_of(bits: u32) -> Quat {
     let largest = (bits >> 30) as usize;
     let mut parts = [0.0_f32; 4];

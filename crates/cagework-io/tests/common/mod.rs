@@ -309,7 +309,7 @@ pub(crate) fn volume(model: &Model) -> f32 {
 /// bone's constant translation, rotates the tip and changes the targets.
 pub(crate) fn rigged() -> Builder {
     let mut rig = Builder::new();
-    // A column of five squares, from height 0 to 2 in world space.
+    // A closed square column from height 0 to 2 in world space: five cross-sections, joined by four segments.
     let (mut at, mut triangles) = (Vec::new(), Vec::new());
     for k in 0..5_u32 {
         let y = 0.5 * k as f32;
@@ -391,4 +391,65 @@ pub(crate) fn rigged() -> Builder {
         .collect();
     rig.push("animations", json!({ "name": "walk", "samplers": samplers, "channels": channels }));
     rig
+}
+
+/// Relationships of a 3MF whose first model part is `3D/3dmodel.model`.
+const RELATIONSHIPS: &str = "<Relationships xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\">\
+    <Relationship Target=\"/3D/3dmodel.model\" Id=\"a\" Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/>\
+    </Relationships>";
+
+/// A 3MF with these model parts, and a file of settings that is not read.
+pub(crate) fn package(parts: &[(&str, String)]) -> Vec<u8> {
+    let mut files = vec![
+        ("_rels/.rels".to_owned(), RELATIONSHIPS.as_bytes().to_vec()),
+        ("Metadata/settings.config".to_owned(), b"layer_height = 0.2\r\n".to_vec()),
+    ];
+    files.extend(parts.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec())));
+    cagework_io::write_zip(&files).unwrap()
+}
+
+/// The cube as the mesh of a 3MF, with a painted triangle, and a triangle with property 1 of group 1.
+pub(crate) fn cube_mesh() -> String {
+    let vertices =
+        CUBE.map(|[x, y, z]| format!("   <vertex x=\"{x:.3}\"  y='{y:.3}' z=\"{z:.3}\" />\r\n")).concat();
+    let triangles: Vec<String> = CUBE_TRIANGLES
+        .iter()
+        .enumerate()
+        .map(|(t, [a, b, c])| {
+            let more = [" paint_color=\"8\"", " pid=\"1\" p1=\"1\""].get(t).copied().unwrap_or_default();
+            format!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"{more}/>")
+        })
+        .collect();
+    format!("<mesh><vertices>\r\n{vertices}</vertices><triangles>{}</triangles></mesh>", triangles.concat())
+}
+
+/// A model part of a 3MF.
+pub(crate) fn model_part(resources: &str, build: &str) -> String {
+    format!(
+        "\u{feff}<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- by hand -->\n<model unit=\"millimeter\" \
+        xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" \
+        xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\">\n\
+        <metadata name=\"Title\">A &amp; B</metadata>\n<resources>{resources}</resources>\n<build>{build}</build></model>\n"
+    )
+}
+
+/// A 3MF with two placements of a pair of cubes, one of which is mirrored, and a cube in another model part.
+pub(crate) fn plate() -> Vec<u8> {
+    package(&plate_parts())
+}
+
+/// Names and texts of the model parts of [`plate`].
+pub(crate) fn plate_parts() -> [(&'static str, String); 2] {
+    let resources = format!(
+        "<basematerials id=\"1\"><base name=\"Red\" displaycolor=\"#FF0000\"/><base name=\"Blue\" displaycolor=\"#0000FF80\"/>\
+        </basematerials>\n<object id=\"2\" name=\"cube &lt;1&gt;\" pid=\"1\" pindex=\"0\" type=\"model\" \
+        p:UUID=\"00000002-61cb-4c03-9d28-80fed5dfa1dc\">{}</object>\n\
+        <object id=\"3\" type=\"model\"><components><component objectid=\"2\"/>\
+        <component objectid=\"2\" transform=\"-1 0 0 0 2 0 0 0 1 4 5 6\"/></components></object>",
+        cube_mesh()
+    );
+    let build = "<item objectid=\"3\" transform=\"1 0 0 0 1 0 0 0 1 10 20 30\"/><item objectid=\"3\" \
+        transform=\"0 1 0 -1 0 0 0 0 1 0 0 0.5\"/><item objectid=\"2\" p:path=\"/3D/Objects/b.model\" printable=\"0\"/>";
+    let other = format!("<object id=\"2\" type=\"model\">{}</object>", cube_mesh());
+    [("3D/3dmodel.model", model_part(&resources, build)), ("3D/Objects/b.model", model_part(&other, ""))]
 }

@@ -17,14 +17,14 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
 
 use crate::common::{
-    Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, plain_cube, quantized, read, rigged, skinned,
-    textured_square, twist,
+    Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, package, plain_cube, plate, plate_parts, quantized,
+    read, rigged, skinned, textured_square, twist,
 };
 
 /// Number of GLB samples, which precede all other samples.
 const N_GLB: usize = 7;
 
-/// Generator of the inputs of a seed.
+/// Generates numbered inputs from a seed.
 pub(crate) struct Inputs {
     seed: u64,
     files: BoxedStrategy<Vec<u8>>,
@@ -35,7 +35,7 @@ impl Inputs {
         Self { seed, files: files() }
     }
 
-    /// The input with this number, independent of others.
+    /// The input with this number. It depends only on the seed and the number.
     pub(crate) fn get(&mut self, number: u64) -> Vec<u8> {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());
@@ -66,7 +66,8 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         &[Vec3::ONE],
         &[Vec3::ONE],
     ));
-    // Weights of eight controls, with frames of a joint with a bone, and entries in all kinds of columns.
+    // Weights of six cage vertices and two joints with a bone between them. Entries are in all kinds of columns: cage
+    // vertices, joints and offsets of the frames.
     let frames = Frames {
         joints: vec![6, 7],
         bones: vec![[0, 1]],
@@ -97,10 +98,14 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     samples.push(
         b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
     );
+    samples.push(plate());
     let capture = read("a.ply", &splats()).expect("the capture is valid");
     for format in ModelFormat::ALL.into_iter().filter(|format| format.holds_splats()) {
         samples.push(capture.write(format, &capture.positions).expect("the capture is valid"));
     }
+    // SPZ 4 with compressed blocks, and with uncompressed blocks, in which damaged bytes change the decoded values.
+    samples.push(include_bytes!("../splats/helix-4.spz").to_vec());
+    samples.push(include_bytes!("../splats/six-4.spz").to_vec());
     samples
 }
 
@@ -182,12 +187,14 @@ fn files() -> BoxedStrategy<Vec<u8>> {
             .prop_map(|(glb, changes, as_text)| odd_json(&glb, changes, as_text)),
         5 => (select(texts), prop::collection::vec(line_damage(), 1..6)).prop_map(|(text, damage)| damaged_lines(&text, &damage)),
         1 => prop::collection::vec(damage(), 1..6).prop_map(move |damage| gzip_damaged(&gzipped, &damage)),
+        2 => (prop::collection::vec((any::<Index>(), odd_attribute()), 1..5), prop::collection::vec(damage(), 0..2))
+            .prop_map(|(changes, damage)| odd_package(&changes, &damage)),
         2 => soup(),
     ]
     .boxed()
 }
 
-/// A mutation of bytes.
+/// A random change of a file's bytes.
 #[derive(Clone, Debug)]
 enum Damage {
     Set(Index, u8),
@@ -249,7 +256,7 @@ fn odd_number() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// A mutation of OBJ lines.
+/// A random change of the lines of an OBJ file.
 #[derive(Clone, Debug)]
 enum LineDamage {
     Word(Index, Index, String),
@@ -364,7 +371,30 @@ fn odd_json(sample: &[u8], changes: Vec<(Index, Value)>, as_text: bool) -> Vec<u
     if as_text { json.to_string().into_bytes() } else { glb(&json, Some(bin_of(sample))) }
 }
 
-/// Name of a sample's external buffer: its length, which is unique.
+fn odd_attribute() -> impl Strategy<Value = String> {
+    prop_oneof![
+        3 => (-1..12_i64).prop_map(|x| x.to_string()),
+        1 => odd_number().prop_map(|x| x.to_string()),
+        1 => "[-0-9. e/#&;a]{0,9}",
+        1 => select(vec!["4294967295", "2147483647", "/3D/Objects/b.model", "3D/3dmodel.model", "1 0 0 0 1 0 0 0 1 0 0 0"])
+            .prop_map(str::to_owned),
+    ]
+}
+
+/// The 3MF of [`plate`] with changed attributes in its first part and damaged bytes in its second one.
+fn odd_package(changes: &[(Index, String)], damage: &[Damage]) -> Vec<u8> {
+    let [(root, first), (other, second)] = plate_parts();
+    // Of the pieces of the XML between quotes, every second one is the value of an attribute.
+    let mut pieces: Vec<&str> = first.split('"').collect();
+    for (at, value) in changes {
+        let n = pieces.len() / 2;
+        pieces[2 * at.index(n) + 1] = value.as_str();
+    }
+    let second = String::from_utf8_lossy(&damaged(second.into_bytes(), damage)).into_owned();
+    package(&[(root, pieces.join("\"")), (other, second)])
+}
+
+/// Name of a sample's external buffer. It contains the length of the sample, which differs for all samples.
 fn sample_name(sample: &[u8]) -> String {
     format!("{}.bin", sample.len())
 }

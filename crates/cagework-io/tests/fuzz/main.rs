@@ -19,16 +19,17 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Limit on CPU time per input. The slowest takes about 1 s.
+/// Limit on CPU time per input. The slowest input takes about 1 s.
 const CPU_TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// Limit on wall-clock time per input, for a process that waits or gets no CPU time.
 const WALL_TIME_LIMIT: Duration = Duration::from_secs(600);
 
-/// Address space limit of the child process, KiB. Inputs need a few MiB.
+/// Address space limit of the child process, KiB: 4 GiB. Inputs need a few MiB, so only a runaway allocation reaches
+/// it.
 const MEMORY_KIB: &str = "4194304";
 
-/// Failures after which the run ends.
+/// Number of failed inputs after which the run ends.
 const MAX_FAILURES: u64 = 50;
 
 const USAGE: &str = "usage: cargo xtask fuzz [--minutes N] [--seed S] | FILE ...";
@@ -147,7 +148,7 @@ impl Trial {
         Some(Duration::from_millis(10 * (ticks(11)? + ticks(12)?)))
     }
 
-    /// How the process ended; `None` on success.
+    /// Waits until the process ends, or kills it if `timed_out` is set. Returns how it ended; `None` on success.
     fn end(mut self, timed_out: bool) -> Option<String> {
         if timed_out {
             // Ignore the error: the process may have exited in the meantime.

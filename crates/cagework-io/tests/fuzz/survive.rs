@@ -1,4 +1,4 @@
-//! Runs the operations of the command line and of the page on each input.
+//! Runs the operations of the command line and of the web page on each input.
 
 use std::sync::LazyLock;
 
@@ -25,7 +25,7 @@ const GRID: u32 = 8;
 /// Valid samples, cages and points that inputs are combined with.
 struct Rest {
     samples: Vec<Vec<u8>>,
-    /// Reference cage for poses.
+    /// A cage; each input is also read as a pose of this cage.
     cage: Model,
     closed: Cage,
     /// Points inside the cage.
@@ -113,8 +113,11 @@ fn as_file(model: &Model) {
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
     let _ = model.look();
     let _ = model.write_obj(&moved);
-    for format in [ModelFormat::Ply, ModelFormat::Stl, ModelFormat::Off] {
-        if let Ok(bytes) = model.write(format, &model.positions) {
+    let moving = [(ModelFormat::ThreeMf, &moved)];
+    let still =
+        [ModelFormat::Ply, ModelFormat::Stl, ModelFormat::Off].map(|format| (format, &model.positions));
+    for (format, positions) in still.into_iter().chain(moving) {
+        if let Ok(bytes) = model.write(format, positions) {
             let again = Model::read("y", &bytes, &mut |_| None);
             assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
         }
@@ -194,7 +197,7 @@ fn as_model(model: &Model, choice: u32) {
     if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
         assert_eq!(made.cage.notices(), []);
         let (smooth, options) = (options.smooth, bind_options(choice));
-        // With `smooth`, the limit surface encloses the model.
+        // If `smooth` is set, the generated cage encloses the model by its subdivided surface, so bind to this surface.
         let smooth =
             ControlSet::new(&made.cage, smooth, InnerControls::default()).expect("the cage is valid");
         match bind(&model.positions, &smooth, &options, &Silent) {
@@ -202,7 +205,7 @@ fn as_model(model: &Model, choice: u32) {
                 assert_eq!(binding.weights.n_rows(), model.positions.len());
                 assert!(binding.weights.data().iter().all(|w| w.is_finite()));
             }
-            // The model is inside the cage, but the classic method's cells may be too large for it.
+            // The cage encloses the model, but with the classic method, a thin cage may have no interior cells.
             Err(error) => assert_eq!(options.method, Method::Classic, "{error}"),
         }
     }

@@ -58,7 +58,8 @@ fn clips_do_not_affect_the_reshaped_positions() {
     assert_eq!(with, without);
 }
 
-/// Cubic splines follow the rule for translations also between keys, because their tangents take its linear part.
+/// The map of translations also holds between the keys of a cubic spline, because the map's linear part is applied to
+/// the tangents.
 #[test]
 fn splines_follow_the_rule_between_their_keys() {
     let mut rig = rigged();
@@ -69,7 +70,7 @@ fn splines_follow_the_rule_between_their_keys() {
     rig.json["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE".into();
     let model = read(&rig.glb());
     let (before, after) = (player(&model), player(&read(&reshaped(&model, Joints::Follow).0)));
-    // `f` scales heights by 1.2, and so do the translations of the root.
+    // `f` scales heights by 1.2, so the translations of the root scale by 1.2 as well.
     let root = |player: &Player, seconds: f32| player.at(Some(0), seconds, &[]).origins[1];
     for seconds in [0.0, 0.3, 0.7, 1.0] {
         let [old, new] = [&before, &after].map(|player| root(player, seconds));
@@ -157,7 +158,8 @@ fn unnamed_clips_are_called_by_their_index() {
     assert_eq!(message, "there is no clip 'walk'; the model has clip 0");
 }
 
-/// Counting references per track would take quadratic time: more than 5 min for 60 clips of 65 joints.
+/// Counting all references to accessors again for each track would take quadratic time: more than 5 min for 60 clips of
+/// 65 joints.
 #[test]
 fn many_clips_take_linear_time() {
     let mut rig = rigged();
@@ -173,7 +175,7 @@ fn many_clips_take_linear_time() {
     let model = read(&rig.glb());
     let began = std::time::Instant::now();
     let (bytes, report) = reshaped(&model, Joints::Follow);
-    // Reshaping takes 0.5 s; an algorithm of quadratic time would take 60 s.
+    // Reshaping these 6,001 clips takes 0.5 s; an algorithm of quadratic time would take 60 s.
     assert!(began.elapsed().as_secs() < 20, "{:?}", began.elapsed());
     assert_eq!(report.tracks, 2 * 6001);
     assert_eq!(read(&bytes).clips().len(), 6001);

@@ -235,7 +235,7 @@ fn joints_without_vertices_outside_the_cage_follow_their_parents() {
     );
 }
 
-/// The skinning matrix of the column's upper half is singular.
+/// The skinning matrices of the upper three of the column's five rings are singular.
 #[test]
 fn vertices_with_singular_skinning_follow_their_neighbours() {
     let mut rig = rigged();
@@ -312,7 +312,8 @@ fn colliders_without_offset_are_scaled() {
     let json = json_of(&reshaped(&read(&rig.glb()), Joints::Follow).0);
     let shape =
         |k: usize, kind: &str| json["extensions"]["VRMC_springBone"]["colliders"][k]["shape"][kind].clone();
-    // At height 1, `f` scales y by 1.2 and shears, which preserves volume. The armature scales by two.
+    // At height 1, `f` scales y by 1.2 and shears. A shear preserves volume, so radii change by the cube root of 1.2.
+    // The armature scales by two, so local tails are half as long.
     for of in [shape(0, "sphere"), shape(1, "capsule")] {
         let radius = of["radius"].as_f64().unwrap();
         assert!((radius / 0.1 - 1.2_f64.cbrt()).abs() < 1e-3, "{radius}");
@@ -336,7 +337,7 @@ fn vertices_without_weights_follow_the_node_with_a_notice() {
         let model = read(&rig.glb());
         let notice = format!("skin 0 has no positive weight for {n} vertex: they follow the mesh's node");
         assert!(model.notices.contains(&notice), "{weight}: {:?}", model.notices);
-        // The node is at (7, 7, 7), where the vertex is bound.
+        // The vertex without weights is moved by the mesh's node, whose translation is (7, 7, 7), and is bound there.
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
         let bytes = reshaped(&model, Joints::Follow).0;
         assert_near(&read(&bytes).positions, &moved, 16.0 * ROUNDED, "with a loose vertex");
@@ -365,7 +366,7 @@ fn primitives_with_fewer_targets_are_padded() {
     assert_near(&posed, &moved, 4.0 * ROUNDED, "the pose");
 }
 
-/// Poses with times are added next to the model's clips.
+/// Poses become the keyframes of one extra clip, "poses", beside the model's own clips.
 #[test]
 fn poses_are_played_at_their_times() {
     let rig = rigged();
@@ -380,7 +381,9 @@ fn poses_are_played_at_their_times() {
     let cubic = timed(Timeline::new(&[0.5, 2.0], None).unwrap().with(Interpolation::Cubic)).unwrap().0;
     let written = read(&cubic);
     let clip = written.clips().iter().position(|clip| clip.name.as_deref() == Some("poses")).unwrap();
-    // A quarter of the way to a key after which the clip ends: 3 u^2 - 2 u^3, and the slope of 1/2 at 0.5 s.
+    // 0.875 s is a quarter of the way from the key at 0.5 s to the last key. Share of the last pose by cubic Hermite
+    // interpolation: 3 u^2 - 2 u^3, plus the term of the slope at 0.5 s. The share grows from 0 to 1 between the
+    // neighbouring keys at 0 and 2 s, so this slope is 1/2 per second. The slope at the last key is 0.
     let (u, gap) = (0.25_f32, 1.5);
     let share = 3.0 * u * u - 2.0 * u.powi(3) + gap * (u.powi(3) - 2.0 * u * u + u) / 2.0;
     let at = shown(&player(&written), Some(clip), 0.875, &[]);

@@ -8,6 +8,7 @@ mod clips;
 #[path = "../common/mod.rs"]
 mod common;
 mod features;
+mod feet;
 mod nodes;
 mod people;
 mod surfaces;
@@ -17,7 +18,7 @@ use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport};
 use common::{json_of, rigged};
 use glam::{DVec3, Vec3, vec3};
 
-/// Rounding of an f32 round trip of positions up to 2.
+/// Tolerance for positions of up to 2 that are transformed back and forth in f32.
 const ROUNDED: f32 = 2e-6;
 
 fn read(bytes: &[u8]) -> Model {
@@ -235,7 +236,7 @@ fn rig_errors_are_reported_or_ignored() {
         message(&|rig| rig.json["nodes"][3]["children"] = serde_json::json!([1])),
         "rigged.glb: node 1 has two parents: the nodes must be a tree"
     );
-    // Viewers accept these files; unreadable tracks stay unchanged.
+    // Viewers accept a file with an unreadable track, so it is no error, and the track stays unchanged.
     let mut rig = rigged();
     let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
     rig.json["accessors"][output]["count"] = 1.into();
@@ -422,7 +423,7 @@ fn many_morph_ends_are_interpolated_in_a_lattice() {
         bounds.diagonal() as f64
     };
     let cell = report.lattice_cell * diagonal;
-    // A box of 1 x 1.2 x 0.7 holds 60,000 cells of size 0.0241.
+    // 60,000 nodes, the limit, in a box of 1 x 1.2 x 0.7 give cells of size 0.0241.
     assert!(cell < 0.026, "{cell}");
     assert_targets(&model, &out, &[0, 7, 30, 53], 4.0 * ROUNDED + (0.2 / 8.0 * cell * cell) as f32);
 
@@ -495,7 +496,13 @@ fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
     rig.json["extensionsUsed"] = serde_json::json!(["KHR_mesh_quantization"]);
     let model = read(&rig.glb());
     assert_near(&model.positions, &read(&rigged().glb()).positions, 2.0 * UNIT, "half a step, doubled");
-    let after = player(&read(&reshaped(&model, Joints::Follow).0));
+    let bytes = reshaped(&model, Joints::Follow).0;
+    let json = json_of(&bytes);
+    for target in json["meshes"][0]["primitives"][0]["targets"].as_array().unwrap() {
+        let accessor = &json["accessors"][target["POSITION"].as_u64().unwrap() as usize];
+        assert!(accessor.get("sparse").is_some(), "sparse targets stay sparse: {accessor}");
+    }
+    let after = player(&read(&bytes));
     let before = player(&model);
     for targets in [[0.25, 0.0], [1.0, 0.0], [0.25, 1.0]] {
         let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();

@@ -130,8 +130,9 @@ fn vrm_bones_follow_the_cage_with_their_meshes() {
     }
 }
 
-/// A robot of rigid parts with a skinned hand. The foot is a child of the root, next to the hips; the shin is a child
-/// of the hips and ends at the foot. The two clips are a jump and a translation to another position.
+/// A robot of rigid parts with a skinned hand. The hips and the foot are children of the root. A node without a mesh, the
+/// end of the shin, is a child of the hips and lies at the foot. In the first clip the robot jumps; in the second it
+/// stands somewhere else.
 fn robot() -> Builder {
     let mut b = Builder::new();
     let mesh = centred_cube(&mut b);

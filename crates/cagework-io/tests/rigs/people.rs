@@ -1,4 +1,4 @@
-//! The walking sample, deformed by its own cage: from cage to exported clip.
+//! Deforms the walking sample by its own cage, and checks the skeleton and the clips of the export.
 
 use cagework_cage::generate::{CageOptions, generate};
 use cagework_cage::samples;
@@ -75,7 +75,7 @@ fn joints_of_lengthened_arms_follow_the_arms() {
     let (model, longer, _) = shaped(arms, Joints::Follow);
     for name in ["forearm.L", "hand.R"] {
         let (before, after) = (origin(&model, name), origin(&longer, name));
-        // The tolerance is 2 % of the limb's length, 0.8.
+        // The limb has a length of 0.8, and the tolerance is 2 % of this length.
         assert!(after.distance(arms(before)) <= 0.016, "{name}: {after} instead of {}", arms(before));
     }
     let knee = origin(&model, "shin.L");
@@ -85,7 +85,8 @@ fn joints_of_lengthened_arms_follow_the_arms() {
     assert_eq!((report.joints_moved, report.tracks), (0, 0));
 }
 
-/// Whether each triangle is flipped relative to its normal after skinning, in each of eight frames of the first clip.
+/// Whether each triangle faces against its rest normal, transformed by the skinning matrix of its first corner, in each
+/// of eight frames of the first clip.
 fn turned(player: &Player, triangles: &[[u32; 3]]) -> Vec<bool> {
     let at_rest = player.at(None, 0.0, &[]).palette;
     let rest = cagework_core::skin::skin_vertices(&player.skin, &at_rest, &[]);

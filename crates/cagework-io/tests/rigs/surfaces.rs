@@ -7,16 +7,18 @@ use serde_json::json;
 use super::common::{Builder, json_of};
 use super::{f, read, reshaped};
 
-/// Cells along a side of the sheet.
+/// Number of cells along a side of the sheet.
 const N: u32 = 24;
 
 /// Positions, normals and triangles.
 type Sheet = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>);
 
-/// Height and slope of a profile at `u`: here of a wave, below of a roof with a smooth normal at its ridge.
+/// Height and slope of a wave at `u`.
 fn wave(u: f32) -> [f32; 2] {
     [0.2 * (3.0 * u).sin(), 0.6 * (3.0 * u).cos()]
 }
+
+/// Height and slope at `u` of a roof whose normal at the ridge is vertical.
 fn roof(u: f32) -> [f32; 2] {
     let slope = 0.5 - u;
     [-slope.abs(), if slope == 0.0 { 0.0 } else { slope.signum() }]

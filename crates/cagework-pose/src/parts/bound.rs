@@ -1,8 +1,8 @@
-//! [`Parts`] of a model bound to a cage. A frame needs no pass over the vertices of the pieces.
+//! [`Parts`] of a model bound to a cage. The motions of the pieces in a pose take no pass over the pieces' vertices.
 //!
-//! Displacements are linear in the controls, and so are the two sums from which Kabsch's rotation follows. These sums
-//! are precomputed per piece and control, so a frame costs a few operations per control, whatever the size of the
-//! piece.
+//! Displacements are linear in the vectors of the weights' columns (controls and [`Frames`]), and so are the two sums
+//! from which Kabsch's rotation follows. These sums are precomputed per piece and column, so the motion of a piece
+//! costs a few operations per column, whatever the size of the piece.
 
 use glam::{DMat3, DVec3, Vec3, Vec4};
 
@@ -35,7 +35,7 @@ struct PieceSums {
     /// Sum of `from from^T`, with `from` the rest position minus the centre.
     moments: DMat3,
     n: f64,
-    /// For each control that moves the piece: its index, the sum of its weights, and the sum of weight times `from`.
+    /// For each column that moves the piece: its index, the sum of its weights, and the sum of weight times `from`.
     columns: Vec<(u32, f64, DVec3)>,
 }
 
@@ -123,7 +123,8 @@ impl PieceSums {
 }
 
 /// Applies fixed vertices and rigid pieces to deformed `positions`, `[n_vertices]`, object units, in place. `rest`,
-/// `piece_of`: fields of [`BoundParts`]; `motions`: from [`BoundParts::motions`]. GPU twin: `shaders/hold_parts.wgsl`.
+/// `piece_of`: fields of [`BoundParts`]; `motions`: from [`BoundParts::motions`]. GPU kernel:
+/// `shaders/hold_parts.wgsl`.
 ///
 /// # Panics
 /// If an entry of `piece_of` is larger than the number of `motions`.

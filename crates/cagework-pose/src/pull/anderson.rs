@@ -57,8 +57,8 @@ impl Anderson {
 mod tests {
     use super::*;
 
-    /// Without acceleration, `x -> A x + b` converges by a factor of 0.95 per step. Anderson acceleration solves a map
-    /// in two dimensions in four steps.
+    /// Without acceleration, `x -> A x + b` converges by a factor of 0.95 per step. Anderson acceleration finds the
+    /// fixed point as soon as the differences between iterates span both dimensions, which takes at most four steps.
     #[test]
     fn a_linear_map_converges_in_as_many_steps_as_it_has_dimensions() {
         let a = DMatrix::from_row_slice(2, 2, &[0.95, 0.0, 0.0, -0.5]);

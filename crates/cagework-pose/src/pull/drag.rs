@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use super::anderson::Anderson;
 use super::energy::Pull;
@@ -11,61 +12,67 @@ use crate::symmetry::Symmetry;
 use cagework_core::options::{Number, Slider};
 use cagework_core::rotation::nearest_rotation;
 
-/// Weight of the cage's own edges in the energy. Results are nearly equal from 0.02 to 0.4. Below this range, the cage
-/// gets spikes where it hardly moves the model.
+/// Weight of the cage's edges in the energy E ([`super`]). Results are nearly equal from 0.02 to 0.4. Below this range,
+/// the cage gets spikes where it hardly moves the model.
 pub(super) const CAGE_WEIGHT: f64 = 0.1;
-/// Weight of the cage's edges while a cage vertex is dragged. With a lower weight, its neighbours move against the
-/// drag.
+/// Weight of the cage's edges while a cage vertex is dragged. With a lower weight, the vertex's neighbours move against
+/// the drag.
 const GRABBED_CAGE_WEIGHT: f64 = 3.0;
 /// Weight of samples beyond the reach, which stay in place. Results are nearly equal from 100 to 300.
 const STAY_WEIGHT: f64 = 200.0;
-/// Share of the reach within which samples move freely. From there to the full reach, their weight rises from 0 to 1.
+/// Share of the reach within which samples move freely. From there to the full reach, the weight that keeps a sample in
+/// place rises from 0 to [`STAY_WEIGHT`].
 const FREE_SHARE: f64 = 0.75;
-/// Share of the model's area that the automatic reach of one grab encloses.
+/// Share of the model's area that the automatic reach of one grab encloses. With more grabs, it is twice this share.
 const REACH_AREA: f64 = 0.15;
-/// Smallest and largest automatic reach, as multiples of the model's size.
+/// Range of the automatic reach, as multiples of the model's size. [`REACH_PER_GRAB_DISTANCE`] can extend it further.
 const REACH_RANGE: [f64; 2] = [0.15, 0.5];
-/// Smallest automatic reach, as a multiple of the largest distance between two grabs.
+/// Lower limit on the automatic reach of several grabs, as a multiple of the largest distance between two of them.
 const REACH_PER_GRAB_DISTANCE: f64 = 1.2;
 /// Radius of the patch that a pin fixes, as a fraction of the model's size. With a single point pinned, the model would
-/// roll about it.
+/// rotate about that point.
 const PIN_RADIUS: f64 = 0.05;
 /// Weight of the samples in a pin's patch.
 const PIN_WEIGHT: f64 = 2e4;
-/// Stiffness of grabs and pins, as a multiple of the mean diagonal of the whole matrix.
+/// Stiffness mu of grabs and pins, as a multiple of the mean diagonal entry of the matrix of E with fixed samples.
 const HANDLE_STIFFNESS: f64 = 1e3;
-/// Regularisation, as a fraction of the mean diagonal of the matrix without fixed samples.
+/// Regularisation eps, as a fraction of the mean diagonal entry of the matrix of E without fixed samples.
 pub(super) const REGULARISATION: f64 = 1e-6;
-/// The drag has settled when a frame moves the cage by less than this, as a fraction of the model's size. At 1e-4, a
-/// pull of the whole model stops 5 % short of the targets.
+/// The drag has settled when the last step of a frame changes each coordinate of the cage by less than this, as a
+/// fraction of the model's size. With 1e-4 instead, a pull of the whole model would stop 5 % short of the targets.
 const MIN_FRAME_MOVE: f64 = 2e-5;
 
 /// Distance along the surface, from the grabs, up to which a drag moves the model.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Reach {
-    /// The distance within which 15 % of the model's area lies, per grab.
+    /// The distance within which 15 % of the model's area lies, or 30 % with two or more grabs; limited to 0.15 to 0.5
+    /// times the model's size, but at least 1.2 times the largest distance between two grabs.
     #[default]
     Automatic,
-    /// A multiple of the model's size.
+    /// The given multiple of the model's size.
     Of(f64),
     /// The whole model moves: only pins stay in place.
     Whole,
 }
 
 /// Options of a drag.
-#[derive(Clone, Copy, Debug)]
-pub struct DragOptions<'a> {
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct DragOptions {
     /// Distance along the surface up to which the model moves.
     pub reach: Reach,
     /// Share by which parts within the reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
     pub relax: f64,
-    /// Keeps the cage symmetric: each step is averaged with its mirror image. `None` for no symmetry.
-    pub symmetry: Option<&'a Symmetry>,
+    /// Whether the cage stays symmetric: each step averages it with its mirror image. Default false.
+    pub symmetry: bool,
 }
 
-impl Default for DragOptions<'_> {
+impl Default for DragOptions {
     fn default() -> Self {
-        Self { reach: Reach::Automatic, relax: 0.5, symmetry: None }
+        Self { reach: Reach::Automatic, relax: 0.5, symmetry: false }
     }
 }
 
@@ -84,7 +91,8 @@ pub struct Drag {
     pub(super) targets: DMatrix<f64>,
     /// Positions of the grabs at the start of the drag. `[n_grabs]`
     pub(super) start: Vec<DVec3>,
-    /// `A^-1`, `A^-1 Q^T` and `(Q A^-1 Q^T + 1 / mu)^-1`, with the matrix A of the energy without grabs and pins.
+    /// `A^-1`, `A^-1 Q^T` and `(Q A^-1 Q^T + 1 / mu)^-1`, where A is the matrix of the energy E without grabs and pins,
+    /// and mu the stiffness of grabs and pins.
     pub(super) inverse: DMatrix<f64>,
     pub(super) spread: DMatrix<f64>,
     pub(super) hold: DMatrix<f64>,
@@ -97,11 +105,12 @@ pub struct Drag {
     pub(super) moments: Vec<f64>,
     /// Distance along the surface to the nearest grab, object units. `[n_vertices]`
     walks: Vec<f32>,
-    /// Whether the drag has a single grab and neither reach nor pins, so that it only translates the model.
+    /// Whether the drag has a single grab, on the model, no pins and an unlimited reach, so that it only translates the
+    /// model.
     pub(super) is_shift: bool,
     pub(super) anderson: Anderson,
     pub(super) moved: f64,
-    pub(super) mirror: Option<(f64, Vec<Option<u32>>)>,
+    pub(super) mirror: Option<Symmetry>,
 }
 
 impl Drag {
@@ -115,7 +124,7 @@ impl Drag {
         start: &[DVec3],
         grabs: &[Grip],
         pins: &[Grip],
-        options: DragOptions<'_>,
+        options: DragOptions,
     ) -> Result<Self, PullError> {
         check(pull, start, grabs, pins, options)?;
         let n = pull.n_cage();
@@ -155,7 +164,7 @@ impl Drag {
         for i in 0..n {
             matrix[(i, i)] += REGULARISATION * mean;
         }
-        // Scale by the trace of the whole matrix: in a coarse cage, each handle is coupled to all of it.
+        // Scale by the trace of the whole matrix: in a coarse cage, each handle is coupled to all cage vertices.
         let firm = HANDLE_STIFFNESS * matrix.trace() / n as f64;
         let constant = &held * (&pull.sample_rows * &cage) + REGULARISATION * mean * &cage;
         let inverse = matrix.cholesky().ok_or(PullError::Singular)?.inverse();
@@ -166,7 +175,8 @@ impl Drag {
         }
         let hold = hold.cholesky().ok_or(PullError::Singular)?.inverse();
 
-        // References of the start pose, and references of the rest shape with each group rotated to the start pose.
+        // Gradients and edges of the start pose and of the rest shape. Each group of the rest shape is rotated to fit
+        // the start pose best.
         let posed = pull.references(start);
         let rest = pull.references(&pull.cage);
         let of_rest = pull.moments(&rest, gamma);
@@ -210,9 +220,7 @@ impl Drag {
             is_shift: reach.is_infinite() && grips.len() == 1 && !cage_grabbed,
             anderson: Anderson::default(),
             moved: 0.0,
-            mirror: options
-                .symmetry
-                .map(|s| (f64::from(s.plane()), (0..n as u32).map(|i| s.partner(i)).collect())),
+            mirror: options.symmetry.then(|| pull.symmetry.clone()),
         })
     }
 
@@ -240,7 +248,7 @@ impl Drag {
         &self.walks
     }
 
-    /// Weight with which a vertex of the model stays in place: 0 within the reach, 1 beyond.
+    /// Weight with which a vertex of the model stays in place: 0 up to 75 % of the reach, 1 from the reach on.
     #[must_use]
     pub fn stays(&self, vertex: u32) -> f64 {
         stays(self.walks[vertex as usize], self.reach)
@@ -253,7 +261,8 @@ impl Drag {
         (0..self.n).map(|i| DVec3::new(x[i], y[i], z[i])).collect()
     }
 
-    /// Whether the last frame moved the cage by less than 2e-5 of the model's size: no further frame is needed.
+    /// Whether the last step of the last frame changed each coordinate of the cage by less than 2e-5 of the model's
+    /// size: no further frame is needed.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.moved < MIN_FRAME_MOVE
@@ -273,7 +282,7 @@ fn check(
     start: &[DVec3],
     grabs: &[Grip],
     pins: &[Grip],
-    options: DragOptions<'_>,
+    options: DragOptions,
 ) -> Result<(), PullError> {
     if grabs.is_empty() {
         return Err(PullError::NoGrab);
@@ -310,7 +319,8 @@ fn check(
     }
 }
 
-/// How far along the surface a pull moves the model. Beyond the upper half of the slider it moves the whole model.
+/// The `reach` option: distance along the surface up to which a pull moves the model. In the upper half of its slider,
+/// the page sends [`Reach::Whole`] instead of a distance.
 pub const REACH: Number = Number {
     name: "reach",
     help: "Distance along the surface that a pull affects",
@@ -320,8 +330,8 @@ pub const REACH: Number = Number {
     slider: Some(Slider { min: 0.05, max: 2.4, step: 0.05 }),
 };
 
-/// Reach in object units. Automatic: the distance that encloses 15 % of the area per grab, but at least 1.2 times the
-/// largest distance between two grabs.
+/// Reach in object units. Automatic: the distance that encloses 15 % of the area (30 % with two or more grabs), limited
+/// to [`REACH_RANGE`], but at least 1.2 times the largest distance between two grabs.
 fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64 {
     match reach {
         Reach::Whole => return f64::INFINITY,
@@ -355,8 +365,8 @@ fn stays(walk: f32, reach: f64) -> f64 {
     }
 }
 
-/// Share with which each group takes part in relaxation: 1 within the reach, 0 beyond. The share of a cage vertex is
-/// the mean over the samples, weighted by how far the vertex moves them. `[n_groups]`
+/// Share with which each group takes part in relaxation: 1 near the grabs, 0 beyond the reach. The share of a cage
+/// vertex is the mean over the samples, weighted by how far the vertex moves them. `[n_groups]`
 fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     let shares = DVector::from_column_slice(&pull.probes.shares);
     let followed =

@@ -1,4 +1,4 @@
-//! Precomputation once per bind: samples, gradients and the matrix of the energy.
+//! Precomputation once per bind: samples, gradients and the matrix of the energy E (notation: [`super`]).
 
 use glam::{DVec3, Vec3};
 use nalgebra::DMatrix;
@@ -7,17 +7,20 @@ use super::PullError;
 use super::geodesic::Geodesic;
 use super::grip::{Grip, check};
 use super::samples::Probes;
+use crate::symmetry::Symmetry;
 use cagework_core::controls::Controls;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::weights::Weights;
 
 /// A model and its cage, ready for pulling and fitting.
 pub struct Pull {
-    /// Diagonal of the model's box, object units. Lengths that are fractions refer to it.
+    /// Diagonal of the model's box, object units. Lengths that are given as fractions are multiples of this size.
     pub(super) size: f64,
     pub(super) n_vertices: usize,
     /// Rest positions of cage vertices and inner controls. `[n]`
     pub(super) cage: Vec<DVec3>,
+    /// Mirror images of the cage's vertices at rest.
+    pub(super) symmetry: Symmetry,
     pub(super) geodesic: Geodesic,
     pub(super) probes: Probes,
     /// Weights at the samples. `[n_samples, n]`
@@ -26,7 +29,8 @@ pub struct Pull {
     gradients: DMatrix<f64>,
     /// Edges of the cage and of inner controls, in both directions.
     edges: Vec<[u32; 2]>,
-    /// Weight of each edge. The total weight of all edges equals that of the model's samples.
+    /// Weight of each edge, such that the weighted sum of squared edge lengths at rest is 3, as it is for the samples'
+    /// gradients.
     edge_weight: f64,
     /// The sum `sum_e w_e D_e^T D_e` over the model's rows, and the same sum over the cage's edges. `[n, n]`
     of_model: DMatrix<f64>,
@@ -82,6 +86,7 @@ impl Pull {
             n_vertices: mesh.positions.len(),
             geodesic: Geodesic::new(&mesh.positions, &mesh.triangles, size),
             cage: rest,
+            symmetry: Symmetry::new(controls.rest()),
             probes,
             sample_rows,
             gradients,
@@ -98,7 +103,7 @@ impl Pull {
         self.cage.len()
     }
 
-    /// Number of samples on the model.
+    /// Number of sample points on the model ([`Probes`]).
     #[must_use]
     pub fn n_samples(&self) -> usize {
         self.probes.samples.len()
@@ -110,12 +115,13 @@ impl Pull {
         self.n_samples() + self.n_cage()
     }
 
-    /// Matrix of the energy, with the cage's part weighted by `gamma`. `[n, n]`
+    /// Matrix of the energy E, with the terms of the cage's edges weighted by `gamma`. `[n, n]`
     pub(super) fn matrix(&self, gamma: f64) -> DMatrix<f64> {
         &self.of_model + gamma * &self.of_cage
     }
 
-    /// References `d_e` of all rows for a cage: first the gradients at the samples, then the edges.
+    /// Vectors `d_e` of a reference cage: gradients at the samples, then edges. E measures how far the vectors `D_e c`
+    /// of a pose are from rotations of `d_e`.
     pub(super) fn references(&self, cage: &[DVec3]) -> Vec<DVec3> {
         let gradient = |e: usize| {
             let row = self.gradients.row(e);
@@ -154,10 +160,10 @@ impl Pull {
         moments
     }
 
-    /// A grip on a vertex of the cage.
+    /// A grip on a control: a cage vertex or, from the number of cage vertices on, an inner control.
     ///
     /// # Errors
-    /// [`PullError::Missing`] if the cage has no such vertex.
+    /// [`PullError::Missing`] if there is no such control.
     pub fn on_cage(&self, vertex: u32) -> Result<Grip, PullError> {
         check("vertex of the cage", vertex, self.n_cage())?;
         let mut row = vec![0.0; self.n_cage()];

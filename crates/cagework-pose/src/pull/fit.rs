@@ -11,19 +11,19 @@ use super::{MAX_CAGE, PullError};
 use crate::parts::Motion;
 use cagework_core::weights::Weights;
 
-/// Range of the energy's weight lambda when it is estimated from the noise. With the lower end, a target without noise
-/// is met within 1e-5 of the model's size.
+/// Range of lambda, the weight of the energy E ([`super`]), if it is estimated from the noise of the targets. With the
+/// smallest value, targets without noise are met within 1e-5 of the model's size.
 const LAMBDA_RANGE: [f64; 2] = [1e-10, 1e-2];
 
 /// Limit on the rounds that estimate lambda, and the ratio of successive values below which the estimate has converged.
 const MAX_LAMBDA_ROUNDS: usize = 8;
 const LAMBDA_RATIO: f64 = 1.1;
 
-/// Number of points per cage vertex from which on noise can be estimated.
+/// Smallest number of points per cage vertex with which the noise can be estimated.
 const MIN_POINTS_PER_VERTEX: usize = 4;
 
-/// Value of lambda with fewer points. Landmarks are then met within about 1e-3 of the model's size, and the model bends
-/// as little as possible between them.
+/// Value of lambda with fewer points per cage vertex. Landmarks are then met within about 1e-3 of the model's size, and
+/// the model bends as little as possible between them.
 const LANDMARK_LAMBDA: f64 = 1e-5;
 
 /// Limit on local-global steps, and the movement of the cage in a step, as a fraction of the model's size, at which
@@ -34,10 +34,10 @@ const MIN_STEP_MOVE: f64 = 1e-8;
 /// Options of [`Pull::fit`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
-    /// Weight of the energy against the mean squared distance from the targets (divided by the model's size squared),
-    /// at least 0. `None`: the most likely value given the remaining distance, `n d / (N E)`, for N points at the mean
-    /// squared distance d and a cage of n vertices with the energy E; with fewer than four points per cage vertex,
-    /// 1e-5.
+    /// Weight of the energy E ([`crate::pull`]) against the mean squared distance from the targets (divided by the
+    /// model's size squared), at least 0. `None`: the most likely value given the remaining distance,
+    /// `n d / ((N - n) E)`, for N points at the mean squared distance d and a cage of n vertices, but 1e-10 to 1e-2;
+    /// with fewer than four points per cage vertex, 1e-5.
     pub lambda: Option<f64>,
 }
 
@@ -46,7 +46,7 @@ pub struct FitOptions {
 pub struct Fit {
     /// Positions of the cage vertices and inner controls. `[n]`, object units
     pub cage: Vec<DVec3>,
-    /// Weight of the energy.
+    /// Weight lambda of the energy in the fit: the given one, or its estimate.
     pub lambda: f64,
     /// Energy of the pose: mean squared distance of the model's gradients from rotations, plus 0.1 times that of the
     /// cage's edges.
@@ -55,7 +55,7 @@ pub struct Fit {
     pub rms: f64,
     /// The largest distance from a target.
     pub largest: f64,
-    /// Number of local-global steps.
+    /// Number of local-global steps that ran.
     pub steps: usize,
     /// Whether the steps converged.
     pub is_settled: bool,
@@ -80,8 +80,8 @@ impl Pull {
         &self.probes.areas
     }
 
-    /// Minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`, with E the energy of a pull (see the module)
-    /// relative to the rest shape, without fixed samples.
+    /// Minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`. E is the first sum of the energy of a pull
+    /// ([`crate::pull`]), with the rest shape as reference.
     ///
     /// `weights`: rows of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight `m_k` of each point,
     /// scaled to sum to 1; a point with the share 0 is ignored. `to`: targets, object units.
@@ -168,7 +168,7 @@ impl Pull {
         let n = self.n_cage();
         let own = self.matrix(CAGE_WEIGHT);
         let regular = REGULARISATION * own.trace() / n as f64;
-        // Keep the matrix regular with lambda 0 if no point depends on a vertex.
+        // If lambda is 0 and no point depends on some vertex, a tiny weight of the energy keeps the matrix regular.
         let energy_weight = lambda.max(f64::EPSILON);
         let mut matrix = &goals.matrix + energy_weight * &own;
         for i in 0..n {
@@ -209,7 +209,8 @@ impl Pull {
         })
     }
 
-    /// The rest cage moved rigidly onto the targets. It is the initial guess of the rotations.
+    /// Vertices of the rest cage, moved rigidly to fit the targets best. The iteration starts from them: the first
+    /// rotations are computed from these positions.
     fn align_rest(&self, goals: &Goals<'_>) -> Vec<DVec3> {
         let points = goals.used().map(|(row, _, to)| {
             let at = place(row, &self.cage);

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, group_matrices, smooth};
 use super::grip::Handle;
+use crate::symmetry::Symmetry;
 use cagework_core::rotation::nearest_rotation;
 
 /// Limit on the frames that [`Drag::settle`] runs.
@@ -16,16 +17,16 @@ const MIN_TARGET_MOVE: f64 = 1e-9;
 /// Length of a drag, as a fraction of the model's size, at which relaxation is complete.
 const RELAX_LENGTH: f64 = 0.1;
 
-/// Rotation of the grabs, in radians, above which [`Drag::go`] moves them on arcs. On straight paths, grabs that make a
-/// half turn would meet in one point.
+/// Rotation of the grabs, in radians, above which [`Drag::frame`] and [`Drag::go`] move them on arcs. On straight
+/// paths, grabs that make a half turn would meet in one point.
 const MIN_ARC_ANGLE: f64 = 0.5;
 /// Multiple of the identity that is added to the grabs' covariance, as a fraction of the covariance's trace. It
 /// prevents rotations that the grabs do not determine, such as that of two grabs about the line between them.
 const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {
-    /// Runs one frame with the grabs at `to` (`[n_grabs]`, object units). Ignores targets that are not finite, so the
-    /// pose stays finite.
+    /// Runs one frame with the grabs at `to` (`[n_grabs]`, object units). If the grabs rotate together by more than 0.5
+    /// radians, runs frames on the way there, too. Ignores targets that are not finite, so the pose stays finite.
     pub fn frame(&mut self, to: &[DVec3]) {
         if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
             return;
@@ -59,8 +60,8 @@ impl Drag {
             }
             self.moved = (&image - &self.cage).amax() / self.size;
             let mut next = self.anderson.next(&self.cage, image);
-            if let Some((plane, partners)) = &self.mirror {
-                average(&mut next, *plane, partners);
+            if let Some(symmetry) = &self.mirror {
+                average(&mut next, symmetry);
             }
             self.cage = next;
         }
@@ -133,11 +134,13 @@ impl Drag {
     }
 }
 
-/// Paths of the grabs: a common rigid motion, plus what each displacement has beyond this motion.
+/// Paths of the grabs: a common rigid motion, plus the remaining displacement of each grab, which grows linearly along
+/// the path.
 struct GrabPath<'a> {
     from: &'a [DVec3],
     to: &'a [DVec3],
-    /// Means of `from` and `to`, and the rotation that best maps one set about its mean to the other.
+    /// Means of `from` and `to`, and the rotation that best maps `from`, relative to its mean, to `to`, relative to its
+    /// own.
     middles: [DVec3; 2],
     turn: DQuat,
 }
@@ -199,11 +202,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Averages the cage with its mirror image.
-fn average(cage: &mut DVector<f64>, plane: f64, partners: &[Option<u32>]) {
-    let n = partners.len();
+fn average(cage: &mut DVector<f64>, symmetry: &Symmetry) {
+    let (n, plane) = (cage.len() / 3, f64::from(symmetry.plane()));
     let before = cage.clone();
-    for (i, partner) in partners.iter().enumerate() {
-        let Some(p) = partner.map(|p| p as usize) else { continue };
+    for i in 0..n {
+        let Some(p) = symmetry.partner(i as u32).map(|p| p as usize) else { continue };
         cage[i] = 0.5 * (before[i] + 2.0 * plane - before[p]);
         for x in 1..3 {
             cage[x * n + i] = 0.5 * (before[x * n + i] + before[x * n + p]);

@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::nearest::KdTree;
 use cagework_core::mesh::weld;
 
-/// Minimum length of a bridge, as a fraction of the model's size.
+/// Lower limit on the lengths of the graph's edges, including bridges, as a fraction of the model's size.
 const MIN_BRIDGE_LENGTH: f32 = 1e-9;
 
 /// Graph of the model's edges. Vertices at equal positions are one node. A bridge joins each component to the largest
@@ -111,7 +111,7 @@ fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     best.into_iter().flatten().map(|(edge, _)| edge).collect()
 }
 
-/// Root of a component: find with path halving.
+/// Root of the component that contains node `i`, by union-find with path halving.
 fn root(part: &mut [u32], mut i: u32) -> u32 {
     while part[i as usize] != i {
         part[i as usize] = part[part[i as usize] as usize];

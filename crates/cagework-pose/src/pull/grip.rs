@@ -4,7 +4,8 @@ use super::samples::dense;
 use super::{Pull, PullError};
 use cagework_core::weights::Weights;
 
-/// Tolerance of barycentric coordinates, which come from pointers and files.
+/// Barycentric coordinates come from pointers and files, so each may be this far below 0, and their sum this far from
+/// 1.
 const BARYCENTRIC_TOLERANCE: f64 = 1e-3;
 
 /// A point that can be grabbed or pinned.
@@ -14,11 +15,11 @@ pub enum Handle {
     Vertex(u32),
     /// A point of the model: a triangle and barycentric coordinates.
     Triangle(u32, [f64; 3]),
-    /// A vertex of the cage.
+    /// A cage vertex or, from the number of cage vertices on, an inner control.
     Cage(u32),
 }
 
-/// A handle with its weights.
+/// A handle with the weights of the controls at its point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grip {
     /// Weights of the controls at the point. `[n_cage]`

@@ -1,14 +1,17 @@
-//! Direct manipulation of the model: the user moves points of the model, and the cage is solved for so that the rest of
-//! the model bends as little as possible.
+//! Direct manipulation of the model: the user moves points of the model, and a solver finds the cage that moves them
+//! there while the rest of the model bends as little as possible.
 //!
-//! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is as rigid as possible (Sorkine and Alexa 2007),
-//! with rotation groups and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
+//! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is the as-rigid-as-possible energy of Sorkine and
+//! Alexa 2007, with one rotation per group as in Jacobson et al. 2012, "Fast automatic skinning transformations":
 //!
 //! ```text
 //! E(c) = sum_r sum_{e in r} w_e |D_e c - R_r d_e|^2    groups r with one rotation each
-//!      + sum_s m_s |W_s c - p_s|^2                      samples beyond the reach stay in place
+//!      + sum_s m_s |W_s c - p_s|^2                      samples far from the moved points stay in place
 //!      + mu |Q c - T|^2 + eps |c - c0|^2                grabs and pins; regularisation
 //! ```
+//!
+//! `W_s` and `Q` are the weights of samples, and of grabs and pins; `p_s` and `T` are the positions at which these are
+//! held. `d_e` are the vectors `D_e c` of a reference pose, and `c0` is the cage at the start.
 //!
 //! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures the
 //! distance of the deformation's Jacobian from a rotation), or a cage vertex with its edges. The gradients come from a
@@ -66,7 +69,7 @@ pub enum PullError {
     /// The cage is too large.
     #[error("the cage has {cage} vertices; at most {MAX_CAGE} can be pulled: make a coarser cage")]
     Cage {
-        /// Number of its vertices.
+        /// Number of vertices of the cage.
         cage: usize,
     },
     /// A handle does not exist.
@@ -74,7 +77,7 @@ pub enum PullError {
     Missing {
         /// Kind of handle: vertex, triangle or cage vertex.
         what: &'static str,
-        /// The invalid index.
+        /// The index that does not exist.
         index: u32,
         /// The largest valid index.
         last: usize,
@@ -88,12 +91,12 @@ pub enum PullError {
     /// There are too many grabs and pins.
     #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}")]
     Handles(usize),
-    /// A value that is not finite or out of range.
+    /// A value is not finite, or it is out of range.
     #[error("{what} is {value}; it must be {range}")]
     Value {
-        /// Name of the quantity.
+        /// Name of the invalid quantity.
         what: &'static str,
-        /// The value.
+        /// The rejected value.
         value: f64,
         /// The valid range, in words.
         range: &'static str,
@@ -103,14 +106,14 @@ pub enum PullError {
     Targets {
         /// Number of targets.
         given: usize,
-        /// Number of points.
+        /// Number of points, each of which needs a target.
         points: usize,
     },
     /// No point has a target and weight.
     #[error("no point has a target: all points lie outside the cage or have zero weight")]
     NoTarget,
     /// The start pose belongs to another cage.
-    #[error("the start has {given} vertices, but the cage has {cage}")]
+    #[error("the start pose has {given} vertices, but the cage has {cage}")]
     Start {
         /// Number of vertices of the start pose.
         given: usize,

@@ -74,14 +74,14 @@ impl BoundSample {
         start: &[DVec3],
         grabs: &[Handle],
         pins: &[Handle],
-        options: DragOptions<'_>,
+        options: DragOptions,
     ) -> Result<Drag, PullError> {
         let [grabs, pins] =
             [grabs, pins].map(|list| list.iter().map(|&h| self.grip(h)).collect::<Result<Vec<_>, _>>());
         Drag::new(&self.pull, start, &grabs?, &pins?, options)
     }
 
-    /// Displacement of a handle when the cage is at `cage`.
+    /// Displacement of a handle from the rest pose when the cage's vertices are at `cage`.
     fn moved(&self, handle: Handle, cage: &[DVec3]) -> DVec3 {
         let row = self.grip(handle).unwrap().row;
         row.iter().zip(cage.iter().zip(self.rest())).map(|(w, (c, r))| *w * (*c - r)).sum()
@@ -184,7 +184,7 @@ fn a_single_grab_with_whole_reach_translates_the_model() {
     let by = b.size * DVec3::new(0.3, 0.2, 0.1);
     let cage = pulled(&mut drag, by, 3);
     let expected: Vec<DVec3> = b.rest().iter().map(|p| *p + by).collect();
-    // f32 weights sum to 1 within 1e-7.
+    // f32 weights sum to 1 within 1e-7, so the translation is reproduced with an error of this order.
     assert!(b.apart(&cage, &expected) < 1e-6);
 }
 
@@ -199,7 +199,8 @@ fn the_result_is_independent_of_the_path() {
     let mut away = drag();
     pulled(&mut away, 50.0 * by, 5);
     pulled(&mut away, DVec3::ZERO, 5);
-    // A drag counts as settled at 2e-5 per frame; more frames bring it closer to the end.
+    // A drag counts as settled when a step moves the cage by less than 2e-5 of the model's size; more frames bring the
+    // cage closer to the rest pose.
     let back = pulled(&mut away, DVec3::ZERO, 30);
     assert!(b.apart(&back, &b.rest()) < 1e-4, "{}", b.apart(&back, &b.rest()));
 }
@@ -248,7 +249,7 @@ fn symmetric_pulls_are_symmetric() {
     let symmetry = Symmetry::new(b.cage.positions());
     assert!(symmetry.is_complete());
     let grabs = [b.hand(), b.farthest(Vec3::NEG_X)];
-    let options = DragOptions { symmetry: Some(&symmetry), ..DragOptions::default() };
+    let options = DragOptions { symmetry: true, ..DragOptions::default() };
     let mut drag = b.try_drag(&b.rest(), &grabs, &[], options).unwrap();
     let (mirror, by) = (DVec3::new(-1.0, 1.0, 1.0), b.size * DVec3::new(-0.05, 0.1, 0.05));
     let to = [drag.start()[0] + by, drag.start()[1] + mirror * by];
@@ -261,7 +262,6 @@ fn symmetric_pulls_are_symmetric() {
     }
 }
 
-/// Unreachable targets end in a finite pose.
 #[test]
 fn unreachable_targets_stay_finite() {
     let b = humanoid();

@@ -11,6 +11,8 @@
 Lengths are in the model's own units. For many files on many machines see cagework.distributed.
 """
 
+from typing import Any
+
 from cagework._errors import ArrayError, BindError, CageError, Error, ModelError, OptionError, PullError
 from cagework._native import (
     Cage,
@@ -47,4 +49,31 @@ __all__ = [
     "pull",
     "read_model",
     "reshape",
+    "show",
 ]
+
+
+def show(model: Any, cage: Cage, weights: Any = None, report: dict[str, Any] | None = None, **options: Any) -> Any:
+    """Draws a model in its cage in a notebook: show(model, cage, weights=None, report=None, *, theme="auto", height=400) -> widget
+
+    model: path of a file or its bytes, with its materials; or a mesh, which is (vertices, triangles) or an object with vertices and
+    faces. A .gltf must contain its buffers. weights and report: the result of bind; without them, the model is bound here. theme:
+    "auto", "dark" or "light"; height: CSS pixels.
+
+    The widget's pose is the cage's vertices, [n_cage, 3] float64, object units. Drag vertices in the notebook, or assign a pose.
+    widget.observe(function, "pose") calls a function at each change. The array is read-only: copy it to change numbers. deformed: the
+    model's vertices in this pose.
+
+    Needs `pip install 'cagework[notebook]'`; raises ImportError without it, ArrayError, and the exceptions of bind and read_model.
+
+    >>> cage = cw.generate_cage(mesh.vertices, mesh.faces, target=40)
+    >>> widget = cw.show(mesh, cage, *cw.bind(mesh.vertices, cage, grid=24))
+    >>> widget.pose = cage.vertices * [2, 1, 1]
+    >>> bool(np.allclose(widget.deformed, mesh.vertices * [2, 1, 1], atol=1e-3))
+    True
+    """
+    try:
+        from cagework_notebook import show as draw
+    except ModuleNotFoundError as error:
+        raise ImportError(f"cagework.show needs the notebook widget ({error}): pip install 'cagework[notebook]'") from error
+    return draw(model, cage, weights, report, **options)

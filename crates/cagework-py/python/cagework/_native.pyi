@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, TypedDict, final
 
@@ -10,6 +10,7 @@ from typing_extensions import Unpack
 __version__: str
 
 _Faces = ArrayLike | Sequence[ArrayLike]
+_Progress = Callable[[float], object] | None
 _Model = str | PathLike[str] | bytes
 
 class BindOptions(TypedDict, total=False):
@@ -73,6 +74,7 @@ class Field:
     def gradient(self, points: ArrayLike) -> NDArray[np.float32]: ...
     def save(self, path: str | PathLike[str]) -> None: ...
 
+@final
 class Splats:
     def __new__(cls, path: str | PathLike[str]) -> Splats: ...
     def __len__(self) -> int: ...
@@ -95,15 +97,17 @@ class Splats:
     def shells(self) -> tuple[NDArray[np.float32] | NDArray[np.float64], NDArray[np.int32]]: ...
     def save(self, path: str | PathLike[str]) -> None: ...
 
-def generate_cage(vertices: ArrayLike, triangles: ArrayLike, **options: Unpack[CageOptions]) -> Cage: ...
+def generate_cage(
+    vertices: ArrayLike, triangles: ArrayLike, *, progress: _Progress = None, **options: Unpack[CageOptions]
+) -> Cage: ...
 def check_cage(
     cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int = 64, smooth: int | None = None
 ) -> list[dict[str, Any]]: ...
 def bind(
-    points: ArrayLike, cage: Cage, **options: Unpack[BindOptions]
+    points: ArrayLike, cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
 ) -> tuple[csr_array, dict[str, Any]]: ...
 def bind_many(
-    models: Sequence[ArrayLike], cage: Cage, **options: Unpack[BindOptions]
+    models: Sequence[ArrayLike], cage: Cage, *, progress: _Progress = None, **options: Unpack[BindOptions]
 ) -> list[tuple[csr_array, dict[str, Any]]]: ...
 def deform(
     weights: Any, posed: ArrayLike, report: dict[str, Any] | None = None
@@ -124,17 +128,25 @@ def pull(
     **options: Unpack[BindOptions],
 ) -> NDArray[np.float64]: ...
 def read_model(
-    model: _Model, states: bool = False, clip: str | None = None
+    model: _Model | list[_Model], states: bool = False, clip: str | None = None
 ) -> tuple[NDArray[np.float32] | NDArray[np.float64], NDArray[np.int32]]: ...
 def reshape(
     model: _Model,
     cage: Cage,
-    posed: ArrayLike,
+    posed: ArrayLike | dict[str, ArrayLike],
     *,
     joints: Literal["follow", "stay", "turn"] = "follow",
     keep_travel: bool = False,
+    ground: bool = False,
+    feet: Literal["free", "lock"] = "free",
     rigid: Sequence[str] = [],
     mask: dict[str, float] | None = None,
+    skeleton: _Model | None = None,
+    expressions: bool = False,
+    times: Sequence[float] | None = None,
+    interpolation: Literal["step", "linear", "cubic"] = "linear",
     static: bool = False,
+    quantize: bool = False,
+    compress: Literal["none", "meshopt"] = "none",
     **options: Unpack[BindOptions],
 ) -> bytes: ...

@@ -5,7 +5,7 @@
     done = reshape_files(files, "out", cage, posed, client=Client("scheduler:8786"))
 
 Inputs and outputs are on a file system that all workers share. Outputs are written atomically. An output newer than its input is
-kept, so that the same call after a crash processes only the remaining files. Dask gives the tasks of a dead worker to another one.
+kept, so that the same call after a crash processes only the remaining files. Dask gives the tasks of a dead worker to another worker.
 """
 
 import os

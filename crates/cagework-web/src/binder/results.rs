@@ -9,17 +9,42 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{corners, flat};
-use crate::views::object;
+use crate::error::{Answer, ErrorName, Fault};
+use crate::views::{object, optional};
 use cagework_editor::CageControls;
 
-/// Frames of a bind, and the points outside the cage. The frames' columns of the weights follow those of the controls.
+/// Frames of a bind, and the points outside the cage.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Offsets {
-    /// Frames. In the weights, their columns follow those of the controls.
+    /// Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
+    /// In the weights, their columns follow those of the controls.
     pub(crate) frames: Frames,
     /// Points outside the cage.
     pub(crate) outside: Vec<OutsideVertex>,
+}
+
+impl Offsets {
+    /// Weights and frames from the arrays of a [`Bound`] with `n_controls` controls.
+    ///
+    /// # Errors
+    /// If the arrays do not match each other or `n_controls`.
+    pub(crate) fn bound(
+        self,
+        n_controls: usize,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+    ) -> Answer<(Weights, Frames)> {
+        let frames = self.frames;
+        if !frames.fits(n_controls) {
+            let message =
+                format!("offsets has frames of more than {n_controls} controls, or joints without bones");
+            return Err(Fault::new(ErrorName::Error, message));
+        }
+        let n_columns = (n_controls + frames.n_columns()) as u32;
+        Ok((Weights::new(n_columns, indptr, indices, data)?, frames))
+    }
 }
 
 /// Weights as compressed sparse rows, and the frames that the columns after the controls refer to.
@@ -67,14 +92,14 @@ impl Bound {
         self.weights.indptr().to_vec()
     }
 
-    /// Number of weights.
+    /// Number of non-zero weights.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn count(&self) -> usize {
         self.weights.data().len()
     }
 
-    /// Column indices and weights from `start` to `end`.
+    /// Column indices and values of the non-zero weights `start` to `end - 1`, so that the page can read them in parts.
     #[wasm_bindgen(unchecked_return_type = "[Uint32Array, Float32Array]")]
     #[must_use]
     pub fn rows(&self, start: usize, end: usize) -> JsValue {
@@ -97,16 +122,15 @@ impl Bound {
         self.weights.data().to_vec()
     }
 
-    /// Frames, and points outside the cage. The frames' columns of the weights follow those of the controls.
-    ///
-    /// # Errors
-    /// Never.
+    /// Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce,
+    /// and the points outside the cage. In the weights, the columns of the frames follow those of the controls.
     #[wasm_bindgen(getter, unchecked_return_type = "Offsets")]
-    pub fn offsets(&self) -> Result<JsValue, JsValue> {
-        Ok(object(&self.offsets)?)
+    #[must_use]
+    pub fn offsets(&self) -> JsValue {
+        object(&self.offsets)
     }
 
-    /// Report of the bind; undefined for closed-form coordinates and slices.
+    /// Report of the bind; undefined for closed-form coordinates, slices and lattices.
     #[wasm_bindgen(getter, unchecked_return_type = "BindReport | undefined")]
     #[must_use]
     pub fn report(&self) -> JsValue {
@@ -132,12 +156,10 @@ impl Polygons {
 
     /// Subdivision and interior controls of a project's cage; undefined for other meshes. In `positions`, the positions
     /// of interior controls follow the vertices.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(getter, unchecked_return_type = "CageControls | undefined")]
-    pub fn controls(&self) -> Result<JsValue, JsValue> {
-        Ok(self.controls.as_ref().map_or(Ok(JsValue::UNDEFINED), object)?)
+    #[must_use]
+    pub fn controls(&self) -> JsValue {
+        optional(self.controls.as_ref())
     }
 
     /// Number of disconnected parts of the model that a generated cage joins into one; 0 if it joins none.
@@ -172,21 +194,21 @@ impl BuiltSample {
         flat(&self.positions)
     }
 
-    /// The cage of the sample.
+    /// The cage of the sample, at rest.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Polygons {
         self.cage.clone().into()
     }
 
-    /// Point of the model to pull first. `[3]`
+    /// Point of the model that the page asks the user to pull first. `[3]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn grip(&self) -> Vec<f32> {
         self.grip.to_array().to_vec()
     }
 
-    /// Names of the sample's poses.
+    /// Names of the sample's poses, by the index that `posePositions` takes.
     #[wasm_bindgen(getter, js_name = poseNames)]
     #[must_use]
     pub fn pose_names(&self) -> Vec<String> {
@@ -198,5 +220,25 @@ impl BuiltSample {
     #[must_use]
     pub fn pose_positions(&self, index: usize) -> Vec<f32> {
         self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_name_no_column_are_refused() {
+        let bound = |joints: Vec<u32>, column: u32| {
+            let plain = vec![[0.0; 4]; 3 * joints.len()];
+            let frames = Frames { joints, plain, whole: vec![[0.0; 3]; 3], ..Frames::default() };
+            let offsets = Offsets { frames, outside: Vec::new() };
+            offsets.bound(3, vec![0, 1], vec![column], vec![1.0])
+        };
+        // The frames add 9 columns to those of the 3 controls: 3 for the coordinate axes, 3 for the motion of the whole
+        // cage, and 3 for the joint.
+        assert!(bound(vec![2], 11).is_ok());
+        assert!(bound(vec![2], 12).is_err(), "a column");
+        assert!(bound(vec![3], 2).is_err(), "a joint");
     }
 }

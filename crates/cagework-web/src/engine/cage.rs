@@ -16,7 +16,7 @@ use crate::binder::Polygons;
 use crate::controls;
 use crate::error::{Answer, Fault};
 use crate::options::{JsBindOptions, decode};
-use crate::views::object;
+use crate::views::optional;
 
 #[wasm_bindgen]
 impl Engine {
@@ -39,7 +39,7 @@ impl Engine {
 
     /// Replaces the cage. `corners`: for each face its corner count, then its vertex indices. A mesh that is not a
     /// valid cage is stored as a draft; `Binder.checkCage` finds its faults. Without `controls`, the current interior
-    /// controls that fit into the new cage are kept. With a label, adds a step to the history.
+    /// controls are kept if they fit into the new cage. With a label, adds a step to the history.
     ///
     /// # Errors
     /// If the arrays are not a polygon mesh, or a control does not fit into the cage. The document is then unchanged.
@@ -58,7 +58,7 @@ impl Engine {
         if !is_step {
             self.change(|state| state.editor.amend());
         }
-        self.cage_state()
+        Ok(self.cage_state())
     }
 
     /// Draws the edges of another cage in place of the current one, until this is called with empty arrays or the cage
@@ -82,12 +82,10 @@ impl Engine {
     }
 
     /// Properties of the cage for panels; undefined without a cage.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
-    pub fn cage_state(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| state.cage_state().map_or(Ok(JsValue::UNDEFINED), |shown| object(&shown)))?)
+    #[must_use]
+    pub fn cage_state(&self) -> JsValue {
+        self.read(|state| optional(state.cage_state()))
     }
 
     /// Applies a command to the document. With a label, adds a step to the history; otherwise the next history step
@@ -123,7 +121,7 @@ impl Engine {
         });
     }
 
-    /// Undoes the last history step; false if the history is empty, or while models are being added.
+    /// Undoes the last history step; false if there is no step to undo, or while models are being added.
     #[must_use]
     pub fn undo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.undo())
@@ -135,7 +133,7 @@ impl Engine {
         self.change(|state| !state.is_adding && state.editor.redo())
     }
 
-    /// Clears the history.
+    /// Deletes all history steps, so that nothing can be undone or redone.
     #[wasm_bindgen(js_name = clearHistory)]
     pub fn clear_history(&self) {
         self.change(|state| state.editor.clear_history());
@@ -179,7 +177,7 @@ impl Engine {
         })
     }
 
-    /// Starts or ends reshaping the cage. If this resets the pose, it adds a step to the history with this label.
+    /// Starts or ends reshaping the cage. If the start resets a pose, adds a step to the history with this label.
     #[wasm_bindgen(js_name = setEditingRest)]
     pub fn set_editing_rest(&self, editing: bool, label: &str) {
         self.change(|state| {
@@ -213,7 +211,8 @@ impl Engine {
         Ok(bytes as f64)
     }
 
-    /// Estimated work of a bind: updates of one value. A second on one processor core is about 10^9.
+    /// Estimated work of a bind, as a number of updates of one value at a grid node. A processor core does about 10^9
+    /// updates per second.
     ///
     /// # Errors
     /// Without a cage, or if an option is out of range.

@@ -18,23 +18,21 @@ const PIXELS_PER_TURN: f32 = 900.0;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Target, direction and distance of the camera.
-    ///
-    /// # Errors
-    /// Never.
+    /// Target, direction, distance and projection of the camera.
     #[wasm_bindgen(unchecked_return_type = "CameraView")]
-    pub fn camera(&self) -> Result<JsValue, JsValue> {
+    #[must_use]
+    pub fn camera(&self) -> JsValue {
         let camera = self.read(|state| state.camera);
-        Ok(object(&CameraView {
+        object(&CameraView {
             target: camera.target.to_array(),
             yaw: camera.yaw,
             pitch: camera.pitch,
             distance: camera.distance,
             parallel: camera.projection == Projection::Orthographic,
-        })?)
+        })
     }
 
-    /// Sets the camera.
+    /// Sets the camera's target, direction, distance and projection.
     ///
     /// # Errors
     /// If a number is not finite or is out of range.
@@ -71,7 +69,7 @@ impl Engine {
         self.change(|state| state.camera.pan(Vec2::new(dx, dy)));
     }
 
-    /// Zooms by `factor` about the view point (`x`, `y`) in CSS pixels.
+    /// Zooms by `factor` about the point (`x`, `y`) of the view, CSS pixels.
     #[wasm_bindgen(js_name = zoomAt)]
     pub fn zoom_at(&self, x: f32, y: f32, factor: f32) {
         if factor.is_finite() && factor > 0.0 {
@@ -82,13 +80,13 @@ impl Engine {
         }
     }
 
-    /// Moves the camera so that model and cage fit into the view.
+    /// Moves the camera so that the posed cage fits into the view, or without a cage the models.
     #[wasm_bindgen(js_name = frameAll)]
     pub fn frame_all(&self) {
         self.change(super::super::state::State::frame_all);
     }
 
-    /// Moves the camera so that the selected vertices fit into the view; model and cage if nothing is selected.
+    /// Moves the camera so that the selected vertices fit into the view. If nothing is selected, acts as `frameAll`.
     #[wasm_bindgen(js_name = frameSelection)]
     pub fn frame_selection(&self) {
         self.change(|state| {

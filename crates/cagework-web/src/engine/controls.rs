@@ -17,12 +17,10 @@ use crate::views::object;
 #[wasm_bindgen]
 impl Engine {
     /// Subdivision and interior controls of the cage, in the form that `setCage` takes.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(js_name = cageControls, unchecked_return_type = "CageControls")]
-    pub fn cage_controls(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| object(&state.cage().controls))?)
+    #[must_use]
+    pub fn cage_controls(&self) -> JsValue {
+        self.read(|state| object(&state.cage().controls))
     }
 
     /// Replaces the interior controls by those of an OBJ file, and adds a step to the history.
@@ -41,7 +39,9 @@ impl Engine {
         Ok(self.step(Command::ReplaceControls { positions, elements }, Some(label))?)
     }
 
-    /// The point of the rest model, halfway through it under the pointer, where a new control is placed. `[3]`
+    /// Place for a new control: a point inside the rest model under the pointer, midway between the first two surfaces.
+    /// If the pointer is not on the model, the point of the pointer's ray that is nearest to the centre of model
+    /// and cage. `[3]`
     #[wasm_bindgen(js_name = middleAt)]
     #[must_use]
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {
@@ -58,8 +58,8 @@ impl Engine {
         middle.to_array().to_vec()
     }
 
-    /// Adds the largest sheet around `center` that fits into the cage, parallel to the view plane, and adds a step to
-    /// the history.
+    /// Adds a sheet around `center`, parallel to the view plane and shrunk until it fits into the cage, and adds a step
+    /// to the history.
     ///
     /// # Errors
     /// If even the smallest sheet does not fit.

@@ -1,14 +1,15 @@
 //! Methods that write files and return arrays of the models.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use cagework_core::deform::{OutsideVertex, displacements};
 use cagework_core::field::bend_vertices;
 use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
-    Clip, ModelFormat, ReshapeReport, Timeline, write_cage_obj, write_inner_controls, write_weights_npz,
-    write_zip,
+    Clip, Feet, Ground, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, Timeline, compact,
+    shown, write_cage_obj, write_inner_controls, write_weights_npz, write_zip,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint8Array, Uint32Array};
@@ -18,8 +19,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{JsRigOptions, decode};
-use crate::playing::{Playback, SharedClip};
+use crate::options::{JsRigOptions, READ_LIMIT, decode};
+use crate::playing::SharedClip;
 use crate::state::State;
 use crate::views::object;
 
@@ -37,8 +38,8 @@ impl Engine {
         Ok(write_zip(&files).ok_or_else(equal)?)
     }
 
-    /// The posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With `options.dynamic`, and
-    /// if the model has this clip, the frames of `clip` are exported as morph targets instead.
+    /// The posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With `options.dynamic`, the
+    /// frames of the clip with the index `clip` become morph targets instead, if the model has this clip.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -49,6 +50,9 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
         clip: u32,
     ) -> Result<Vec<u8>, JsValue> {
+        if let Some(bytes) = self.posed_capture(id, ModelFormat::Gltf)? {
+            return Ok(bytes);
+        }
         let request: JsRigOptions = decode(options)?;
         let clips = self.read(|state| SharedClip::all(state.models()));
         let (bytes, notices) = match clips.get(clip as usize).and_then(|clip| clip.of(id)) {
@@ -56,11 +60,54 @@ impl Engine {
             _ => self.posed_glb(id, &request)?,
         };
         self.state.borrow_mut().rig_notices = notices;
-        Ok(bytes)
+        Ok(compact(bytes, request.size).map_err(Fault::from)?)
     }
 
-    /// The posed model in a format that stores only its shape, without rig or animation. `frame`: the shown frame of a
-    /// clip, if one is shown.
+    /// Fits a file of clips without a mesh to the posed skeleton of the model with the most joints. Matches joints by
+    /// name. `name`: the file's name.
+    ///
+    /// # Errors
+    /// If the file has a mesh or no clips, no model has a skeleton, or no joint of the file has the name of a joint of
+    /// the model.
+    #[wasm_bindgen(js_name = exportClips)]
+    pub fn export_clips(
+        &self,
+        name: &str,
+        bytes: Vec<u8>,
+        #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
+    ) -> Result<Vec<u8>, JsValue> {
+        let request: JsRigOptions = decode(options)?;
+        let mut clips =
+            Model::read_with_clips(name, bytes, &mut |_| None, READ_LIMIT).map_err(Fault::from)?;
+        if !clips.positions.is_empty() {
+            return Err(Fault::new(
+                ErrorName::Error,
+                format!("{} has a mesh: open it as a model", shown(name)),
+            )
+            .into());
+        }
+        let pose = self.read(|state| state.pose().to_vec());
+        let options = self.of_rig(&pose, &request)?;
+        let skeleton = self.with_session(|session| {
+            self.read(|state| {
+                let bodies = state.models().iter().rev().filter(|member| member.model.is_rigged());
+                let body = bodies.max_by_key(|member| member.model.counts.joints);
+                let id = body.ok_or_else(|| Fault::missing("skeleton", "open a model that has one"))?.id;
+                let moved = MovedModel::new(state, id, session)?;
+                clips.set_up(state.up());
+                clips.see_from(state.models().origin());
+                Answer::Ok(moved.model.skeleton(&moved.by(state, &pose)?, &moved.outside, &options)?)
+            })
+        })?;
+        let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
+        let by = vec![DVec3::ZERO; clips.extra_points().map_err(Fault::from)?.len()];
+        let (bytes, report) = clips.write_reshaped(&by, &[], &[], &options).map_err(Fault::from)?;
+        self.state.borrow_mut().rig_notices = report.notices();
+        Ok(compact(bytes, request.size).map_err(Fault::from)?)
+    }
+
+    /// The posed model in a format that stores only its shape, without rig or animation. With `frame`, exports the
+    /// shown frame of a clip instead of the pose, if playback shows a clip.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -72,9 +119,21 @@ impl Engine {
         frame: bool,
     ) -> Result<Vec<u8>, JsValue> {
         let format: ModelFormat = decode(format)?;
-        let shown = self.read(|state| state.playing.as_ref().filter(|_| frame).map(Playback::positions));
+        if let Some(bytes) = self.posed_capture(id, format)? {
+            return Ok(bytes);
+        }
+        let shown = self.read(|state| {
+            let playing = state.playing.as_ref().filter(|_| frame)?;
+            let is_stale = playing.is_stale(&state.editor);
+            Some(if is_stale { Err(playing.options.clone()) } else { Ok(playing.positions()) })
+        });
         let posed = match shown {
-            Some(positions) => positions,
+            Some(Ok(positions)) => positions,
+            Some(Err(options)) => {
+                let mut current = self.playback(options)?;
+                self.read(|state| state.playing.as_ref().map(|playing| current.show_as(playing)));
+                current.positions()
+            }
             None => {
                 let pose = self.read(|state| state.pose().to_vec());
                 self.deformed(&[pose])?.pop().unwrap_or_default()
@@ -88,7 +147,8 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// Notices of the last export about the rig, one sentence each. Clears them, so that each notice is returned once.
+    /// Notices from the last export, one sentence each: changes of the rig, and data that the file format loses. Clears
+    /// them, so that each is returned once.
     #[wasm_bindgen(js_name = rigNotices)]
     #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {
@@ -105,14 +165,16 @@ impl Engine {
         id: u32,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
+        self.require_mesh()?;
         let (rest, timeline, named): (Vec<Vec3>, Timeline, Vec<(String, Vec<Vec3>)>) = self.read(|state| {
             let document = state.editor.document();
             let poses = document.fitting_poses();
             let named = poses.map(|pose| (pose.name.to_string(), pose.positions.to_vec()));
             (state.rest().positions.clone(), document.timeline(), named.collect())
         });
-        if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &decode(options)?)? {
-            return Ok(bytes);
+        let request: JsRigOptions = decode(options)?;
+        if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &request)? {
+            return Ok(compact(bytes, request.size).map_err(Fault::from)?);
         }
         let (names, poses): (Vec<String>, Vec<Vec<Vec3>>) = named.into_iter().unzip();
         let posed = self.deformed(&poses)?;
@@ -120,7 +182,8 @@ impl Engine {
             let member = state.models().get(id)?;
             let own = posed.iter().map(|posed| member.share(posed).to_vec());
             let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(own).collect();
-            Answer::Ok(member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?)
+            let glb = member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?;
+            Answer::Ok(compact(glb, request.size)?)
         })?)
     }
 
@@ -141,7 +204,7 @@ impl Engine {
         Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
-    /// The posed interior controls as OBJ. They follow the cage's vertices in the pose.
+    /// The interior controls in the current pose, as OBJ.
     ///
     /// # Errors
     /// If the cage has no interior controls.
@@ -164,6 +227,7 @@ impl Engine {
     /// If the models are not bound.
     #[wasm_bindgen(js_name = exportWeights)]
     pub fn export_weights(&self, id: u32) -> Result<Vec<u8>, JsValue> {
+        self.require_mesh()?;
         Ok(self.with_session(|session| {
             self.read(|state| {
                 let Some(ModelRows { mut weights, frames, outside, rig }) = state.own_rows(id, session)?
@@ -188,12 +252,10 @@ impl Engine {
     }
 
     /// Up axis of the models' files.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(unchecked_return_type = "UpAxis")]
-    pub fn up(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| object(&state.up()))?)
+    #[must_use]
+    pub fn up(&self) -> JsValue {
+        self.read(|state| object(&state.up()))
     }
 
     /// Origin of all positions, in the axes of the models' files; zero unless the models are far from the world origin.
@@ -258,16 +320,49 @@ impl Engine {
 }
 
 impl Engine {
+    /// A posed capture of splats, or a posed point cloud, as a file; `None` for other models. Stores a notice of what
+    /// the format loses.
+    fn posed_capture(&self, id: u32, format: ModelFormat) -> Answer<Option<Vec<u8>>> {
+        let (bytes, lost) = self.read(|state| {
+            let model = &state.models().get(id)?.model;
+            if model.n_faces() > 0 {
+                return Answer::Ok((None, None));
+            }
+            if state.editor.document().is_posed() && state.lattice.is_none() {
+                return Err(Fault::missing("lattice", "wait until the splats follow the cage"));
+            }
+            let bytes = match state.field() {
+                Some(field) => model.write_in_field(format, &field)?,
+                None => model.write(format, &model.positions)?,
+            };
+            Ok((Some(bytes), model.lost_in(format)))
+        })?;
+        self.state.borrow_mut().rig_notices.extend(lost);
+        Ok(bytes)
+    }
+
+    /// Rejects captures of splats and point clouds.
+    fn require_mesh(&self) -> Answer<()> {
+        if self.read(|state| state.models().splats().is_none()) {
+            return Ok(());
+        }
+        let reason = "splats and points have neither morph targets nor weights: export them as PLY";
+        Err(Fault::new(ErrorName::Error, reason))
+    }
+
     /// A posed model as GLB, and notices about its rig.
     pub(super) fn posed_glb(&self, id: u32, request: &JsRigOptions) -> Answer<(Vec<u8>, Vec<String>)> {
         let pose = self.read(|state| state.pose().to_vec());
         if let Some((bytes, report)) = self.reshaped(id, &pose, &[], request)? {
             return Ok((bytes, report.notices()));
         }
+        let options = self.of_rig(&pose, request)?;
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
             let member = state.models().get(id)?;
-            Ok((member.model.write_glb(member.share(&posed))?, Vec::new()))
+            let mut posed = member.share(&posed).to_vec();
+            member.model.stand(&mut posed, &options);
+            Ok((member.model.write_glb(&posed)?, Vec::new()))
         })
     }
 
@@ -295,40 +390,95 @@ impl Engine {
         poses: &[(String, Vec<Vec3>)],
         request: &JsRigOptions,
     ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
+        if request.plain {
+            return Ok(None);
+        }
+        let mut options = self.of_rig(pose, request)?;
+        if !poses.is_empty() {
+            let is_vrm = self.read(|state| Answer::Ok(state.models().get(id)?.model.vrm().is_some()))?;
+            options.expressions = request.reshape.expressions && is_vrm;
+            let timeline = self.read(|state| state.editor.document().timeline());
+            options.timeline = Some(timeline).filter(|_| !options.expressions);
+        }
+        self.reshaped_as(id, pose, poses, options)
+    }
+
+    fn reshaped_as(
+        &self,
+        id: u32,
+        pose: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+        mut options: ReshapeOptions,
+    ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
         let is_rigged = |state: &State| Answer::Ok(state.models().get(id)?.model.is_rigged());
-        if request.plain || !self.read(is_rigged)? {
+        if !self.read(is_rigged)? {
             return Ok(None);
         }
         self.with_session(|session| {
             self.read(|state| {
-                let (member, rest) = (state.models().get(id)?, &state.rest().positions);
-                let (model, own) = (&member.model, state.own_rows(id, session)?);
-                let by = |pose: &[Vec3]| match &own {
-                    Some(ModelRows { weights, frames, rig, .. }) if pose.len() == rest.len() => {
-                        let mut by = displacements(weights, frames, rest, pose);
-                        by.extend(displacements(rig, frames, rest, pose));
-                        Ok(by)
-                    }
-                    Some(_) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
-                    None => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
-                };
-                let outside: Vec<u32> = own.iter().flat_map(|own| &own.outside).map(|o| o.vertex).collect();
+                let moved = MovedModel::new(state, id, session)?;
                 let by_poses = poses
                     .iter()
-                    .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
+                    .map(|(name, pose)| Ok((name.clone(), moved.by(state, pose)?)))
                     .collect::<Answer<Vec<_>>>()?;
-                let mut options = request.options();
                 // `rigid` may name parts of other models.
-                let props = model.props()?;
+                let props = moved.model.props()?;
                 options.rigid.retain(|name| props.contains(name));
-                options.parts = member.parts()?;
-                options.timeline = Some(state.editor.document().timeline());
-                Ok(Some(model.write_reshaped(&by(pose)?, &outside, &by_poses, &options)?))
+                options.parts = state.models().get(id)?.parts()?;
+                let by = moved.by(state, pose)?;
+                Ok(Some(moved.model.write_reshaped(&by, &moved.outside, &by_poses, &options)?))
             })
         })
     }
 
-    /// Vertices of all models in each of the cage's `poses`; at rest before a bind.
+    /// Options for exporting the rig of a model. With several models, joints with the same name get the same
+    /// displacement, and the lowest point of all models determines the ground.
+    fn of_rig(&self, pose: &[Vec3], request: &JsRigOptions) -> Answer<ReshapeOptions> {
+        // Only `export_poses` writes saved poses, which can become expressions.
+        let mut options = ReshapeOptions { expressions: false, ..request.reshape.clone() };
+        let models: Vec<(u32, Arc<Model>)> = self.read(|state| {
+            state.models().iter().map(|member| (member.id, Arc::clone(&member.model))).collect()
+        });
+        if models.len() < 2 {
+            return Ok(options);
+        }
+        let mut skeleton = Skeleton::default();
+        models.iter().for_each(|(_, model)| skeleton.add(model.joints_with_vertices()));
+        options.skeleton = Some(Arc::new(skeleton.clone()));
+        if !options.ground {
+            return Ok(options);
+        }
+        let known = self.read(|state| {
+            let (bound, of_request, ground) = state.ground.as_ref()?;
+            let is_same = state.bound.as_ref().is_some_and(|own| Arc::ptr_eq(own, bound));
+            (is_same && of_request == request && state.pose() == pose).then(|| ground.clone())
+        });
+        let ground = match known {
+            Some(ground) => ground,
+            None => {
+                let posed = self.deformed(&[pose.to_vec()])?.pop().unwrap_or_default();
+                let mut all = Ground::default();
+                for (id, model) in &models {
+                    let free = ReshapeOptions { feet: Feet::Free, ..options.clone() };
+                    let found = if request.plain { None } else { self.reshaped_as(*id, pose, &[], free)? };
+                    all.add(match found.and_then(|(_, report)| report.ground) {
+                        Some(ground) => ground,
+                        None => self
+                            .read(|state| Answer::Ok(model.ground(state.models().get(*id)?.share(&posed))))?,
+                    });
+                }
+                let mut state = self.state.borrow_mut();
+                if state.pose() == pose {
+                    state.ground = state.bound.clone().map(|bound| (bound, request.clone(), all.clone()));
+                }
+                all
+            }
+        };
+        options.skeleton = Some(Arc::new(skeleton.with_ground(ground)));
+        Ok(options)
+    }
+
+    /// Vertices of all models in each of the cage's `poses`; their rest positions if the models are not bound.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let (rest, controls) =
             self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
@@ -346,6 +496,36 @@ impl Engine {
             };
             poses.iter().map(deformed).collect()
         })
+    }
+}
+
+/// A model and its weights, from which its displacements in a pose of the cage are computed.
+struct MovedModel {
+    model: Arc<Model>,
+    rows: Option<ModelRows>,
+    /// Indices of the points outside the cage.
+    outside: Vec<u32>,
+}
+
+impl MovedModel {
+    fn new(state: &State, id: u32, session: &Session) -> Answer<Self> {
+        let (model, rows) = (Arc::clone(&state.models().get(id)?.model), state.own_rows(id, session)?);
+        let outside = rows.iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect();
+        Ok(Self { model, rows, outside })
+    }
+
+    /// Displacements of the model's vertices and of the points of its rig.
+    fn by(&self, state: &State, pose: &[Vec3]) -> Answer<Vec<DVec3>> {
+        let rest = &state.rest().positions;
+        match &self.rows {
+            Some(ModelRows { weights, frames, rig, .. }) if pose.len() == rest.len() => {
+                let mut by = displacements(weights, frames, rest, pose);
+                by.extend(displacements(rig, frames, rest, pose));
+                Ok(by)
+            }
+            Some(_) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
+            None => Ok(vec![DVec3::ZERO; self.model.positions.len() + self.model.extra_points()?.len()]),
+        }
     }
 }
 
@@ -384,7 +564,7 @@ impl State {
     }
 }
 
-/// The weights of a range of rows.
+/// Copies a range of rows of the weights.
 fn rows_of(all: &Weights, range: Range<usize>) -> Weights {
     all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
 }

@@ -2,22 +2,23 @@
 
 use cagework_core::view::View as _;
 use cagework_editor::edit::{Constraint, Gesture, GestureKind};
-use cagework_gpu::render::{GizmoPart, pick_gizmo};
+use cagework_gpu::render::{GizmoMode, GizmoPart, pick_gizmo};
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::options::{GizmoHandle, JsGizmo, decode};
+use crate::options::decode;
 use crate::state::State;
-use crate::views::object;
+use crate::views::{object, optional};
 
 /// Smallest movement of the selection that changes the cage, pixels.
 const MIN_MOVE: f32 = 1e-3;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Begins a gesture that moves, rotates or scales the selection; false if nothing is selected.
+    /// Begins a gesture that moves, rotates or scales the selection; false if nothing is selected or another gesture is
+    /// in progress.
     ///
     /// # Errors
     /// If the kind of gesture is unknown.
@@ -35,13 +36,11 @@ impl Engine {
         }))
     }
 
-    /// The handle of the gizmo under the pointer, or the nearest handle within `radius` CSS pixels; otherwise
-    /// undefined.
-    ///
-    /// # Errors
-    /// Never.
-    #[wasm_bindgen(js_name = gizmoAt, unchecked_return_type = "GizmoHandle | undefined")]
-    pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> Result<JsValue, JsValue> {
+    /// Highlights and returns the gizmo's handle under the pointer, or the nearest handle within `radius` CSS pixels.
+    /// Undefined if there is no such handle.
+    #[wasm_bindgen(js_name = gizmoAt, unchecked_return_type = "GizmoPart | undefined")]
+    #[must_use]
+    pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> JsValue {
         let part = self.read(|state| {
             let gizmo = state.gizmo().filter(|_| state.has_cage_in_view())?;
             pick_gizmo(&state.camera, &gizmo, state.pointer(x, y), radius)
@@ -52,26 +51,32 @@ impl Engine {
                 state.is_changed = true;
             });
         }
-        Ok(part.map_or(Ok(JsValue::UNDEFINED), |part| object(&handle_of(part)))?)
+        optional(part)
     }
 
-    /// Begins the gesture that dragging a handle of the gizmo performs.
+    /// Begins the gesture that dragging a handle of the gizmo performs; false if nothing is selected or another gesture
+    /// is in progress.
     ///
     /// # Errors
     /// If the handle is unknown.
     #[wasm_bindgen(js_name = beginGizmo)]
     pub fn begin_gizmo(
         &self,
-        #[wasm_bindgen(unchecked_param_type = "GizmoHandle")] handle: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "GizmoPart")] part: JsValue,
         x: f32,
         y: f32,
     ) -> Result<bool, JsValue> {
-        let (part, constraint) = part_of(decode(handle)?);
+        let part = decode(part)?;
         Ok(self.change(|state| {
-            let kind = match state.view.gizmo {
-                JsGizmo::None | JsGizmo::Move => GestureKind::Grab,
-                JsGizmo::Rotate => GestureKind::Rotate,
-                JsGizmo::Scale => GestureKind::Scale,
+            let kind = match state.view.gizmo.unwrap_or_default() {
+                GizmoMode::Move => GestureKind::Grab,
+                GizmoMode::Rotate => GestureKind::Rotate,
+                GizmoMode::Scale => GestureKind::Scale,
+            };
+            let constraint = match part {
+                GizmoPart::Axis(axis) => Constraint::Axis(axis.min(2).into()),
+                GizmoPart::Plane(axis) => Constraint::Plane(axis.min(2).into()),
+                GizmoPart::View => Constraint::Free,
             };
             let at = state.pointer(x, y);
             let began = state.editor.begin(kind, at, constraint);
@@ -107,19 +112,11 @@ impl Engine {
         self.with_gesture(|gesture, _| gesture.type_amount(amount));
     }
 
-    /// Sets the radius of proportional editing, in multiples of the cage's diagonal; 0 turns proportional editing off.
-    #[wasm_bindgen(js_name = setProportional)]
-    pub fn set_proportional(&self, radius: f32) {
-        self.change(|state| state.editor.set_radius(radius, &state.camera));
-    }
-
     /// State of the gesture for the status line; null without one.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(js_name = gestureView, unchecked_return_type = "GestureView | null")]
-    pub fn gesture_view(&self) -> Result<JsValue, JsValue> {
-        Ok(object(&self.read(|state| state.editor.gesture().as_ref().map(|g| g.view(&state.camera))))?)
+    #[must_use]
+    pub fn gesture_view(&self) -> JsValue {
+        object(&self.read(|state| state.editor.gesture().as_ref().map(|g| g.view(&state.camera))))
     }
 
     /// Ends the gesture, and reverts it unless `keep` is set. Returns true if `keep` is set and a vertex has moved.
@@ -153,53 +150,10 @@ impl Engine {
         })
     }
 
-    /// Sets the centre about which gestures rotate and scale.
-    ///
-    /// # Errors
-    /// If the pivot type is unknown.
-    #[wasm_bindgen(js_name = setPivot)]
-    pub fn set_pivot(
-        &self,
-        #[wasm_bindgen(unchecked_param_type = "Pivot")] pivot: JsValue,
-    ) -> Result<(), JsValue> {
-        let pivot = decode(pivot)?;
-        self.change(|state| {
-            state.editor.pivot = pivot;
-            state.is_changed = true;
-        });
-        Ok(())
-    }
-
     /// Moves the cage to its pose at a time, in seconds, of the animation of the saved poses.
     #[wasm_bindgen(js_name = playAt)]
     pub fn play_at(&self, seconds: f32) {
         self.change(|state| state.editor.play_at(seconds));
-    }
-}
-
-/// The handle that stands for a part of the gizmo.
-fn handle_of(part: GizmoPart) -> GizmoHandle {
-    match part {
-        GizmoPart::Axis(0) => GizmoHandle::X,
-        GizmoPart::Axis(1) => GizmoHandle::Y,
-        GizmoPart::Axis(_) => GizmoHandle::Z,
-        GizmoPart::Plane(0) => GizmoHandle::PlaneX,
-        GizmoPart::Plane(1) => GizmoHandle::PlaneY,
-        GizmoPart::Plane(_) => GizmoHandle::PlaneZ,
-        GizmoPart::View => GizmoHandle::All,
-    }
-}
-
-/// The gizmo part that a handle stands for, and the constraint on gestures that drag it.
-fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
-    match handle {
-        GizmoHandle::X => (GizmoPart::Axis(0), Constraint::Axis(0)),
-        GizmoHandle::Y => (GizmoPart::Axis(1), Constraint::Axis(1)),
-        GizmoHandle::Z => (GizmoPart::Axis(2), Constraint::Axis(2)),
-        GizmoHandle::PlaneX => (GizmoPart::Plane(0), Constraint::Plane(0)),
-        GizmoHandle::PlaneY => (GizmoPart::Plane(1), Constraint::Plane(1)),
-        GizmoHandle::PlaneZ => (GizmoPart::Plane(2), Constraint::Plane(2)),
-        GizmoHandle::All => (GizmoPart::View, Constraint::Free),
     }
 }
 

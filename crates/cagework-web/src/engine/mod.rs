@@ -63,7 +63,7 @@ impl Engine {
     /// `View` after the document, the selection or the weights change.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`.
+    /// `NoAdapter` or `NoDevice` if no GPU can be opened; `Canvas` if the GPU cannot draw into the canvas.
     pub async fn create(
         canvas: HtmlCanvasElement,
         invalidate: Function,
@@ -81,7 +81,7 @@ impl Engine {
     }
 
     /// Replaces the open models, cage and poses, and clears the history. Consumes the JavaScript handles of the models.
-    /// Returns notices.
+    /// Returns notices for the user, one sentence each.
     ///
     /// # Errors
     /// If the GPU runs out of memory, or cannot draw the models' transparent layers fast enough. The previous models
@@ -93,6 +93,9 @@ impl Engine {
     ) -> Result<Vec<String>, JsValue> {
         let contents: OpenContents = decode(contents)?;
         let mut models = models;
+        if models.len() > 1 && models.iter().any(|loaded| loaded.model.n_faces() == 0) {
+            return Err(one_capture().into());
+        }
         let Some(first) = models.first_mut() else {
             return Err(Fault::missing("model", "open one first").into());
         };
@@ -128,7 +131,7 @@ impl Engine {
             gpu.others.clear();
             self.state.borrow_mut().forget_gpu();
             if let Err(error) = gpu.main.set_shared_model(draw).await {
-                // Upload the previous models again, with their weights.
+                // `change` starts an upload of the previous models, because `forget_gpu` marked all data as missing.
                 self.change(|_| ());
                 return Err(Fault::from(error).into());
             }
@@ -143,11 +146,12 @@ impl Engine {
                 notices.extend(state.editor.take_pose(&settings).err().map(str::to_owned));
             });
         }
+        page_turn().await;
         Ok(notices)
     }
 
-    /// Uses the weights that `Binder.bind` computed: row pointers, a function that returns a range of column indices and
-    /// values, the offsets, and the report. Weights of a `final` pass are cached for undo.
+    /// Uses the weights that `Binder.bind` computed: row pointers, a function that returns a range of column indices
+    /// and values, the offsets, and the report. If `is_final` is set, also caches the weights for undo.
     ///
     /// # Errors
     /// If the arrays do not match models and cage, or the GPU runs out of memory. `Cancelled` if models or cage change
@@ -219,6 +223,10 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "WeightRows")] rows: Function,
     ) -> Result<(), JsValue> {
         let kind: Coordinates = decode(kind)?;
+        if self.read(|state| state.models().splats().is_some()) {
+            let reason = "coordinates cannot be compared on splats and points: open a mesh";
+            return Err(Fault::new(ErrorName::Error, reason).into());
+        }
         let (revision, n_columns) = self
             .read(|state| (state.revision, state.set().map_or(0, |set| kind.n_columns(set.cage())) as u32));
         let weights = incoming::weights(n_columns, &indptr, &rows).await?;
@@ -251,7 +259,7 @@ impl Engine {
         Ok(self.read(|state| state.others.contains(&kind)))
     }
 
-    /// Number that increases with each change of the models or the rest cage.
+    /// Number that increases with each change of the models' joined mesh or of the rest cage.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn revision(&self) -> u32 {
@@ -297,7 +305,8 @@ impl Engine {
     /// Opens a new GPU device and uploads all data to it. Can be called again after an error.
     ///
     /// # Errors
-    /// `NoAdapter`, `NoDevice`: try again later. Also if the GPU runs out of memory.
+    /// `NoAdapter` or `NoDevice` if no GPU can be opened yet; `Canvas` if the GPU cannot draw into the canvas. Also if
+    /// the GPU runs out of memory.
     pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
         let (surface, context) = Surface::open(canvas).await?;
         {
@@ -310,6 +319,7 @@ impl Engine {
         }
         self.change(|state| {
             state.others.clear();
+            state.on_gpu.floaters = None;
             (state.is_moved, state.is_changed) = (true, true);
             state.place_viewport();
         });
@@ -333,6 +343,7 @@ impl Engine {
         };
         self.announce();
         self.start_upload();
+        self.follow_pose();
         changed
     }
 
@@ -343,7 +354,7 @@ impl Engine {
             let given = object(&view);
             *self.last_view.borrow_mut() = view;
             // Ignore exceptions that the page's callback throws.
-            let _ = given.map(|view| self.changed.call1(&JsValue::NULL, &view));
+            let _ = self.changed.call1(&JsValue::NULL, &given);
         }
         let _ = self.invalidate.call0(&JsValue::NULL);
     }
@@ -395,6 +406,10 @@ fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     let rows =
         |range: std::ops::Range<usize>| weights.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>());
     (rows(0..n_vertices), Some(rows(n_vertices..n)))
+}
+
+fn one_capture() -> Fault {
+    Fault::new(ErrorName::Error, "splats and points cannot share a cage with other models: open them alone")
 }
 
 fn lost() -> Fault {

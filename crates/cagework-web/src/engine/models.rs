@@ -8,7 +8,7 @@ use glam::Vec3;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::{Engine, lost};
+use super::{Engine, lost, one_capture};
 use crate::error::Answer;
 use crate::gpu::upload;
 use crate::incoming::page_turn;
@@ -16,7 +16,7 @@ use crate::loaded::Loaded;
 use crate::state::State;
 use crate::views::{ModelInfo, object};
 
-/// Painted amount of a vertex that does not move at all.
+/// [Painted amount](cagework_editor::Member::painted) of a vertex that stays in place.
 const MAX_AMOUNT: f32 = 255.0;
 /// Fraction of the brush radius within which the full amount is painted; beyond it, the amount falls linearly to 0 at
 /// the rim.
@@ -30,6 +30,10 @@ impl Engine {
     /// # Errors
     /// The errors of `open`. The document is then unchanged.
     pub async fn add(&self, models: Vec<Loaded>, label: Option<String>) -> Result<(), JsValue> {
+        let is_capture = self.read(|state| state.models().splats().is_some());
+        if is_capture || models.iter().any(|loaded| loaded.model.n_faces() == 0) {
+            return Err(one_capture().into());
+        }
         let (up, origin) = self.read(|state| (state.up(), state.models().origin()));
         let (mut added, mut draws) = (Vec::new(), Vec::new());
         for mut loaded in models {
@@ -49,8 +53,8 @@ impl Engine {
         });
         let is_too_much = self.read(|state| {
             let (positions, triangles) = (state.models().positions(), state.models().triangles());
-            // The current camera may be close to one model, where all models would cover far more of the picture than
-            // usual.
+            // Count layers from a camera that frames all models. The current camera may be close to one of them, where
+            // the models would cover far more of the picture than usual.
             let (camera, size) = state.view_of(positions);
             check_layers(gpu.main.context(), &camera, positions, triangles, size)
         });
@@ -78,7 +82,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Pixels of the models' textures.
+    /// Total number of pixels of the models' textures, at the sizes at which they are drawn.
     #[wasm_bindgen(getter, js_name = texturePixels)]
     #[must_use]
     pub fn texture_pixels(&self) -> f64 {
@@ -95,7 +99,7 @@ impl Engine {
     /// If no model is open.
     #[wasm_bindgen(js_name = modelInfo, unchecked_return_type = "ModelInfo")]
     pub fn model_info(&self) -> Result<JsValue, JsValue> {
-        Ok(self.read(|state| object(&ModelInfo::of(state.models())?))?)
+        Ok(self.read(|state| ModelInfo::of(state.models()).map(|info| object(&info)))?)
     }
 
     /// Painted amount of each vertex of a model, 0 (moves with the cage) to 255 (stays in place). `[n_vertices]`, empty
@@ -107,7 +111,8 @@ impl Engine {
         Ok(self.read(|state| Answer::Ok(state.models().get(id)?.painted.to_vec()))?)
     }
 
-    /// Shows the painted amounts of a model in colour, and selects this model for `paint`; undefined hides them.
+    /// Shows in colour how much each vertex of a model stays in place, and selects this model for `paint`; undefined
+    /// removes the colour.
     #[wasm_bindgen(js_name = showPainting)]
     pub fn show_painting(&self, id: Option<u32>) {
         self.change(|state| {
@@ -176,7 +181,7 @@ impl State {
         if amount == 0 && member.painted.is_empty() {
             return true;
         }
-        let (n, vertices) = (member.model.positions.len(), member.vertices.clone());
+        let (n, vertices) = (member.positions().len(), member.vertices.clone());
         let posed = &self.held.posed[vertices];
         self.editor.paint(id, |painted| {
             painted.resize(n, 0);

@@ -24,8 +24,8 @@ impl Engine {
         });
     }
 
-    /// Sets the widths of the viewport's margins under overlays, CSS pixels. The camera's target is drawn in the middle of
-    /// the rest; of several pictures side by side, each has these margins.
+    /// Sets the widths of the viewport's margins under overlays, CSS pixels. The camera's target is drawn in the middle
+    /// of the uncovered area. If several pictures are shown side by side, each of them has these margins.
     pub fn cover(&self, left: f32, top: f32, right: f32, bottom: f32) {
         self.change(|state| {
             state.covered =
@@ -38,7 +38,7 @@ impl Engine {
     /// resolution; undefined if the GPU is busy and nothing was drawn, in which case the page has to draw again.
     ///
     /// # Errors
-    /// `DeviceLost`, `Refused`, `OutOfMemory`.
+    /// `DeviceLost`. `Gpu` if the GPU refuses a command or runs out of memory.
     #[wasm_bindgen(js_name = drawFrame)]
     pub fn draw_frame(&self, sharp: bool) -> Result<Option<bool>, JsValue> {
         Ok(match self.try_frame(if sharp { FrameQuality::Sharp } else { FrameQuality::Soon })? {
@@ -48,11 +48,11 @@ impl Engine {
         })
     }
 
-    /// Draws a bound box into an offscreen texture. Drivers finish compiling a pipeline when it is first used; this
-    /// draw moves that delay to before the first model opens.
+    /// Draws a small box mesh, bound to itself as its cage, into an offscreen texture. Drivers finish compiling a
+    /// pipeline when it is first used; this draw moves that delay to before the first model opens.
     ///
     /// # Errors
-    /// `DeviceLost`, `Refused`, `OutOfMemory`.
+    /// `DeviceLost`. `Gpu` if the GPU refuses a command or runs out of memory.
     pub async fn warm(&self) -> Result<(), JsValue> {
         let (context, (target, format)) = {
             let gpu = self.gpu.lock().await;
@@ -82,7 +82,7 @@ impl Engine {
     /// `[height, width, 4]`
     ///
     /// # Errors
-    /// If the picture is too large.
+    /// If the GPU device is lost, or the picture is too large.
     pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Result<Vec<u8>, JsValue> {
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
@@ -94,7 +94,7 @@ impl Engine {
             height as f32 / state.size.y
         };
         let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
-        // The next frame writes the scene of the view again.
+        // The picture has replaced the scene on the GPU, so the next frame must write the scene of the view again.
         self.change(|state| state.is_changed = true);
         Ok(picture?)
     }

@@ -1,17 +1,22 @@
 //! Methods that play clips. Playback shows the models as an export would contain them.
 
+use cagework_core::Controls;
+use cagework_core::enclosure::Enclosure;
 use cagework_core::field::{self, Field, FieldWeights, Lattice};
-use cagework_core::{Controls, Weights};
 use cagework_io::ModelFormat;
 use js_sys::Float32Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen_futures::spawn_local;
 
 use super::{Engine, lost};
 use crate::binder::Offsets;
+use crate::clock::now_ms;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{JsRigOptions, decode};
-use crate::playing::{ModelMotion, Playback, SharedClip};
+use crate::outlines::{Outline, outlines};
+use crate::playing::{ModelMotion, Playback};
+use crate::state::State;
 
 #[wasm_bindgen]
 impl Engine {
@@ -24,43 +29,30 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<(), JsValue> {
-        let revision = self.revision();
-        let request: JsRigOptions = decode(options)?;
-        let field = if request.dynamic { Some(self.field()?) } else { None };
-        let ids: Vec<u32> = self.read(|state| state.models().iter().map(|member| member.id).collect());
-        let parts =
-            ids.into_iter().map(|id| Ok((id, self.part(id, &request)?))).collect::<Answer<Vec<_>>>()?;
-        let (clips, up) = self.read(|state| (SharedClip::all(state.models()), state.up().turn()));
-        let playing = Playback::new(parts, clips, up, field.clone());
-        let mut gpu = self.gpu.lock().await;
-        let gpu = gpu.as_mut().ok_or_else(lost)?;
-        gpu.main.start_playing(&playing.skin, field).await.map_err(Fault::from)?;
-        self.read(|state| state.require(revision))?;
-        self.change(|state| {
-            state.playing = Some(playing);
-            state.is_changed = true;
-        });
-        Ok(())
+        Ok(self.play(decode(options)?, false).await?)
     }
 
     /// Shows the models at a time of a clip, in seconds; without a clip, at rest. `targets`: weights of the morph
-    /// targets that the clip does not animate; if empty, the weights of the file. Does nothing before `startClip`.
+    /// targets that the clip does not animate; if empty, the weights of the file. `is_paused`: the cage is shown and
+    /// can be moved. Does nothing before `startClip`.
     #[wasm_bindgen(js_name = showClip)]
-    pub fn show_clip(&self, clip: Option<u32>, seconds: f32, targets: &Float32Array) {
+    pub fn show_clip(&self, clip: Option<u32>, seconds: f32, targets: &Float32Array, is_paused: bool) {
         let is_ready = self.read(|state| state.playing.is_some());
         if !is_ready {
             return;
         }
         self.change(|state| {
             if let Some(playing) = &mut state.playing {
-                playing.show(clip.map(|clip| clip as usize), seconds, &targets.to_vec());
-                // Joint marks are part of the scene, which must be rebuilt.
-                state.is_changed |= state.view.joints.is_some();
+                playing.show(clip.map(|clip| clip as usize), seconds, targets.to_vec());
+                // Joint marks and the cage are part of the scene, which must be rebuilt.
+                state.is_changed |= state.view.joints.is_some() || playing.is_paused != is_paused;
+                playing.is_paused = is_paused;
             }
         });
     }
 
-    /// Whether playback of a clip is shown instead of the posed model. Changing the pose stops playback.
+    /// Whether playback of a clip is shown instead of the posed model. A change of models, cage or weights stops
+    /// playback; after a change of the pose, playback shows the models in the new pose.
     #[wasm_bindgen(getter, js_name = showsClip)]
     #[must_use]
     pub fn shows_clip(&self) -> bool {
@@ -98,16 +90,37 @@ impl Engine {
         let lattice = self.read(|state| {
             let controls = Controls::from(state.require_set()?);
             let lattice = Lattice::new(controls.surface(), field::CLIP_CELLS);
-            let Offsets { frames, .. } = decode(offsets)?;
-            let n_columns = controls.n_controls() + frames.n_columns();
-            let weights = Weights::new(n_columns as u32, indptr, indices, data)?;
-            if weights.n_rows() != lattice.points().len() || !frames.fits(controls.n_controls()) {
+            let (weights, frames) =
+                decode::<Offsets>(offsets)?.bound(controls.n_controls(), indptr, indices, data)?;
+            if weights.n_rows() != lattice.points().len() {
                 return Err(Fault::new(ErrorName::Error, "the weights are those of another cage's lattice"));
             }
             Answer::Ok(FieldWeights::new(lattice, weights, frames))
         })?;
-        self.state.borrow_mut().lattice = Some(lattice);
+        self.change(|state| {
+            state.floaters = state.outside_splats();
+            state.lattice = Some(lattice);
+            (state.is_moved, state.is_changed) = (true, true);
+        });
         Ok(())
+    }
+
+    /// Half axes and angle, radians, of three ellipses on the screen: the splat nearest to the pointer at rest, the
+    /// unit sphere's image under the deformation gradient at this splat, and the splat in the pose. `[3, 3]`; empty if
+    /// the pointer is not on a capture.
+    #[wasm_bindgen(js_name = outlinesAt)]
+    #[must_use]
+    pub fn outlines_at(&self, x: f32, y: f32) -> Vec<f32> {
+        let found = self.posed(|state, _| {
+            let models = state.models();
+            let place =
+                state.surface_at(state.pointer(x, y)).and_then(|at| at.at(models, models.positions()));
+            let across = [state.camera.right(), state.camera.up()];
+            let of = |(splats, place)| outlines(splats, state.field().as_ref(), place, across);
+            Ok(models.splats().zip(place).and_then(of))
+        });
+        let flat = |of: Outline| [of.half_axes.x, of.half_axes.y, of.angle];
+        found.ok().flatten().map_or_else(Vec::new, |all| all.map(flat).concat())
     }
 
     /// Vertices during playback, computed on the CPU for tests and pictures. `[n_vertices, 3]`
@@ -121,7 +134,91 @@ impl Engine {
     }
 }
 
+impl State {
+    /// Splats outside the cage, ascending.
+    fn outside_splats(&self) -> Vec<u32> {
+        match (self.models().splats(), self.set()) {
+            (Some(splats), Some(set)) => Enclosure::new(set.cage(), &splats.positions).outside(),
+            _ => Vec::new(),
+        }
+    }
+}
+
 impl Engine {
+    /// Starts playback of the models in the current pose. If a playback is running, the new one replaces it and
+    /// continues at the same time. With `is_update`, does nothing if no playback is running, because the user may have
+    /// stopped it during the preparation.
+    ///
+    /// # Errors
+    /// If the models are not bound or cannot be exported, or the GPU runs out of memory. `Cancelled` if models or cage
+    /// change during the preparation.
+    async fn play(&self, options: JsRigOptions, is_update: bool) -> Answer<()> {
+        // Wait, because `playback` reads weights, which fails during an upload.
+        self.ready().await;
+        let start = now_ms();
+        let revision = self.revision();
+        let mut playing = self.playback(options)?;
+        playing.prepared_ms = now_ms() - start;
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        gpu.main.start_playing(&playing.skin, playing.field.clone()).await?;
+        self.read(|state| state.require(revision))?;
+        self.change(|state| {
+            match &state.playing {
+                Some(before) => playing.show_as(before),
+                None if is_update => return,
+                None => {}
+            }
+            state.playing = Some(playing);
+            state.is_changed = true;
+        });
+        Ok(())
+    }
+
+    /// Updates the playback after a change of the pose, unless an update is in progress.
+    pub(super) fn follow_pose(&self) {
+        {
+            let mut state = self.state.borrow_mut();
+            if state.is_preparing || state.stale_clip().is_none() {
+                return;
+            }
+            state.is_preparing = true;
+        }
+        let engine = self.clone();
+        spawn_local(async move {
+            let mut outcome = Ok(());
+            while outcome.is_ok()
+                && let Some(options) = engine.read(State::stale_clip)
+            {
+                outcome = engine.play(options, true).await;
+            }
+            {
+                let mut state = engine.state.borrow_mut();
+                state.is_preparing = false;
+                if let Err(fault) = outcome {
+                    state.playing = None;
+                    (state.is_moved, state.is_changed) = (true, true);
+                    if !fault.is(ErrorName::Cancelled) {
+                        state.fault = Some(fault);
+                    }
+                }
+            }
+            engine.announce();
+        });
+    }
+
+    /// Prepares playback of the models in the current pose.
+    ///
+    /// # Errors
+    /// If the models cannot be exported, or for `options.dynamic` without a lattice.
+    pub(super) fn playback(&self, options: JsRigOptions) -> Answer<Playback> {
+        let field = if options.dynamic { Some(self.field()?) } else { None };
+        let ids: Vec<u32> = self.read(|state| state.models().iter().map(|member| member.id).collect());
+        let parts =
+            ids.into_iter().map(|id| Ok((id, self.part(id, &options)?))).collect::<Answer<Vec<_>>>()?;
+        Ok(self.read(|state| Playback::new(&state.editor, options, parts, field)))
+    }
+
     /// Motion of one model: that of its export, or with `dynamic` that of the original file, which the cage then
     /// deforms.
     fn part(&self, id: u32, request: &JsRigOptions) -> Answer<ModelMotion> {

@@ -6,36 +6,32 @@ use cagework_core::view::View as _;
 use cagework_editor::SurfacePoint;
 use cagework_gpu::Session;
 use glam::{Vec2, Vec3};
+use js_sys::{Array, Float64Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::{Answer, Fault};
+use crate::held::Grab;
 use crate::options::decode;
 use crate::state::State;
-use crate::views::object;
+use crate::views::optional;
 
 #[wasm_bindgen]
 impl Engine {
     /// Surface point under the pointer; undefined if the pointer is not on a model, without weights, during playback,
     /// or while the GPU is busy.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
-    pub fn surface_at(&self, x: f32, y: f32) -> Result<JsValue, JsValue> {
-        if self.read(|state| state.playing.is_some()) {
-            // During playback, the drawn surface differs from the posed surface that is picked.
-            return Ok(JsValue::UNDEFINED);
-        }
+    #[must_use]
+    pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
         let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
-        Ok(found.map_or(Ok(JsValue::UNDEFINED), |point| object(&point))?)
+        optional(found)
     }
 
     /// Posed position of a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
-    /// Without weights, or while the GPU is busy.
+    /// If `point` is not a surface point. Without weights, or while the GPU is busy.
     #[wasm_bindgen(js_name = placeOf)]
     pub fn place_of(
         &self,
@@ -46,26 +42,45 @@ impl Engine {
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
-    /// Weights of a surface point, and the nearest vertex of the model; undefined if the point does not exist.
+    /// Weights of the controls at the points of a pull, `[n, n_controls]`, and the nearest vertex of the model for each
+    /// point, or 2^32 - 1 for a vertex of the cage. The points are `grabs`, then all pins except the one under the
+    /// pointer.
     ///
     /// # Errors
-    /// Without weights.
-    #[wasm_bindgen(js_name = gripOf, unchecked_return_type = "Grip | undefined")]
-    pub fn grip_of(
+    /// If `grabs` are neither surface points nor vertices. Without weights, or while the GPU is busy.
+    #[wasm_bindgen(js_name = gripsOf, unchecked_return_type = "[Float64Array, Uint32Array]")]
+    pub fn grips_of(
         &self,
-        #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "readonly (SurfacePoint | number)[]")] grabs: JsValue,
+        x: f32,
+        y: f32,
     ) -> Result<JsValue, JsValue> {
-        let point: SurfacePoint = decode(point)?;
-        let grip = self.posed(|state, session| {
-            Ok(session.weights().zip(session.frames()).and_then(|bound| state.grip_of(point, bound)))
+        let grabs: Vec<Grab> = decode(grabs)?;
+        let (rows, seeds): (Vec<Vec<f64>>, Vec<u32>) = self.posed(|state, session| {
+            let pins = state.pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
+            let bound = session.weights().zip(session.frames());
+            let grip = |grab| state.grip_of(grab, bound?);
+            Ok(grabs.into_iter().chain(pins).filter_map(grip).unzip())
         })?;
-        Ok(grip.map_or(Ok(JsValue::UNDEFINED), |grip| object(&grip))?)
+        let rows = Float64Array::from(rows.concat().as_slice());
+        Ok(Array::of2(&rows, &Uint32Array::from(seeds.as_slice())).into())
     }
 
-    /// Mirror image of a surface point; undefined if the surface is not symmetric there.
+    /// The pins after a click. A pin under the pointer is removed. If there is none and `may_pin` is set, a pin is
+    /// added at the surface point under the pointer. Undefined if nothing changes, without weights, or while the GPU
+    /// is busy.
+    #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
+    #[must_use]
+    pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
+        let pins = self.posed(|state, _| Ok(state.pins_after(state.pointer(x, y), may_pin)));
+        optional(pins.ok().flatten())
+    }
+
+    /// Vertex nearest to the mirror image of a surface point. Undefined if no vertex is near the image, or if the
+    /// point is near the mirror plane.
     ///
     /// # Errors
-    /// Never.
+    /// If `point` is not a `SurfacePoint`.
     #[wasm_bindgen(js_name = imageOf, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn image_of(
         &self,
@@ -73,7 +88,7 @@ impl Engine {
     ) -> Result<JsValue, JsValue> {
         let point = decode(point)?;
         let image = self.read(|state| state.image_of(point));
-        Ok(image.map_or(Ok(JsValue::UNDEFINED), |image| object(&image))?)
+        Ok(optional(image))
     }
 
     /// Moves a position parallel to the view plane by `dx`, `dy` CSS pixels. `[3]`

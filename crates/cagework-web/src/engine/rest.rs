@@ -9,7 +9,7 @@ use super::Engine;
 use crate::problems::Faults;
 use crate::state::State;
 
-/// Maximum number of vertex–triangle pairs that are tested for each frame while the user drags the cage.
+/// Maximum number of vertex–triangle pairs that are tested at each pointer event while the user drags the cage.
 const WATCHED_PAIRS: usize = 250_000;
 
 #[wasm_bindgen]
@@ -31,8 +31,8 @@ impl Engine {
         });
     }
 
-    /// Number of vertices outside the dragged cage, among every k-th vertex of the models. Fast enough for every
-    /// pointer event; the check of all vertices runs after the drag.
+    /// Number of vertices outside the dragged cage, in a sample of the models' vertices that is small enough to be
+    /// tested at every pointer event. The check of all vertices runs after the drag.
     #[must_use]
     pub fn strays(&self) -> u32 {
         // Borrow the state directly: `change` would request a frame, but nothing visible changes.
@@ -43,7 +43,7 @@ impl Engine {
         let Ok(set) = &document.cage.set else { return 0 };
         let vertices = document.models.positions();
         let (plain, watched) = watched.get_or_insert_with(|| {
-            // Count against the cage without interior controls: balls and tubes cut holes out of the enclosed volume.
+            // Test against the cage alone: interior controls cut balls and tubes out of the enclosed volume.
             let plain = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
                 .unwrap_or_else(|_| ControlSet::plain(set.cage()));
             let surface = Controls::from(&plain).surface();

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::error::Fault;
 use crate::options::{JsSceneOptions, SliceShown, decode};
-use crate::views::{ColorMap, Largest, Legend, object};
+use crate::views::{ColorMap, Largest, Legend, optional};
 
 #[wasm_bindgen]
 impl Engine {
@@ -32,11 +32,9 @@ impl Engine {
     }
 
     /// Legend of the colours of the slice or the model; undefined if the colours show no quantity.
-    ///
-    /// # Errors
-    /// Never.
     #[wasm_bindgen(unchecked_return_type = "Legend | undefined")]
-    pub fn legend(&self) -> Result<JsValue, JsValue> {
+    #[must_use]
+    pub fn legend(&self) -> JsValue {
         let (slice, style) =
             self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
         let plain = |low, high, map| Legend { low, high, logarithmic: false, map, largest: None };
@@ -46,7 +44,7 @@ impl Engine {
             (_, MeshStyle::Weights { column }) => {
                 let largest = self.largest_weight(column);
                 let high = match largest {
-                    Some(largest) if !self.read(|state| state.view.weights_to_one) => {
+                    Some(largest) if !self.read(|state| state.view.options.weights_to_one) => {
                         largest.value.max(MIN_WEIGHT_RANGE)
                     }
                     _ => 1.0,
@@ -59,7 +57,7 @@ impl Engine {
             }
             _ => None,
         };
-        Ok(legend.map_or(Ok(JsValue::UNDEFINED), |legend| object(&legend))?)
+        optional(legend)
     }
 }
 

@@ -11,25 +11,25 @@ use crate::state::State;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Sets the element type that clicks select: vertex, edge or face.
+    /// Sets how clicks and gestures act on the cage.
     ///
     /// # Errors
-    /// If the type is unknown.
-    #[wasm_bindgen(js_name = setElement)]
-    pub fn set_element(
+    /// If the tools are invalid.
+    #[wasm_bindgen(js_name = setTools)]
+    pub fn set_tools(
         &self,
-        #[wasm_bindgen(unchecked_param_type = "Element")] element: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "Tools")] tools: JsValue,
     ) -> Result<(), JsValue> {
-        let element = decode(element)?;
+        let tools = decode(tools)?;
         self.change(|state| {
-            state.editor.element = element;
-            state.editor.hovered.clear();
+            state.editor.set_tools(tools, &state.camera);
             state.is_changed = true;
         });
         Ok(())
     }
 
-    /// Vertices of the cage element within `radius` CSS pixels of the pointer; empty if there is none.
+    /// Vertices of the picked cage element, whose type the tools select: a vertex or an edge within `radius` CSS
+    /// pixels of the pointer, or the face under the pointer. Empty if there is none.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {
@@ -38,7 +38,7 @@ impl Engine {
             }
             let (at, positions, topology, view) =
                 (state.pointer(x, y), state.pose(), state.editor.topology(), &state.camera);
-            match state.editor.element {
+            match state.element() {
                 Element::Vertex => {
                     pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
                 }
@@ -121,21 +121,6 @@ impl Engine {
     #[must_use]
     pub fn selection_center(&self) -> Vec<f32> {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
-    }
-
-    /// Turns symmetric editing on or off. With it, mirror images of the selected vertices move too.
-    #[wasm_bindgen(js_name = setSymmetry)]
-    pub fn set_symmetry(&self, on: bool) {
-        self.change(|state| {
-            state.editor.is_mirrored = on;
-            state.is_changed = true;
-        });
-    }
-
-    /// Indices of the vertices without a mirror image.
-    #[must_use]
-    pub fn unmatched(&self) -> Vec<u32> {
-        self.read(|state| state.editor.symmetry().unmatched())
     }
 
     fn change_selection(&self, change: impl FnOnce(&mut State)) {

@@ -13,8 +13,9 @@ use crate::options::{JsBindOptions, decode};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Shows a slice. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1. `options` are those of the bind; the
-    /// arrays are the weights of `Binder.bindSlice`, empty if no cell is inside the cage.
+    /// Shows one layer of grid cells, normal to `axis` (0 to 2) at `fraction` (0 to 1) of the grid's length along it.
+    /// `options` determine the grid. The arrays are the weights that `Binder.bindSlice` returned; they are empty if no
+    /// cell of the layer is inside the cage.
     ///
     /// # Errors
     /// Without a cage, or if the number of weights does not match the slice.

@@ -18,7 +18,7 @@ use read::{Crate, ROOT};
 /// Edges `(from, to)`: module `from` uses module `to`. The value is the first line that does so (`file:line`).
 type Edges = BTreeMap<(String, String), String>;
 
-/// Checks all crates, and the packages of tests and benches.
+/// Checks that no modules use each other in a circle, in all crates and in the packages of tests and benches.
 ///
 /// # Errors
 /// Shows one circle of the first crate that has any.
@@ -36,8 +36,8 @@ pub(super) fn check() -> Result<(), String> {
     Ok(())
 }
 
-/// Root files of all crates, and whether their code for tests counts: not in `lib.rs` and `main.rs` of `crates/*/src`,
-/// but in every target of the packages of tests and benches.
+/// Root files of all crates, each with whether its code under `#[cfg(test)]` is checked. This is false for the `lib.rs`
+/// and `main.rs` of `crates/*/src`, and true for the targets of the packages of tests and benches.
 fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     let mut roots = Vec::new();
     for folder in files_in(&root().join("crates"))? {

@@ -13,7 +13,7 @@ export type BindEvent =
       readonly iteration: number;
       readonly delta: number | null;
     }
-  /** The engine uses new weights. Those of the coarse pass are replaced by those of the fine pass, which are final. */
+  /** The engine uses the weights of `pass`. The weights of the fine pass replace those of the coarse pass. */
   | { readonly kind: "adopted"; readonly pass: "coarse" | "fine"; readonly report: BindReport }
   /** The GPU failed, and the bind continues on the CPU. `reason` is the error message. */
   | { readonly kind: "fallback"; readonly reason: string };

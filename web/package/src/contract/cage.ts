@@ -3,13 +3,13 @@
 import type { CageControls, Problem } from "./generated";
 
 /**
- * `positions` is `[n_controls, 3]`: cage vertices, then controls inside. `corners` lists, for each face, the number of
- * its corners and then their vertices.
+ * `positions` is `[n_controls, 3]`: cage vertices, then controls inside the cage. `corners` lists, for each face, the
+ * number of its corners and then their vertices.
  */
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
-  /** Undefined for a new cage: the document then keeps the current controls inside that fit into it. */
+  /** Undefined for a new cage. The document then keeps those of its inner controls that fit into the cage. */
   readonly controls?: CageControls | undefined;
 }
 
@@ -33,6 +33,9 @@ export interface CheckedCage extends CageArrays {
    * For a generated cage that joins separate parts of the model, the number of these parts; otherwise 0 or undefined.
    */
   readonly bridged?: number;
-  /** For a generated cage, sentences about gaps of the model that it closes and settings that would keep them open. */
+  /**
+   * For a generated cage, sentences about gaps of the model that the cage closes, with settings that would keep the
+   * gaps open.
+   */
   readonly notices?: readonly string[];
 }

@@ -17,7 +17,7 @@ export type Solver = "jacobi" | "multigrid" | "cg";
  */
 export type Preconditioner = "none" | "v_cycle";
 /**
- * Processor of a bind.
+ * Processor that computes a bind.
  */
 export type Backend = "cpu" | "gpu";
 /**
@@ -25,7 +25,7 @@ export type Backend = "cpu" | "gpu";
  */
 export type CellShape = "box" | "cubic";
 /**
- * Norm of the change of a cell in Eq. 2 of the paper.
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
  */
 export type DeltaNorm = "euclidean" | "literal";
 /**
@@ -37,7 +37,7 @@ export type OutsidePolicy = "extend" | "stay" | "refuse";
  */
 export type BindOptions = { backend: Backend,
 /**
- * Cells along the longest side (each side for classic box cells), 8 to 512. Default 64.
+ * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
  */
 grid: number,
 /**
@@ -57,11 +57,12 @@ preconditioner: Preconditioner,
  */
 cell_shape: CellShape,
 /**
- * Delta of Jacobi sweeps. Default Euclidean.
+ * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
  */
 delta_norm: DeltaNorm,
 /**
- * Convergence threshold for delta. Default 1e-5.
+ * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
+ * of the other solvers. Default 1e-5.
  */
 tau: number,
 /**
@@ -69,12 +70,13 @@ tau: number,
  */
 max_iterations: number,
 /**
- * Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all.
- * Default 0.
+ * Total of the smallest weights that are dropped from each row, after which the row's sum and rest position are
+ * restored. 0 drops none. Default 0.
  */
 sparsify: number,
 /**
- * Fails before the bind if it needs more bytes of memory, including `held`. Default 4 GiB; 2 GiB in wasm.
+ * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
+ * exceed this. Default 4 GiB; 2 GiB in wasm.
  */
 memory_limit: number,
 /**
@@ -107,7 +109,8 @@ joints: Array<number>,
  */
 bones: Array<[number, number]>,
 /**
- * Weight and gradient (per object unit) of each vertex of the cage at each joint. `[n_joints, n_cage]`
+ * Weights of the cage vertices at each joint in the cage without inner controls, and their gradients (per object
+ * unit). `[n_joints, n_cage]`
  */
 plain: Array<[number, number, number, number]>, };
 /**
@@ -127,11 +130,12 @@ distance: number,
  */
 share: number, };
 /**
- * Frames of a bind, and the points outside the cage. The frames' columns of the weights follow those of the controls.
+ * Frames of a bind, and the points outside the cage.
  */
 export type Offsets = {
 /**
- * Frames. In the weights, their columns follow those of the controls.
+ * Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
+ * In the weights, their columns follow those of the controls.
  */
 frames: Frames,
 /**
@@ -139,11 +143,11 @@ frames: Frames,
  */
 outside: Array<OutsideVertex>, };
 /**
- * Report of a bind.
+ * Options, grid, convergence, times and errors of a bind.
  */
 export type BindReport = {
 /**
- * Discretisation of the cage: classic (as published) or embedded.
+ * Discretisation of the cage: classic (K. Smith; `docs/method.md`, sources) or embedded.
  */
 method: Method,
 /**
@@ -159,11 +163,11 @@ preconditioner: Preconditioner,
  */
 backend: Backend,
 /**
- * Name of the GPU, if it solved.
+ * Name of the GPU, if it computed the solution.
  */
 adapter?: string,
 /**
- * Number of threads that solved.
+ * Number of threads of the solver.
  */
 threads: number,
 /**
@@ -179,15 +183,15 @@ dims: [number, number, number],
  */
 cell_size: [number, number, number],
 /**
- * Shape of the cells: rectangular (as published) or cubic.
+ * Shape of the cells: rectangular (K. Smith) or cubic.
  */
 cell_shape: CellShape,
 /**
- * Norm of the change of a cell in Eq. 2 of the paper.
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2; `docs/method.md`, sources).
  */
 delta_norm: DeltaNorm,
 /**
- * Convergence threshold for delta.
+ * Convergence threshold for delta, the last value of `delta_history`.
  */
 tau: number,
 /**
@@ -195,7 +199,7 @@ tau: number,
  */
 cells: CellCounts,
 /**
- * Unknowns of each level, finest first; one entry for Jacobi.
+ * Number of unknowns of each level, finest first; one entry for Jacobi.
  */
 levels: Array<number>,
 /**
@@ -203,15 +207,15 @@ levels: Array<number>,
  */
 iterations: number,
 /**
- * Whether delta fell below tau within the limit on iterations.
+ * Whether delta fell to tau within the limit on iterations, or f32 precision was exhausted.
  */
 converged: boolean,
 /**
- * Whether f32 precision ended the solve before delta fell below tau.
+ * Whether f32 precision ended the solve before delta fell to tau.
  */
 at_round_off: boolean,
 /**
- * Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the mean change of a cell per sweep. Other
+ * Delta after every `delta_interval` iterations. Jacobi: mean change of a cell per sweep (K. Smith, Eq. 2). Other
  * solvers: estimated remaining error, RMS over cells. `[iterations / delta_interval]`, rounded up.
  */
 delta_history: Array<number>,
@@ -228,19 +232,20 @@ residual_history: Array<number>,
  */
 timings_ms: Timings,
 /**
- * Bytes of working memory.
+ * Working memory of the bind: estimated and largest actual size, bytes.
  */
 memory_bytes: MemoryBytes,
 /**
- * Rest error: distance of `sum_i w_i c_i` from the mesh vertex (Eq. 3), over vertices inside the cage.
+ * Rest error: distance of `sum_i w_i c_i`, over all columns, from the mesh vertex.
  */
 rest_error: RestError,
 /**
- * Error of the rows of weights before correction, which is the error of the solver alone.
+ * Error of the rows of weights before they are corrected. With the embedded method, it is the error of the solver
+ * alone.
  */
 raw_error: RawError,
 /**
- * Statistics of the stored weights.
+ * Range, largest sum error, and number of the stored weights.
  */
 weights: WeightStats,
 /**
@@ -268,19 +273,19 @@ outside_vertices: number,
  */
 staying_vertices: number,
 /**
- * Largest distance from the cage of a mesh vertex outside it, object units.
+ * Largest distance between the cage and a mesh vertex outside it, object units.
  */
 outside_distance: number,
 /**
- * Number of mesh vertices inside balls and tubes.
+ * Number of mesh vertices inside the balls and tubes around inner points and bones.
  */
 held_vertices: number,
 /**
- * Number of cells that lines along the three axes classify differently.
+ * Number of cells for which lines along x, y and z disagree about inside and outside the cage.
  */
 ambiguous_cells: number,
 /**
- * Notices in whole sentences, such as flipped faces or unused vertices.
+ * Notices in whole sentences, for example about flipped faces or unused vertices.
  */
 notices: Array<string>, };
 /**
@@ -288,11 +293,12 @@ notices: Array<string>, };
  */
 export type CellCounts = {
 /**
- * Cells inside the cage, whose weights are the unknowns.
+ * Cells inside the cage, without the boundary cells.
  */
 interior: number,
 /**
- * Cells that the cage's surface intersects.
+ * Classic method: cells that the cage's surface intersects. Embedded method: cells with their centre inside the
+ * cage and less than a cell from it along an axis.
  */
 boundary: number,
 /**
@@ -300,7 +306,7 @@ boundary: number,
  */
 exterior: number, };
 /**
- * Stage times in milliseconds.
+ * Wall-clock time of each stage of a bind, milliseconds.
  */
 export type Timings = {
 /**
@@ -320,11 +326,11 @@ sample: number,
  */
 total: number, };
 /**
- * Working memory, bytes.
+ * Working memory of a bind, bytes.
  */
 export type MemoryBytes = {
 /**
- * Estimate before the bind.
+ * Estimate that is compared with the memory limit before the bind starts.
  */
 estimated: number,
 /**
@@ -332,27 +338,28 @@ estimated: number,
  */
 peak: number, };
 /**
- * Reconstruction error of the rest pose (Eq. 3).
+ * Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
+ * K. Smith's paper (`docs/method.md`, sources).
  */
 export type RestError = {
 /**
- * Mean, object units.
+ * Mean over the vertices, object units.
  */
 mean: number,
 /**
- * 99th percentile, object units.
+ * 99th percentile over the vertices, object units.
  */
 p99: number,
 /**
- * Largest, object units.
+ * Largest error of a vertex, object units.
  */
 max: number,
 /**
- * Mean, as a fraction of the diagonal of the cage's bounding box.
+ * Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
  */
 mean_rel: number,
 /**
- * Largest, as a fraction of the diagonal of the cage's bounding box.
+ * Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
  */
 max_rel: number, };
 /**
@@ -361,7 +368,7 @@ max_rel: number, };
  */
 export type RawError = {
 /**
- * `|sum_i w_i - 1|`.
+ * Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
  */
 sum: MeanMax,
 /**
@@ -369,19 +376,19 @@ sum: MeanMax,
  */
 point_rel: MeanMax,
 /**
- * Smallest value, before negative values are clamped to 0.
+ * Smallest weight, before negative weights are set to 0.
  */
 min_weight: number, };
 /**
- * Mean and maximum.
+ * Mean and maximum of an error over the mesh vertices inside the cage.
  */
 export type MeanMax = {
 /**
- * Mean.
+ * Mean of the error.
  */
 mean: number,
 /**
- * Largest.
+ * Largest error of a vertex.
  */
 max: number, };
 /**
@@ -409,16 +416,21 @@ nonzeros: number, };
  */
 export type Shape = "follow" | "hull";
 /**
- * Options of [`super::generate`]. Aliases are their names on the page, in projects and in JavaScript.
+ * Mirror symmetry of the cage about a plane through the centre of the model's box.
+ */
+export type Symmetry = "auto" | "none" | "x" | "y" | "z";
+/**
+ * Options of [`super::generate`]. Serde aliases are names in older project files.
  */
 export type CageOptions = {
 /**
  * Target number of vertices, 8 to 400. Default 80.
  */
-vertices: number,
+target: number,
 /**
  * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
- * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, a voxel of 36.
+ * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
+ * lattice for the default target, which has 36 voxels along the longest side.
  */
 detail: number,
 /**
@@ -432,17 +444,17 @@ shape: Shape,
 /**
  * Mirror symmetry. Default auto.
  */
-symmetry: "auto" | "on" | "off",
+symmetry: Symmetry,
 /**
  * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
  * Otherwise thin bridges join them to one cage. Default false.
  */
 per_component: boolean,
 /**
- * Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
- * half a voxel. Default 0.
+ * Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
+ * of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
  */
-margin: number,
+clearance: number,
 /**
  * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
  * voxels are closed, detail thinner than one is lost. Default 0.
@@ -465,11 +477,11 @@ export type InnerKind = "point" | "line" | "face";
  */
 export type CageControls = {
 /**
- * Number of subdivision steps.
+ * Number of subdivision steps from the cage to its smooth surface.
  */
 smooth: number,
 /**
- * Number of interior controls: the last of the cage's positions.
+ * Number of interior controls, which are the last of the cage's positions.
  */
 inner: number,
 /**
@@ -477,7 +489,7 @@ inner: number,
  */
 elements: Array<InnerElement>,
 /**
- * Radius of points and lines, object units; null for a share of the cage's size.
+ * Radius of points and lines, object units; null for 1/32 of the cage's longest side.
  */
 radius: number | null, };
 /**
@@ -497,15 +509,15 @@ export type CageState = { usable: boolean, info: CageInfo, controls: CageControl
  */
 radius: number, };
 /**
- * Kinds of problems. The names are part of the file format and stay stable.
+ * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
 export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
 /**
- * Severity of a problem.
+ * Effect of a problem on binding and its results.
  */
 export type Severity = "error" | "warning" | "note";
 /**
- * A repair.
+ * A repair of a cage mesh that needs no decision by the user.
  */
 export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
 /**
@@ -523,7 +535,7 @@ message: string, count: number, fix: Mend | null, };
 /**
  * File format of a model.
  */
-export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "splat" | "spz";
+export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz";
 /**
  * The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
  * they are read, and back when they are written. The rotations are exact.
@@ -546,7 +558,7 @@ rigid: Array<string>,
  */
 stays: Array<string>, };
 /**
- * One of the models in a cage.
+ * Properties and options of one of the models in the cage.
  */
 export type MemberInfo = {
 /**
@@ -562,25 +574,21 @@ parts: Array<string>, options: PartOptions,
  */
 painted: boolean, };
 /**
- * Settings of a model in a project.
- */
-export type MemberSettings = {
-/**
- * Number by which surface points refer to the model's first triangle.
- */
-first_triangle: number, options: PartOptions,
-/**
- * Painted amounts as runs of (amount 0 to 255, number of vertices); empty for an unpainted model.
- */
-painted: Array<[number, number]>, };
-/**
- * Properties of the models in the cage, taken together.
+ * Combined properties of all models in the cage.
  */
 export type ModelInfo = {
 /**
  * Name of the first model.
  */
-name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
+name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number,
+/**
+ * Number of splats of a capture, otherwise 0.
+ */
+splats: number,
+/**
+ * Number of points of a point cloud, otherwise 0.
+ */
+points: number, skins: number, joints: number, clips: Array<ClipView>,
 /**
  * Morph targets of all models, and their weights at rest.
  */
@@ -592,11 +600,16 @@ props: Array<string>,
 /**
  * Whether a model has a rig that an export keeps.
  */
-rigged: boolean, bounds: Bounds,
+rigged: boolean,
 /**
- * Whether the models seem to lie on their back, because the file's up axis is z.
+ * Whether a model is a VRM.
  */
-lies: boolean, notices: Array<string>,
+vrm: boolean, bounds: Bounds,
+/**
+ * Another up axis that the file probably has: z if the models seem to lie on their back, y down if captures in the
+ * file's format have y down by convention.
+ */
+suggestedUp: UpAxis | null, notices: Array<string>,
 /**
  * Properties of each model.
  */
@@ -618,55 +631,15 @@ interpolation: Interpolation,
  */
 loops: boolean,
 /**
- * Time that this return takes, seconds.
+ * Time of the return from the last pose to the shape at the start, seconds.
  */
 back: number, };
-/**
- * Settings of a document in a project.
- */
-export type DocumentSettings = {
-/**
- * Identifier of the built-in sample that the cage belongs to.
- */
-sample?: string | null,
-/**
- * Subdivision and interior controls; the controls are the last positions of the cage.
- */
-controls?: CageControls | null,
-/**
- * The pose in the axes of the model's file: [`cagework_io::encode_pose`] in URL-safe base 64. Null at rest.
- */
-pose?: string | null,
-/**
- * Surface points that pulls keep in place.
- */
-pins?: Array<SurfacePoint>,
-/**
- * Surface points that pulls keep in place, of each saved pose.
- */
-pose_pins?: Array<Array<SurfacePoint>>,
-/**
- * Share of each saved pose in the pose, 0 to 1.
- */
-pose_shares?: Array<number>,
-/**
- * Time from the previous pose to each saved pose, seconds. If empty, one second each.
- */
-pose_leads?: Array<number>,
-/**
- * How the animation of the saved poses goes from one to the next, and how it ends.
- */
-transition?: Transition | null,
-/**
- * Visibility, parts and painted amounts of each model.
- */
-models?: Array<MemberSettings>, };
 /**
  * A change of the document.
  */
 export type Command = { "do": "set_pose",
 /**
- * Positions of cage vertices and interior controls, object units.
+ * Positions of cage vertices, then of interior controls, object units. `[n_controls]`
  */
 positions: readonly (readonly [number, number, number])[], } | { "do": "reset_pose" } | { "do": "save_pose",
 /**
@@ -674,11 +647,11 @@ positions: readonly (readonly [number, number, number])[], } | { "do": "reset_po
  */
 name: string, } | { "do": "apply_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number, } | { "do": "rename_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number,
 /**
@@ -686,15 +659,15 @@ index: number,
  */
 name: string, } | { "do": "remove_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number, } | { "do": "update_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number, } | { "do": "duplicate_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number,
 /**
@@ -702,15 +675,15 @@ index: number,
  */
 name: string, } | { "do": "move_pose",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number,
 /**
- * Its new index.
+ * Index in this list to which the pose moves.
  */
 to: number, } | { "do": "set_pose_time",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number,
 /**
@@ -718,15 +691,15 @@ index: number,
  */
 seconds: number, } | { "do": "set_transition",
 /**
- * The new settings.
+ * Interpolation between the poses, and how the animation ends.
  */
 transition: Transition, } | { "do": "blend",
 /**
- * Index of the pose.
+ * Index of the pose in the list of saved poses.
  */
 index: number,
 /**
- * Share, 0 to 1.
+ * New share of the pose, 0 to 1.
  */
 share: number, } | { "do": "carry_poses",
 /**
@@ -738,7 +711,7 @@ from: number,
  */
 positions: readonly (readonly [number, number, number])[],
 /**
- * Shares of the saved poses in the pose.
+ * Shares of the saved poses in the current pose.
  */
 shares: Array<number>, } | { "do": "set_pins",
 /**
@@ -750,23 +723,23 @@ pins: Array<SurfacePoint>, } | { "do": "replace_cage",
  */
 mesh: unknown,
 /**
- * Subdivision and interior controls; null keeps the current ones that fit.
+ * Subdivision and interior controls; null keeps the current ones if they fit.
  */
 controls: CageControls | null,
 /**
- * Notices of the generator.
+ * Notices of the cage generator about the new cage.
  */
 notices: Array<string>, } | { "do": "move_rest" } | { "do": "edit_rest",
 /**
- * Kind of edit.
+ * What to do with the selected elements.
  */
 edit: RestEdit, } | { "do": "subdivide",
 /**
- * Steps, 0 to 3.
+ * Number of subdivision steps, 0 to 3.
  */
 steps: number, } | { "do": "set_radius",
 /**
- * Radius, object units; null for a fixed fraction of the cage's size.
+ * Radius, object units; null for 1/32 of the cage's longest side.
  */
 radius: number | null, } | { "do": "add_control",
 /**
@@ -774,19 +747,19 @@ radius: number | null, } | { "do": "add_control",
  */
 kind: InnerKind,
 /**
- * Positions, object units.
+ * Positions of the corners of the new element, object units.
  */
 places: readonly (readonly [number, number, number])[], } | { "do": "add_sheet",
 /**
- * Centre of the sheet.
+ * Centre of the sheet, object units.
  */
 center: readonly [number, number, number],
 /**
- * Half axes of the largest size that is tried.
+ * Half axes of the sheet before it is shrunk: the largest size that is tried is 4/5 of these axes.
  */
 axes: readonly (readonly [number, number, number])[], } | { "do": "replace_controls",
 /**
- * Positions of the new controls.
+ * Positions of the new controls, object units. `[n_inner]`
  */
 positions: readonly (readonly [number, number, number])[],
 /**
@@ -794,19 +767,19 @@ positions: readonly (readonly [number, number, number])[],
  */
 elements: Array<InnerElement>, } | { "do": "remove_model",
 /**
- * Id of the model.
+ * Identifier of the model in the document.
  */
 id: number, } | { "do": "set_parts",
 /**
- * Id of the model.
+ * Identifier of the model in the document.
  */
 id: number,
 /**
- * Visibility and parts.
+ * Visibility, and names of the parts that are rigid or stay in place.
  */
 options: PartOptions, } | { "do": "set_painted",
 /**
- * Id of the model.
+ * Identifier of the model in the document.
  */
 id: number,
 /**
@@ -814,23 +787,27 @@ id: number,
  */
 amounts: Array<number>, };
 /**
- * A saved pose.
+ * A saved pose, as panels show it.
  */
 export type PoseView = {
 /**
- * Name of the pose.
+ * Name of the pose, as lists show it.
  */
 name: string,
 /**
- * Whether the pose belongs to the current cage rather than a replaced one.
+ * Whether the pose has one position per vertex and interior control of the current cage.
  */
 fits: boolean,
 /**
- * Time in the animation, seconds; 0 if the pose belongs to a replaced cage.
+ * Time in the animation, seconds; 0 if `fits` is false.
  */
-seconds: number, };
+seconds: number,
 /**
- * The selection.
+ * Hash of the positions, by which the page finds the pose's picture.
+ */
+hash: number, };
+/**
+ * The selected vertices, as panels show them.
  */
 export type SelectionView = {
 /**
@@ -846,6 +823,30 @@ last: number | null,
  */
 center: [number, number, number] | null, };
 /**
+ * How clicks and gestures act on the cage.
+ */
+export type Tools = {
+/**
+ * Element type that a click selects.
+ */
+element: Element,
+/**
+ * Whether gestures also move the mirror images of the selected vertices.
+ */
+symmetry: boolean,
+/**
+ * Centre of rotation and scaling.
+ */
+pivot: Pivot,
+/**
+ * Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
+ */
+proportional: number,
+/**
+ * Whether vertices near the selection follow it.
+ */
+proportionalOn: boolean, };
+/**
  * Document and bind state that panels show.
  */
 export type View = {
@@ -854,23 +855,31 @@ export type View = {
  */
 bound: boolean,
 /**
- * Changes with the models, their options and painted amounts.
+ * Whether weights on a lattice around the cage are available.
+ */
+lattice: boolean,
+/**
+ * Number of splats outside the cage; 0 before the lattice is available.
+ */
+floaters: number,
+/**
+ * Key that changes whenever the models, their options or the areas that the user fixed with the brush change.
  */
 models: number,
 /**
- * Changes with the models' joined mesh.
+ * Key that changes whenever the models' joined mesh changes.
  */
 mesh: number,
 /**
- * Changes with the cage at rest.
+ * Key that changes whenever the cage at rest changes.
  */
 cage: number,
 /**
- * Saved poses.
+ * Names and times of the saved poses, in the order of the list.
  */
 poses: Array<PoseView>,
 /**
- * Share of each saved pose in the pose.
+ * Share of each saved pose in the current pose.
  */
 shares: Array<number>,
 /**
@@ -878,7 +887,7 @@ shares: Array<number>,
  */
 transition: Transition,
 /**
- * Length of this animation, seconds.
+ * Length of the animation of the saved poses, seconds.
  */
 animationSeconds: number,
 /**
@@ -898,15 +907,23 @@ editingRest: boolean,
  */
 sample: string | null,
 /**
- * Whether the cage is the one of the sample.
+ * Whether the cage is the built-in one of `sample`; smoothing and interior controls may differ.
  */
 sampleCage: boolean,
 /**
- * The selection.
+ * Number, last vertex and centre of the selected vertices.
  */
 selected: SelectionView,
 /**
- * Changes with each step, undo and redo.
+ * How clicks and gestures act on the cage.
+ */
+tools: Tools,
+/**
+ * Number of vertices without a mirror image, in symmetric editing; otherwise 0.
+ */
+unmatched: number,
+/**
+ * Number of openings, steps, undos and redos so far.
  */
 steps: number,
 /**
@@ -930,11 +947,11 @@ export type CageContents = {
  */
 positions: Float32Array,
 /**
- * For each face its corner count, then its vertex indices.
+ * For each face, the number of its corners, then the vertex index of each corner.
  */
 corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
 /**
- * A named pose.
+ * A saved pose of the cage and the name that the list of poses shows.
  */
 export type PoseContents = { name: string,
 /**
@@ -946,7 +963,7 @@ positions: Float32Array, };
  */
 export type OpenContents = {
 /**
- * Identifier of the built-in sample; undefined for other models.
+ * Identifier of the built-in sample; null for other models.
  */
 sample: string | null,
 /**
@@ -978,21 +995,21 @@ export type Colour = "material" | "clay" | "weight" | "error";
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
 /**
- * Quantity that the slice shows.
+ * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
  */
 export type SliceShown = "off" | "kinds" | "value";
 /**
- * Type of gizmo.
+ * Operation of a gizmo, with the shape of its handles.
  */
-export type Gizmo = "none" | "move" | "rotate" | "scale";
+export type GizmoMode = "move" | "rotate" | "scale";
 /**
- * What the scene shows.
+ * Elements of the scene that are drawn, and their colours.
  */
-export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour,
+export type SceneOptions = { model: boolean, cage: boolean, original: boolean, colour: Colour, slice: SliceShown,
 /**
- * Whether the colour scale of weights ends at 1 rather than at the largest weight.
+ * What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
  */
-weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo,
+gizmo: GizmoMode | null,
 /**
  * Whether dragging pulls the model's surface. The cage is then drawn faintly.
  */
@@ -1004,7 +1021,28 @@ compare: Array<Coordinates>, problems: boolean,
 /**
  * Treatment of joints by the next export, which the marks of joints show. Null hides the marks.
  */
-joints: Joints | null, };
+joints: Joints | null,
+/**
+ * Colours of background and overlays.
+ */
+theme: Theme,
+/**
+ * Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of K. Smith's paper (`docs/method.md`,
+ * sources).
+ */
+base_wireframe: boolean,
+/**
+ * Whether the floor grid is drawn.
+ */
+floor: boolean,
+/**
+ * Whether splats outside the cage are drawn.
+ */
+floaters: boolean,
+/**
+ * Whether colours of weights span 0 to 1 instead of 0 to the maximum.
+ */
+weights_to_one: boolean, };
 /**
  * Position and direction of the camera.
  */
@@ -1026,7 +1064,7 @@ distance: number, parallel: boolean, };
  */
 export type SurfacePoint = {
 /**
- * Number of the triangle; see [`Models`].
+ * Number of the triangle, unique among all models that the document has ever contained.
  */
 triangle: number,
 /**
@@ -1034,49 +1072,41 @@ triangle: number,
  */
 bary: [number, number, number], };
 /**
- * Weights of a surface point, and the nearest vertex of the model.
+ * Distance along the surface, from the grabs, up to which a drag moves the model.
  */
-export type Grip = {
+export type Reach = "automatic" | { "of": number } | "whole";
 /**
- * Weights of the cage's vertices at the point. `[n_cage]`
+ * Options of a drag.
  */
-row: Array<number>,
+export type DragOptions = {
 /**
- * Index of the nearest vertex of the model.
+ * Distance along the surface up to which the model moves.
  */
-seed: number, };
+reach: Reach,
 /**
- * Options for pulling the model's surface.
+ * Share by which parts within the reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
  */
-export type PullOptions = {
+relax: number,
 /**
- * Distance along the surface that a pull affects, as a fraction of the model's size; null for automatic.
+ * Whether the cage stays symmetric: each step averages it with its mirror image. Default false.
  */
-reach: number | null,
-/**
- * Whether a pull affects the whole model, without a limit of distance.
- */
-whole: boolean,
-/**
- * Whether the mirror image of the grabbed point is pulled symmetrically.
- */
-mirrored: boolean, };
+symmetry: boolean, };
 /**
  * How the skeleton follows the cage.
  */
 export type Joints = "follow" | "stay" | "turn";
 /**
- * Options for exporting a rig.
+ * What happens to planted feet in clips.
  */
-export type RigOptions = { joints: Joints,
+export type Feet = "free" | "lock";
 /**
- * Whether translations in clips keep their length; otherwise they scale with the height of the hips.
+ * Compression of a GLB.
  */
-keep_travel: boolean,
+export type Compression = "none" | "meshopt";
 /**
- * Names of parts that move rigidly, without changing their shape.
+ * How an export treats the rig of a model.
  */
-rigid: Array<string>,
+export type RigOptions = {
 /**
  * Whether to export only the shape, without the rig.
  */
@@ -1084,9 +1114,41 @@ plain: boolean,
 /**
  * Whether the cage deforms the model after a clip has moved it.
  */
-dynamic: boolean, };
+dynamic: boolean,
 /**
- * An animation clip.
+ * How the skeleton follows the cage.
+ */
+joints: Joints,
+/**
+ * Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
+ */
+keep_travel: boolean,
+/**
+ * Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
+ */
+rigid: Array<string>,
+/**
+ * Whether the lowest points of the shape at rest and in each clip keep their heights.
+ */
+ground: boolean,
+/**
+ * What happens to planted feet in clips.
+ */
+feet: Feet,
+/**
+ * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
+ */
+expressions: boolean,
+/**
+ * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
+ */
+quantize: boolean,
+/**
+ * Compression of the buffers.
+ */
+compress: Compression, };
+/**
+ * Name and duration of an animation clip, for the list of clips.
  */
 export type ClipView = {
 /**
@@ -1126,7 +1188,7 @@ export type Pivot = "middle" | "border" | "last";
  */
 export type SelectMode = "replace" | "add" | "remove" | "toggle";
 /**
- * Kind of gesture.
+ * What a gesture does with the selection.
  */
 export type Gesture = "grab" | "rotate" | "scale";
 /**
@@ -1134,7 +1196,7 @@ export type Gesture = "grab" | "rotate" | "scale";
  */
 export type GestureView = {
 /**
- * Kind of the gesture.
+ * Whether the gesture translates, rotates or scales, which determines the unit of `amounts`.
  */
 kind: Gesture,
 /**
@@ -1142,7 +1204,7 @@ kind: Gesture,
  */
 amounts: Array<number>,
 /**
- * Axis of the restriction, 0 to 2.
+ * Axis of the constraint, 0 to 2; null if the gesture is free.
  */
 axis: number | null,
 /**
@@ -1150,30 +1212,34 @@ axis: number | null,
  */
 plane: boolean, };
 /**
- * Handle of the gizmo: one axis, the plane normal to an axis, or all axes.
+ * A handle of a gizmo.
  */
-export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | "all";
+export type GizmoPart = { "axis": number } | { "plane": number } | "view";
 /**
  * An edit of the selected elements of the cage.
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
-export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"margin":0.0,"voxels":0};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
-export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
+export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
+export const VIEW_DEFAULTS: View = {"models":0,"mesh":0,"cage":0,"poses":[],"shares":[],"transition":{"interpolation":"linear","loops":true,"back":1.0},"animationSeconds":0.0,"pins":[],"posed":false,"editingRest":false,"sample":null,"sampleCage":false,"selected":{"count":0,"last":null,"center":null},"tools":{"element":"vertex","symmetry":false,"pivot":"middle","proportional":0.2,"proportionalOn":false},"unmatched":0,"steps":0,"undo":null,"redo":null,"forgotten":0,"bound":false,"lattice":false,"floaters":0};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","base_wireframe":false,"floor":true,"floaters":true,"weights_to_one":false,"model":true,"cage":true,"original":false,"colour":"material","slice":"off","gizmo":null,"pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 export const COORDINATES: readonly Coordinates[] = ["harmonic","mean_value","green"];
 /** File extensions of models, preferred first. */
-export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off", "splat", "spz"] as const;
+export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off", "3mf", "splat", "spz"] as const;
 /** MIME types of models. */
-export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json", "model/obj", "model/stl"] as const;
+export const MODEL_TYPES = ["model/gltf-binary", "model/gltf+json", "model/obj", "model/stl", "model/3mf"] as const;
 /** Extensions of models that refer to other files. */
 export const NAMING_ENDINGS = ["gltf", "obj"] as const;
 /** Extensions of these other files. */
 export const COMPANION_ENDINGS = ["bin", "png", "jpg", "jpeg", "webp", "ktx2", "mtl"] as const;
 /** Formats that store only a shape. */
-export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
+export const SHAPE_FORMATS = ["obj", "ply", "stl", "off", "3mf"] as const;
+/** Formats that store splats and nothing else. */
+export const SPLAT_FORMATS = ["ply", "splat", "spz"] as const;
 /** MIME types of exported models, by extension. */
-export const EXPORT_TYPES: Readonly<Record<string, string>> = { glb: "model/gltf-binary", vrm: "model/gltf-binary", gltf: "model/gltf-binary", obj: "model/obj", stl: "model/stl", };
+export const EXPORT_TYPES: Readonly<Record<string, string>> = { "glb": "model/gltf-binary", "vrm": "model/gltf-binary", "gltf": "model/gltf-binary", "obj": "model/obj", "stl": "model/stl", "3mf": "model/3mf", };
 /** Sliders of options, by name. */
-export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, vertices: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, margin: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, } as const;
+export const SLIDERS = { tau: {"min":-8.0,"max":-2.0,"step":1.0}, max_iterations: {"min":1.0,"max":1000000.0,"step":1.0}, target: {"min":8.0,"max":400.0,"step":2.0}, detail: {"min":0.007,"max":0.112,"step":0.05}, clearance: {"min":0.0,"max":0.15,"step":0.005}, voxels: {"min":16.0,"max":128.0,"step":8.0}, divisions: {"min":1.0,"max":8.0,"step":1.0}, radius: {"min":0.005,"max":0.12,"step":0.0025}, proportional: {"min":0.02,"max":1.0,"step":0.01}, brush: {"min":0.01,"max":0.3,"step":0.01}, reach: {"min":0.05,"max":2.4,"step":0.05}, } as const;
 export const BOX_DIVISIONS = 2;
+export const HULL_TARGET = 24;

@@ -1,22 +1,24 @@
 /** Inputs and outputs of worker jobs. */
 
-import type { ErrorName, PullOptions } from "./generated";
+import type { DragOptions, ErrorName } from "./generated";
 
-/** Start of a pull. `start` is the current pose of the cage and of the controls inside, `[n_controls, 3]`. */
+/** Start of a pull. `start` is the current pose of the cage and of the controls inside it, `[n_controls, 3]`. */
 export interface GrabInput {
   readonly start: Float32Array;
   /** Weights of the grabbed points, then of the pinned points. `[n_grabs + n_pins, n_controls]` */
   readonly rows: Float64Array;
   /**
-   * For each of these points, the nearest model vertex; 2^32 - 1 if the point is a cage vertex. `[n_grabs + n_pins]`
+   * For each row of `rows`, the model vertex nearest to the point; 2^32 - 1 if the point is a cage vertex.
+   * `[n_grabs + n_pins]`
    */
   readonly seeds: Uint32Array;
   /** Number of grabbed points. */
   readonly grabs: number;
-  readonly options: PullOptions;
+  readonly options: Partial<DragOptions>;
 }
 
-export interface Grabbed {
+/** Result of starting a pull: the grabbed points, and which part of the model the pull moves. */
+export interface GrabResult {
   /** Positions of the grabbed points in the pose `start`. `[n_grabs, 3]` */
   readonly place: Float32Array;
   /** How strongly the pull keeps each model vertex in place, 0 to 1. `[n_vertices]` */
@@ -34,7 +36,7 @@ export interface PullFrame {
   readonly error: number;
 }
 
-/** Why WebGPU cannot be used: the browser lacks it, it found no graphics card, or the device did not start. */
+/** Why WebGPU cannot be used: the browser lacks it or found no graphics card, or the device did not start. */
 export type Lack = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
 
 export interface Job<T> {

@@ -12,7 +12,10 @@ const TOUCH_RADIUS = 24;
 /** Logarithm of the zoom factor per wheel unit. A wheel notch is about 100 units, which enlarges the view by 16 %. */
 const WHEEL_RATE = 0.0015;
 
-/** Calls `posed` after every change of the pose. Returns a function that cancels the drag in progress. */
+/**
+ * Lets the pointer drag handles, orbit and zoom. Calls `posed` after every change of the pose. Returns a function that
+ * cancels the drag in progress.
+ */
 export function attachPointer(
   element: HTMLElement,
   engineOf: () => Engine | undefined,
@@ -26,7 +29,7 @@ export function attachPointer(
   };
   const release = (keep: boolean) => {
     const isMoved = drag === "handle" && engineOf()?.endTransform(keep);
-    // A cancelled drag restores the pose, which is a change too.
+    // A cancelled drag restores the previous pose, which is also a change.
     if (isMoved || (drag === "handle" && !keep)) posed();
     drag = undefined;
   };

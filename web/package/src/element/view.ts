@@ -1,6 +1,6 @@
 /** The element's view: an engine on a canvas, with a model and its cage. */
 
-import type { BindReport, Engine, Job, ModelInfo, SceneOptions } from "../contract";
+import type { BindReport, CageArrays, Engine, Job, ModelInfo, SceneOptions } from "../contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "../contract/generated";
 import { isSoftware } from "../session/adapter";
 import type { Package } from "../session/artifact";
@@ -9,14 +9,20 @@ import { type Client, createClient, named } from "../session/client";
 import { createFrames, type Frames } from "../session/frames";
 import { type Canvases, type OpenedOn, openOn } from "../session/open";
 import { createApart, load } from "../session/reader";
+import type { Bound, Cage } from "../types";
 
-export interface Wanted {
+/** A model to open, and how to bind it. */
+export interface ModelRequest {
   readonly name: string;
   readonly file: Blob;
   /** Maximum number of cage vertices. */
   readonly vertices: number;
   /** Number of cells along the cage's longest side. */
   readonly grid: number;
+  /** The cage to use, instead of the cage of a project or a generated one. */
+  readonly cage?: Cage | undefined;
+  /** Result of a bind of the model to `cage`. */
+  readonly bound?: Bound | undefined;
 }
 
 export interface Ready {
@@ -29,8 +35,11 @@ export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: num
 
 export interface View {
   readonly engine: Engine;
-  /** Opens a model, generates a cage unless the file is a project with one, and binds. Cancels a previous `open`. */
-  open(wanted: Wanted, hear: Hear): Promise<Ready>;
+  /**
+   * Opens a model, generates a cage unless the request or the project has one, and binds the model unless the request
+   * has the result of a bind. Cancels a previous `open`.
+   */
+  open(wanted: ModelRequest, hear: Hear): Promise<Ready>;
   close(): Promise<void>;
 }
 
@@ -84,20 +93,28 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     return job.done;
   };
 
-  async function openModel({ name, file, vertices, grid }: Wanted, hear: Hear): Promise<Ready> {
+  async function openModel(wanted: ModelRequest, hear: Hear): Promise<Ready> {
+    const { name, file, vertices, grid, bound } = wanted;
     hear("Opening", 0);
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined, used: 0 }));
-    await engine.open(await load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
+    await engine.open(load(pkg, read), { sample: null, settings: null, cage: null, poses: [] });
     engine.frameAll();
-    let cage = read.cage;
+    let cage = wanted.cage ? arraysOf(wanted.cage, engine.origin()) : read.cage;
     if (!cage) {
       const [positions, triangles] = engine.modelStates();
-      const options = { ...CAGE_DEFAULTS, vertices };
+      const options = { ...CAGE_DEFAULTS, target: vertices };
       const input = { positions, triangles, model: engine.modelPositions(), options, smooth: 0 };
       cage = await run(client.run("cage", input, ({ fraction }) => hear("Making a cage", fraction)));
     }
     engine.setCage(cage.positions, cage.corners, cage.controls, [], undefined);
     engine.frameAll();
+    if (bound) {
+      const { indptr, indices, data, offsets } = bound.weights;
+      const rows = (start: number, end: number) =>
+        [indices.subarray(start, end), data.subarray(start, end)] as const;
+      await engine.adopt(indptr, rows, offsets, bound.report, true);
+      return { model: engine.modelInfo(), report: bound.report };
+    }
     const report = await run(
       startBind({
         client,
@@ -105,11 +122,11 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
         adapter,
         options: { ...BIND_DEFAULTS, grid, backend },
         listener: (event) => event.kind === "progress" && hear("Binding", event.fraction),
-        cage: {
+        cage: () => ({
           positions: engine.restPositions(),
           corners: engine.cageCorners(),
           controls: engine.cageControls(),
-        },
+        }),
       }),
     );
     return { model: engine.modelInfo(), report };
@@ -136,13 +153,23 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       frames.stop();
       current?.cancel();
       client.close();
-      // Free the engine only when none of its methods is running. Losing the device ends those that wait for the GPU.
+      // Free the engine only when none of its methods is running. Losing the device ends methods that wait for the GPU.
       engine.lose();
       await work;
       engine.lose();
       await watching;
       engine.free();
     },
+  };
+}
+
+/** Copies a cage to arrays relative to the model's origin. */
+function arraysOf({ positions, corners, controls, origin }: Cage, to: ArrayLike<number>): CageArrays {
+  const shift = [0, 1, 2].map((axis) => (origin?.[axis] ?? 0) - (to[axis] ?? 0));
+  return {
+    positions: Float32Array.from(positions, (x, k) => x + (shift[k % 3] ?? 0)),
+    corners: Uint32Array.from(corners),
+    controls: controls ?? { smooth: 0, inner: 0, elements: [], radius: null },
   };
 }
 

@@ -5,7 +5,7 @@ import { fetchPart } from "./parts";
 /** The exports that both builds share. */
 export type Package = typeof import("../pkg/cagework");
 
-/** One build of the module. */
+/** One build of the wasm module: its JavaScript, its wasm file and its worker. */
 export interface Artifact {
   readonly pkg: Package;
   /** URL of the build's wasm file. */
@@ -13,8 +13,19 @@ export interface Artifact {
   openWorker(): Worker;
 }
 
-/** Downloads and compiles a module; compiles during the download if the server sends the MIME type of wasm. */
-export async function compile(url: string): Promise<WebAssembly.Module> {
+/** Modules by URL. Several views on a page share a module. */
+const modules = new Map<string, Promise<WebAssembly.Module>>();
+
+/** Downloads and compiles a wasm module, unless an earlier call has. */
+export function compile(url: string): Promise<WebAssembly.Module> {
+  const known = modules.get(url) ?? download(url);
+  modules.set(url, known);
+  known.catch(() => modules.delete(url));
+  return known;
+}
+
+/** Compiles during the download if the server sends the MIME type of wasm. */
+function download(url: string): Promise<WebAssembly.Module> {
   return fetchPart(url, async (response) => {
     if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
       return WebAssembly.compileStreaming(response);

@@ -1,4 +1,7 @@
-/** Runs a bind: first a coarse pass, so that the model can soon be dragged, then a pass with the given options. */
+/**
+ * Runs a bind. If the model is not bound yet and the requested grid is finer than `COARSE`, a coarse pass runs first,
+ * so that the model can soon be dragged. There is no coarse pass above the limit `MOST_COARSE`.
+ */
 
 import type {
   BindEvent,
@@ -14,23 +17,20 @@ import { createEta } from "../eta";
 import { type Client, named } from "./client";
 import type { KeptRows } from "./messages";
 
-/** Number of cells along the cage's longest side in the coarse pass. */
+/** Value of the option `grid` in the coarse pass. */
 const COARSE = 32;
 
-/** Largest number of weights with a coarse pass. Of more, assembling takes most of the time, and both passes take the same. */
+/**
+ * Number of bound points times number of controls above which there is no coarse pass: assembling the weights then
+ * takes most of the time on any grid.
+ */
 const MOST_COARSE = 1 << 23;
 
-/** Number of weights above which the worker ends after a bind, to free its memory: 64 MiB. */
+/** Number of weights above which the worker ends after a bind to free its memory, 64 MiB at 8 bytes per weight. */
 const MOST_KEPT = 1 << 23;
 
-/** Names of errors after which the bind is repeated on the CPU. */
-const GPU_ERRORS: readonly string[] = [
-  "NoAdapter",
-  "NoDevice",
-  "DeviceLost",
-  "Gpu",
-  "Missing",
-] satisfies ErrorName[];
+/** Names of errors after which a bind on the GPU is repeated on the CPU. */
+const GPU_ERRORS: readonly string[] = ["NoAdapter", "NoDevice", "DeviceLost", "Gpu"] satisfies ErrorName[];
 
 export interface BindStart {
   readonly client: Client;
@@ -38,7 +38,7 @@ export interface BindStart {
   readonly adapter: string;
   readonly options: BindOptions;
   readonly listener: (event: BindEvent) => void;
-  readonly cage: CageArrays;
+  readonly cage: () => CageArrays;
 }
 
 type Pass = "coarse" | "fine";
@@ -49,8 +49,8 @@ export function startBind(start: BindStart): Job<BindReport> {
   let job: Job<KeptRows> | undefined;
   let isCancelled = false;
   const { revision } = engine;
-  const positions = engine.boundPoints();
-  const extra = (positions.length - engine.modelPositions().length) / 3;
+  const points = engine.boundPoints().length / 3;
+  const extra = points - engine.modelPositions().length / 3;
 
   const step = (pass: Pass) => {
     const eta = createEta(performance.now());
@@ -62,7 +62,11 @@ export function startBind(start: BindStart): Job<BindReport> {
   };
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
-    job = client.run("bindKept", { positions, extra, cage, options: asked }, step(pass));
+    job = client.run(
+      "bindKept",
+      () => ({ positions: engine.boundPoints(), extra, cage: cage(), options: asked }),
+      step(pass),
+    );
     const { key, indptr, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     engine.requireCurrent(revision);
@@ -90,7 +94,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    const isLarge = (positions.length / 3) * (cage.positions.length / 3) > MOST_COARSE;
+    const isLarge = (points * cage().positions.length) / 3 > MOST_COARSE;
     if (!engine.bound && !isLarge && options.grid > COARSE) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");

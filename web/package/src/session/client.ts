@@ -1,7 +1,7 @@
-/** Client of a worker: jobs as promises. */
+/** Sends jobs to a worker, and returns their results as promises. */
 
 import type { Job } from "../contract";
-import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
+import { buffers, type FromWorker, type JobKind, type Jobs, type ToWorker } from "./messages";
 
 /**
  * Time after which the worker of a cancelled job is terminated if the job has not stopped, ms. A job on the CPU blocks
@@ -10,17 +10,21 @@ import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
 const PATIENCE = 400;
 
 interface Waiting {
-  /** The message, to send again if the worker is replaced. */
-  readonly asked: ToWorker;
+  /** Sends the job, again if the worker is replaced. */
+  readonly ask: (to: Worker) => void;
   readonly done: (output: never) => void;
   readonly failed: (error: Error) => void;
   readonly step: ((step: never) => void) | undefined;
 }
 
 export interface Client {
+  /**
+   * Runs a job. If `input` is a function, the arrays that it returns are moved to the worker instead of copied, and
+   * `input` is called again if the worker is replaced.
+   */
   run<K extends JobKind>(
     job: K,
-    input: Jobs[K]["input"],
+    input: Jobs[K]["input"] | (() => Jobs[K]["input"]),
     step?: (step: Jobs[K]["step"]) => void,
   ): Job<Jobs[K]["output"]>;
   /** Whether a job is running or queued. */
@@ -30,14 +34,17 @@ export interface Client {
   close(): void;
 }
 
-/** An error with the name that callers check. */
+/** Creates an error with a `name`, by which callers recognise what failed. */
 export function named(name: string, message: string): Error {
   const error = new Error(message);
   error.name = name;
   return error;
 }
 
-/** An error named Unloaded: there is no connection, or the server has a newer version of the program. */
+/**
+ * An error named Unloaded, for a file of the program that could not be downloaded: there is no connection, or the
+ * server has a newer version.
+ */
 export function unloaded(reason: string): Error {
   return named("Unloaded", `part of the program could not be loaded (${reason}): check the connection`);
 }
@@ -110,7 +117,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     drop(id);
     if (waiting.size === 0) return;
     worker = start();
-    for (const { asked } of waiting.values()) say(worker, asked);
+    for (const { ask } of waiting.values()) ask(worker);
   }
 
   function drop(id: number): void {
@@ -125,10 +132,14 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       const id = next++;
       worker ??= start();
       // postMessage throws for input that cannot be cloned; the job is then not registered.
-      const asked: ToWorker = { kind: "job", id, job, input };
-      say(worker, asked);
+      const ask = (to: Worker) => {
+        const isMoved = typeof input === "function";
+        const message: ToWorker = { kind: "job", id, job, input: isMoved ? input() : input };
+        to.postMessage(message, isMoved ? buffers(message.input) : []);
+      };
+      ask(worker);
       const done = new Promise<never>((resolve, reject) => {
-        waiting.set(id, { asked, done: resolve, failed: reject, step });
+        waiting.set(id, { ask, done: resolve, failed: reject, step });
       });
       return {
         done,

@@ -1,4 +1,4 @@
-/** Reads dropped files: finds the model among them, and its siblings, the files that it may refer to. */
+/** Reads files that are opened together: finds the model, and its siblings, the other files that it may refer to. */
 
 import type { NamedFile } from "../contract";
 import { NAMING_ENDINGS } from "../contract/generated";
@@ -10,17 +10,14 @@ import { named } from "./client";
 /** Maximum size of a file, bytes. Opening a file takes several times its size in memory. */
 const LARGEST = 1 << 30;
 
-/** Bytes that are read at a time. */
+/** Number of bytes that are read at a time. */
 const CHUNK = 1 << 23;
 
 export interface Bytes {
   readonly name: string;
-  /** The file, or its decompressed contents. Reading it into wasm memory twice takes less memory than passing a copy on. */
   readonly content: Blob;
   /** The siblings, by name and by path relative to the model's folder. */
   readonly siblings: ReadonlyMap<string, Uint8Array>;
-  /** The compressed original, if `content` was decompressed. */
-  readonly packed?: Blob;
 }
 
 /** Returns a function that finds a sibling by the path in the model's file, or else by the file name in that path. */
@@ -46,7 +43,7 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   return { name: main.name, content: main.file, siblings };
 }
 
-/** The error for the first file above the size limit; undefined if there is none. */
+/** The error for the first file above the size limit; undefined if all files are smaller. */
 export function tooLarge(files: readonly NamedFile[]): Error | undefined {
   const large = files.find(({ file }) => file.size > LARGEST);
   const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);

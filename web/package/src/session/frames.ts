@@ -1,4 +1,4 @@
-/** Draws frames on demand. All requests between two animation frames are answered by one drawing. */
+/** Draws frames on demand. All requests between two animation frames result in one drawing. */
 
 /** Pause before the next attempt if the GPU is busy, ms. */
 const BUSY_PAUSE = 12;
@@ -6,19 +6,7 @@ const BUSY_PAUSE = 12;
 /** Idle time after which a frame drawn at low resolution is drawn again at full resolution, ms. */
 const QUIET = 250;
 
-export interface Frames {
-  ask(): void;
-  /**
-   * Starts drawing. The argument of `draw` says whether to draw at full resolution. It returns whether it did, or
-   * undefined if the GPU is busy and nothing was drawn. `calm` says whether there is time to draw a frame again at full
-   * resolution.
-   */
-  start(draw: (sharp: boolean) => boolean | undefined, calm: () => boolean): void;
-  listen(listener: (ms: number) => void): () => void;
-  stop(): void;
-}
-
-export function createFrames(): Frames {
+export function createFrames() {
   const listeners = new Set<(ms: number) => void>();
   let draw: ((sharp: boolean) => boolean | undefined) | undefined;
   let calm = () => true;
@@ -30,7 +18,7 @@ export function createFrames(): Frames {
     if (stopped) return;
     clearTimeout(quiet);
     if (!asked) requestAnimationFrame(frame);
-    // A requested frame takes precedence over drawing the last one again at full resolution.
+    // A requested frame takes precedence over drawing the previous frame again at full resolution.
     asked = asked === "soon" ? asked : how;
   };
   const sharpen = () => {
@@ -60,11 +48,16 @@ export function createFrames(): Frames {
   };
   return {
     ask: () => request("soon"),
-    start(first, whenCalm) {
+    /**
+     * Starts drawing. `first` draws a frame, at full resolution if its argument is true. It returns whether the frame
+     * has full resolution, or undefined if the GPU is busy and nothing was drawn. `whenCalm` returns whether there is
+     * time to draw the last frame again at full resolution.
+     */
+    start(first: (sharp: boolean) => boolean | undefined, whenCalm: () => boolean) {
       [draw, calm] = [first, whenCalm];
       request("soon");
     },
-    listen(listener) {
+    listen(listener: (ms: number) => void): () => void {
       listeners.add(listener);
       return () => listeners.delete(listener);
     },
@@ -75,3 +68,5 @@ export function createFrames(): Frames {
     },
   };
 }
+
+export type Frames = ReturnType<typeof createFrames>;

@@ -8,8 +8,8 @@ import type {
   Check,
   CheckedCage,
   Coordinates,
-  Grabbed,
   GrabInput,
+  GrabResult,
   NamedFile,
   Offsets,
   Progress,
@@ -19,7 +19,6 @@ import type {
   RigOptions,
   UpAxis,
 } from "../contract";
-import type { Bytes } from "./files";
 
 /** A decoded image, RGBA, rows from top to bottom. */
 export interface Texture {
@@ -29,27 +28,21 @@ export interface Texture {
 }
 
 /** A file that a worker has read successfully. */
-export interface ReadModel extends Bytes {
-  /** The up axis that the user chose; undefined for the file's own. */
-  readonly up: UpAxis | undefined;
-  /** Pixels of the textures of other models, which share a limit with this one. */
-  readonly used: number;
-  /** Pixels of the textures. */
+export interface ReadModel {
+  /** Arrays of each model, for `Loaded.restore`. */
+  readonly models: Uint8Array[][];
+  /** Total number of pixels of all textures. */
   readonly pixels: number;
   /** Textures of each model, by index; null for those that are missing or that this browser cannot decode. */
   readonly textures: readonly (readonly (Texture | null)[])[];
   /** The cage of a project. */
   readonly cage: CheckedCage | undefined;
   readonly notices: readonly string[];
-  /**
-   * Time that the worker took to read the file, ms. The page freezes for about as long when it reads the file again.
-   */
-  readonly took: number;
   /** Number of vertices of all models. */
   readonly vertices: number;
 }
 
-/** Weights as compressed sparse rows, and the offset columns. */
+/** Weights as compressed sparse rows. `offsets` describes the columns after those of the controls. */
 export interface BoundArrays {
   readonly indptr: Uint32Array;
   readonly indices: Uint32Array;
@@ -65,10 +58,9 @@ export type KeptRows = Omit<BoundArrays, "indices" | "data"> & {
 };
 
 export interface SampleArrays {
-  readonly glb: Uint8Array;
-  readonly cage: CheckedCage;
+  readonly read: ReadModel;
   readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
-  /** Point of the model to pull first. */
+  /** Point of the model that the page suggests to pull first, object units. */
   readonly grip: Float32Array;
 }
 
@@ -82,7 +74,7 @@ export interface Jobs {
   };
   /** Like `bind`, but the worker keeps columns and weights for `rows`. */
   bindKept: { input: Jobs["bind"]["input"]; step: Progress; output: KeptRows };
-  /** Columns and weights of the last `bindKept`, from `start` to `end`. */
+  /** Columns and values of the weights `start` to `end - 1` of the last `bindKept`, counted over all rows. */
   rows: {
     input: { key: number; start: number; end: number };
     step: never;
@@ -95,7 +87,7 @@ export interface Jobs {
   };
   /** A model's vertices and triangles. */
   model: {
-    /** `states`: append the vertices of morph targets and, if `clip` is given, of its frames. */
+    /** `states`: append the vertices of the morph targets and, if `clip` is given, of the clip's frames. */
     input: { files: readonly NamedFile[]; states: boolean; clip: string | undefined };
     step: Reading;
     output: { positions: Float32Array; triangles: Uint32Array; origin: Float64Array };
@@ -120,7 +112,7 @@ export interface Jobs {
     output: BoundArrays | undefined;
   };
   lattice: {
-    /** `cells`: along the longest side of the cage; by default those of the lattice that deforms clips. */
+    /** `cells`: lattice cells along the cage's longest side; undefined for the lattice of splats and clips. */
     input: { cage: CageArrays; cells?: number | undefined; options: BindOptions };
     step: Progress;
     output: BoundArrays;
@@ -138,7 +130,7 @@ export interface Jobs {
     output: CheckedCage;
   };
   read: {
-    /** `used`: pixels of the textures of other models that are drawn together with this one. */
+    /** `used`: number of texture pixels of the other models that are drawn together with this one. */
     input: { files: readonly NamedFile[]; up: UpAxis | undefined; used: number };
     step: Reading;
     output: ReadModel;
@@ -167,15 +159,16 @@ export interface Jobs {
     step: never;
     output: Float32Array;
   };
-  /** Prepares pulls of a model, and discards what was prepared before. */
+  /** Prepares pulls of a model. Replaces the model of the previous `pullOpen`. */
   pullOpen: {
     input: { positions: Float32Array; triangles: Uint32Array; cage: CageArrays };
     step: never;
     output: null;
   };
-  pullGrab: { input: GrabInput; step: never; output: Grabbed };
+  pullGrab: { input: GrabInput; step: never; output: GrabResult };
   pullFrame: { input: { to: Float32Array }; step: never; output: PullFrame };
-  sample: { input: { id: string }; step: never; output: SampleArrays };
+  /** Builds a sample. `name`: file name of its model, with the extension .glb. */
+  sample: { input: { id: string; name: string }; step: never; output: SampleArrays };
 }
 
 export type JobKind = keyof Jobs;
@@ -192,3 +185,16 @@ export type FromWorker =
   | { readonly kind: "step"; readonly id: number; readonly step: Step }
   | { readonly kind: "done"; readonly id: number; readonly output: unknown }
   | { readonly kind: "failed"; readonly id: number; readonly name: string; readonly message: string };
+
+/** Buffers of all typed arrays in a message, without duplicates, to be transferred instead of copied. */
+export function buffers(value: unknown): ArrayBuffer[] {
+  const found = new Set<ArrayBuffer>();
+  const look = (value: unknown): void => {
+    if (ArrayBuffer.isView(value)) {
+      if (value.buffer instanceof ArrayBuffer) found.add(value.buffer);
+    } else if (value instanceof Map) for (const item of value.values()) look(item);
+    else if (typeof value === "object" && value !== null) for (const item of Object.values(value)) look(item);
+  };
+  look(value);
+  return [...found];
+}

@@ -17,7 +17,7 @@ export interface OpenedOn {
   readonly artifact: Artifact;
   readonly module: WebAssembly.Module;
   readonly canvas: HTMLCanvasElement;
-  /** Name of the GPU. */
+  /** Name of the GPU; "WebGL2" without WebGPU. */
   readonly adapter: string;
   /** Why WebGL2 is used; null with WebGPU. */
   readonly lack: Lack | null;

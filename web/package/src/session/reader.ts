@@ -1,12 +1,11 @@
-/** The page's part of opening a file. A worker reads the file first; the page reads it only if the worker succeeded. */
+/** The page's part of opening a file: a worker reads it, and the page restores the model from the worker's arrays. */
 
 import type { Job, Reading } from "../contract";
 import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Client, named } from "./client";
-import { read as readBytes, siblingOf, tooLarge, toWasm } from "./files";
+import { tooLarge } from "./files";
 import type { Jobs, ReadModel } from "./messages";
-import { furtherOf } from "./reading";
 
 export type Hear = ((progress: Reading) => void) | undefined;
 
@@ -76,34 +75,18 @@ export function createApart(open: () => Client): Apart {
   return Object.assign(apart, { share });
 }
 
-/** Longest time for which reading blocks the main thread without a pause, ms. */
-const HELD = 30;
-
-/** Time of the last pause, ms. */
-let paused = 0;
-
-/** Lets pending events and frames run, unless the last pause was less than `HELD` ms ago. */
-async function pause(): Promise<void> {
-  if (performance.now() - paused < HELD) return;
-  await new Promise((resolve) => setTimeout(resolve));
-  paused = performance.now();
-}
-
 /**
- * Reads on this thread a file that a worker has already read. Returns its model, then the other models of a project.
+ * Restores the models that a worker has read: the first, then the others of a project. Removes the models' arrays from
+ * `read`, so that their memory can be freed.
  */
-export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
-  const bytes = await toWasm(pkg, read.name, read.content);
-  const loaded = pkg.Loaded.read(read.name, bytes, siblingOf(read.siblings));
-  if (read.packed) loaded.setPacked(await readBytes(read.name, read.packed));
-  if (read.up) loaded.setUp(read.up);
-  await pause();
-  loaded.prepare(read.used);
-  const all: [Loaded, ...Loaded[]] = [loaded, ...furtherOf(loaded)];
-  all.forEach((one, number) => {
+export function load(pkg: Package, read: ReadModel): [Loaded, ...Loaded[]] {
+  const [first, ...others] = read.models.splice(0).map((arrays, number) => {
+    const loaded = pkg.Loaded.restore(arrays);
     read.textures[number]?.forEach((texture, k) => {
-      if (texture) one.setTexture(k, texture.width, texture.height, texture.rgba);
+      if (texture) loaded.setTexture(k, texture.width, texture.height, texture.rgba);
     });
+    return loaded;
   });
-  return all;
+  if (!first) throw new Error("a file that was read can be opened once");
+  return [first, ...others];
 }

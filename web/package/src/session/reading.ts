@@ -1,9 +1,9 @@
-/** The worker's part of opening a file. If a file crashes the reader or never ends, the page is not affected. */
+/** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
 import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
-import type { Loaded, Polygons } from "../pkg/cagework";
+import type { BuiltSample, Loaded, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
-import { type Bytes, read as readBytes, readFiles, siblingOf, toWasm } from "./files";
+import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
 import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
@@ -18,12 +18,15 @@ export async function readModel(
   { files, up, used }: Jobs["read"]["input"],
   tell: Tell,
 ): Promise<ReadModel> {
-  const { loaded, file } = await read(pkg, files, tell);
-  const began = performance.now();
+  const loaded = await read(pkg, files, tell);
   if (up) loaded.setUp(up);
+  return packed(pkg, loaded, used, tell);
+}
+
+/** Prepares all models of a file for drawing, copies them to arrays, and checks the cage of a project. */
+async function packed(pkg: Package, loaded: Loaded, used: number, tell: Tell): Promise<ReadModel> {
   loaded.prepare(used);
   const all = [loaded, ...furtherOf(loaded)];
-  const took = file.took + performance.now() - began;
   const decoded = [];
   for (const one of all) {
     decoded.push(await decodeTextures(one, (share) => say(tell, "textures", share)));
@@ -34,24 +37,30 @@ export async function readModel(
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
   say(tell, "check");
   const mesh = loaded.cage;
-  const positions = all.map((one) => one.positions);
+  const positions = all.map((one) => one.checkedPositions);
   const vertices = positions.reduce((sum, { length }) => sum + length / 3, 0);
   const cage = mesh && checked(pkg, mesh, flat(positions));
   return {
-    ...file,
-    up,
-    used,
+    models: all.map((one) => one.store()),
     pixels: drawn.reduce((sum, pixels) => sum + pixels, 0),
     textures: decoded.map(({ textures }) => textures),
     cage,
     notices: failed > 0 ? [notice] : [],
-    took,
     vertices,
   };
 }
 
-/** Takes all models after the first out of an opened project. */
-export function furtherOf(loaded: Loaded): Loaded[] {
+/** Reads a sample's file together with its cage. */
+export async function readSample(pkg: Package, name: string, sample: BuiltSample): Promise<ReadModel> {
+  const bytes = new pkg.FileBytes(0);
+  bytes.push(sample.glb);
+  const loaded = pkg.Loaded.read(name, bytes, () => undefined);
+  const cage = checked(pkg, sample.cage, sample.positions);
+  return { ...(await packed(pkg, loaded, 0, () => undefined)), cage };
+}
+
+/** Takes all models after `loaded`, the first one, out of an opened project. */
+function furtherOf(loaded: Loaded): Loaded[] {
   const next = loaded.takeNext();
   return next ? [next, ...furtherOf(loaded)] : [];
 }
@@ -73,7 +82,7 @@ export async function readCage(
   { files, up, origin, model, smooth }: Jobs["readCage"]["input"],
   tell: Tell,
 ): Promise<CheckedCage> {
-  const { loaded } = await read(pkg, files, tell);
+  const loaded = await read(pkg, files, tell);
   loaded.seeFrom(origin);
   loaded.setUp(up);
   say(tell, "check");
@@ -108,30 +117,24 @@ export function polygons(mesh: Polygons): CageArrays {
   return { positions, corners, controls };
 }
 
-export async function read(
-  pkg: Package,
-  files: Jobs["read"]["input"]["files"],
-  tell: Tell,
-): Promise<{ loaded: Loaded; file: Bytes & { took: number } }> {
+export async function read(pkg: Package, files: Jobs["read"]["input"]["files"], tell: Tell): Promise<Loaded> {
   say(tell, "bytes");
-  const file = await readFiles(files);
-  const sibling = siblingOf(file.siblings);
-  const timed = async (content: Blob) => {
-    const bytes = await toWasm(pkg, file.name, content, (share) => say(tell, "bytes", share));
+  const { name, content, siblings } = await readFiles(files);
+  const sibling = siblingOf(siblings);
+  const load = async (content: Blob) => {
+    const bytes = await toWasm(pkg, name, content, (share) => say(tell, "bytes", share));
     say(tell, "geometry");
-    const began = performance.now();
-    const loaded = pkg.Loaded.read(file.name, bytes, sibling);
-    return { loaded, file: { ...file, content, took: performance.now() - began } };
+    return pkg.Loaded.read(name, bytes, sibling);
   };
   try {
-    return await timed(file.content);
+    return await load(content);
   } catch (error) {
     if (!(error instanceof Error) || error.name !== "Compressed") throw error;
     say(tell, "decompress");
     const { decompress } = await loadPart(import("../decode"));
-    const packed = await readBytes(file.name, file.content);
-    const plain = await decompress(file.name, packed, sibling);
-    const { loaded, file: decompressed } = await timed(new Blob([plain as BlobPart]));
-    return { loaded, file: { ...decompressed, packed: file.content } };
+    const file = await readBytes(name, content);
+    const loaded = await load(new Blob([(await decompress(name, file, sibling)) as BlobPart]));
+    loaded.setPacked(file);
+    return loaded;
   }
 }

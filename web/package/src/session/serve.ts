@@ -1,13 +1,21 @@
-/** Code of the worker, which runs long jobs in sequence. */
+/** Code of the workers. A worker runs the page's jobs one after the other. */
 
 import type { Progress } from "../contract";
 import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { named } from "./client";
-import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
-import { check, checked, read, readCage, readModel } from "./reading";
+import {
+  type BoundArrays,
+  buffers,
+  type FromWorker,
+  type JobKind,
+  type Jobs,
+  type Step,
+  type ToWorker,
+} from "./messages";
+import { check, checked, read, readCage, readModel, readSample } from "./reading";
 
-/** Shortest time between two progress messages of a stage, ms. The page draws about as often. */
+/** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
 
 type Send = (message: FromWorker, transfer?: Transferable[]) => void;
@@ -52,7 +60,10 @@ async function answer(work: Work, id: number, job: JobKind, input: unknown): Pro
   }
 }
 
-/** Returns a function that sends progress messages at intervals. It returns false once the job is cancelled. */
+/**
+ * Returns a function that sends progress messages at intervals of at least `STEP_PAUSE`, or when the stage changes. The
+ * function returns false once the job is cancelled.
+ */
 function steps(id: number): (step: Step) => boolean {
   let last = Number.NEGATIVE_INFINITY;
   let stage: string | undefined;
@@ -76,7 +87,7 @@ type Work = {
 
 function createWork(pkg: Package): Work {
   let shared: Binder | undefined;
-  /** Weights of the last bind that have not all been fetched. */
+  /** Weights of the last `bindKept`, until the job `rows` has fetched all of them. */
   let kept: Bound | undefined;
   let keptKey = 0;
   let puller: Puller | undefined;
@@ -84,17 +95,15 @@ function createWork(pkg: Package): Work {
     if (!puller) throw new Error("no model is ready to be pulled: bind it again");
     return puller;
   };
-  const binder = async (needsGpu: boolean): Promise<Binder> => {
+  const binder = (): Binder => {
     shared ??= new pkg.Binder();
-    if (needsGpu) await shared.openGpu();
     return shared;
   };
   const bind = async (
     { positions, extra, cage, options }: Jobs["bind"]["input"],
     step: (step: Progress) => boolean,
   ): Promise<Bound> => {
-    const by = await binder(options.backend === "gpu");
-    return by.bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step);
+    return binder().bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step);
   };
   return {
     bind: async (input, step) => taken(await bind(input, step)),
@@ -117,11 +126,10 @@ function createWork(pkg: Package): Work {
       return rows;
     },
     async formula({ kind, positions, cage }) {
-      const by = await binder(false);
-      return taken(by.bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
+      return taken(binder().bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
     },
     async model({ files, states, clip }, step) {
-      const { loaded } = await read(pkg, files, step);
+      const loaded = await read(pkg, files, step);
       try {
         const [positions, triangles] = states ? loaded.states(clip) : [loaded.positions, loaded.triangles];
         return { positions, triangles, origin: loaded.origin };
@@ -130,29 +138,26 @@ function createWork(pkg: Package): Work {
       }
     },
     async reshape({ files, origin, cage, posed, options, rig }, step) {
-      const { loaded } = await read(pkg, files, step);
+      const loaded = await read(pkg, files, step);
       try {
         loaded.seeFrom(origin);
-        const by = await binder(options.backend === "gpu");
         const { positions, corners, controls } = cage;
-        return await by.reshape(loaded, positions, corners, controls, posed, options, rig, step);
+        return await binder().reshape(loaded, positions, corners, controls, posed, options, rig, step);
       } finally {
         loaded.free();
       }
     },
     async slice({ cage, axis, fraction, options }, step) {
-      const by = await binder(options.backend === "gpu");
       const { positions, corners, controls } = cage;
-      const bound = await by.bindSlice(positions, corners, controls, axis, fraction, options, step);
+      const bound = await binder().bindSlice(positions, corners, controls, axis, fraction, options, step);
       return bound && taken(bound);
     },
     async lattice({ cage, cells, options }, step) {
-      const by = await binder(options.backend === "gpu");
       const { positions, corners, controls } = cage;
-      return taken(await by.bindLattice(positions, corners, controls, cells, options, step));
+      return taken(await binder().bindLattice(positions, corners, controls, cells, options, step));
     },
     async cage({ positions, triangles, model, options, smooth }, step) {
-      const cage = (await binder(false)).generateCage(positions, triangles, options, smooth, step);
+      const cage = binder().generateCage(positions, triangles, options, smooth, step);
       const { bridged, notices } = cage;
       return { ...checked(pkg, cage, model, smooth), bridged, notices };
     },
@@ -185,11 +190,10 @@ function createWork(pkg: Package): Work {
       const by = opened();
       return { cage: by.frame(to), settled: by.settled, error: by.error };
     },
-    async sample({ id }) {
+    async sample({ id, name }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
-      const { glb, grip } = sample;
-      const output = { glb, cage: checked(pkg, sample.cage, sample.positions), poses, grip };
+      const output = { read: await readSample(pkg, name, sample), poses, grip: sample.grip };
       sample.free();
       return output;
     },
@@ -201,17 +205,4 @@ function taken(bound: Bound): BoundArrays {
   const { indptr, indices, data, offsets, report } = bound;
   bound.free();
   return { indptr, indices, data, offsets, report };
-}
-
-/** Buffers of all typed arrays in a result, without duplicates, to be transferred instead of copied. */
-function buffers(value: unknown): ArrayBuffer[] {
-  const found = new Set<ArrayBuffer>();
-  const look = (value: unknown): void => {
-    if (ArrayBuffer.isView(value)) {
-      if (value.buffer instanceof ArrayBuffer) found.add(value.buffer);
-    } else if (value instanceof Map) for (const item of value.values()) look(item);
-    else if (typeof value === "object" && value !== null) for (const item of Object.values(value)) look(item);
-  };
-  look(value);
-  return [...found];
 }

@@ -7,16 +7,7 @@ interface Spot {
   y: number;
 }
 
-export interface Touch {
-  /** `down`, `move` and `up` return true if the touch is part of a two-finger gesture: the caller then ignores it. */
-  down(id: number, at: Spot): boolean;
-  move(id: number, at: Spot): boolean;
-  up(id: number): boolean;
-  /** Treats all fingers as lifted. */
-  clear(): void;
-}
-
-export function createTouch(options: { engine: () => Engine; interrupt: () => void }): Touch {
+export function createTouch(options: { engine: () => Engine; interrupt: () => void }) {
   const fingers = new Map<number, Spot>();
   /**
    * True from the second finger's touch until all fingers are lifted, so that the last finger does not drag anything.
@@ -24,14 +15,15 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
   let navigating = false;
 
   return {
-    down(id, at) {
+    /** `down`, `move` and `up` return true if the touch is part of a two-finger gesture: the caller then ignores it. */
+    down(id: number, at: Spot): boolean {
       fingers.set(id, at);
       if (fingers.size < 2) return navigating;
       if (!navigating) options.interrupt();
       navigating = true;
       return true;
     },
-    move(id, at) {
+    move(id: number, at: Spot): boolean {
       const before = [...fingers.values()];
       if (!fingers.has(id)) return navigating;
       fingers.set(id, at);
@@ -44,18 +36,21 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
       }
       return true;
     },
-    up(id) {
+    up(id: number): boolean {
       fingers.delete(id);
       const was = navigating;
       if (fingers.size === 0) navigating = false;
       return was;
     },
+    /** Treats all fingers as lifted. */
     clear() {
       fingers.clear();
       navigating = false;
     },
   };
 }
+
+export type Touch = ReturnType<typeof createTouch>;
 
 /**
  * Change between two positions of two fingers: translation of their midpoint, its new position, and zoom factor.

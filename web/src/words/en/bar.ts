@@ -1,4 +1,4 @@
-/** Sentences of the step bar and of the buttons at the foot of each panel. */
+/** Text of the step bar, and of the buttons at the foot of each panel. */
 
 export const bar = {
   steps: "Steps",
@@ -32,7 +32,7 @@ export const panel = {
   newCage: "Make a new cage",
 };
 
-/** Sentences about the tour that appear outside its card. Those of the card are in tour.ts. */
+/** Text about the tour outside its card; the text of the card is in tour.ts. */
 export const tour = {
   begin: "Take the tour",
   copied: "Link copied. It opens the tour at this stop.",

@@ -1,4 +1,4 @@
-/** Sentences of step Bind and of its report. */
+/** Text of step Bind and of its report. */
 
 import { bytes, duration, plural, scientific } from "../../format";
 
@@ -51,7 +51,7 @@ export const bind = {
   outsideTips: {
     extend: "Vertices near the cage follow it, those farther away less and less",
     stay: "They stay in place",
-    refuse: "The bind fails if there are any",
+    refuse: "The bind fails if any vertex is outside",
   },
   stages: {
     simplify: "Making a cage",

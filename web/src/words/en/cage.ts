@@ -1,4 +1,4 @@
-/** Sentences of step Cage. */
+/** Text of step Cage. */
 
 import { count, endings, plural } from "../../format";
 
@@ -28,7 +28,7 @@ export const cage = {
   asVertices: "as the vertices allow",
   from: (share: string) => `from ${share} of the model's size`,
   symmetry: "Symmetric left and right",
-  symmetries: { auto: "If the model is", on: "Yes", off: "No" },
+  symmetries: { auto: "If the model is", x: "Yes", none: "No" },
   around: "Enclose",
   aroundRest: "The model at rest and its morph targets",
   perPart: "A cage for each part",
@@ -96,7 +96,8 @@ export const cage = {
   edges: "Edges",
   faces: "Faces",
   posesWait: "The pose and the saved poses belong to the previous cage and return with it.",
-  bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
+  bridged: (parts: number, models: number) =>
+    `${models > 1 ? "The models have" : "The model has"} ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>
     `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices, move Closeness to the right.`,
   sparsest: (share: string) =>

@@ -1,4 +1,4 @@
-/** Sentences about clips, morph targets and skeletons of rigged models. */
+/** Text about clips, morph targets and skeletons of rigged models. */
 
 import { plural } from "../../format";
 
@@ -7,7 +7,8 @@ export const clips = {
   clip: "Clip",
   rest: "None: pose with the cage",
   named: (name: string, length: string) => `${name}, ${length}`,
-  posing: "While a clip is shown, dragging turns the view. To pose the model, choose None.",
+  playing: "Pause the clip to pose it with the cage.",
+  paused: "Drag a handle of the cage. The pose applies to the whole clip; the view shows this frame.",
   play: "Play the clip",
   pause: "Pause the clip",
   time: "Time",
@@ -27,6 +28,10 @@ export const clips = {
     "For a cage that poses the model, for example raises an arm: joints turn too, and rotations in clips are adapted.",
   travel: "Keep travel distance",
   travelSentence: "Off: longer legs walk farther.",
+  ground: "Stand on the same ground",
+  groundSentence: "The lowest point keeps its height, at rest and in each clip.",
+  feet: "Hold planted feet",
+  feetSentence: "In clips, thighs and shins turn so that feet on the ground do not slide.",
   keep: "Keep skeleton, morph targets and clips",
   keepSentence: (joints: number, targets: number, clips: number) =>
     [

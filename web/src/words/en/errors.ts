@@ -3,7 +3,7 @@
 export const fixes = {
   coarser: "Use a coarser grid",
   cpu: "Use the processor",
-  fewer: "Make a cage of fewer vertices",
+  fewer: "Make a cage with fewer vertices",
   file: "Choose another file",
   add: "Add another file",
   regenerate: "Make a new cage",
@@ -33,6 +33,7 @@ export const failed = {
   turn: "The model could not be turned",
   link: "This link is damaged",
   tour: "The tour could not start",
+  sheet: "The shortcuts could not be shown",
 };
 
 export const offline = {
@@ -41,7 +42,7 @@ export const offline = {
   reload: "Reload for the new version",
 };
 
-/** Faults of a share link. */
+/** Messages about faults of a share link. */
 export const link = {
   noSample: "It does not say which sample it shows.",
   long: (most: number) => `It is longer than ${most} characters.`,
@@ -49,8 +50,10 @@ export const link = {
     pose: "Its pose cannot be read.",
     view: "Its view cannot be read.",
     controls: "Its controls cannot be read.",
+    clip: "Its clip cannot be read.",
   },
   unknown: (sample: string) => `There is no sample called "${sample}" here.`,
+  noClip: (clip: number) => `The sample has no clip ${clip}.`,
 };
 
 export const lost = {

@@ -1,4 +1,4 @@
-/** Sentences of step Export. */
+/** Text of step Export. */
 
 import { bytes, list, plural } from "../../format";
 
@@ -6,10 +6,7 @@ export const exports = {
   title: "Export",
   sentence: "Files for Blender, Unity, Unreal, three.js, Python and this page.",
   items: {
-    glb: [
-      "Posed model",
-      "GLB of the model in this pose. Keeps its parts, materials, textures, skeleton and clips.",
-    ],
+    glb: ["Posed model", "GLB of the model in this pose, with its parts, materials and textures."],
     shape: [
       "Shape only",
       "The shape alone, without skeleton and clips, for printing, measuring or other programs.",
@@ -18,12 +15,18 @@ export const exports = {
       "Poses as morph targets",
       "GLB with one morph target per saved pose and an animation that plays them.",
     ],
+    clips: [
+      "Clips in other files",
+      "Choose GLB files of clips without a mesh. They are fitted to this skeleton and downloaded.",
+    ],
     cage: ["Cage", "OBJ of the cage in this pose, for any modelling program."],
     controls: ["Controls inside", "OBJ of points (p), bones (l) and sheets (f) in this pose."],
     weights: ["Weights", "NPZ for scipy.sparse.load_npz: one row per vertex of your file."],
     picture: ["Picture", "PNG of the view."],
     project: ["Project", "Model, cage, poses and settings in one GLB that Cagework opens again."],
   },
+  splats: ["Splats as PLY, SPLAT or SPZ", "The splats as you see them, for viewers and editors of captures."],
+  points: ["Points as PLY, OBJ or OFF", "The points as you see them."],
   bindFirst: "Bind the model first.",
   cageFirst: "Make a cage first.",
   poseFirst: "Save a pose first, in step Pose.",
@@ -32,6 +35,20 @@ export const exports = {
   format: "Format of the shape",
   size: "Size of the picture",
   sizes: ["As shown", "Twice", "Four times"],
+  fileSize: "Size of the GLB",
+  fileSizes: {
+    plain: ["Plain", ""],
+    small: [
+      "Smaller",
+      "Normals, texture coordinates and weights as integers. Opens in Blender, Unity and three.js.",
+    ],
+    smallest: [
+      "Smallest",
+      "Also rounds positions to 16 bits and compresses by meshopt, for three.js and Babylon.js. Blender cannot open it.",
+    ],
+  },
+  expressions: "Expressions of the VRM",
+  expressionsSentence: "Each pose becomes an expression of the same name. No animation is written.",
   alone: "Model only",
   aloneSentence: "Without cage and floor, on a transparent background.",
   which: "Which model",

@@ -1,4 +1,4 @@
-/** Every sentence of the page in English, one file per panel. */
+/** All text of the page in English, one file per panel. */
 
 import { bar, panel, tour } from "./bar";
 import { bind, report } from "./bind";
@@ -10,8 +10,7 @@ import { model, opening, samples } from "./model";
 import { models } from "./models";
 import { did, gesture, pose, pull } from "./pose";
 import { legend, see } from "./see";
-import { sheet } from "./sheet";
-import { eta, hints, status, toast, view } from "./view";
+import { eta, hints, keys, status, toast, view } from "./view";
 import { without } from "./without";
 import { works } from "./works";
 
@@ -55,7 +54,7 @@ const words = {
   hints,
   toast,
   eta,
-  sheet,
+  keys,
   tour,
 };
 
@@ -65,4 +64,8 @@ export const EN = {
   words,
   /** Downloads the sentences of the tour. They are needed only if the tour is started. */
   tourWords: async () => (await import("./tour")).tourWords,
+  /** Downloads the sentences of the shortcut sheet. */
+  sheetWords: async () => (await import("./sheet")).sheetWords,
+  /** Downloads the sentences of the gallery. */
+  galleryWords: async () => (await import("./gallery")).galleryWords,
 };

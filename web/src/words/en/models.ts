@@ -1,4 +1,4 @@
-/** Sentences about the models that share the cage. */
+/** Text about the models that share the cage. */
 
 import { plural } from "../../format";
 
@@ -29,7 +29,7 @@ export const models = {
   whole: "Whole model",
   kinds: { material: "Materials", node: "Nodes", joint: "Joints", group: "Groups" } as Record<string, string>,
   paint: "Paint fixed areas",
-  paintSentence: "Drag over the model: grey areas stay as they are. Drag the background to turn the view.",
+  paintSentence: "Drag over the model: blue areas stay as they are. Drag the background to turn the view.",
   size: "Size of the brush",
   brush: "Painted areas",
   brushes: { paint: "Stay", erase: "Follow again" },

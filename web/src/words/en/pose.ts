@@ -1,4 +1,4 @@
-/** Sentences of step Pose and about pulling, and labels of undo steps. */
+/** Text of step Pose and of pulling, and labels of undo steps. */
 
 import { plural } from "../../format";
 
@@ -43,7 +43,7 @@ export const pose = {
   showTip: (name: string, undo: string) => `Show ${name}; ${undo} returns to the current pose`,
   delete: (name: string) => `Delete ${name}`,
   duplicate: (name: string) => `Duplicate ${name}`,
-  update: "Update this pose",
+  update: "Update",
   updateOf: (name: string) => `Update ${name} to what you see`,
   move: (name: string) => `Move ${name}`,
   moveTip: "Drag, or press Alt with an arrow key, to change the order",

@@ -1,6 +1,6 @@
-/** Sentences of the See panel and of legends. */
+/** Text of the See panel and of legends. */
 
-import { count, scientific } from "../../format";
+import { count, plural, scientific } from "../../format";
 
 export const see = {
   title: "See",
@@ -35,6 +35,11 @@ export const see = {
     floor: ["Floor", ""],
     problems: ["Faults of the cage", ""],
   },
+  floaters: (n: number) =>
+    [
+      `${plural(n, "splat")} outside the cage`,
+      "They follow the cage less the farther away they are.",
+    ] as const,
   parallel: "Parallel projection",
 };
 

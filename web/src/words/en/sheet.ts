@@ -1,4 +1,4 @@
-/** Sentences of the shortcut sheet. */
+/** Text of the shortcut sheet, downloaded when the sheet is first opened. */
 
 import type { Command } from "../../input/shortcuts";
 
@@ -40,7 +40,7 @@ const commands: { readonly [command in Command]?: string } = {
   toggleWire: "The model at rest, as wireframe",
   heatMap: "Weight of the selected handle",
   see: "The See panel",
-  tour: "The tour, ten stops",
+  tour: "The tour, eleven stops",
   nextStop: "Next or previous stop of the tour",
   restMode: "Reshape the cage, or pose",
   split: "Split an edge",
@@ -57,7 +57,7 @@ const commands: { readonly [command in Command]?: string } = {
   sheet: "This sheet",
 };
 
-export const sheet = {
+export const sheetWords = {
   title: "Keyboard shortcuts",
   all: "All shortcuts",
   or: "or",
@@ -71,20 +71,6 @@ export const sheet = {
     file: "File",
   },
   commands,
-  keys: {
-    mod: "Ctrl",
-    shift: "Shift",
-    alt: "Alt",
-    " ": "Space",
-    escape: "Esc",
-    enter: "Enter",
-    tab: "Tab",
-    home: "Home",
-    delete: "Del",
-    backspace: "Backspace",
-    pagedown: "PgDn",
-    pageup: "PgUp",
-  },
   pointer: "Mouse and fingers",
   pointers: [
     ["Drag a handle", "Move it in the plane of the view"],

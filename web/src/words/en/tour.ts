@@ -1,4 +1,4 @@
-/** Sentences of the tour, which are downloaded when it starts. */
+/** Text of the tour, downloaded when the tour starts. */
 
 import type { BindReport } from "../../contract";
 import { count, duration, scientific } from "../../format";
@@ -28,6 +28,8 @@ export const tourWords = {
   iterations: (name: string, n: number) => `${name}: ${count(n)}`,
   again: "Measure again",
   bone: "Put a bone into the lower jaw",
+  pointAt: "Point at the cow, or tap it.",
+  ellipses: ["Splat at rest", "A sphere after the deformation", "Splat in this pose"],
   stops: {
     cage: {
       title: "What a cage does",
@@ -94,6 +96,12 @@ export const tourWords = {
       claim: () =>
         "Where it bends, a cage of flat faces leaves its edges on the model. A smooth subdivision surface with the same handles does not. A bone inside adds a handle in the middle of the model.",
       task: "choose 2 steps and watch the bend, then put the bone in and pull it down.",
+    },
+    splat: {
+      title: "What a splat is",
+      claim: () =>
+        "This cow has no triangles: 10,000 splats, soft ellipsoids with a colour, show it. The cage deforms the space around each splat. Nearby, that is a stretch and a rotation, which turn a small sphere into an ellipsoid and a splat into another splat.",
+      task: "pull the head, then point at the neck or tap it.",
     },
   },
 };

@@ -1,4 +1,4 @@
-/** Sentences of the view and of its status line. */
+/** Text of the view and of its status line. */
 
 import { plural } from "../../format";
 
@@ -9,7 +9,7 @@ export const view = {
   looks: "View",
   axes: "Axes",
   cue: "Drag here",
-  /** Positive and negative end of each axis. */
+  /** Labels of the buttons that look along an axis: from its positive end, then from its negative end. */
   from: [
     "From the right (+X)",
     "From the left (−X)",
@@ -50,7 +50,7 @@ export const status = {
     line: "Click each corner of the bone, then Done",
     face: "Click the model to put a sheet there",
   },
-  /** Handles are cage vertices and controls inside. */
+  /** Handles are cage vertices and interior controls. */
   manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
   reshaping: "Reshaping the cage",
   ready: "Ready",
@@ -58,8 +58,11 @@ export const status = {
 };
 
 export const hints = {
-  clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose None.",
-  clipTouch: "A clip is shown: one finger turns, two move and zoom. To pose the model, choose None.",
+  clip: "A clip is playing: drag to turn, scroll to zoom. Pause to pose it with the cage.",
+  clipTouch: "A clip is playing: one finger turns, two move and zoom. Pause to pose it with the cage.",
+  clipPaused: "Drag a handle of the cage to pose the whole clip · drag elsewhere to turn · scroll to zoom",
+  clipPausedTouch:
+    "Drag a handle of the cage to pose the whole clip. Elsewhere, one finger turns, two move and zoom.",
   noCage: "A model needs a cage around it before it can be posed.",
   placing:
     "The control is placed under the pointer, halfway between the model's front and back. Drag to turn the view.",
@@ -86,4 +89,20 @@ export const toast = { close: "Close message" };
 export const eta = {
   second: "about a second left",
   left: (time: string) => `about ${time} left`,
+};
+
+/** Labels of keys. */
+export const keys = {
+  mod: "Ctrl",
+  shift: "Shift",
+  alt: "Alt",
+  " ": "Space",
+  escape: "Esc",
+  enter: "Enter",
+  tab: "Tab",
+  home: "Home",
+  delete: "Del",
+  backspace: "Backspace",
+  pagedown: "PgDn",
+  pageup: "PgUp",
 };

@@ -1,4 +1,4 @@
-/** Sentences for browsers without WebGPU. */
+/** Text for browsers without WebGPU. */
 
 export const without = {
   different:

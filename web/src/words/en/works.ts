@@ -1,4 +1,4 @@
-/** Sentences about work saved in the browser. */
+/** Text about work kept in the browser. */
 
 import { bytes } from "../../format";
 

@@ -9,7 +9,7 @@ use crate::cage::shapes;
 /// Tolerance for f32 rounding of a row of about ten weights.
 const ROUNDING: f64 = 1e-6;
 
-/// Rows of the C-shape's 16 columns.
+/// A row of weights in batches of lanes. Lanes without a weight are 0.
 fn rows_of(weights: &[f32]) -> Vec<Row> {
     weights.chunks(LANES).map(|w| std::array::from_fn(|k| w.get(k).copied().unwrap_or(0.0))).collect()
 }
@@ -23,7 +23,8 @@ proptest! {
     ) {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
         let columns = Columns::new((&cage).into());
-        // Keep corners of the box so that the row spans space.
+        // Always keep five corners that do not lie in one plane, so that a correction can move the sum in every
+        // direction.
         let kept = |i: usize| [0, 1, 6, 7, 8].contains(&i) || !dropped[i];
         let mut exact: Vec<f32> = (0..16).map(|i| if kept(i) { weights[i] } else { 0.0 }).collect();
         let sum: f32 = exact.iter().sum();

@@ -96,8 +96,8 @@ fn surface_follows_its_controls() {
     assert!(posed[posed.len() - 642..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }
 
-/// Balls and tubes at a distance of 2.004 radii (of 0.05) do not overlap, although meshes of equal volume would; at 1.8
-/// radii they overlap.
+/// Balls and tubes do not overlap if their centres or axes are 2.004 radii apart, although their meshes of equal volume
+/// would. At 1.8 radii they overlap.
 #[test]
 fn elements_that_nearly_touch_are_accepted() {
     use InnerElement::{Line, Point};

@@ -2,11 +2,12 @@
 
 use crate::solve::stop::{ROUND_OFF, SolveReport, StopRule};
 
-/// Upper bound on the contraction of a V-cycle: 0.03 to 0.10 measured on the Armadillo and on boxes.
+/// Smallest contraction of a V-cycle that error estimates assume, slightly above the 0.03 to 0.10 measured on the
+/// Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
 
 /// Below [`ROUND_OFF`], a cycle makes no progress if its correction exceeds this multiple of the previous correction.
-/// What remains is rounding noise, and tau may be unreachable.
+/// The remaining changes are rounding noise, and the tolerance may be unreachable.
 const MAX_CORRECTION_RATIO: f64 = 0.5;
 
 /// Contraction above which plain cycles are slower than conjugate gradients preconditioned by cycles.
@@ -18,8 +19,8 @@ const CYCLES_TO_JUDGE: usize = 4;
 /// Upper bound on the contraction with which the remaining error is extrapolated.
 const CONTRACTION_BOUND: f64 = 0.99;
 
-/// Number of consecutive cycles without progress (see [`MAX_CORRECTION_RATIO`]) that end the solve. A single one may be
-/// chance.
+/// Number of consecutive cycles without progress (see [`MAX_CORRECTION_RATIO`]) that end the solve. A single such cycle
+/// may occur by chance.
 const MAX_STALLED_CYCLES: u32 = 2;
 
 /// Convergence history of a batch.
@@ -36,7 +37,7 @@ pub struct Convergence {
 }
 
 impl Convergence {
-    /// State before the first cycle.
+    /// Starts the history of a batch, before its first cycle.
     #[must_use]
     pub fn new(rule: StopRule) -> Self {
         let report = SolveReport::default();
@@ -86,7 +87,7 @@ impl Convergence {
         self.report.latest()
     }
 
-    /// The report.
+    /// Ends the history and returns the report, with `stalled` set if conjugate gradients should continue the solve.
     #[must_use]
     pub fn into_report(self) -> SolveReport {
         SolveReport { stalled: self.stalls(), ..self.report }
@@ -119,7 +120,7 @@ mod tests {
             assert_eq!(convergence.stalls(), stalls);
             let left = 1e-2 * f64::powi(contraction, 4) / (1.0 - contraction);
             let delta = convergence.latest().1;
-            // The estimate assumes one more cycle at the usual contraction of 0.12.
+            // The estimate is the sum of the remaining corrections, times 1 - 0.12 = 0.88 (`CONTRACTION`).
             assert!(contraction > 1.0 || (0.88 * left - delta).abs() < 1e-9, "{delta}, not {left}");
         }
     }

@@ -25,9 +25,9 @@ pub(super) enum Pass {
     Black,
     /// Over-relaxation of black cells by [`OMEGA`].
     BlackFurther,
-    /// [`Pass::Red`] on a zero field, whose stored values are ignored.
+    /// As [`Pass::Red`], with zeros for all cells instead of their stored values.
     RedFromZero,
-    /// [`Pass::BlackFurther`] with zero black cells, whose stored values are ignored.
+    /// As [`Pass::BlackFurther`], with zeros for the black cells instead of their stored values.
     BlackFurtherFromZero,
     /// Residual of the red cells. The residual of black cells is zero after [`Pass::Black`].
     Residual,
@@ -47,7 +47,7 @@ pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
 /// Passes on the finest level between two coarse corrections. The residual after the last pass is injected.
 pub(super) const BETWEEN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
-/// [`BETWEEN`] with one sweep less, before a short last cycle.
+/// [`BETWEEN`] with one sweep fewer, before a short last cycle.
 pub(super) const BETWEEN_SHORT: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];

@@ -64,7 +64,7 @@ fn sweeps_from_zero_match_sweeps_of_zeros() {
     on_two_levels(|_, level, _| {
         let (_, dense) = rhs(level);
         let mut expected = vec![ZERO; level.n_rows()];
-        // Stored values must not matter, except for the two zero rows.
+        // The kernel must ignore stored values, except in the two zero rows.
         let mut u = some_field(level, 1);
         for plane in 0..level.grid.dims[2] as usize {
             relax_plane(level, 0, plane, &mut expected, Rhs::Dense(&dense));

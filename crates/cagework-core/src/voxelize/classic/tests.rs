@@ -1,5 +1,5 @@
-//! Tests kinds of cells against formulas, and values against a test of every cell with every triangle (Algorithm 1 of
-//! the paper).
+//! Tests kinds of cells against formulas, and values against a test of every cell with every triangle (K. Smith,
+//! Algorithm 1).
 
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
@@ -28,8 +28,9 @@ fn center(cells: &ClassicCells, cell: usize) -> DVec3 {
     cells.origin + at.as_dvec3() * cells.cell_size
 }
 
-/// Asserts that values sum to 1, that no exterior cell is inside, and that interior cells are inside, except (with
-/// `pockets`) those that boundary cells separate from the outside.
+/// Asserts that the values of each boundary cell sum to 1, that the centres of exterior cells are outside the cage and,
+/// unless `pockets`, that those of interior cells are inside. Pockets are cells outside the cage that boundary cells
+/// separate from the exterior; they count as interior.
 fn assert_sound(cage: &Cage, cells: &ClassicCells, pockets: bool) {
     let boundary: Vec<u32> =
         (0u32..).zip(&cells.kinds).filter(|(_, k)| **k == CellKind::Boundary).map(|(c, _)| c).collect();
@@ -69,7 +70,7 @@ fn box_cells_are_equally_many_and_cubic_cells_equally_long_per_axis() {
     let long = shapes::cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 1.0));
     let (_, cells) = voxelized(&long, 16, CellShape::Box);
     assert_eq!(cells.dims, [16; 3]);
-    // The cage's box is 16 cells minus the padding of 1/500 cell long.
+    // The cage's box is as long as 16 cells minus the padding, which is 1/500 cell.
     assert!((cells.cell_size * (16.0 - 2.0 * PADDING) - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-12);
     let (cage, cells) = voxelized(&long, 16, CellShape::Cubic);
     assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells plus padding");
@@ -89,7 +90,7 @@ fn l_shape_has_the_kinds_of_its_outline() {
 
 #[test]
 fn all_eight_corners_of_an_octahedron_are_exterior() {
-    // The corners are not connected: flooding from cell (0, 0, 0) alone, as in the paper, misses seven of them.
+    // The corners are not connected: flooding from cell (0, 0, 0) alone would miss seven of them.
     let (cage, cells) = voxelized(&shapes::octahedron(), 21, CellShape::Box);
     for corner in 0..8usize {
         let at = |axis: usize| (corner >> axis & 1) * 20;
@@ -100,7 +101,7 @@ fn all_eight_corners_of_an_octahedron_are_exterior() {
 
 #[test]
 fn cavity_is_enclosed_and_counts_as_interior() {
-    // As published: cells that the exterior's flood does not reach are interior.
+    // As in K. Smith's paper, cells that the flood of the exterior does not reach are interior.
     let hollow = shapes::together(&shapes::cube(), &shapes::cuboid(Vec3::splat(0.3), Vec3::splat(0.7)));
     let (_, cells) = voxelized(&hollow, 21, CellShape::Box);
     assert_eq!(count(&cells, CellKind::Exterior), 0);

@@ -28,7 +28,7 @@ fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     let triangles = || (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t));
     for cell in grid.cells().step_by(every) {
         let winding = winding_number(grid.center(cell), triangles());
-        // On the surface itself, either classification is valid.
+        // Centres on the surface itself are not checked: either classification is valid.
         if (winding - winding.round()).abs() < 1e-6 {
             assert_eq!(
                 votes[grid.index(cell)] == 3,

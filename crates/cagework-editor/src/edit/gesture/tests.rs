@@ -4,7 +4,7 @@ use super::*;
 use crate::edit::tests::{Flat, cuboid};
 use crate::edit::{SelectMode, Selection, SharedPull};
 
-/// Rounding of a few f32 operations on positions of size 1.
+/// Tolerance for rounding of a few f32 operations on positions of size 1.
 const ROUNDING: f32 = 1e-5;
 
 /// Pixel of the world's origin in [`Flat`].

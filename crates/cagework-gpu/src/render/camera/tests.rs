@@ -1,9 +1,9 @@
 use super::*;
 
-/// Rounding of f32 products of numbers up to 10, in pixels of a picture 800 wide.
+/// Tolerance for rounding of f32 products of numbers up to 10, in pixels of a picture 800 wide.
 const PIXELS: f32 = 0.02;
 
-/// Rounding of f32 products of numbers up to 10, in object units.
+/// Tolerance for rounding of f32 products of numbers up to 10, in object units.
 const UNITS: f32 = 2e-5;
 
 fn camera(projection: Projection) -> Camera {
@@ -180,8 +180,8 @@ fn framed_box_fills_the_picture() {
     }
 }
 
-/// A picture of 800 x 600 pixels, of which overlays cover 100 on the left, 40 at the top, 60 on the right and 80 at the
-/// bottom, leaves the middle at (100 + 740) / 2, (40 + 520) / 2.
+/// Overlays cover 100 pixels on the left, 40 at the top, 60 on the right and 80 at the bottom of a picture of 800 x
+/// 600. The middle of the free part is at ((100 + 740) / 2, (40 + 520) / 2).
 #[test]
 fn target_is_in_the_middle_of_what_overlays_leave_free() {
     for mut camera in both() {
@@ -203,7 +203,7 @@ fn target_is_in_the_middle_of_what_overlays_leave_free() {
     }
 }
 
-/// Of overlays that cover more than half of the picture, only half counts.
+/// Margins under overlays that cover more than half of a side of the picture are scaled down to half of it.
 #[test]
 fn free_part_is_at_least_half_of_the_picture() {
     let mut camera = Camera::default();
@@ -211,7 +211,8 @@ fn free_part_is_at_least_half_of_the_picture() {
     assert_eq!(camera.free_part(), [Vec2::new(62.5, 50.0), Vec2::new(50.0, 100.0)]);
 }
 
-/// A resized picture shows what the previous one showed, and returns to the same distance with its size.
+/// A resized picture shows at least what the previous one showed. At the original size, the distance is again the
+/// original one.
 #[test]
 fn resizing_keeps_what_is_visible() {
     let bounds = Bounds { min: Vec3::new(-3.0, 0.0, 1.0), max: Vec3::new(1.0, 1.0, 2.0) };
@@ -230,7 +231,7 @@ fn resizing_keeps_what_is_visible() {
         }
         camera.set_free_part(Vec2::new(800.0, 600.0), [0.0; 4]);
         assert!((camera.distance / framed - 1.0).abs() < 1e-5, "{} instead of {framed}", camera.distance);
-        // The horizontal field of view stays when the picture gets narrower: half the width, twice the distance.
+        // The visible width stays the same when the picture gets narrower: half the pixels, twice the distance.
         camera.zoom_at(0.5, Vec2::new(10.0, 20.0));
         let zoomed = camera.distance;
         camera.set_free_part(Vec2::new(400.0, 600.0), [0.0; 4]);
@@ -265,8 +266,8 @@ fn depth_is_ordered_and_within_the_clip_volume() {
         };
         let (near, far) = (camera.target + camera.backward(), camera.target - camera.backward());
         assert!(0.0 < z(near) && z(near) < z(far) && z(far) < 1.0);
-        // Lifting a point's clip depth by a hundredth of the distance gives the depth of a point nearer by this
-        // distance.
+        // Decreasing clip depth by 0.01 times `lift` gives the depth of a point that is nearer to the eye by 0.01 of
+        // the distance.
         let clip = camera.clip_from_world() * camera.target.extend(1.0);
         let nearer = camera.target + 0.01 * camera.distance * camera.backward();
         assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);

@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 
 use super::{RING_SEGMENTS, Vertex, ring_points, unit};
 
-/// Segments of cones and rods.
+/// Number of segments around cones and rods.
 const CONE_SEGMENTS: u32 = 16;
 
 /// A vertex. A zero normal disables shading.
@@ -14,7 +14,7 @@ pub(super) fn vertex(p: Vec3, n: Vec3, [r, g, b, a]: [f32; 4]) -> Vertex {
     [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, a]
 }
 
-/// An axis-aligned cube.
+/// Appends the triangles of an axis-aligned cube to `out`.
 pub(super) fn cube(out: &mut Vec<Vertex>, center: Vec3, half: f32, color: [f32; 4]) {
     for axis in 0..3u8 {
         for sign in [-1.0, 1.0] {
@@ -28,7 +28,7 @@ pub(super) fn cube(out: &mut Vec<Vertex>, center: Vec3, half: f32, color: [f32; 
     }
 }
 
-/// A rotated cone or frustum along z from `z[0]` to `z[1]`, closed at its lower end.
+/// Appends a rotated cone or frustum to `out`: along z from `z[0]` to `z[1]`, closed at its lower end.
 pub(super) fn cone(out: &mut Vec<Vertex>, turn: Quat, z: [f32; 2], radius: [f32; 2], color: [f32; 4]) {
     let around = |k: u32| {
         let (sin, cos) = (TAU * k as f32 / CONE_SEGMENTS as f32).sin_cos();
@@ -48,7 +48,8 @@ pub(super) fn cone(out: &mut Vec<Vertex>, turn: Quat, z: [f32; 2], radius: [f32;
     }
 }
 
-/// A torus about an axis; `[radius, tube radius]`.
+/// Appends a torus about an axis to `out`. `radius`: distance of the tube's centre line from the axis; `tube`: radius
+/// of the tube.
 pub(super) fn ring(out: &mut Vec<Vertex>, axis: u8, [radius, tube]: [f32; 2], color: [f32; 4]) {
     const SIDES: u32 = 8;
     let points: Vec<Vec3> = ring_points(axis).collect();

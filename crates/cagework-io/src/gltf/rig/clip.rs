@@ -10,7 +10,7 @@ use super::tracks::{ChannelTarget, channel_target};
 use crate::gltf::{GltfDocument, GltfError};
 use crate::timeline::{Interpolation, hermite};
 
-/// An animation clip.
+/// An animation of a glTF, which can be evaluated at any time.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Clip {
     /// Name, if any.
@@ -73,6 +73,14 @@ impl Clip {
         times.sort_unstable_by(f32::total_cmp);
         times.dedup();
         times
+    }
+
+    /// Nodes whose transforms the clip animates; a node occurs once per channel.
+    pub(super) fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.tracks.iter().filter_map(|(driven, _)| match *driven {
+            ChannelTarget::Translation(n) | ChannelTarget::Rotation(n) | ChannelTarget::Scale(n) => Some(n),
+            ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_) => None,
+        })
     }
 
     /// The value of each channel at a time, seconds.
@@ -157,7 +165,7 @@ fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbe
     })
 }
 
-/// The unit quaternion of the same direction; the identity for zeros.
+/// Converts `[x, y, z, w]` to a unit quaternion; the identity if all four are zero.
 pub(super) fn quaternion(q: &[f64]) -> DQuat {
     let q = DQuat::from_xyzw(q[0], q[1], q[2], q[3]);
     if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }

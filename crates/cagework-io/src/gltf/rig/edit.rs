@@ -8,12 +8,16 @@ use serde_json::{Value, json};
 use super::overlap::{ViewOffset, overlapping};
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
-use crate::gltf::pack::{self, F32, Pack, VERTICES, each_accessor, push, write_glb};
+use crate::gltf::pack::{self, F32, Pack, U32, VERTICES, each_accessor, push, write_glb};
 use crate::gltf::patch::embed_images_by;
 use crate::gltf::scene::Instance;
 
 /// Alignment of accessors, bytes.
 const ALIGN: usize = 4;
+
+/// Limit on the elements of a written sparse accessor. Readers, including this crate's, limit the zeros that a file
+/// implies.
+const MAX_SPARSE_COUNT: usize = 1 << 20;
 
 pub(super) struct Edit<'a> {
     document: &'a GltfDocument,
@@ -97,15 +101,54 @@ impl<'a> Edit<'a> {
         accessor
     }
 
+    /// Writes the deltas of a morph target: in place if possible, otherwise into a new accessor. The new accessor is
+    /// sparse if that takes at most half the bytes of a dense one or, if the old accessor was sparse, at most as many
+    /// bytes as a dense one. Returns the accessor's index.
+    pub(super) fn write_deltas(&mut self, accessor: Option<usize>, values: &[[f32; 3]]) -> usize {
+        let moved: Vec<u32> = (0..).zip(values).filter(|(_, v)| **v != [0.0; 3]).map(|(k, _)| k).collect();
+        // In a sparse accessor, a value and its index take 16 bytes; in a dense one, a value takes 12.
+        let was_sparse = accessor.is_some_and(|a| self.json["accessors"][a].get("sparse").is_some());
+        let limit = 12 * values.len() / if was_sparse { 1 } else { 2 };
+        let is_sparse = 16 * moved.len() <= limit && values.len() <= MAX_SPARSE_COUNT;
+        if !is_sparse || accessor.is_some_and(|accessor| self.is_plain(accessor, values.len())) {
+            return self.write(accessor, values, true, true);
+        }
+        self.has_written = true;
+        // glTF does not allow a sparse accessor without values.
+        let moved = if moved.is_empty() { vec![0] } else { moved };
+        let indices: Vec<u8> = moved.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let of_moved: Vec<u8> =
+            moved.iter().flat_map(|&v| values[v as usize]).flat_map(f32::to_le_bytes).collect();
+        let [indices, of_moved] =
+            [indices, of_moved].map(|bytes| Self::push_view(&mut self.bin, &mut self.json, &bytes));
+        let [min, max] = pack::bounds(values);
+        let sparse = json!({
+            "count": moved.len(),
+            "indices": { "bufferView": indices, "componentType": U32 },
+            "values": { "bufferView": of_moved },
+        });
+        let of_accessor = json!({
+            "componentType": F32, "count": values.len(), "type": "VEC3", "min": min, "max": max, "sparse": sparse,
+        });
+        push(&mut self.json, "accessors", of_accessor)
+    }
+
+    /// Whether an accessor can be overwritten with `count` f32 vectors.
+    fn is_plain(&self, accessor: usize, count: usize) -> bool {
+        let of_accessor = &self.json["accessors"][accessor];
+        of_accessor["componentType"] == F32
+            && of_accessor.get("sparse").is_none()
+            && of_accessor["bufferView"].is_u64()
+            && of_accessor["count"].as_u64() == Some(count as u64)
+            && self.uses.get(&self.place(accessor)) == Some(&1)
+            && !self.overlapping.contains(&self.place(accessor))
+    }
+
     fn overwrite<const N: usize>(&mut self, accessor: usize, values: &[[f32; N]]) -> bool {
         let of_accessor = &self.json["accessors"][accessor];
         let number = |value: &Value, key: &str| value[key].as_u64().unwrap_or(0) as usize;
-        let plain = of_accessor["componentType"] == F32
-            && of_accessor.get("sparse").is_none()
-            && number(of_accessor, "count") == values.len()
-            && self.uses.get(&self.place(accessor)) == Some(&1)
-            && !self.overlapping.contains(&self.place(accessor));
-        let Some(view) = of_accessor["bufferView"].as_u64().filter(|_| plain) else { return false };
+        let is_plain = self.is_plain(accessor, values.len());
+        let Some(view) = of_accessor["bufferView"].as_u64().filter(|_| is_plain) else { return false };
         let view = &self.json["bufferViews"][view as usize];
         let start = number(view, "byteOffset") + number(of_accessor, "byteOffset");
         let stride = view["byteStride"].as_u64().map_or(4 * N, |s| s as usize);
@@ -129,7 +172,7 @@ impl<'a> Edit<'a> {
         {
             return same;
         }
-        let view = Self::push_view(&mut self.bin, &mut self.json, bytes);
+        let view = Self::push_view(&mut self.bin, &mut self.json, &bytes);
         if attribute {
             self.json["bufferViews"][view]["target"] = VERTICES.into();
         }
@@ -155,10 +198,10 @@ impl<'a> Edit<'a> {
         self.bin.get(start..start + bytes.len()) == Some(bytes)
     }
 
-    fn push_view(bin: &mut Vec<u8>, json: &mut Value, bytes: Vec<u8>) -> usize {
+    fn push_view(bin: &mut Vec<u8>, json: &mut Value, bytes: &[u8]) -> usize {
         bin.resize(bin.len().next_multiple_of(ALIGN), 0);
         let view = json!({ "buffer": 0, "byteOffset": bin.len(), "byteLength": bytes.len() });
-        bin.extend(bytes);
+        bin.extend_from_slice(bytes);
         push(json, "bufferViews", view)
     }
 
@@ -170,7 +213,7 @@ impl<'a> Edit<'a> {
         }
         embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
         if document.is_decoded {
-            // Nothing refers to the compressed streams any more: the pack drops them.
+            // Nothing refers to the compressed streams, so `Pack::finish` drops them.
             return Pack::of_bytes(&json, &bin).finish(json);
         }
         // If the buffer has not changed, keep its declared length: the chunk may be longer because of padding.

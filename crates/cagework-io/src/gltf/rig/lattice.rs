@@ -1,9 +1,10 @@
 //! Replaces large numbers of morph target ends by a lattice of bound points.
 //!
-//! A baked clip has one target per frame, each of which moves every vertex: weights of a million ends would
-//! take gigabytes. Instead, the displacement field u is bound at the nodes of a lattice, in the cells that
-//! contain vertices and ends, and interpolated trilinearly. Only differences `u(end) - u(rest)` are
-//! interpolated, so the rest shape stays exact and errors are small for small motions.
+//! An end of a morph target is a vertex with this target at weight 0 or 1. A baked clip has one target per frame, each
+//! of which moves every vertex: weights of a million ends would take gigabytes. Instead, the displacement field u is
+//! bound at the nodes of a lattice, in the cells that contain vertices and ends, and interpolated trilinearly. Only
+//! differences `u(end) - u(rest)` are interpolated, so the rest shape stays exact and errors are small for small
+//! motions.
 
 use std::ops::Range;
 
@@ -11,11 +12,12 @@ use glam::{DVec3, U64Vec3};
 
 use super::{Rig, RigPrimitive, Target};
 
-/// Largest number of morph target ends that are bound one by one: about 0.4 GB of weights at 100 cage vertices.
+/// Largest number of morph target ends that are bound without a lattice. At 100 cage vertices, the sparse weights of
+/// these ends take about 0.16 GB: eight bytes per weight.
 pub(super) const MAX_ENDS: usize = 200_000;
 
-/// Limits on the lattice: nodes, and cells along the longest side. Finer cells than those of the solver's
-/// grid add no accuracy.
+/// Limits on the number of nodes of a lattice, and on its cells along the model's longest side. Finer cells than those
+/// of the solver's grid add no accuracy.
 const MAX_NODES: usize = 60_000;
 const MAX_CELLS_PER_SIDE: f64 = 256.0;
 
@@ -137,7 +139,7 @@ impl Rig<'_> {
         Some(Lattice::new(&points, (box_of[1] - box_of[0]).max_element()))
     }
 
-    /// Indices of the points of an end in `extras`.
+    /// Range in `extras` of the ends of one target at one weight. `first`: point index of the first of these ends.
     pub(super) fn range(&self, target: &Target, first: usize) -> Range<usize> {
         first - self.n_vertices..first - self.n_vertices + target.moved.len()
     }
@@ -199,7 +201,8 @@ impl Rig<'_> {
     }
 }
 
-/// Each end of a primitive's morph targets, with the index of its first point.
+/// The targets of a primitive, once for each of the weights 0 and 1 at which a target has ends, with the point index of
+/// the first of these ends.
 pub(super) fn ends(part: &RigPrimitive) -> impl Iterator<Item = (&Target, usize)> + Clone {
     part.targets.iter().flat_map(|target| target.ends.iter().flatten().map(move |&first| (target, first)))
 }

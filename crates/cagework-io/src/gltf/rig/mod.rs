@@ -11,6 +11,9 @@
 
 mod clip;
 mod edit;
+mod expressions;
+mod feet;
+mod ground;
 mod lattice;
 mod nodes;
 mod overlap;
@@ -19,6 +22,8 @@ mod poses;
 mod report;
 mod reshape;
 mod shape;
+mod skeleton;
+mod stand;
 mod surface;
 mod tracks;
 mod vrm;
@@ -38,16 +43,22 @@ use crate::origin::relative;
 
 pub use clip::Clip;
 pub(crate) use clip::clips;
+pub use expressions::Vrm;
+pub(crate) use expressions::vrm;
+pub use feet::Feet;
+pub use ground::Ground;
 use lattice::Lattice;
 pub use nodes::{JointPoint, Joints};
-pub use play::{Player, Posed};
+pub use play::{Player, RigPose};
 pub(crate) use poses::PoseDisplacements;
 pub use report::ReshapeReport;
 pub use reshape::ReshapeOptions;
-pub(crate) use reshape::reshape;
+pub(crate) use reshape::{reshape, skeleton};
+pub use skeleton::Skeleton;
+pub(crate) use skeleton::joints_with_vertices;
 use vrm::VrmPoint;
 
-/// Step of the central differences for the deformation gradient at a node, over the model's diagonal.
+/// Step of the central differences for the deformation gradient at a node, as a fraction of the model's diagonal.
 const GRADIENT_STEP: f64 = 0.02;
 
 /// Directions from a node's origin to the six points that measure the deformation gradient.
@@ -63,8 +74,8 @@ pub(crate) struct Rig<'a> {
     /// Nodes that follow the cage, parents first, each with the index of the first of its seven points: its origin,
     /// then the six points around the origin.
     follows: Vec<(u32, usize)>,
-    /// For each node, the sum of its weights as a joint, plus the number of vertices of its unskinned meshes.
-    /// `[n_nodes]`
+    /// For each node, the sum of its weights as a joint, plus the number of vertices of the unskinned meshes that it
+    /// carries ([`Self::hold_without_skins`]). `[n_nodes]`
     held: Vec<f64>,
     /// Whether each node is a joint, a node animated by clips, a VRM bone, or a descendant of one of these. `[n_nodes]`
     on_skeleton: Vec<bool>,
@@ -81,7 +92,7 @@ pub(crate) struct Rig<'a> {
     lattice: Option<Lattice>,
 }
 
-/// A primitive, at a node or under a skin.
+/// A primitive that is placed by a node or deformed by a skin.
 struct RigPrimitive {
     instance: Instance,
     primitive: u32,
@@ -101,8 +112,9 @@ struct Target {
     /// Vertices that the target moves, ascending, and their deltas in mesh space.
     moved: Vec<u32>,
     deltas: Vec<DVec3>,
-    /// Index of the first point of the moved vertices with this target at weight 0 and at weight 1, and all other
-    /// targets at their default weights. `None` if that is the rest shape.
+    /// For the weights 0 and 1: point index of the first moved vertex with this target at that weight and all other
+    /// targets at their default weights. The points of the other moved vertices follow. `None` if that weight is the
+    /// target's default, so that the vertices are at rest, or if no vertex moves.
     ends: [Option<usize>; 2],
 }
 
@@ -185,7 +197,7 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// Whether an export must fit skins, morph targets or nodes that follow the cage.
+    /// Whether the document has skins, morph targets or nodes that an export must adapt to the deformation.
     pub(crate) fn is_needed(document: &GltfDocument) -> bool {
         let instances = || document.instances.iter();
         let follow = || !nodes::holders(document).is_empty() || instances().any(|i| has_pivot(&i.world));
@@ -209,7 +221,7 @@ impl<'a> Rig<'a> {
         ends.map(|&end| relative(end, self.origin))
     }
 
-    /// Displacements of all points after holding parts in place or rigid. `by`: displacements by the cage alone.
+    /// Displacements of all points, with `parts` held in place or kept rigid. `by`: displacements by the cage alone.
     /// `rest`: `[n_vertices]`.
     pub(crate) fn held(&self, parts: &HeldParts, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
@@ -362,7 +374,8 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// Adds the vertices of unskinned meshes to `held`, for their node and for the nearest joint or animated ancestor.
+    /// Adds the number of vertices of each unskinned mesh to `held`: for the mesh's node if it has a pivot, and for the
+    /// nearest ancestor that is a joint, an animated node or a VRM bone.
     fn hold_without_skins(&mut self) {
         let mut holders = vec![None; self.held.len()];
         for node in nodes::holders(self.document) {
@@ -394,7 +407,7 @@ fn has_pivot(world: &DMat4) -> bool {
     world.w_axis.truncate() != DVec3::ZERO
 }
 
-/// Key of an instance's deformation: instances with equal keys have the same.
+/// Key of an instance's deformation. Instances with equal keys are deformed equally.
 fn key_of(instance: &Instance) -> (u32, Option<u32>, Option<u32>) {
     (instance.mesh, instance.skin, instance.skin.is_none().then_some(instance.node).flatten())
 }

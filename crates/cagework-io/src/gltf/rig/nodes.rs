@@ -35,7 +35,7 @@ const MIN_BONE_LENGTH: f64 = 1e-4;
 const MIN_HIP_HEIGHT: f64 = 0.1;
 /// Minimum number of enclosed vertices for fitting a rigid motion.
 const MIN_RIGID_VERTICES: usize = 3;
-/// Range of the scale factor of clip translations.
+/// Limits of the factor that scales the translations in clips of a skeleton.
 const TRAVEL_SCALE_RANGE: (f64, f64) = (0.2, 5.0);
 
 /// The nodes of a document after the deformation.
@@ -45,11 +45,23 @@ pub(super) struct NodeUpdate {
     pub(super) nodes: Vec<Node>,
     /// World transforms, computed from the local transforms after rounding them to f32, as they are written.
     pub(super) world: Vec<DMat4>,
+    /// Displacement of each node that follows the cage. `[n_nodes]`
+    pub(super) deltas: Vec<DVec3>,
+    /// Scale factor of clip translations of each node. `[n_nodes]`
+    pub(super) ratios: Vec<f64>,
     pub(super) n_moved: usize,
     /// Number of joints outside the cage that carry vertices.
     pub(super) n_outside: usize,
     /// Number of joints outside the cage that carry no vertices. These joints follow their parent.
     pub(super) n_loose: usize,
+}
+
+/// How the nodes of a document move with the nodes of the same names in a [`Skeleton`](super::Skeleton).
+pub(super) struct NamedMoves {
+    /// Displacement of each node and scale factor of its clip translations. `[n_nodes]`
+    pub(super) of_nodes: Vec<Option<(DVec3, f64)>>,
+    /// Whether each node carries vertices in one of the files. `[n_nodes]`
+    pub(super) holds: Vec<bool>,
 }
 
 /// The deformation that [`Rig::moved`] applies to the nodes.
@@ -60,6 +72,8 @@ pub(super) struct Deformation<'a> {
     pub(super) keep_travel: bool,
     /// Motions of nodes whose meshes stay rigid.
     pub(super) rigid: &'a HashMap<u32, Motion>,
+    /// Moves that a skeleton shared with other files determines.
+    pub(super) named: Option<&'a NamedMoves>,
     /// Up axis of the file.
     pub(super) up: DVec3,
 }
@@ -92,7 +106,8 @@ pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
     joints.chain(animated).chain(bones).filter(|&node| node < document.root.nodes.len()).collect()
 }
 
-/// A node that follows the cage: a joint, an animated node, a node with a mesh, or a descendant of these.
+/// A node that follows the cage: a joint, an animated node, a VRM bone, a node with an unskinned mesh, or a descendant
+/// of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointPoint {
     /// Node index in the file.
@@ -145,8 +160,8 @@ impl Rig<'_> {
         named.filter(|&node| self.is_prop(node)).filter(follows).collect()
     }
 
-    /// Rigid motions of nodes whose meshes stay rigid: least squares over the enclosed vertices or, with too
-    /// few of them, the deformation at the node's origin.
+    /// Rigid motions of nodes whose meshes stay rigid: least squares over the vertices inside the cage or, with fewer
+    /// than [`MIN_RIGID_VERTICES`], the displacement and rotation at the node's origin.
     pub(super) fn motions(&self, props: &[u32], by: &[DVec3], is_outside: &[bool]) -> HashMap<u32, Motion> {
         let of = |&(node, at): &(u32, usize)| {
             let own = self.parts.iter().filter(|part| part.instance.node == Some(node));
@@ -170,6 +185,8 @@ impl Rig<'_> {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
             world: self.worlds.world.clone(),
+            deltas: vec![DVec3::ZERO; n],
+            ratios: vec![1.0; n],
             n_moved: 0,
             n_outside: 0,
             n_loose: 0,
@@ -204,13 +221,20 @@ impl Rig<'_> {
                 delta[i] = (new[i].w_axis - old[i].w_axis).truncate();
                 continue;
             }
-            let is_outside = given.is_outside[at];
-            let is_loose = is_outside && self.held[i] <= 0.0;
+            let named = given.named.and_then(|named| named.of_nodes[i]);
+            let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
+            let is_outside = given.is_outside[at] && named.is_none();
+            // A file of clips has no vertices, and its points are not bound.
+            let is_loose = named.is_none() && (self.parts.is_empty() || is_outside && !holds);
             moved.n_outside += usize::from(is_outside && !is_loose);
             moved.n_loose += usize::from(is_loose);
-            // Nodes without vertices, such as a root on the floor, a control or the end of a chain, follow
+            // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a chain, follow
             // their parent.
-            let by = if is_loose { parent.map_or(DVec3::ZERO, |p| delta[p as usize]) } else { given.by[at] };
+            let by = match named {
+                Some((by, _)) => by,
+                None if is_loose => parent.map_or(DVec3::ZERO, |p| delta[p as usize]),
+                None => given.by[at],
+            };
             delta[i] = if by.length() <= MIN_DISPLACEMENT * self.diagonal { DVec3::ZERO } else { by };
             let turn = given.joints == Joints::Turn;
             let turn = turn.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
@@ -221,7 +245,13 @@ impl Rig<'_> {
             new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + delta[i]);
         }
         let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
-        let ratios = if travels { self.ratios(given, &delta) } else { vec![1.0; n] };
+        let mut ratios = if travels { self.ratios(given, &delta) } else { vec![1.0; n] };
+        if let Some(named) = given.named.filter(|_| travels) {
+            // Joints that the shared skeleton lacks get the factor of another joint.
+            let one = named.of_nodes.iter().flatten().map(|(_, ratio)| *ratio).next();
+            let of_nodes = ratios.iter_mut().zip(&named.of_nodes);
+            of_nodes.for_each(|(own, named)| *own = named.map(|(_, ratio)| ratio).or(one).unwrap_or(*own));
+        }
         for &(node, parent) in &self.worlds.order {
             let i = node as usize;
             let [above, above_new] =
@@ -275,10 +305,11 @@ impl Rig<'_> {
             let moving = DMat3::from_diagonal(DVec3::splat(ratios[i]));
             moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
         }
+        (moved.deltas, moved.ratios) = (delta, ratios);
         if moved.n_moved > 0 {
             let mut root = root.clone();
             root.nodes = std::mem::take(&mut moved.nodes);
-            // The hierarchy is that of the original document, so that this cannot fail.
+            // The hierarchy is that of the original document, which was checked, so this cannot fail.
             if let Ok(worlds) = Worlds::new(&root) {
                 moved.world = worlds.world;
             }
@@ -287,11 +318,12 @@ impl Rig<'_> {
         moved
     }
 
-    /// Scale factors of clip translations, by node. All nodes of a skeleton share one factor, or feet would
+    /// Scale factors of clip translations, by node. All nodes of a skeleton share one factor; otherwise, feet would
     /// detach from legs.
     ///
-    /// The factor is the ratio of hip heights above the skeleton's lowest vertex, after and before. The hips
-    /// are the node above the floor that carries the most vertices, including its descendants.
+    /// The factor is the height of the hips above the skeleton's lowest vertex after the deformation, divided by this
+    /// height before the deformation. The hips are the node above the floor that, together with its descendants,
+    /// carries the most vertices.
     fn ratios(&self, given: &Deformation<'_>, delta: &[DVec3]) -> Vec<f64> {
         let (skeletons, n_skeletons) = self.skeletons();
         let mut carried = self.held.clone();
@@ -329,8 +361,9 @@ impl Rig<'_> {
         skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()
     }
 
-    /// Skeleton index of each node that follows the cage, and the number of skeletons. Nodes belong to the
-    /// same skeleton if they share an ancestor that does not follow the cage, or a skin.
+    /// Skeleton index of each node that follows the cage, and a number that is larger than all these indices. Nodes
+    /// belong to the same skeleton if their nearest ancestors that do not follow the cage are equal, or if a skin
+    /// connects them.
     fn skeletons(&self) -> (Vec<Option<usize>>, usize) {
         let n = self.held.len();
         let top = |above: &[usize], mut node: usize| {

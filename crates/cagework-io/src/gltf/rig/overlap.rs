@@ -99,8 +99,8 @@ mod tests {
 
     use super::*;
 
-    /// Overlapping locations. `views`: offset, length and stride (0 for none). `accessors`: view, offset and
-    /// type of ten floats or vectors.
+    /// Overlapping locations of a test document. `views`: offset, length and stride (0 for none) of each buffer view.
+    /// `accessors`: view, offset and element type of accessors with ten f32 elements each.
     fn found(views: &[[u64; 3]], accessors: &[(u64, u64, &str)]) -> Vec<ViewOffset> {
         let views: Vec<Value> = views
             .iter()

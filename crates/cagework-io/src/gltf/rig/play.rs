@@ -24,8 +24,9 @@ pub struct Player {
     /// Nodes, each with its parent; parents come first.
     order: Vec<(u32, Option<u32>)>,
     /// Node and inverse bind matrix of each entry of the palette.
-    palette: Vec<(Option<u32>, DMat4)>,
-    /// Default weights of all morph targets, and for each node or mesh the index of its first target.
+    pub(super) palette: Vec<(Option<u32>, DMat4)>,
+    /// Default weights of all morph targets. `of_nodes` and `of_meshes` give the index of the first target of a node or
+    /// mesh that a clip animates; a mesh has one entry for each of its instances.
     defaults: Vec<f32>,
     of_nodes: HashMap<usize, usize>,
     of_meshes: HashMap<usize, Vec<usize>>,
@@ -34,9 +35,9 @@ pub struct Player {
     origin: DVec3,
 }
 
-/// Skinning input at a time of a clip.
+/// Input of skinning at one time of a clip.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Posed {
+pub struct RigPose {
     /// Transforms from mesh space to world space relative to the model's origin. `[n_palette]`
     pub palette: Vec<Mat4>,
     /// Weights of the morph targets. `[n_targets]`
@@ -164,7 +165,7 @@ impl Player {
     /// Evaluates a clip at a time in seconds; `None` is the rest pose. `targets`: weights of the morph targets that the
     /// clip does not animate, `[n_targets]`; empty for the file's defaults.
     #[must_use]
-    pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
+    pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
         let mut nodes = self.nodes.clone();
         let mut weights = if targets.is_empty() { self.defaults.clone() } else { targets.to_vec() };
         weights.resize(self.defaults.len(), 0.0);
@@ -206,6 +207,6 @@ impl Player {
             (seen * node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind)).as_mat4()
         };
         let origins = world.iter().map(|w| relative(w.w_axis.truncate(), self.origin)).collect();
-        Posed { palette: self.palette.iter().map(matrix).collect(), targets: weights, origins }
+        RigPose { palette: self.palette.iter().map(matrix).collect(), targets: weights, origins }
     }
 }

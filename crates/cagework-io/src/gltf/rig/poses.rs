@@ -1,11 +1,12 @@
 //! Appends cage poses as morph targets.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::edit::Edit;
+use super::expressions::PoseTarget;
 use super::shape::SurfaceGradients;
 use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
 use super::{Rig, key_of};
@@ -19,17 +20,17 @@ pub(crate) struct PoseDisplacements<'a> {
     pub(crate) by: &'a [DVec3],
 }
 
-/// Appends one morph target per pose to every mesh, and an animation that plays them. `rigid`: nodes whose meshes stay
-/// rigid, and whether each point is outside the cage.
-pub(super) fn append(
+/// Appends one morph target per pose to every mesh, and an animation that plays them if there is a timeline. `rigid`:
+/// nodes whose meshes stay rigid, and whether each point is outside the cage. Returns the targets of each pose.
+pub(super) fn append<'p>(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,
     triangles: &[[u32; 3]],
-    (poses, timeline): (&[PoseDisplacements<'_>], &Timeline),
+    (poses, timeline): (&[PoseDisplacements<'p>], Option<&Timeline>),
     rigid: (&[u32], &[bool]),
-) -> Result<(), WriteError> {
+) -> Result<Vec<(&'p str, Vec<PoseTarget>)>, WriteError> {
     if poses.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     // Number of targets of each mesh. All primitives of a mesh must have the same number of targets.
     let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
@@ -41,7 +42,7 @@ pub(super) fn append(
         let mesh = edit.mesh_of(&part.instance);
         let number = part.primitive as usize;
         for _ in part.targets.len()..meshes[&mesh] {
-            let nothing = edit.write(None, &vec![[0.0; 3]; part.local.len()], true, true);
+            let nothing = edit.write_deltas(None, &vec![[0.0; 3]; part.local.len()]);
             push(
                 &mut edit.json["meshes"][mesh]["primitives"][number],
                 "targets",
@@ -50,7 +51,8 @@ pub(super) fn append(
         }
     }
     // Process poses one at a time: gradients need more memory than the output.
-    for pose in poses {
+    let mut moved = vec![BTreeSet::new(); poses.len()];
+    for (pose, moved) in poses.iter().zip(&mut moved) {
         let by = held(rig, rigid, pose.by);
         let turned = SurfaceGradients::new(triangles, &by);
         for part in &rig.parts {
@@ -64,7 +66,10 @@ pub(super) fn append(
                     if delta.is_finite() { delta.as_vec3().to_array() } else { [0.0; 3] }
                 })
                 .collect();
-            let mut target = json!({ "POSITION": edit.write(None, &positions, true, true) });
+            if positions.iter().flatten().any(|&x| x != 0.0) {
+                moved.insert(mesh);
+            }
+            let mut target = json!({ "POSITION": edit.write_deltas(None, &positions) });
             let before = rig.normals(part)?;
             if let (Some(shape), Some(before)) = (shape.and_then(|shape| shape.normals), before) {
                 let deltas: Vec<[f32; 3]> = shape
@@ -72,7 +77,7 @@ pub(super) fn append(
                     .zip(before)
                     .map(|(a, b): (&DVec3, DVec3)| (*a - b).as_vec3().to_array())
                     .collect();
-                target["NORMAL"] = edit.write(None, &deltas, true, false).into();
+                target["NORMAL"] = edit.write_deltas(None, &deltas).into();
             }
             push(&mut edit.json["meshes"][mesh]["primitives"][number], "targets", target);
         }
@@ -124,12 +129,23 @@ pub(super) fn append(
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
         }
     }
-    play(rig, edit, &meshes, timeline);
-    Ok(())
+    if let Some(timeline) = timeline {
+        play(rig, edit, &meshes, timeline);
+    }
+    let nodes: BTreeSet<usize> =
+        rig.document.instances.iter().filter_map(|instance| Some(instance.node? as usize)).collect();
+    let targets = |(k, moved): (usize, &BTreeSet<usize>)| {
+        let target = |&node: &usize| {
+            let mesh = edit.json["nodes"][node]["mesh"].as_u64()? as usize;
+            moved.contains(&mesh).then(|| PoseTarget { node, mesh, target: meshes[&mesh] + k })
+        };
+        (poses[k].name, nodes.iter().filter_map(target).collect())
+    };
+    Ok(moved.iter().enumerate().map(targets).collect())
 }
 
-/// Displacements of all points in a pose. Ends of morph targets move with the rest shape, so that their deltas are
-/// unchanged.
+/// Displacements of all points in a pose, with the meshes of rigid nodes moved rigidly. Ends of morph targets move with
+/// the rest shape, so that their deltas are unchanged.
 fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
     let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
     for part in &rig.parts {

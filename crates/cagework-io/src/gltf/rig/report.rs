@@ -3,24 +3,25 @@
 use cagework_core::words::counted;
 use serde::Serialize;
 
+use super::ground::Ground;
 use super::lattice::MAX_ENDS;
 
 /// Counts and measures of reshaping a document.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReshapeReport {
-    /// Nodes that follow the cage: joints, animated nodes, nodes with meshes, and their descendants.
+    /// Number of nodes that follow the cage: joints, animated nodes, nodes with meshes, and their descendants.
     pub joints: usize,
-    /// Nodes among `joints` with a changed transform.
+    /// Number of nodes among `joints` whose transform has changed.
     pub joints_moved: usize,
-    /// Joints outside the cage that carry vertices. They move like vertices outside the cage.
+    /// Number of joints outside the cage that carry vertices. They move like vertices outside the cage.
     pub joints_outside: usize,
-    /// Joints outside the cage that have no vertices; they follow their parent.
+    /// Number of joints outside the cage that carry no vertices. They follow their parent.
     pub joints_loose: usize,
-    /// Ends of morph targets: vertices with one target at weight 0 or 1.
+    /// Number of ends of morph targets. An end is a vertex with one target at weight 0 or 1.
     pub morph_ends: usize,
-    /// Ends of morph targets outside the cage. They move like vertices outside the cage.
+    /// Number of ends of morph targets outside the cage. They move like vertices outside the cage.
     pub morph_ends_outside: usize,
-    /// Nodes of the lattice that replaces a large number of ends; otherwise 0.
+    /// Number of nodes of the lattice that is bound instead of a large number of ends; 0 without a lattice.
     pub lattice_points: usize,
     /// Cell size of the lattice, as a fraction of the model's diagonal.
     pub lattice_cell: f64,
@@ -32,6 +33,19 @@ pub struct ReshapeReport {
     pub max_condition: f64,
     /// Number of vertices whose skinning matrix is singular; they follow their neighbours.
     pub singular_vertices: usize,
+    /// Distance by which the model was lifted so that its lowest point keeps its height, object units.
+    pub lift: f64,
+    /// Further lift of each clip, object units; empty unless the model is kept on its ground.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clip_lifts: Vec<f64>,
+    /// Lowest points, if the model is kept on its ground.
+    #[serde(skip)]
+    pub ground: Option<Ground>,
+    /// Number of legs, and of their contacts with the ground in all clips; `None` unless planted feet are locked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feet: Option<[usize; 2]>,
+    /// Mean distance that a foot slides during a contact, object units: without and with the correction.
+    pub slide: [f64; 2],
 }
 
 impl ReshapeReport {
@@ -84,6 +98,38 @@ impl ReshapeReport {
                 counted(n, "vertex is", "vertices are")
             ),
         );
+        if self.lift != 0.0 {
+            notice(1, format!("lifted by {:.4} to stand at the same height", self.lift));
+        }
+        let n = self.clip_lifts.iter().filter(|lift| **lift != 0.0).count();
+        let most = self.clip_lifts.iter().map(|lift| lift.abs()).fold(0.0, f64::max);
+        let clips = counted(self.clip_lifts.len(), "clip", "clips");
+        notice(
+            n,
+            format!(
+                "lifted or lowered {n} of {clips} by up to {most:.4}, so that their lowest points keep their heights"
+            ),
+        );
+        if let Some([legs, contacts]) = self.feet {
+            let [before, after] = self.slide;
+            notice(
+                1,
+                match (legs, contacts) {
+                    (0, _) => {
+                        "found no legs: a leg is a joint named foot, ankle, paw or hoof below two other joints".into()
+                    }
+                    (_, 0) => format!(
+                        "found {}, but no contact with the ground in the clips",
+                        counted(legs, "leg", "legs")
+                    ),
+                    _ => format!(
+                        "held feet in {} of {}: a foot slides by {after:.4} instead of {before:.4}",
+                        counted(contacts, "contact", "contacts"),
+                        counted(legs, "leg", "legs")
+                    ),
+                },
+            );
+        }
         let n = self.tracks_unread;
         notice(
             n,

@@ -1,17 +1,22 @@
 //! Reshapes a rigged document and writes it.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use cagework_pose::Parts;
 use glam::{DMat4, DVec3, Mat4, Vec3};
-use serde_json::Value;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::edit::Edit;
+use super::feet::Feet;
+use super::ground::{Ground, MIN_LIFT};
 use super::nodes::{Deformation, Joints};
 use super::poses::PoseDisplacements;
 use super::report::ReshapeReport;
 use super::shape::{Shape, SurfaceGradients};
-use super::{Rig, RigPrimitive, key_of, poses, tracks, vrm};
+use super::skeleton::Skeleton;
+use super::{Rig, RigPrimitive, expressions, feet, key_of, poses, stand, tracks, vrm};
 use crate::error::WriteError;
 use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
@@ -20,7 +25,9 @@ use crate::shown::shown;
 use crate::timeline::Timeline;
 
 /// Options for reshaping a rigged document.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct ReshapeOptions {
     /// How the skeleton follows the cage.
     pub joints: Joints,
@@ -29,12 +36,27 @@ pub struct ReshapeOptions {
     /// Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
     pub rigid: Vec<String>,
     /// Vertices that stay in place or keep their shape.
+    #[serde(skip)]
+    #[cfg_attr(feature = "typescript", ts(skip))]
     pub parts: Parts,
-    /// When the clip of the poses shows each of them; `None` for one per second, starting and ending at rest.
+    /// When the animation of the poses shows each pose; `None` for one per second, starting and ending at rest.
+    #[serde(skip)]
+    #[cfg_attr(feature = "typescript", ts(skip))]
     pub timeline: Option<Timeline>,
+    /// Whether the lowest points of the shape at rest and in each clip keep their heights.
+    pub ground: bool,
+    /// What happens to planted feet in clips.
+    pub feet: Feet,
+    /// How joints with given names move, for files that share a rig.
+    #[serde(skip)]
+    #[cfg_attr(feature = "typescript", ts(skip))]
+    pub skeleton: Option<Arc<Skeleton>>,
+    /// Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
+    pub expressions: bool,
 }
 
-/// Writes the document with points displaced by `by`; with `poses`, at rest with one more morph target per pose.
+/// Writes the document with points displaced by `by`, and adds each of the `poses` as a morph target. With poses, `by`
+/// is zero, so that the document stays at rest.
 ///
 /// `triangles`: of the model. `is_outside`: whether each point is outside the cage. The caller checks the counts.
 pub(crate) fn reshape(
@@ -50,6 +72,15 @@ pub(crate) fn reshape(
         return Err(WriteError::Document(message.into()));
     }
     let mut edit = Edit::new(document);
+    let grounded;
+    let mut by = by;
+    let own = options.ground.then(|| rig.ground(by, up));
+    let shared = options.skeleton.as_ref().and_then(|skeleton| skeleton.ground.as_ref());
+    let lift = shared.or(own.as_ref()).map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
+    if lift != DVec3::ZERO {
+        grounded = by.iter().map(|&by| by + lift).collect::<Vec<_>>();
+        by = &grounded;
+    }
     let mut rigid = Vec::new();
     for name in &options.rigid {
         let found = rig.props_named(name);
@@ -69,14 +100,23 @@ pub(crate) fn reshape(
         lattice_cell: rig.lattice.as_ref().map_or(0.0, |lattice| lattice.cell / rig.diagonal),
         ..ReshapeReport::default()
     };
-    let has_moved = by.iter().any(|&by| by != DVec3::ZERO);
+    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
+    if let Some(named) = named.as_ref().filter(|_| rig.parts.is_empty())
+        && named.of_nodes.iter().all(Option::is_none)
+    {
+        return Err(WriteError::Document("none of its nodes has the name of a joint of the skeleton".into()));
+    }
+    let is_shared =
+        named.iter().flat_map(|named| named.of_nodes.iter().flatten()).any(|m| m.0 != DVec3::ZERO);
+    let has_moved = is_shared || by.iter().any(|&by| by != DVec3::ZERO);
     if has_moved || !poses.is_empty() {
         separate(rig, &mut edit);
     }
     if has_moved {
         let (joints, keep_travel) = (options.joints, options.keep_travel);
         let motions = rig.motions(&rigid, by, is_outside);
-        let given = Deformation { by, is_outside, joints, keep_travel, rigid: &motions, up };
+        let named = named.as_ref();
+        let given = Deformation { by, is_outside, joints, keep_travel, rigid: &motions, named, up };
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
@@ -110,14 +150,76 @@ pub(crate) fn reshape(
         tracks::rescale(document, &mut edit, &moved.changes, &mut report);
         vrm::write(rig, &given, &moved.world, &mut edit.json);
     }
-    let every_second = Timeline::every_second(poses.len());
-    let timeline = options.timeline.as_ref().filter(|_| !poses.is_empty()).unwrap_or(&every_second);
-    timeline.require(poses.len())?;
-    poses::append(rig, &mut edit, triangles, (poses, timeline), (&rigid, is_outside))?;
-    Ok((edit.finish()?, report))
+    let every_second = (!options.expressions).then(|| Timeline::every_second(poses.len()));
+    let timeline = options.timeline.as_ref().filter(|_| !poses.is_empty()).or(every_second.as_ref());
+    timeline.map_or(Ok(()), |timeline| timeline.require(poses.len()))?;
+    let targets = poses::append(rig, &mut edit, triangles, (poses, timeline), (&rigid, is_outside))?;
+    if options.expressions {
+        expressions::add(&mut edit.json, &targets)?;
+    }
+    let mut glb = edit.finish()?;
+    report.lift = lift.dot(up);
+    report.ground = own;
+    if options.ground && has_moved && options.joints != Joints::Stay {
+        let lows = stand::StandInput { named: named.as_ref(), shared, lift: report.lift, up };
+        let (stood, clips) = stand::stand(rig, glb, &lows)?;
+        glb = stood;
+        report.clip_lifts = clips.iter().map(|clip| clip.lift).collect();
+        report.ground = report.ground.map(|ground| ground.with(clips));
+    }
+    if options.feet == Feet::Lock && has_moved {
+        let (locked, contacts) = feet::lock(document, glb, up)?;
+        glb = locked;
+        report.feet = Some([contacts.legs, contacts.n]);
+        report.slide = contacts.slide;
+    }
+    Ok((glb, report))
+}
+
+/// How the joints of a document move when its points are displaced by `by`.
+pub(crate) fn skeleton(
+    document: &GltfDocument,
+    rig: &Rig<'_>,
+    triangles: &[[u32; 3]],
+    (by, is_outside): (&[DVec3], &[bool]),
+    (options, up): (&ReshapeOptions, DVec3),
+) -> Result<Skeleton, WriteError> {
+    let (joints, keep_travel, none) = (options.joints, options.keep_travel, HashMap::new());
+    let ground = if options.ground {
+        let options = ReshapeOptions { feet: Feet::Free, ..options.clone() };
+        reshape(document, rig, triangles, (by, is_outside), &[], (&options, up))?.1.ground
+    } else {
+        None
+    };
+    let lift = ground.as_ref().map_or(DVec3::ZERO, |ground| rig.lift(ground) * up);
+    let by = by.iter().map(|&by| by + lift).collect::<Vec<_>>();
+    let given = Deformation { by: &by, is_outside, joints, keep_travel, rigid: &none, named: None, up };
+    let mut json = document.json.clone();
+    // `Rig::moved` computes the travel factors only for documents with animations. The clips of other files need them.
+    if json["animations"].as_array().is_none_or(Vec::is_empty) {
+        json["animations"] = json!([{}]);
+    }
+    Ok(rig.skeleton(&given, ground, &mut json))
 }
 
 impl Rig<'_> {
+    /// Heights of the lowest visible vertex at rest, before and after the deformation.
+    fn ground(&self, by: &[DVec3], up: DVec3) -> Ground {
+        let mut lows = [f64::INFINITY; 2];
+        for part in self.parts.iter().filter(|part| part.slot.is_some()) {
+            for (at, by) in part.rest().into_iter().zip(&by[part.first..]) {
+                let heights = [at, at + *by].map(|p| p.dot(up));
+                lows = [0, 1].map(|k| lows[k].min(heights[k]));
+            }
+        }
+        Ground::at_rest(lows)
+    }
+
+    /// Height by which the model is lifted; 0 if the difference is only rounding.
+    fn lift(&self, ground: &Ground) -> f64 {
+        Some(ground.lift()).filter(|lift| lift.abs() > MIN_LIFT * self.diagonal).unwrap_or(0.0)
+    }
+
     /// Number of ends of morph targets outside the cage.
     fn ends_outside(&self, is_outside: &[bool]) -> usize {
         let targets = self.parts.iter().flat_map(|part| &part.targets);
@@ -232,14 +334,12 @@ fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &RigPrimitive, shape: &S
     for (k, (deltas, target)) in shape.targets.iter().zip(before.targets.iter().flatten()).enumerate() {
         if target.positions.is_some() && !part.targets[k].moved.is_empty() {
             put(&format!("targets/{k}/POSITION"), &mut |edit, a| {
-                edit.write(a, &narrow(&deltas.positions), true, true)
+                edit.write_deltas(a, &narrow(&deltas.positions))
             });
         }
         for (what, values) in [("NORMAL", &deltas.normals), ("TANGENT", &deltas.tangents)] {
             if let Some(values) = values {
-                put(&format!("targets/{k}/{what}"), &mut |edit, a| {
-                    edit.write(a, &narrow(values), true, false)
-                });
+                put(&format!("targets/{k}/{what}"), &mut |edit, a| edit.write_deltas(a, &narrow(values)));
             }
         }
     }

@@ -42,7 +42,7 @@ pub(super) struct SurfaceGradients<'a> {
 }
 
 impl<'a> SurfaceGradients<'a> {
-    /// Gradients are computed when first needed. `triangles`: of the model; `by`: displacements of all points.
+    /// Gradients are computed when first needed. `triangles`: those of the model. `by`: displacements of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }
@@ -252,9 +252,9 @@ impl Directions {
         self.of_targets.get(target).and_then(|of| of[kind].as_ref()).map_or(DVec3::ZERO, |all| all[v])
     }
 
-    /// Computes normals and tangents of a shape. `turn`: returns the normal and the tangent of each vertex in the
-    /// default state (`None`), or in the state (target, end, weight of the target's deltas that is added to the default
-    /// state).
+    /// Sets the normals and tangents of a shape and of its morph targets. `turn(None)` returns the normal and the
+    /// tangent of each vertex with all targets at their default weights. `turn(Some((k, end, share)))` returns them
+    /// with target k at weight `end`, 0 or 1: `share` times its deltas are added to the default state.
     fn turned(
         &self,
         part: &RigPrimitive,

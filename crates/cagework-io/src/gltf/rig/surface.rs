@@ -6,7 +6,8 @@ use cagework_core::mesh::weld;
 
 use crate::origin::{origin_near, relative};
 
-/// Determinant below which a gradient counts as singular and is replaced by the identity.
+/// Gradients whose determinant does not exceed this value, because they are singular or mirror, are replaced by the
+/// identity. The value is also the diagonal term that regularises the least squares.
 const MIN_DETERMINANT: f64 = 1e-9;
 
 /// Coincident vertices whose normals have a smaller dot product belong to opposite sides of a thin sheet,
@@ -23,7 +24,8 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// `from` and `to`: positions of the vertices before and after. `triangles` index these.
+    /// `from` and `to`: positions of the vertices before and after the deformation. `triangles`: indices of these
+    /// vertices.
     pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
         let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let origin = origin_near(&world);
@@ -35,7 +37,7 @@ impl Surface {
             triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
         }
         normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
-        // For each position, the distinct vertices there: the first vertex of each, and its index after merging.
+        // For each position, the groups of merged vertices there: the first vertex and the index of each group.
         let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_unique = 0;
         let mut unique_of = Vec::with_capacity(from.len());
@@ -54,8 +56,8 @@ impl Surface {
         Self { triangles, unique_of, n_unique: n_unique as usize }
     }
 
-    /// Gradient of the map from `from` to `to` at each vertex: least squares over edges, with the constraint
-    /// that the unit normal maps to the unit normal. `None` if no adjacent triangle has moved. `[n]`
+    /// Gradient of the map from `from` to `to` at each vertex: least squares over the edges at the vertex, and over the
+    /// unit normals before and after as one more pair of vectors. `None` if no adjacent triangle has moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
@@ -136,7 +138,7 @@ impl Surface {
         self.unique_of.iter().enumerate().map(of).collect()
     }
 
-    /// Replaces each unknown value by the mean of the known values at adjacent vertices.
+    /// Replaces each unknown value by the mean of the known values at adjacent vertices, or by zero if there are none.
     pub(super) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
         let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
         for triangle in &self.triangles {

@@ -26,7 +26,8 @@ pub(super) enum ChannelTarget {
 pub(super) struct NodeChange {
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// Linear maps for deviations from `from`: in tracks of constant translation, and in tracks that move the node.
+    /// Linear maps for deviations from `from`: `still` in tracks of constant translation, `moving` in tracks that move
+    /// the node.
     pub(super) still: DMat3,
     pub(super) moving: DMat3,
     /// Rotation by which rotation keys are multiplied from the left.
@@ -69,7 +70,7 @@ pub(super) struct Output {
 
 impl Output {
     /// Whether element `k` is a value, not a tangent.
-    fn is_value(&self, k: usize) -> bool {
+    pub(super) fn is_value(&self, k: usize) -> bool {
         !self.is_cubic || k % 3 == 1
     }
 }
@@ -100,14 +101,14 @@ pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize)
 }
 
 /// Values of a translation or rotation track; `None` if the count does not match the keys.
-fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Vec<[f32; N]>> {
+pub(super) fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Vec<[f32; N]>> {
     let values = document.source().floats::<N>(output.accessor, "a track").ok()?;
     let per_key = if output.is_cubic { 3 } else { 1 };
     (values.len() == per_key * output.n_keys).then_some(values)
 }
 
-/// For each changed node, whether a clip moves it. If none does, constant translation tracks set the length of its
-/// bone.
+/// Whether a clip moves each changed node: the range of a translation track exceeds [`MIN_TRANSLATION_RANGE`]. The
+/// translation tracks of other nodes are constant and repeat the length of the node's bone.
 fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<NodeChange>]) -> Vec<bool> {
     let mut moving = vec![false; changes.len()];
     for animation in edit.json["animations"].as_array().into_iter().flatten() {

@@ -12,11 +12,11 @@ pub(super) const ROOT: &str = "crate";
 
 /// A path that a module mentions.
 pub(super) struct Mention {
-    /// Path of the module that mentions it, from the crate's root.
+    /// Path of the module that mentions the path, from the crate's root.
     pub(super) from: Vec<String>,
     /// Segments from the crate's root: modules, then an item or `*`.
     pub(super) segments: Vec<String>,
-    /// `file:line`
+    /// Where the path is written, as `file:line`.
     pub(super) place: String,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Crate {
     pub(super) modules: BTreeSet<Vec<String>>,
     /// Names that the root imports, with their paths.
     imported: BTreeMap<String, Vec<String>>,
-    /// Every path that may lead to another module.
+    /// Every mentioned path that begins at the crate's root or is relative to a module.
     pub(super) paths: Vec<Mention>,
 }
 
@@ -122,7 +122,7 @@ impl Crate {
         Ok(())
     }
 
-    /// `mod name;` or `mod name { .. }`.
+    /// Reads the module declared by `mod name;` or `mod name { .. }` at the start of `rest`.
     fn read_module(&mut self, rest: &[TokenTree], place: &Place) -> Result<(), String> {
         let Some(TokenTree::Ident(name)) = rest.get(1) else { return Ok(()) };
         let name = name.to_string();
@@ -145,7 +145,7 @@ impl Crate {
     /// a use by the root. Returns the number of tokens of the import.
     fn read_root_import(&mut self, tokens: &[TokenTree], before: Option<&TokenTree>, place: &Place) -> usize {
         let (paths, length) = paths(tokens);
-        // `pub use` and `pub(crate) use`.
+        // The token before `use` is `pub`, or the parentheses of `pub(crate)`.
         let is_public = match before {
             Some(TokenTree::Ident(word)) => word == "pub",
             Some(TokenTree::Group(group)) => group.delimiter() == Delimiter::Parenthesis,
@@ -170,7 +170,7 @@ impl Crate {
             "crate" => &[],
             "self" => &place.module,
             "super" => &place.module[..place.module.len().saturating_sub(ups)],
-            // Paths in the root need no prefix. Which names are modules is known once the whole root has been read.
+            // In the root, a path to a module needs no prefix. Only modules declared before the path are recognised.
             _ if place.module.is_empty() && self.is_at_root(first) => &[],
             _ => return,
         };
@@ -184,7 +184,7 @@ impl Crate {
 /// A path as the source writes it.
 struct Found {
     segments: Vec<String>,
-    /// Name under which it is imported.
+    /// Name that the path brings into scope in a `use`: the name after `as`, or else the last segment.
     name: String,
     line: usize,
 }

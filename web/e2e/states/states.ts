@@ -1,6 +1,6 @@
 /**
- * For words.spec.ts: the page around a fake session. It shows each step, panel, dialog and message with made-up
- * contents.
+ * The page with a fake session instead of the engine, for words.spec.ts. Shows each step, panel, dialog and message
+ * with made-up contents.
  */
 
 import { sayGesture } from "../../src/actions/edit";
@@ -20,7 +20,7 @@ import { INITIAL, STEPS } from "../../src/state";
 import { STOPS, solvers, stopsOf } from "../../src/tour/stops";
 import { askAfterCrash, showReport } from "../../src/ui/crashed";
 import { createLost } from "../../src/ui/lost";
-import { mount, mountUnsupported } from "../../src/ui/page";
+import { loadSheetPart, mount, mountUnsupported } from "../../src/ui/page";
 import { createToasts } from "../../src/ui/toasts";
 import { createStage } from "../../src/ui/viewport";
 import { chooseLanguage, T } from "../../src/words";
@@ -36,7 +36,7 @@ declare global {
 
 type Patch = Partial<AppState>;
 
-// Made-up names contain no letters, so that they are no faults in any language.
+// Made-up names contain no letters, so that `inspect` does not report them as untranslated.
 const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
 const ONE = {
   ...memberOf(0, "01", 1234),
@@ -56,6 +56,7 @@ const RIG: ModelInfo = {
   targets: [{ name: "1", default: 0.5 }],
   props: ["1"],
   rigged: true,
+  vrm: true,
   bounds: BOUNDS,
   members: [ONE],
 };
@@ -120,21 +121,21 @@ const selected = (count: number, last: number | null): AppState["selected"] => (
 const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
   values.map((value) => ({ ...also, [key]: value }) as Patch);
 
-/** Each step with as much as it can contain, upon `BOUND`. */
+/** For each step, changes of `BOUND` with which its panel shows as much as it can contain. */
 const full = (): Record<AppState["step"], Patch> => ({
   model: {
     model: SEVERAL,
     sample: "rat",
     painting: { id: 0, radius: 0.1, erase: false },
     works: [work("here")],
-    undoLabel: T.did.grab,
-    redoLabel: T.did.pull,
+    undo: T.did.grab,
+    redo: T.did.pull,
   },
   cage: {
     check: checkOf(MENDS, "error", 2),
     cage: { ...CONTROLLED, usable: false },
     editingRest: true,
-    element: "face",
+    tools: { ...INITIAL.tools, element: "face" },
     placing: "line",
     cageProgress: 0.5,
   },
@@ -147,9 +148,9 @@ const full = (): Record<AppState["step"], Patch> => ({
   pose: {
     selected: selected(3, 1),
     pins: [{ triangle: 0, bary: [1, 0, 0] }],
-    symmetry: true,
-    proportionalOn: true,
-    poses: [{ name: "01", fits: true, seconds: 1 }],
+    tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
+    unmatched: 3,
+    poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }],
     shares: [0.5],
     clip: { ...INITIAL.clip, clip: 0 },
     scene: { ...INITIAL.scene, slice: "value", colour: "weight" },
@@ -159,23 +160,23 @@ const full = (): Record<AppState["step"], Patch> => ({
   export: {
     model: SEVERAL,
     cage: CONTROLLED,
-    poses: [{ name: "01", fits: true, seconds: 1 }],
+    poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }],
   },
 });
 
-/** Other states of each step. */
+/** States of each step other than those of `full`. */
 const states = (): Record<AppState["step"], readonly Patch[]> => ({
   model: [
     { model: null, cage: null, bound: false },
     { works: [work("here"), work("nowhere")], lack: "NoWebGPU" },
-    { model: SEVERAL, sample: "rat", undoLabel: T.did.grab, redoLabel: T.did.pull },
+    { model: SEVERAL, sample: "rat", undo: T.did.grab, redo: T.did.pull },
     ...of("painting", [
       { id: 0, radius: 0.1, erase: false },
       { id: 0, radius: 0.1, erase: true },
     ]),
     {
       busy: T.opening.fileOf("01", 0, 2),
-      busyStep: T.opening.freezes(1_234_567, 12_345),
+      busyStep: T.opening.large(12_345_678),
       goOn: () => {},
       cancelBusy: () => {},
     },
@@ -195,7 +196,11 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { cage: { ...CAGE, info: { ...CAGE.info, vertices: 30 } } },
     { cage: CONTROLLED, selected: selected(1, 81) },
     ...of("placing", ["point", "line", "face"], { cage: CONTROLLED }),
-    ...of("element", ["vertex", "edge", "face"], { editingRest: true, selected: selected(2, 1) }),
+    ...(["vertex", "edge", "face"] as const).map((element) => ({
+      tools: { ...INITIAL.tools, element },
+      editingRest: true,
+      selected: selected(2, 1),
+    })),
     { editingRest: true, strays: 3 },
     { editingRest: true, check: null },
     { editingRest: true, scene: { ...INITIAL.scene, cage: false } },
@@ -232,8 +237,8 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { selected: selected(1, 81), cage: CONTROLLED },
     {
       selected: selected(3, 1),
-      symmetry: true,
-      proportionalOn: true,
+      tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
+      unmatched: 3,
       scene: { ...INITIAL.scene, pull: false },
     },
     { selected: selected(1, 1), editingRest: true, scene: { ...INITIAL.scene, gizmo: "move", pull: false } },
@@ -244,7 +249,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { boxArmed: true, ortho: true },
     { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
     {
-      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k })),
+      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k, hash: 7 })),
       shares: [0.5, 1, 0],
       playing: true,
       playingPose: null,
@@ -293,8 +298,10 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { model: null, cage: null, bound: false },
     { bound: false, report: null },
     { cage: CONTROLLED },
-    { model: SEVERAL, poses: [{ name: "01", fits: true, seconds: 1 }] },
+    { model: SEVERAL, poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }] },
     { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
+    { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true } },
+    { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true, compress: "meshopt" } },
   ],
 });
 
@@ -318,10 +325,11 @@ const CRASH = { during: "…", report: "…" };
 
 async function start(): Promise<void> {
   await chooseLanguage();
+  await loadSheetPart();
   const byId = (id: string) => document.getElementById(id) ?? document.body;
   const stage = createStage(byId("stage"));
   const fake = createFake();
-  fake.teach({ unmatched: () => new Uint32Array(3), legend: () => legend ?? undefined });
+  fake.teach({ legend: () => legend ?? undefined });
   let legend: AppState["legend"] = null;
   const { store } = fake;
   const { Toasts, tell, offer } = createToasts();
@@ -338,7 +346,7 @@ async function start(): Promise<void> {
     recover: () => (isBroken ? Promise.reject(new Error("1")) : new Promise(() => {})),
   } as unknown as Session);
   mount({ app, Toasts, Lost: lost.Lost, byId });
-  // The model counts as bound, because the page would otherwise start a bind.
+  // Mark the model as bound, so that the page does not start a bind.
   fake.show({ bound: true });
   const show = (patch: Patch) => {
     legend = patch.legend ?? null;
@@ -346,10 +354,19 @@ async function start(): Promise<void> {
     store.set({ ...INITIAL, ...BOUND, adapter: "1", samples, ...patch, legend });
   };
 
+  /** Waits until components are rendered (in microtasks) and effects have run (in a task). */
+  const rendered = async () => {
+    for (const _ of [1, 2]) await new Promise((done) => setTimeout(done));
+  };
+  const visit = (patch: Patch) => {
+    show(patch);
+    return rendered();
+  };
+
   const whole = full();
   const visits = new Map([
-    ...STEPS.map((step) => [step, async () => show({ step, ...whole[step] })] as const),
-    ...DIALOGS.map((patch, k) => [`dialog ${k}`, async () => show(patch)] as const),
+    ...STEPS.map((step) => [step, () => visit({ step, ...whole[step] })] as const),
+    ...DIALOGS.map((patch, k) => [`dialog ${k}`, () => visit(patch)] as const),
     ...STOPS.map((name, stop) => {
       const { binds, step } = stopsOf(true)[name];
       const tour = { stop, reports: binds.map(reportBy), doing: null };
@@ -357,13 +374,13 @@ async function start(): Promise<void> {
         `stop ${name}`,
         async () => {
           await tourLoaded();
-          show({ step, tour });
+          await visit({ step, tour });
         },
       ] as const;
     }),
   ]);
   globalThis.visits = visits;
-  /** Loads the tour, which waits for its sample forever. */
+  /** Loads the tour. Does not await `start`, which waits for a sample that the fake session never opens. */
   const tourLoaded = async () => {
     if (!app.tour.loaded()) void app.tour.start(0);
     while (!app.tour.loaded()) await new Promise((done) => setTimeout(done));
@@ -373,8 +390,7 @@ async function start(): Promise<void> {
     const faults = new Set<string>();
     const seen = new Set<string>();
     const look = async (where: string) => {
-      // Wait until components are rendered (in microtasks) and effects have run (in a task).
-      for (const _ of [1, 2]) await new Promise((done) => setTimeout(done));
+      await rendered();
       for (const fault of inspect(seen)) faults.add(`${where}: ${fault}`);
     };
     const all = states();
@@ -418,7 +434,7 @@ async function start(): Promise<void> {
     offer(T.offline.ready, { label: T.offline.reload, run: () => {} });
     await look("offer");
 
-    // Sentences that no state shows appear as messages, whose lines are as long as those of any panel.
+    // Show every sentence that no state has shown, as a message.
     for (const text of sentencesOf(T).filter((text) => !isSeen(seen, text))) {
       tell.say(text);
       await look("message");

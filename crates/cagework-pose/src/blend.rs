@@ -1,4 +1,4 @@
-//! Blending of poses.
+//! Blends of poses of a cage.
 
 use glam::Vec3;
 use thiserror::Error;
@@ -7,14 +7,15 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the pose has {given} vertices, but the cage has {expected}: it belongs to another cage")]
 pub struct PoseError {
-    /// Vertices of the pose.
+    /// Number of vertices of the pose.
     pub given: usize,
-    /// Vertices of the cage.
+    /// Number of vertices of the cage.
     pub expected: usize,
 }
 
-/// Linear blend `rest + sum_k share_k (pose_k - rest)`; exact for the model, because deformation is linear in the cage.
-/// A missing share counts as 0.
+/// Linear blend `rest + sum_k share_k (pose_k - rest)` of cage poses. Without inner controls, deformation is linear in
+/// the cage's vertices, so the deformed model is the same blend of the models deformed by the poses. A missing share
+/// counts as 0.
 ///
 /// # Errors
 /// [`PoseError`] if a pose and the cage differ in their number of vertices.

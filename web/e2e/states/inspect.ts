@@ -18,10 +18,10 @@ const ATTRIBUTES = ["aria-label", "aria-valuetext", "title", "placeholder", "alt
 const ASIDE = 1.5;
 const ABOVE = 4;
 
-/** Two letters of the alphabet in a row, other than in names. The pseudo-locale accents all its letters. */
+/** Whether a text has two unaccented letters in a row, outside `NAMES`. The pseudo-locale accents all letters. */
 const isPlain = (text: string) =>
   /[a-z]{2}/i.test(NAMES.reduce((rest, name) => rest.replaceAll(name, ""), text));
-/** Messages of Rust are English in every language. */
+/** Whether an element is marked as English: messages from Rust are not translated. */
 const isEnglish = (element: Element) => element.closest("[lang=en]") !== null;
 const isShown = (element: Element) => element.checkVisibility({ visibilityProperty: true });
 
@@ -60,8 +60,8 @@ const overlap = (a: DOMRect, b: DOMRect) =>
   a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 
 /**
- * Messages for a text that reaches beyond a box around it or beyond the window. A box that scrolls may be higher than
- * its visible part.
+ * A message if text extends outside the box of an enclosing element or outside the window; otherwise none. In an element
+ * that scrolls, text may extend above and below the visible part.
  */
 function cutOff(node: Node, parent: Element, text: string): string[] {
   const range = document.createRange();

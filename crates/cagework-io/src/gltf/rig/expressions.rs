@@ -1,0 +1,160 @@
+//! Expressions of VRM 0 and VRM 1: reads their names, and adds poses as expressions.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::error::WriteError;
+use crate::gltf::GltfDocument;
+use crate::gltf::pack::push;
+use crate::shown::shown;
+
+/// Names of the presets of VRM 1 (VRMC_vrm-1.0, "Expressions") and of VRM 0 (`presetName`).
+const PRESETS_1: [&str; 18] = [
+    "happy",
+    "angry",
+    "sad",
+    "relaxed",
+    "surprised",
+    "aa",
+    "ih",
+    "ou",
+    "ee",
+    "oh",
+    "blink",
+    "blinkLeft",
+    "blinkRight",
+    "lookUp",
+    "lookDown",
+    "lookLeft",
+    "lookRight",
+    "neutral",
+];
+const PRESETS_0: [&str; 17] = [
+    "neutral",
+    "a",
+    "i",
+    "u",
+    "e",
+    "o",
+    "blink",
+    "joy",
+    "angry",
+    "sorrow",
+    "fun",
+    "lookup",
+    "lookdown",
+    "lookleft",
+    "lookright",
+    "blink_l",
+    "blink_r",
+];
+
+/// Counts and names of the VRM data in a glTF.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Vrm {
+    /// Version of the specification, such as "0.0" or "1.0".
+    pub version: String,
+    /// Names of the expressions: presets, then custom ones.
+    pub expressions: Vec<String>,
+    /// Number of chains of spring bones; in VRM 0, of groups of chains.
+    pub springs: usize,
+    /// Number of colliders of the spring bones.
+    pub colliders: usize,
+}
+
+/// A morph target that shows a pose on one mesh.
+pub(super) struct PoseTarget {
+    pub(super) node: usize,
+    pub(super) mesh: usize,
+    /// Index of the target in the mesh.
+    pub(super) target: usize,
+}
+
+/// VRM data of a document. If it has both versions, that of VRM 1.
+pub(crate) fn vrm(document: &GltfDocument) -> Option<Vrm> {
+    let extensions = &document.json["extensions"];
+    let count = |list: &Value| list.as_array().map_or(0, Vec::len);
+    let version = |of: &Value, default: &str| of["specVersion"].as_str().unwrap_or(default).to_owned();
+    let expressions = names(&document.json);
+    let (of_1, of_0) = (&extensions["VRMC_vrm"], &extensions["VRM"]);
+    if of_1.is_object() {
+        let springs = &extensions["VRMC_springBone"];
+        return Some(Vrm {
+            version: version(of_1, "1.0"),
+            expressions,
+            springs: count(&springs["springs"]),
+            colliders: count(&springs["colliders"]),
+        });
+    }
+    let springs = &of_0["secondaryAnimation"];
+    let groups = springs["colliderGroups"].as_array().into_iter().flatten();
+    of_0.is_object().then(|| Vrm {
+        version: version(of_0, "0.0"),
+        expressions,
+        springs: count(&springs["boneGroups"]),
+        colliders: groups.map(|group| count(&group["colliders"])).sum(),
+    })
+}
+
+fn names(json: &Value) -> Vec<String> {
+    let of_1 = &json["extensions"]["VRMC_vrm"]["expressions"];
+    let groups = &json["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"];
+    let of_1 = ["preset", "custom"].into_iter().filter_map(|kind| of_1[kind].as_object());
+    let of_1: Vec<String> = of_1.flat_map(|all| all.keys().cloned()).collect();
+    if !of_1.is_empty() {
+        return of_1;
+    }
+    let groups = groups.as_array().into_iter().flatten();
+    groups.filter_map(|group| Some(group["name"].as_str()?.to_owned())).collect()
+}
+
+/// Adds an expression for each pose.
+///
+/// # Errors
+/// If the document is not a VRM, or has an expression with this name.
+pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result<(), WriteError> {
+    let is_1 = json.pointer("/extensions/VRMC_vrm").is_some_and(Value::is_object);
+    if !is_1 && !json.pointer("/extensions/VRM").is_some_and(Value::is_object) {
+        return Err(WriteError::Document("the file has no VRM data, which expressions need".into()));
+    }
+    let mut known: BTreeSet<String> = names(json).into_iter().collect();
+    for (name, targets) in poses {
+        if !known.insert((*name).to_owned()) {
+            return Err(WriteError::Document(format!(
+                "the file has an expression '{}' already: give the pose another name",
+                shown(name)
+            )));
+        }
+        if is_1 {
+            let binds: Vec<Value> =
+                targets.iter().map(|t| json!({ "node": t.node, "index": t.target, "weight": 1.0 })).collect();
+            let kind = if PRESETS_1.contains(name) { "preset" } else { "custom" };
+            let expression = json!({ "isBinary": false, "morphTargetBinds": binds });
+            let of_kind = object(object(&mut json["extensions"]["VRMC_vrm"], "expressions"), kind);
+            of_kind[*name] = expression;
+        } else {
+            let meshes: BTreeSet<(usize, usize)> = targets.iter().map(|t| (t.mesh, t.target)).collect();
+            let binds: Vec<Value> = meshes
+                .iter()
+                .map(|(mesh, target)| json!({ "mesh": mesh, "index": target, "weight": 100.0 }))
+                .collect();
+            let small = name.to_lowercase();
+            let preset = if PRESETS_0.contains(&small.as_str()) { &small } else { "unknown" };
+            let group = json!({
+                "name": name, "presetName": preset, "binds": binds, "materialValues": [], "isBinary": false,
+            });
+            push(object(&mut json["extensions"]["VRM"], "blendShapeMaster"), "blendShapeGroups", group);
+        }
+    }
+    Ok(())
+}
+
+/// The object under a key. If the value there is not an object, it is replaced by an empty one.
+fn object<'v>(of: &'v mut Value, key: &str) -> &'v mut Value {
+    if !of[key].is_object() {
+        of[key] = json!({});
+    }
+    &mut of[key]
+}

@@ -1,0 +1,217 @@
+//! The zip archive of a 3MF.
+
+use std::collections::HashMap;
+use std::io::{Read, Write as _};
+
+use flate2::Compression;
+use flate2::read::DeflateDecoder;
+use flate2::write::DeflateEncoder;
+use quick_xml::Reader;
+use quick_xml::events::Event;
+use rawzip::path::EntryPath;
+use rawzip::{CompressionMethod, DataDescriptorOutput, Error, ZipArchive, ZipArchiveWriter, crc32};
+
+use super::xml::attributes;
+use crate::error::WriteError;
+use crate::memory::{MemoryError, check_unpacked};
+use crate::polygons::PolygonsError;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+
+/// File that names the first model part.
+const RELATIONSHIPS: &str = "_rels/.rels";
+/// End of the type of the relationship to the first model part.
+const MODEL_TYPE: &str = "/3dmodel";
+/// The first model part of a file without relationships, as most programs name it.
+const USUAL_PART: &str = "3D/3dmodel.model";
+/// Bytes at the end of a file in which [`is_3mf`] looks for the name of a model part, which the archive's directory
+/// contains.
+const DIRECTORY_BYTES: usize = 1 << 20;
+
+/// Whether the content is a zip archive with a model part.
+pub(crate) fn is_3mf(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+        && bytes[bytes.len().saturating_sub(DIRECTORY_BYTES)..]
+            .windows(6)
+            .any(|name| name.eq_ignore_ascii_case(b".model"))
+}
+
+/// A file of the archive.
+struct Entry<'a> {
+    name: Vec<u8>,
+    is_utf8: bool,
+    is_encrypted: bool,
+    method: CompressionMethod,
+    crc: u32,
+    /// Unpacked size in the directory, bytes.
+    size: u64,
+    /// Compressed bytes.
+    data: &'a [u8],
+}
+
+/// An archive, and the limit on the text unpacked from it.
+pub(super) struct Package<'a> {
+    entries: Vec<Entry<'a>>,
+    /// Index of each entry by [`part_name`].
+    index_of: HashMap<Vec<u8>, usize>,
+    /// Size of the archive, bytes.
+    size: u64,
+    comment: Vec<u8>,
+    /// Bytes of the texts unpacked so far.
+    pub(super) unpacked: u64,
+    memory_limit: u64,
+}
+
+/// Name for comparisons. Names of parts do not depend on case, and may begin with a slash.
+pub(super) fn part_name(name: &[u8]) -> Vec<u8> {
+    let slashes = name.iter().take_while(|&&byte| byte == b'/').count();
+    name[slashes..].to_ascii_lowercase()
+}
+
+/// The error for a damaged part of the archive.
+///
+/// `problem` continues the part's name: it is a predicate, such as "is missing", or begins with a colon.
+pub(super) fn fault(name: &str, problem: &str) -> PolygonsError {
+    let space = if problem.starts_with(':') { "" } else { " " };
+    PolygonsError::Syntax(format!("its part '{}'{space}{problem}", shown_start(name, MAX_NAME_CHARS)))
+}
+
+/// All files of an archive, and its comment.
+fn entries(bytes: &[u8]) -> Result<(Vec<Entry<'_>>, Vec<u8>), Error> {
+    let archive = ZipArchive::from_slice(bytes)?;
+    let mut entries = Vec::new();
+    let mut records = archive.entries();
+    while let Some(record) = records.next_entry()? {
+        let (start, end) = archive.get_entry(record.wayfinder())?.compressed_data_range();
+        entries.push(Entry {
+            name: record.file_path().as_bytes().to_vec(),
+            is_utf8: record.flags().is_utf8(),
+            is_encrypted: record.flags().is_encrypted(),
+            method: record.compression_method(),
+            crc: record.crc32(),
+            size: record.uncompressed_size_hint(),
+            data: &bytes[start as usize..end as usize],
+        });
+    }
+    Ok((entries, archive.comment().as_bytes().to_vec()))
+}
+
+impl<'a> Package<'a> {
+    pub(super) fn open(bytes: &'a [u8], memory_limit: u64) -> Result<Self, PolygonsError> {
+        let (entries, comment) =
+            entries(bytes).map_err(|_| PolygonsError::Syntax("its zip archive cannot be read".into()))?;
+        let mut names: Vec<&[u8]> = entries.iter().map(|entry| entry.name.as_slice()).collect();
+        names.sort_unstable();
+        let is_repeated = names.windows(2).any(|pair| pair[0] == pair[1]);
+        // Entries that overlap would make an export larger than the file.
+        let size: usize = entries.iter().map(|entry| entry.data.len()).sum();
+        if is_repeated || size > bytes.len() {
+            return Err(PolygonsError::Syntax(
+                "entries of its zip archive overlap or have the same name".into(),
+            ));
+        }
+        let index_of = (0..entries.len()).rev().map(|k| (part_name(&entries[k].name), k)).collect();
+        Ok(Self { entries, index_of, size: bytes.len() as u64, comment, unpacked: 0, memory_limit })
+    }
+
+    /// Index of an entry.
+    pub(super) fn index(&self, name: &str) -> Option<usize> {
+        self.index_of.get(&part_name(name.as_bytes())).copied()
+    }
+
+    /// Name of the first model part.
+    pub(super) fn first_part(&mut self) -> Result<String, PolygonsError> {
+        let Some(index) = self.index(RELATIONSHIPS) else { return Ok(USUAL_PART.into()) };
+        let text = self.text(RELATIONSHIPS, index)?;
+        let mut reader = Reader::from_str(&text);
+        loop {
+            match reader.read_event().map_err(|_| fault(RELATIONSHIPS, "is not well-formed XML"))? {
+                Event::Start(tag) | Event::Empty(tag) if tag.local_name().as_ref() == "Relationship" => {
+                    let (mut target, mut is_model) = (String::new(), false);
+                    for (key, value) in attributes(&tag) {
+                        match key {
+                            "Target" => target = value.into(),
+                            "Type" => is_model = value.ends_with(MODEL_TYPE),
+                            _ => {}
+                        }
+                    }
+                    if is_model {
+                        return Ok(target);
+                    }
+                }
+                Event::Eof => return Ok(USUAL_PART.into()),
+                _ => {}
+            }
+        }
+    }
+
+    /// Unpacks an entry. The size that the archive's directory declares is checked against the limits first. Unpacking
+    /// stops one byte after the declared size, and fails if the entry has another size.
+    pub(super) fn text(&mut self, name: &str, index: usize) -> Result<String, PolygonsError> {
+        let entry = &self.entries[index];
+        let size = entry.size;
+        self.unpacked = self.unpacked.saturating_add(size);
+        // The factor 2 covers the text and its parsed content: a vertex or triangle takes less memory than its text,
+        // which has at least 27 or 34 characters.
+        MemoryError::check(self.unpacked.saturating_mul(2), self.memory_limit)?;
+        check_unpacked(self.unpacked, self.size).map_err(PolygonsError::Syntax)?;
+        let mut bytes = Vec::with_capacity(size as usize + 1);
+        let mut unpack = |from: &mut dyn Read| from.take(size.saturating_add(1)).read_to_end(&mut bytes);
+        let unpacked = match entry.method {
+            CompressionMethod::STORE if !entry.is_encrypted => unpack(&mut &*entry.data),
+            CompressionMethod::DEFLATE if !entry.is_encrypted => unpack(&mut DeflateDecoder::new(entry.data)),
+            _ => return Err(fault(name, "is encrypted, or compressed by a method other than deflate")),
+        };
+        if unpacked.is_err() || bytes.len() as u64 != size || crc32(&bytes) != entry.crc {
+            return Err(fault(name, "cannot be unpacked"));
+        }
+        String::from_utf8(bytes).map_err(|_| fault(name, "is not UTF-8 text"))
+    }
+
+    /// A copy of the archive with new texts of some entries; the others keep their compressed bytes.
+    pub(super) fn with_texts(self, texts: &HashMap<usize, String>) -> Result<Vec<u8>, WriteError> {
+        let copy = || -> Result<Vec<u8>, Error> {
+            let mut writer = ZipArchiveWriter::new(Vec::new());
+            writer.set_comment(self.comment);
+            for (index, entry) in self.entries.iter().enumerate() {
+                // Names with the UTF-8 flag keep it if they need it; other names are copied byte for byte.
+                let name = match std::str::from_utf8(&entry.name) {
+                    Ok(name) if entry.is_utf8 && !name.is_ascii() => EntryPath::conformant(name),
+                    _ => EntryPath::verbatim(entry.name.as_slice()),
+                };
+                match texts.get(&index) {
+                    Some(text) => put(&mut writer, name, text)?,
+                    None => {
+                        let (mut to, _) = writer.new_file(name).compression_method(entry.method).start()?;
+                        to.write_all(entry.data)?;
+                        to.finish(DataDescriptorOutput::new(entry.crc, entry.size))?;
+                    }
+                }
+            }
+            writer.finish()
+        };
+        copy().map_err(write_error)
+    }
+}
+
+/// Writes a compressed archive. Entries have no modification time, so that equal texts give equal bytes.
+pub(super) fn write_new(files: &[(&str, &str)]) -> Result<Vec<u8>, WriteError> {
+    let mut writer = ZipArchiveWriter::new(Vec::new());
+    for (name, text) in files {
+        put(&mut writer, EntryPath::verbatim(name.as_bytes()), text).map_err(write_error)?;
+    }
+    writer.finish().map_err(write_error)
+}
+
+fn put(writer: &mut ZipArchiveWriter<Vec<u8>>, name: EntryPath<'_>, text: &str) -> Result<(), Error> {
+    let (mut to, _) = writer.new_file(name).compression_method(CompressionMethod::DEFLATE).start()?;
+    let mut encoder = DeflateEncoder::new(&mut to, Compression::default());
+    encoder.write_all(text.as_bytes())?;
+    encoder.finish()?;
+    to.finish(DataDescriptorOutput::new(crc32(text.as_bytes()), text.len() as u64))?;
+    Ok(())
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "an argument of map_err")]
+fn write_error(error: Error) -> WriteError {
+    WriteError::Document(error.to_string())
+}

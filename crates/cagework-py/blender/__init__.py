@@ -1,0 +1,29 @@
+"""Cagework in Blender: a mesh follows its cage through a shape key. Panel *Cagework* in the sidebar of the 3-D view."""
+
+import bpy
+
+from . import binding, operators, panel
+
+CLASSES = [binding.Binding, *operators.CLASSES, panel.Panel]
+HANDLERS = ["depsgraph_update_post", "frame_change_post"]
+FORGET = ["undo_post", "redo_post", "load_post"]
+
+
+def register():
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+    bpy.types.Mesh.cagework = bpy.props.PointerProperty(type=binding.Binding)
+    for name in HANDLERS:
+        getattr(bpy.app.handlers, name).append(binding.on_update)
+    for name in FORGET:
+        getattr(bpy.app.handlers, name).append(binding.forget)
+
+
+def unregister():
+    for name in HANDLERS:
+        getattr(bpy.app.handlers, name).remove(binding.on_update)
+    for name in FORGET:
+        getattr(bpy.app.handlers, name).remove(binding.forget)
+    del bpy.types.Mesh.cagework
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)

@@ -1,0 +1,291 @@
+"""What a bound mesh stores, and the shape key that follows the cage.
+
+Spaces: *bind space* is world space at the time of the bind. `to_bind` maps the mesh's local space to bind space. The cage
+is mapped to the mesh's local space and then by `to_bind`, so that moving mesh and cage together does not deform the mesh.
+"""
+
+import io
+import json
+from uuid import uuid4
+
+import bpy
+import cagework as cw
+import numpy as np
+from bpy.app.handlers import persistent
+from cagework._sparse import csr_array
+
+KEY = "Cagework"
+# A matrix counts as singular if its determinant is at most this fraction of the cube of its largest entry.
+SINGULAR = 1e-12
+
+
+class Binding(bpy.types.PropertyGroup):
+    """Binding of a mesh to a cage. The mesh is bound if `stamp` is not empty."""
+
+    cage: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Cage", description="Closed mesh around the mesh", poll=lambda _, o: o.type == "MESH"
+    )
+    # The object whose space the cage is mapped to, if several objects share the mesh.
+    owner: bpy.props.PointerProperty(type=bpy.types.Object)
+    grid: bpy.props.IntProperty(
+        name="Grid", description="Cells along the longest side of the cage", default=64, min=8, max=512
+    )
+    stamp: bpy.props.StringProperty()
+    weights: bpy.props.StringProperty(subtype="BYTE_STRING")
+    report: bpy.props.StringProperty()
+
+
+class Weights:
+    """Weights of a bound mesh, from an archive in the mesh.
+
+    rows: [n_points, n_cage] float32; rest: [n_cage, 3] the cage with modifiers and shape keys when bound, bind space;
+    cage_local: [n_cage_vertices, 3] the vertices of the cage's mesh without these, local space; to_bind: [4, 4];
+    frames, offsets: for points outside the cage, as in cagework.deform.
+    """
+
+    def __init__(self, archive):
+        with np.load(io.BytesIO(archive), allow_pickle=False) as file:
+            self.rows, self.rest, self.cage_local = file["rows"], file["rest"], file["cage_local"]
+            self.to_bind, frames = file["to_bind"], str(file["frames"])
+            self.matrix, self.extra = None, None
+            if "offsets" in file:
+                self.extra = {"frames": json.loads(frames), "offsets": sparse(file["offsets"])}
+                self.rested = cw.deform(self.sparse(), self.rest, self.extra)
+        self.posed = None
+
+    def sparse(self):
+        """The rows as a sparse matrix for cagework.deform."""
+        if self.matrix is None:
+            self.matrix = sparse(self.rows)
+        return self.matrix
+
+    def displacements(self, posed):
+        """Displacements of the points in a pose of the cage, [n_points, 3], bind space."""
+        if self.extra is None:
+            return self.rows @ (posed - self.rest).astype(np.float32)
+        return cw.deform(self.sparse(), posed, self.extra) - self.rested
+
+
+LOADED: dict[str, Weights] = {}
+
+
+def sparse(rows):
+    n, m = rows.shape
+    return csr_array((rows.ravel(), np.tile(np.arange(m, dtype=np.int32), n), np.arange(n + 1) * m), rows.shape)
+
+
+def loaded(mesh):
+    """Weights of a bound mesh, cached by its stamp."""
+    stamp = mesh.cagework.stamp
+    if stamp not in LOADED:
+        used = {each.cagework.stamp for each in bpy.data.meshes}
+        for old in LOADED.keys() - used:
+            del LOADED[old]
+        LOADED[stamp] = Weights(mesh.cagework.weights)
+    return LOADED[stamp]
+
+
+def coordinates(points):
+    """Positions [n, 3] of vertices or of the points of a shape key."""
+    flat = np.empty(3 * len(points), np.float32)
+    points.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
+
+
+def transform(points, matrix):
+    matrix = np.asarray(matrix, np.float64)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def basis(mesh):
+    """Local positions of a mesh without its shape keys."""
+    return coordinates(mesh.shape_keys.reference_key.points if mesh.shape_keys else mesh.vertices)
+
+
+def cage_mesh(cage, depsgraph):
+    """World positions and faces of a cage with its modifiers and shape keys, also in edit mode."""
+    evaluated = cage.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        corners = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        starts = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("loop_start", starts)
+        return transform(coordinates(mesh.vertices), evaluated.matrix_world), np.split(corners, starts[1:])
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def singular(matrix):
+    matrix = np.asarray(matrix, np.float64)[:3, :3]
+    return abs(np.linalg.det(matrix)) <= SINGULAR * np.abs(matrix).max() ** 3
+
+
+def fixed(obj):
+    """Why the mesh of an object cannot be bound, as a sentence, or None."""
+    mesh = obj.data
+    if mesh.library or mesh.override_library:
+        return f"The mesh of {obj.name} is linked from another file: make it local to bind it"
+    if singular(obj.matrix_world):
+        return f"{obj.name} has a scale of zero: set another scale"
+    if mesh.shape_keys and not mesh.shape_keys.use_relative:
+        return f"The shape keys of {obj.name} are absolute: turn on Relative"
+    return None
+
+
+def cage_fault(mesh, scene):
+    """Why the cage of a mesh cannot be used, as a sentence, or None."""
+    cage = mesh.cagework.cage
+    if cage is None or cage.name not in scene.objects or scene.objects[cage.name] != cage:
+        return "The cage was deleted: undo that, choose another cage, or unbind"
+    if not cage.visible_get():
+        return f"The cage {cage.name} is hidden, so the mesh keeps its shape: show the cage"
+    if len(cage.data.polygons) == 0 and cage.mode != "EDIT":
+        return f"{cage.name} has no faces: choose a closed mesh"
+    return None
+
+
+def problem(obj, scene):
+    """Why a bound mesh does not follow its cage, as a sentence, or None."""
+    mesh = obj.data
+    if fault := fixed(obj) or cage_fault(mesh, scene):
+        return fault
+    n = len(loaded(mesh).rows)
+    if n != len(mesh.vertices):
+        return f"{obj.name} has {len(mesh.vertices)} vertices and was bound with {n}: rebind"
+    if not mesh.shape_keys or KEY not in mesh.shape_keys.key_blocks:
+        return f"The shape key {KEY} of {obj.name} was deleted: rebind"
+    return None
+
+
+def owners(scene):
+    """Objects of a scene with bound meshes: for each mesh, its owner, or another object if the owner is not in the scene."""
+    seen = {}
+    for obj in scene.objects:
+        if obj.type == "MESH" and obj.data.cagework.stamp:
+            if obj.data not in seen or obj.data.cagework.owner == obj:
+                seen[obj.data] = obj
+    return list(seen.values())
+
+
+class Job:
+    """One bind of several objects. `solve` touches no data of Blender, so that it can run in a thread."""
+
+    def __init__(self, objects, cage, depsgraph, grid, keep_rest=False):
+        self.objects, self.cage, self.grid = objects, cage, grid
+        self.rest, faces = cage_mesh(cage, depsgraph)
+        self.cage_local = coordinates(cage.data.vertices)
+        kept = [loaded(o.data) for o in objects if o.data.cagework.stamp and o.data.cagework.cage == cage]
+        kept = [old for old in kept if len(old.rest) == len(self.rest)]
+        # A stored rest cage is in the bind space of its own mesh, so it is reused only if a single
+        # object is bound.
+        if keep_rest and kept and len(objects) == 1:
+            self.rest, self.cage_local, self.to_bind = kept[0].rest, kept[0].cage_local, [kept[0].to_bind]
+        else:
+            self.to_bind = [np.array(o.matrix_world, np.float64) for o in objects]
+        self.points = [transform(basis(o.data), m) for o, m in zip(objects, self.to_bind)]
+        self.faces, self.results = [face.tolist() for face in faces], None
+
+    def solve(self, progress=None):
+        cage = cw.Cage(self.rest, self.faces)
+        if len(self.points) == 1:
+            self.results = [cw.bind(self.points[0], cage, grid=self.grid, progress=progress)]
+        else:
+            self.results = cw.bind_many(self.points, cage, grid=self.grid, progress=progress)
+
+    def store(self, depsgraph):
+        for obj, to_bind, (weights, report) in zip(self.objects, self.to_bind, self.results):
+            mesh, parts = obj.data, {"rows": weights.toarray(), "rest": self.rest, "cage_local": self.cage_local}
+            if report.get("offsets") is not None:
+                parts["offsets"] = report["offsets"].toarray()
+            archive = io.BytesIO()
+            np.savez(archive, to_bind=to_bind, frames=json.dumps(report["frames"]), **parts)
+            bound = mesh.cagework
+            bound.cage, bound.owner, bound.grid, bound.stamp = self.cage, obj, self.grid, uuid4().hex
+            bound.weights, bound.report = archive.getvalue(), card(report)
+            live_key(obj)
+            follow(obj, depsgraph)
+
+
+def card(report):
+    """The report of a bind in a few lines."""
+    points, outside = report["vertices"], report["outside_vertices"]
+    lines = [
+        f"{points:,} points, {report['cage_vertices']:,} cage vertices, grid {report['grid']}",
+        f"{report['timings_ms']['total'] / 1000:.2f} s, {report['memory_bytes']['peak'] / 2**20:.0f} MB",
+        "All points are inside" if not outside else f"{outside:,} points are outside the cage",
+        *report["notices"],
+    ]
+    return "\n".join(lines)
+
+
+def live_key(obj):
+    """The shape key that follows the cage; makes it if it is missing."""
+    keys = obj.data.shape_keys
+    if not keys:
+        obj.shape_key_add(name="Basis", from_mix=False)
+        keys = obj.data.shape_keys
+    key = keys.key_blocks.get(KEY)
+    if key is None:
+        active = obj.active_shape_key_index
+        key = obj.shape_key_add(name=KEY, from_mix=False)
+        key.value = 1.0
+        obj.active_shape_key_index = active
+    return key
+
+
+def posed_cage(obj, depsgraph):
+    """Positions of the posed cage in the bind space of an object's mesh."""
+    world, _ = cage_mesh(obj.data.cagework.cage, depsgraph)
+    matrix = loaded(obj.data).to_bind @ np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
+    return transform(world, matrix)
+
+
+def follow(obj, depsgraph):
+    """Writes the shape that the posed cage gives a bound mesh into its shape key. Returns a sentence if the cage does not fit."""
+    weights = loaded(obj.data)
+    posed = posed_cage(obj, depsgraph)
+    if len(posed) != len(weights.rest):
+        return f"The cage has {len(posed)} vertices and had {len(weights.rest)} when bound: undo that, or bind again"
+    if weights.posed is not None and np.array_equal(posed, weights.posed):
+        return None
+    moved = weights.displacements(posed) @ np.linalg.inv(weights.to_bind[:3, :3]).T
+    points = live_key(obj).points
+    points.foreach_set("co", (basis(obj.data) + moved).astype(np.float32).ravel())
+    obj.data.update_tag()
+    weights.posed = posed
+    return None
+
+
+@persistent
+def on_update(scene, depsgraph=None):
+    """Handler: bound meshes follow their cages; a mesh whose topology changed is bound again."""
+    if depsgraph is None:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+    for obj in owners(scene):
+        if obj.mode == "EDIT" or fixed(obj) or cage_fault(obj.data, scene):
+            continue
+        if len(loaded(obj.data).rows) != len(obj.data.vertices) and len(obj.data.vertices):
+            rebind(obj, depsgraph)
+        elif not problem(obj, scene):
+            follow(obj, depsgraph)
+
+
+def rebind(obj, depsgraph):
+    """Binds an edited mesh again to the rest shape of its cage."""
+    job = Job([obj], obj.data.cagework.cage, depsgraph, obj.data.cagework.grid, keep_rest=True)
+    try:
+        job.solve()
+    except cw.Error as error:
+        # The empty stamp marks the mesh as not bound, so that later updates do not try again.
+        obj.data.cagework.stamp = ""
+        print(f"Cagework: {obj.name} was not bound again: {error}")
+        return
+    job.store(depsgraph)
+
+
+@persistent
+def forget(*_):
+    """Handler: after undo, redo or opening a file, forgets the last poses, so that the next update writes the shape keys."""
+    for weights in LOADED.values():
+        weights.posed = None

@@ -1,0 +1,44 @@
+"""Builds the extension for one platform from a wheel of cagework: python build.py WHEEL OUT_FOLDER
+
+The wheel serves Python 3.10 and newer, hence all versions of Blender from 4.2 on. Prints the path of the archive.
+"""
+
+import re
+import sys
+import zipfile
+from pathlib import Path
+
+PLATFORMS = {
+    r"(manylinux|linux).*x86_64": ["linux-x64"],
+    r"(manylinux|linux).*aarch64": ["linux-arm64"],
+    r"macosx.*universal2": ["macos-arm64", "macos-x64"],
+    r"macosx.*arm64": ["macos-arm64"],
+    r"macosx.*x86_64": ["macos-x64"],
+    r"win_amd64": ["windows-x64"],
+    r"win_arm64": ["windows-arm64"],
+}
+
+
+def build(wheel, out):
+    folder = Path(__file__).parent
+    tag = wheel.stem.split("-")[-1]
+    platforms = next((names for pattern, names in PLATFORMS.items() if re.search(pattern, tag)), None)
+    if platforms is None:
+        raise SystemExit(f"{wheel.name}: Blender has no platform {tag}")
+    manifest = (folder / "blender_manifest.toml").read_text()
+    added = f'platforms = {platforms}\nwheels = ["./wheels/{wheel.name}"]\n'.replace("'", '"')
+    # Top-level keys come before the first table.
+    manifest = manifest.replace("[permissions]", f"{added}\n[permissions]")
+    version = re.search(r'^version = "(.+)"', manifest, re.M)[1]
+    archive = out / f"cagework-{version}-{'-'.join(platforms)}.zip"
+    out.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("blender_manifest.toml", manifest)
+        for source in ["__init__.py", "binding.py", "operators.py", "panel.py"]:
+            file.write(folder / source, source)
+        file.write(wheel, f"wheels/{wheel.name}")
+    return archive
+
+
+if __name__ == "__main__":
+    print(build(Path(sys.argv[1]), Path(sys.argv[2])))

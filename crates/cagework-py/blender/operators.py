@@ -1,0 +1,434 @@
+"""Operators: make a cage, bind, pull, reset, save as shape key, bake, unbind."""
+
+import struct
+import threading
+
+import bpy
+import cagework as cw
+import numpy as np
+from bpy_extras import view3d_utils
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+from . import binding
+
+# Seconds between two updates of the progress of a bind.
+INTERVAL = 0.05
+
+
+def meshes(context):
+    """Selected meshes, the active one first. If a cage is active, the meshes that are bound to it."""
+    active = context.active_object
+    bound = [o for o in binding.owners(context.scene) if o.data.cagework.cage == active]
+    if bound:
+        return bound
+    chosen = [o for o in context.selected_objects if o.type == "MESH"]
+    if active and active.type == "MESH":
+        chosen = [active, *(o for o in chosen if o != active)]
+    cage = chosen[0].data.cagework.cage if chosen else None
+    return [o for o in chosen if o != cage]
+
+
+def bound_mesh(context):
+    """The active bound mesh, or the first one of the active cage."""
+    return next((o for o in meshes(context) if o.data.cagework.stamp), None)
+
+
+class OnBound:
+    """Base class of operators for a bound mesh."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == "OBJECT" and bound_mesh(context) is not None
+
+    def refuse(self, sentence):
+        self.report({"ERROR"}, sentence)
+        return {"CANCELLED"}
+
+
+class MakeCage(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.make_cage"
+    bl_label = "Make Cage"
+    bl_description = "Make a cage around the selected meshes, without their modifiers and shape keys"
+
+    vertices: bpy.props.IntProperty(name="Vertices", description="Largest number of vertices", default=80, min=8, max=400)
+    shape: bpy.props.EnumProperty(
+        name="Shape",
+        items=[("follow", "Follow", "Follows the limbs"), ("hull", "Hull", "The convex hull")],
+    )
+    clearance: bpy.props.FloatProperty(
+        name="Clearance", description="Distance from the mesh, as a fraction of its diagonal", default=0.0, min=0.0, max=0.5
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == "OBJECT" and bool(meshes(context))
+
+    def execute(self, context):
+        objects = meshes(context)
+        points, triangles, n = [], [], 0
+        for obj in objects:
+            if fault := binding.fixed(obj):
+                return self.refuse(fault)
+            obj.data.calc_loop_triangles()
+            corners = np.empty(3 * len(obj.data.loop_triangles), np.int32)
+            obj.data.loop_triangles.foreach_get("vertices", corners)
+            points.append(binding.transform(binding.basis(obj.data), obj.matrix_world))
+            triangles.append(corners.reshape(-1, 3) + n)
+            n += len(points[-1])
+        options = {"target": self.vertices, "shape": self.shape, "clearance": self.clearance}
+        try:
+            made = cw.generate_cage(np.concatenate(points), np.concatenate(triangles), **options)
+        except cw.Error as error:
+            return self.refuse(f"No cage was made: {error}")
+        first = objects[0]
+        local = binding.transform(made.vertices, first.matrix_world.inverted())
+        mesh = bpy.data.meshes.new(f"{first.name} Cage")
+        mesh.from_pydata(local.tolist(), [], [face.tolist() for face in made.faces])
+        cage = bpy.data.objects.new(mesh.name, mesh)
+        (first.users_collection[0] if first.users_collection else context.collection).objects.link(cage)
+        # As a child, the cage moves with the mesh. Moving the cage alone moves the mesh's vertices,
+        # not its object.
+        cage.parent = first
+        cage.display_type, cage.show_in_front, cage.hide_render = "WIRE", True, True
+        for obj in objects:
+            obj.data.cagework.cage = cage
+        return {"FINISHED"}
+
+
+class Bind(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.bind"
+    bl_label = "Bind"
+    bl_description = "Compute the weights. The current shape of the cage becomes its rest shape"
+
+    keep_rest: bpy.props.BoolProperty(
+        name="Keep Rest Shape", description="Bind to the rest shape of the last bind and keep the pose", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == "OBJECT" and any(o.data.cagework.cage for o in meshes(context))
+
+    def prepare(self, context):
+        objects = meshes(context)
+        cage = next(o.data.cagework.cage for o in objects if o.data.cagework.cage)
+        for obj in objects:
+            obj.data.cagework.cage = cage
+            if fault := binding.fixed(obj) or binding.cage_fault(obj.data, context.scene):
+                raise cw.Error(fault)
+            sharing = [o.name for o in context.scene.objects if o.data == obj.data and o != obj and o in objects]
+            if sharing:
+                raise cw.Error(f"{obj.name} and {sharing[0]} share their mesh: select one, or make them single users")
+        grid = objects[0].data.cagework.grid
+        depsgraph = context.evaluated_depsgraph_get()
+        if self.keep_rest and len(objects) > 1:
+            return [binding.Job([o], cage, depsgraph, grid, True) for o in objects]
+        return [binding.Job(objects, cage, depsgraph, grid, self.keep_rest)]
+
+    def execute(self, context):
+        try:
+            jobs = self.prepare(context)
+            for job in jobs:
+                job.solve()
+        except cw.Error as error:
+            return self.refuse(str(error))
+        return self.finish(context, jobs)
+
+    def finish(self, context, jobs):
+        for job in jobs:
+            job.store(context.evaluated_depsgraph_get())
+        self.report({"INFO"}, meshes(context)[0].data.cagework.report.replace("\n", ". "))
+        return {"FINISHED"}
+
+    def invoke(self, context, _event):
+        try:
+            self.jobs = self.prepare(context)
+        except cw.Error as error:
+            return self.refuse(str(error))
+        self.fraction, self.cancelled, self.error = 0.0, False, None
+        self.thread = threading.Thread(target=self.work)
+        self.thread.start()
+        self.timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self):
+        try:
+            for job in self.jobs:
+                job.solve(self.progress)
+        except Exception as error:  # Shown by `modal`, which runs in the main thread.
+            self.error = error
+
+    def progress(self, fraction):
+        self.fraction = fraction
+        if self.cancelled:
+            raise cw.Error("The bind was cancelled")
+
+    def modal(self, context, event):
+        self.cancelled |= event.type == "ESC"
+        if event.type != "TIMER" or self.thread.is_alive():
+            context.workspace.status_text_set(f"Cagework: binding, {self.fraction:.0%} (Esc: cancel)")
+            return {"RUNNING_MODAL"}
+        context.window_manager.event_timer_remove(self.timer)
+        context.workspace.status_text_set(None)
+        if self.error or self.cancelled:
+            return self.refuse(str(self.error or "The bind was cancelled"))
+        return self.finish(context, self.jobs)
+
+
+class Reset(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.reset"
+    bl_label = "Reset Cage"
+    bl_description = "Give the cage's vertices the shape that it had when the mesh was bound"
+
+    def execute(self, context):
+        obj = bound_mesh(context)
+        cage, local = obj.data.cagework.cage, binding.loaded(obj.data).cage_local
+        if fault := binding.cage_fault(obj.data, context.scene):
+            return self.refuse(fault)
+        if len(local) != len(cage.data.vertices):
+            return self.refuse(f"The cage has {len(cage.data.vertices)} vertices and had {len(local)} when bound")
+        write_cage(cage, local)
+        return {"FINISHED"}
+
+
+def write_cage(cage, local):
+    """Sets the local positions of a cage's vertices, or of its active shape key if the cage has shape keys."""
+    keys = cage.data.shape_keys
+    points = cage.active_shape_key.points if keys else cage.data.vertices
+    points.foreach_set("co", np.asarray(local, np.float32).ravel())
+    cage.data.update()
+    if keys:
+        cage.data.update_tag()
+
+
+class Pull(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.pull"
+    bl_label = "Pull"
+    bl_description = "Drag a point of the mesh; the cage follows with little bending"
+
+    vertex: bpy.props.IntProperty(name="Vertex", min=0)
+    offset: bpy.props.FloatVectorProperty(name="Offset", subtype="TRANSLATION", description="In world space")
+
+    def start(self, context):
+        """Reads mesh, cage and weights. Returns a sentence if they cannot be pulled."""
+        self.obj = bound_mesh(context)
+        mesh, cage = self.obj.data, self.obj.data.cagework.cage
+        if fault := binding.problem(self.obj, context.scene):
+            return fault
+        depsgraph = context.evaluated_depsgraph_get()
+        if len(cage_now := binding.cage_mesh(cage, depsgraph)[0]) != len(cage.data.vertices) or cage.modifiers:
+            return f"{cage.name} has modifiers: apply them, or pose it by hand"
+        self.weights, self.cage = binding.loaded(mesh), cage
+        mesh.calc_loop_triangles()
+        corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        self.triangles = corners.reshape(-1, 3)
+        self.rest = binding.transform(binding.basis(mesh), self.weights.to_bind)
+        _, faces = binding.cage_mesh(cage, depsgraph)
+        self.solid = cw.Cage(self.weights.rest, [face.tolist() for face in faces])
+        self.posed = binding.posed_cage(self.obj, depsgraph)
+        self.moved = self.rest + self.weights.displacements(self.posed)
+        self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(self.weights.to_bind)
+        self.world_to_cage = np.linalg.inv(np.array(cage.matrix_world))
+        self.before = binding.transform(cage_now, self.world_to_cage)
+        return None
+
+    def pull(self, vertex, world_target):
+        to = binding.transform(np.array([world_target]), np.linalg.inv(self.to_world))
+        options = {"start": self.posed, "report": self.weights.extra, "grid": self.obj.data.cagework.grid}
+        posed = cw.pull(self.rest, self.triangles, self.solid, self.weights.sparse(), [vertex], to, **options)
+        write_cage(self.cage, binding.transform(binding.transform(posed, self.to_world), self.world_to_cage))
+
+    def execute(self, context):
+        if fault := self.start(context):
+            return self.refuse(fault)
+        if self.vertex >= len(self.rest):
+            return self.refuse(f"There is no vertex {self.vertex}; {self.obj.name} has {len(self.rest)}")
+        at = binding.transform(self.moved[[self.vertex]], self.to_world)[0]
+        try:
+            self.pull(self.vertex, at + np.array(self.offset))
+        except cw.Error as error:
+            return self.refuse(str(error))
+        return {"FINISHED"}
+
+    def invoke(self, context, _event):
+        if context.area is None or context.area.type != "VIEW_3D":
+            return self.execute(context)
+        if fault := self.start(context):
+            return self.refuse(fault)
+        self.tree = BVHTree.FromPolygons(
+            binding.transform(self.moved, self.to_world).tolist(), self.triangles.tolist()
+        )
+        self.dragging = False
+        context.workspace.status_text_set("Cagework: drag a point of the mesh (Esc: cancel)")
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        region = next((r for r in context.area.regions if r.type == "WINDOW"), None)
+        view = context.space_data.region_3d
+        mouse = Vector((event.mouse_x - region.x, event.mouse_y - region.y))
+        try:
+            if event.type in {"ESC", "RIGHTMOUSE"}:
+                write_cage(self.cage, self.before)
+                return self.end(context, {"CANCELLED"})
+            if event.type == "LEFTMOUSE" and event.value == "PRESS":
+                origin = view3d_utils.region_2d_to_origin_3d(region, view, mouse)
+                hit, _, face, _ = self.tree.ray_cast(origin, view3d_utils.region_2d_to_vector_3d(region, view, mouse))
+                if hit is None:
+                    return self.end(context, {"CANCELLED"})
+                world = binding.transform(self.moved[self.triangles[face]], self.to_world)
+                nearest = int(np.linalg.norm(world - np.array(hit), axis=1).argmin())
+                self.vertex, self.at = int(self.triangles[face][nearest]), Vector(world[nearest])
+                self.dragging = True
+            elif event.type == "MOUSEMOVE" and self.dragging:
+                target = view3d_utils.region_2d_to_location_3d(region, view, mouse, self.at)
+                self.offset = target - self.at
+                self.pull(self.vertex, np.array(target))
+            elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self.dragging:
+                return self.end(context, {"FINISHED"})
+            elif not self.dragging and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
+                return {"PASS_THROUGH"}
+        except cw.Error as error:
+            self.end(context, {"CANCELLED"})
+            return self.refuse(str(error))
+        return {"RUNNING_MODAL"}
+
+    def end(self, context, result):
+        context.workspace.status_text_set(None)
+        return result
+
+
+def copy_key(obj, name):
+    """A new shape key with the current shape of the key that follows the cage."""
+    active = obj.active_shape_key_index
+    key = obj.shape_key_add(name=name, from_mix=False)
+    key.value = 0.0  # Blender 5.0 adds keys with the value 1.
+    flat = binding.coordinates(obj.data.shape_keys.key_blocks[binding.KEY].points).astype(np.float32)
+    key.points.foreach_set("co", flat.ravel())
+    obj.active_shape_key_index = active
+    return key
+
+
+class SaveKey(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.save_key"
+    bl_label = "Save as Shape Key"
+    bl_description = "Keep the current deformation as a shape key with the value 0"
+
+    def execute(self, context):
+        for obj in meshes(context):
+            if obj.data.cagework.stamp and obj.data.shape_keys:
+                copy_key(obj, "Cage Pose")
+        return {"FINISHED"}
+
+
+class Bake(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.bake"
+    bl_label = "Bake"
+    bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
+
+    form: bpy.props.EnumProperty(
+        name="Format",
+        items=[
+            ("KEYS", "Shape Keys", "A key per frame, with animated values"),
+            ("MDD", "MDD", "A file for the Mesh Cache modifier"),
+            ("PC2", "PC2", "A file for the Mesh Cache modifier"),
+        ],
+    )
+    first: bpy.props.IntProperty(name="First Frame", default=1)
+    last: bpy.props.IntProperty(name="Last Frame", default=250)
+    step: bpy.props.IntProperty(name="Step", default=1, min=1)
+    filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", description="Without its extension")
+
+    def invoke(self, context, _event):
+        self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        self.filepath = self.filepath or f"//{bound_mesh(context).name}"
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        obj, scene = bound_mesh(context), context.scene
+        frames = list(range(self.first, self.last + 1, self.step))
+        if not frames:
+            return self.refuse(f"There are no frames from {self.first} to {self.last}")
+        if fault := binding.problem(obj, scene):
+            return self.refuse(fault)
+        live, shapes, current = obj.data.shape_keys.key_blocks[binding.KEY], [], scene.frame_current
+        context.window_manager.progress_begin(0, len(frames))
+        for k, frame in enumerate(frames):
+            scene.frame_set(frame)
+            if fault := binding.follow(obj, context.evaluated_depsgraph_get()):
+                return self.refuse(fault)
+            shapes.append(binding.coordinates(live.points))
+            context.window_manager.progress_update(k)
+        context.window_manager.progress_end()
+        scene.frame_set(current)
+        if self.form == "KEYS":
+            self.to_keys(obj, frames, shapes)
+        else:
+            try:
+                self.to_file(obj, frames, shapes, scene.render.fps / scene.render.fps_base)
+            except OSError as error:
+                return self.refuse(f"The file was not written: {error}")
+        return {"FINISHED"}
+
+    def to_keys(self, obj, frames, shapes):
+        for frame, shape in zip(frames, shapes):
+            key = copy_key(obj, f"Cage {frame}")
+            key.points.foreach_set("co", shape.astype(np.float32).ravel())
+            near = [(frame - self.step, 0.0), (frame, 1.0), (frame + self.step, 0.0)]
+            for at, value in near[(frame == frames[0]) : 3 - (frame == frames[-1])]:
+                key.value = value
+                key.keyframe_insert("value", frame=at)
+        obj.data.shape_keys.key_blocks[binding.KEY].mute = True
+        for curve in curves(obj.data.shape_keys):
+            for point in curve.keyframe_points:
+                point.interpolation = "LINEAR"
+
+    def to_file(self, obj, frames, shapes, fps):
+        path = f"{bpy.path.abspath(self.filepath)}.{self.form.lower()}"
+        with open(path, "wb") as file:
+            if self.form == "MDD":
+                file.write(struct.pack(">2i", len(shapes), len(shapes[0])))
+                file.write((np.array(frames) / fps).astype(">f4").tobytes())
+                file.writelines(shape.astype(">f4").tobytes() for shape in shapes)
+            else:
+                header = (b"POINTCACHE2\0", 1, len(shapes[0]), frames[0], self.step, len(shapes))
+                file.write(struct.pack("<12siiffi", *header))
+                file.writelines(shape.astype("<f4").tobytes() for shape in shapes)
+        cache = obj.modifiers.new(f"Cagework {self.form}", "MESH_CACHE")
+        cache.cache_format, cache.filepath, cache.frame_start = self.form, self.filepath_of(path), frames[0] / self.step
+        cache.frame_scale = 1 / self.step  # Blender subtracts `frame_start` from the scaled frame.
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+    def filepath_of(self, path):
+        return bpy.path.relpath(path) if self.filepath.startswith("//") else path
+
+
+def curves(keys):
+    """The F-curves of shape keys, in the actions of Blender 4 and 5."""
+    action = keys.animation_data.action
+    if hasattr(action, "fcurves"):
+        return list(action.fcurves)
+    return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
+
+
+class Unbind(OnBound, bpy.types.Operator):
+    bl_idname = "cagework.unbind"
+    bl_label = "Unbind"
+    bl_description = "Remove the weights and the live shape key. Saved shape keys stay"
+
+    def execute(self, context):
+        for obj in meshes(context):
+            keys = obj.data.shape_keys
+            if keys and binding.KEY in keys.key_blocks:
+                obj.shape_key_remove(keys.key_blocks[binding.KEY])
+            if obj.data.shape_keys and len(obj.data.shape_keys.key_blocks) == 1:
+                obj.shape_key_clear()
+            obj.data.cagework.stamp, obj.data.cagework.weights, obj.data.cagework.report = "", b"", ""
+        return {"FINISHED"}
+
+
+CLASSES = [MakeCage, Bind, Reset, Pull, SaveKey, Bake, Unbind]

@@ -1,0 +1,78 @@
+"""Prints the table of docs/blender.md: Cagework beside Blender's Mesh Deform, on the reference of tests/data/armadillo.
+
+Run by hand, in the environment of `cargo xtask blender`: python compare.py [PRECISION ...]
+"""
+
+import resource
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from conftest import EXTENSION, local, select, world
+
+DATA = Path(__file__).parents[4] / "tests/data/armadillo"
+
+
+def mesh_object(name, vertices, faces):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def weights(model, cage):
+    """The weights that a modifier or the extension uses, measured by moving each cage vertex by one unit along x."""
+    rest, rows = local(cage.data), []
+    before = world(model)
+    for k in range(len(rest)):
+        moved = rest.copy()
+        moved[k, 0] += 1
+        cage.data.vertices.foreach_set("co", moved.astype(np.float32).ravel())
+        cage.data.update()
+        rows.append((world(model) - before)[:, 0])
+    cage.data.vertices.foreach_set("co", rest.astype(np.float32).ravel())
+    cage.data.update()
+    return np.array(rows).T
+
+
+def row(name, grid, bind, expected):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    model = mesh_object("Model", np.load(DATA / "points.npy"), np.zeros((0, 3), int))
+    cage = mesh_object("Cage", np.load(DATA / "cage_positions.npy"), np.load(DATA / "cage_triangles.npy"))
+    select(model)
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    bind(model, cage)
+    took, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    error = np.abs(weights(model, cage) - expected).mean()
+    print(f"| {name} | {grid} | {took:.2f} s | {(after - before) / 1024:.0f} MB | {error:.1e} |", flush=True)
+
+
+def with_mesh_deform(precision):
+    def bind(model, cage):
+        modifier = model.modifiers.new("Deform", "MESH_DEFORM")
+        modifier.object, modifier.precision = cage, precision
+        bpy.ops.object.meshdeform_bind(modifier=modifier.name)
+        assert modifier.is_bound
+
+    return bind
+
+
+def with_cagework(grid):
+    def bind(model, cage):
+        model.data.cagework.cage, model.data.cagework.grid = cage, grid
+        assert bpy.ops.cagework.bind() == {"FINISHED"}
+
+    return bind
+
+
+if __name__ == "__main__":
+    reference = np.load(DATA / "weights_fem.npy")
+    print(EXTENSION.__name__, bpy.app.version_string)
+    for precision in map(int, sys.argv[1:] or ["5", "6"]):
+        cells = 2**precision + 2
+        # Measure the extension first, because the peak memory of a process only grows.
+        row("Cagework", cells, with_cagework(cells), reference)
+        row("Mesh Deform", cells, with_mesh_deform(precision), reference)

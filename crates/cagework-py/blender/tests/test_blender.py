@@ -1,0 +1,312 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bmesh
+import bpy
+import cagework as cw
+import numpy as np
+import pytest
+from conftest import EXTENSION, ball, bind, delete, local, move, select, world
+from mathutils import Euler, Matrix, Vector
+
+binding = EXTENSION.binding
+# Tolerance of float32 positions near 3 that are transformed between two spaces.
+TOLERANCE = 1e-5
+KEY = binding.KEY
+
+
+def bend(points):
+    """Offsets that grow with the square of z above the middle."""
+    return np.stack([0.4 * np.maximum(points[:, 2], 0) ** 2, *np.zeros((2, len(points)))], axis=1)
+
+
+def expected(points, faces, rest, posed, grid=24):
+    """Points deformed by the package without the extension, relative to its reconstruction at rest."""
+    weights, report = cw.bind(points, cw.Cage(rest, faces), grid=grid)
+    return points + cw.deform(weights, posed, report) - cw.deform(weights, rest, report)
+
+
+def faces_of(mesh):
+    return [list(p.vertices) for p in mesh.polygons]
+
+
+def test_made_cage_encloses_the_mesh_and_is_drawn_as_wire(body):
+    select(body)
+    bpy.ops.cagework.make_cage(vertices=60)
+    cage = body.data.cagework.cage
+    assert cage.display_type == "WIRE" and cage.parent == body and 8 <= len(cage.data.vertices) <= 60
+    found = cw.check_cage(cw.Cage(local(cage.data), faces_of(cage.data)), local(body.data))
+    assert not [problem for problem in found if problem["severity"] == "error"]
+
+
+PLACES = {
+    "plain": Matrix(),
+    "turned, scaled unevenly, far": Matrix.LocRotScale(Vector((5, -3, 2)), Euler((0.3, 1.0, -0.7)), Vector((2.0, 0.5, 1.5))),
+    "mirrored": Matrix.Diagonal((-1, 1, 1, 1)),
+}
+
+
+@pytest.mark.parametrize("matrix", PLACES.values(), ids=PLACES.keys())
+def test_posed_vertices_move_the_mesh_as_the_package_does(matrix):
+    body = ball("Body", matrix)
+    cage = bind(body)
+    points, rest = world(body), binding.transform(local(cage.data), cage.matrix_world)
+    move(cage, bend(local(cage.data)))
+    posed = binding.transform(local(cage.data), cage.matrix_world)
+    faces = [face[::-1] if matrix.determinant() < 0 else face for face in faces_of(cage.data)]
+    assert np.abs(world(body) - points).max() > 0.1
+    assert np.abs(world(body) - expected(points, faces, rest, posed)).max() < TOLERANCE * 10
+
+
+def test_moving_the_cage_object_moves_the_mesh_and_moving_the_mesh_moves_both(body):
+    cage = bind(body)
+    before = world(body)
+    cage.location = (0.5, 0.0, 1.0)
+    assert np.abs(world(body) - before - [0.5, 0.0, 1.0]).max() < TOLERANCE
+    body.matrix_world = PLACES["turned, scaled unevenly, far"]
+    both = binding.transform(before + [0.5, 0.0, 1.0], body.matrix_world)
+    assert np.abs(world(body) - both).max() < 10 * TOLERANCE
+
+
+def test_mesh_follows_a_cage_in_edit_mode(body):
+    cage = bind(body)
+    points, rest = world(body), local(cage.data)
+    select(cage)
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(cage.data)
+    for vertex, offset in zip(edited.verts, bend(rest)):
+        vertex.co += Vector(offset)
+    bmesh.update_edit_mesh(cage.data)
+    moved = world(body)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.abs(moved - expected(points, faces_of(cage.data), rest, rest + bend(rest))).max() < TOLERANCE
+
+
+def test_mesh_follows_shape_keys_and_modifiers_of_the_cage(body):
+    cage = bind(body)
+    before = world(body)
+    cage.shape_key_add(name="Basis")
+    wide = cage.shape_key_add(name="Wide")
+    wide.points.foreach_set("co", (local(cage.data) * [2, 1, 1]).astype(np.float32).ravel())
+    wide.value = 0.5
+    cage.data.update_tag()
+    assert np.abs(world(body) - before * [1.5, 1, 1]).max() < TOLERANCE
+    bpy.ops.object.armature_add()
+    armature = bpy.context.active_object
+    group = cage.vertex_groups.new(name=armature.data.bones[0].name)
+    group.add(range(len(cage.data.vertices)), 1.0, "REPLACE")
+    cage.modifiers.new("Armature", "ARMATURE").object = armature
+    armature.pose.bones[0].location = (0, 0, 0.7)
+    bone = armature.data.bones[0].matrix_local.to_3x3() @ Vector((0, 0, 0.7))
+    assert np.abs(world(body) - before * [1.5, 1, 1] - np.array(bone)).max() < TOLERANCE
+
+
+def test_modifiers_of_the_mesh_act_on_the_posed_shape(body):
+    cage = bind(body)
+    body.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    before = world(body)
+    cage.location.x += 1
+    moved = world(body)
+    assert len(moved) > len(body.data.vertices) and np.abs(moved - before - [1, 0, 0]).max() < TOLERANCE
+
+
+def test_saved_file_opens_bound(body, tmp_path):
+    cage = bind(body)
+    move(cage, bend(local(cage.data)))
+    before = world(body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    binding.LOADED.clear()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    body = bpy.data.objects["Body"]
+    assert np.array_equal(world(body), before) and binding.problem(body, bpy.context.scene) is None
+    body.data.cagework.cage.location.x += 1
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+
+
+def test_undo_restores_the_pose_and_the_bind(body):
+    select(body)
+    bpy.ops.ed.undo_push(message="start")
+    before = world(body)
+    cage = bind(body)
+    bpy.ops.ed.undo_push(message="bind")
+    cage.location.x += 1
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="move")
+    bpy.ops.ed.undo()
+    body = bpy.data.objects["Body"]
+    assert np.abs(world(body) - before).max() < TOLERANCE and body.data.cagework.stamp
+    body.data.cagework.cage.location.x += 2
+    assert np.abs(world(body) - before - [2, 0, 0]).max() < TOLERANCE
+    bpy.ops.ed.undo()
+    assert not bpy.data.objects["Body"].data.cagework.stamp
+
+
+def test_edited_mesh_is_bound_again_and_keeps_the_pose(body):
+    cage = bind(body)
+    rest = local(cage.data)
+    move(cage, bend(rest))
+    select(body)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    moved = world(body)
+    points = binding.basis(body.data)
+    assert len(points) == len(moved) and len(binding.loaded(body.data).rows) == len(points)
+    assert np.abs(moved - expected(points, faces_of(cage.data), rest, rest + bend(rest))).max() < TOLERANCE
+
+
+def test_rebind_keeps_the_pose_and_bind_makes_it_the_rest_shape(body):
+    cage = bind(body)
+    before = world(body)
+    move(cage, bend(local(cage.data)))
+    posed = world(body)
+    select(body)
+    bpy.ops.cagework.bind(keep_rest=True)
+    assert np.abs(world(body) - posed).max() < TOLERANCE
+    bpy.ops.cagework.bind()
+    assert np.abs(world(body) - before).max() < TOLERANCE
+
+
+def test_reset_gives_the_cage_its_rest_shape(body):
+    cage = bind(body)
+    rest, before = local(cage.data), world(body)
+    move(cage, bend(rest))
+    bpy.ops.cagework.reset()
+    assert np.array_equal(local(cage.data), rest) and np.abs(world(body) - before).max() < TOLERANCE
+
+
+def test_faults_are_sentences(body, tmp_path):
+    scene, cage = bpy.context.scene, bind(body)
+    cage.hide_set(True)
+    assert "is hidden" in binding.problem(body, scene)
+    cage.hide_set(False)
+    before = world(body)
+    delete(cage)
+    assert "was deleted" in binding.problem(body, scene) and np.array_equal(world(body), before)
+    select(body)
+    with pytest.raises(RuntimeError, match="was deleted"):
+        bpy.ops.cagework.reset()
+    body.scale.x = 0
+    bpy.context.view_layer.update()
+    assert "a scale of zero" in binding.problem(body, scene)
+    with pytest.raises(RuntimeError, match="a scale of zero"):
+        bpy.ops.cagework.make_cage()
+    body.scale.x = 1
+    bpy.context.view_layer.update()
+    open_mesh = bpy.data.meshes.new("Open")
+    open_mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    body.data.cagework.cage = bpy.data.objects.new("Open", open_mesh)
+    scene.collection.objects.link(body.data.cagework.cage)
+    with pytest.raises(RuntimeError, match="not closed"):
+        bpy.ops.cagework.bind()
+
+
+def test_linked_mesh_is_refused_and_its_override_does_not_fail(body, tmp_path):
+    bind(body)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, into):
+        into.objects = ["Body", "Body Cage"]
+    for obj in into.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    linked = bpy.data.objects["Body"].override_create(remap_local_usages=True)
+    assert "make it local" in binding.problem(linked, bpy.context.scene)
+    select(linked)
+    with pytest.raises(RuntimeError, match="make it local"):
+        bpy.ops.cagework.make_cage()
+
+
+def test_linked_duplicates_take_the_same_shape_and_are_bound_once(body):
+    cage = bind(body)
+    twin = body.copy()
+    twin.location = (4, 0, 0)
+    bpy.context.scene.collection.objects.link(twin)
+    before = world(body)
+    cage.location.x += 1
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+    assert np.abs(world(twin) - before - [5, 0, 0]).max() < TOLERANCE
+    select(body, twin)
+    with pytest.raises(RuntimeError, match="share their mesh"):
+        bpy.ops.cagework.bind()
+
+
+def test_several_meshes_follow_one_cage():
+    body = ball("Body")
+    shirt = ball("Shirt", Matrix.Translation((0.2, 0, 0)) @ Matrix.Scale(0.9, 4), segments=12)
+    cage = bind(body, shirt)
+    assert shirt.data.cagework.cage == cage
+    points, rest = [world(body), world(shirt)], binding.transform(local(cage.data), cage.matrix_world)
+    move(cage, bend(local(cage.data)))
+    posed = binding.transform(local(cage.data), cage.matrix_world)
+    for obj, before in zip([body, shirt], points):
+        assert np.abs(world(obj) - expected(before, faces_of(cage.data), rest, posed)).max() < TOLERANCE
+    select(body, shirt)
+    assert bpy.ops.cagework.bind(keep_rest=True) == {"FINISHED"}
+    assert np.abs(world(shirt) - expected(points[1], faces_of(cage.data), rest, posed)).max() < TOLERANCE
+
+
+def test_points_outside_the_cage_follow_as_in_the_package(body):
+    bpy.ops.mesh.primitive_cube_add(size=1.8)
+    cage = bpy.context.active_object
+    body.data.cagework.cage, body.data.cagework.grid = cage, 24
+    select(body)
+    bpy.ops.cagework.bind()
+    points, rest = world(body), local(cage.data)
+    assert "outside the cage" in body.data.cagework.report
+    move(cage, bend(rest))
+    assert np.abs(world(body) - expected(points, faces_of(cage.data), rest, rest + bend(rest))).max() < TOLERANCE
+
+
+def test_pulled_vertex_reaches_its_target():
+    body = ball("Body", PLACES["turned, scaled unevenly, far"])
+    bind(body, grid=32)
+    before = world(body)
+    top = int(before[:, 2].argmax())
+    for offset in [(0.2, 0.0, 0.3), (0.0, 0.1, 0.0)]:
+        assert bpy.ops.cagework.pull(vertex=top, offset=offset) == {"FINISHED"}
+    assert np.abs((world(body) - before)[top] - [0.2, 0.1, 0.3]).max() < 0.02
+
+
+def test_saved_key_has_the_pose_and_stays_after_unbinding(body):
+    cage = bind(body)
+    before = world(body)
+    move(cage, bend(local(cage.data)))
+    posed = world(body)
+    bpy.ops.cagework.save_key()
+    bpy.ops.cagework.unbind()
+    assert np.abs(world(body) - before).max() < TOLERANCE
+    body.data.shape_keys.key_blocks["Cage Pose"].value = 1
+    assert np.abs(world(body) - posed).max() < TOLERANCE and KEY not in body.data.shape_keys.key_blocks
+    body.data.shape_keys.key_blocks["Cage Pose"].value = 0
+    bpy.ops.cagework.bind()
+    assert binding.problem(body, bpy.context.scene) is None
+
+
+@pytest.mark.parametrize("form", ["KEYS", "MDD", "PC2"])
+def test_baked_frames_play_without_the_cage(body, form, tmp_path):
+    cage = bind(body)
+    for frame, x in [(1, 0.0), (5, 1.0), (9, -0.5)]:
+        cage.location.x = x
+        cage.keyframe_insert("location", index=0, frame=frame)
+    scene, live = bpy.context.scene, []
+    for frame in range(1, 10):
+        scene.frame_set(frame)
+        live.append(world(body))
+    assert np.ptp([points[0, 0] for points in live]) > 1
+    bpy.ops.cagework.bake(form=form, first=1, last=9, step=2, filepath=str(tmp_path / "baked"))
+    delete(cage)
+    for frame in range(1, 10, 2):
+        scene.frame_set(frame)
+        assert np.abs(world(body) - live[frame - 1]).max() < TOLERANCE, frame
+
+
+def test_archive_of_the_extension_is_valid():
+    """Blender's own checker reads the manifest of the archive that users install."""
+    checker = Path(bpy.utils.resource_path("LOCAL")) / "scripts/addons_core/bl_pkg/cli/blender_ext.py"
+    command = [sys.executable, checker, "validate", os.environ["CAGEWORK_EXTENSION"]]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,72 @@
+"""The notebook widget without a notebook. `cargo xtask notebooks` tests it in JupyterLab."""
+
+import cagework_notebook
+import numpy as np
+import pytest
+
+import cagework as cw
+
+
+@pytest.fixture
+def widget(model, cage, bound):
+    return cw.show(model, cage, *bound)
+
+
+def test_widget_sends_the_model_its_cage_and_all_weights(widget, model, cage, bound):
+    sent = widget._sent
+    vertices, triangles = cw.read_model(sent["file"])
+    # float32 has 24 significant bits.
+    np.testing.assert_allclose(vertices, model.vertices, atol=2.0**-23)
+    np.testing.assert_array_equal(triangles, model.faces)
+    np.testing.assert_array_equal(np.frombuffer(sent["positions"]).reshape(-1, 3), cage.vertices)
+    assert sent["name"] == "model.ply" and len(sent["data"]) == len(sent["indices"]) == 4 * bound[0].nnz
+    assert np.frombuffer(sent["corners"], "u4").size == sum(1 + len(face) for face in cage.faces)
+
+
+def test_offset_columns_of_outside_points_follow_those_of_the_cage(model, cage):
+    points = np.vstack([model.vertices, [[0.0, 0.0, 3.0]]])
+    weights, report = cw.bind(points, cage, grid=24)
+    sent = cw.show((points, model.faces), cage, weights, report)._sent
+    assert len(sent["data"]) == 4 * (weights.nnz + report["offsets"].nnz)
+    assert np.frombuffer(sent["indices"], "u4").max() >= len(cage.vertices)
+
+
+def test_pose_from_the_notebook_and_from_python_is_one_array(widget, cage):
+    seen = []
+    widget.observe(lambda change: seen.append(change["new"]), "pose")
+    posed = cage.vertices + [0.0, 0.5, 0.0]
+    widget.set_state({"pose": memoryview(posed.tobytes())})
+    np.testing.assert_array_equal(widget.pose, posed)
+    widget.pose = cage.vertices * 2
+    assert [len(pose) for pose in seen] == [len(cage.vertices)] * 2
+    np.testing.assert_array_equal(np.frombuffer(widget.get_state("pose")["pose"]).reshape(-1, 3), cage.vertices * 2)
+    with pytest.raises(ValueError, match="read-only"):
+        widget.pose[0] = 0
+
+
+def test_wrong_shapes_are_rejected_in_a_sentence(widget, model, cage, bound):
+    n = len(cage.vertices)
+    with pytest.raises(cw.ArrayError, match=rf"pose: expected shape \[{n}, 3\], got \[2, 3\]"):
+        widget.pose = np.zeros((2, 3))
+    for wrong in (np.nan, np.inf, 1e308):
+        with pytest.raises(cw.ArrayError, match=r"pose: expected finite numbers of at most 3.4e\+38"):
+            widget.pose = np.full((n, 3), wrong)
+    with pytest.raises(cw.ArrayError, match=rf"weights: .*{n} cage vertices.*got \[5, {n}\]"):
+        cw.show(model, cage, bound[0][:5])
+    with pytest.raises(cw.ArrayError, match=r"triangles: expected shape \[n, 3\], got \[1, 4\]"):
+        cw.show((model.vertices, [[0, 1, 2, 3]]), cage)
+    with pytest.raises(FileNotFoundError, match="nowhere.glb"):
+        cw.show("nowhere.glb", cage)
+
+
+def test_missing_files_of_the_widget_are_named(model, cage, bound, tmp_path, monkeypatch):
+    monkeypatch.setattr(cagework_notebook, "FILES", tmp_path)
+    cagework_notebook._file.cache_clear()
+    with pytest.raises(ImportError, match="without widget.js: build its wheel with `cargo xtask notebook-wheel`"):
+        cw.show(model, cage, *bound)
+
+
+def test_missing_package_is_named(model, cage, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "cagework_notebook", None)
+    with pytest.raises(ImportError, match=r"pip install 'cagework\[notebook\]'"):
+        cw.show(model, cage)

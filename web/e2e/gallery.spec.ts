@@ -1,0 +1,51 @@
+/** The gallery: its examples are live and then idle, and a title opens the page in the example's pose. */
+
+import { decodeShare } from "../src/share";
+import { complaintsOfAxe } from "./stories";
+import { bound, expect, largestMove, restPositions, shoot, test } from "./support";
+
+/** A PNG of a view in one colour is smaller, bytes. */
+const PNG_OF_NOTHING = 3000;
+
+test.use({ viewport: { width: 1440, height: 900 } });
+
+test("every example is drawn, and a title opens the page in its pose", async ({ page }) => {
+  await page.goto("./gallery.html");
+  const examples = page.locator("[data-example]");
+  await expect(page.locator("[data-live=true]")).toHaveCount(6, { timeout: 100_000 });
+  for (const example of await examples.all()) {
+    await expect(example, "fits on one screen").toBeInViewport({ ratio: 1 });
+    const picture = await example.locator("canvas").screenshot();
+    expect(picture.length, (await example.getAttribute("data-example")) ?? "").toBeGreaterThan(
+      PNG_OF_NOTHING,
+    );
+  }
+  // Wait until the last example draws nothing for 60 frames of the browser. If it never stops, the test times out.
+  await page.evaluate(async () => {
+    let quiet = 0;
+    globalThis.cagework?.onFrame(() => {
+      quiet = 0;
+    });
+    for (; quiet < 60; quiet++) await new Promise(requestAnimationFrame);
+  });
+  expect(await complaintsOfAxe(page)).toEqual([]);
+  await shoot(page, "gallery");
+
+  const title = page.getByRole("link", { name: "Bend a capture" });
+  const link = await decodeShare(new URL((await title.getAttribute("href")) ?? "", page.url()).hash);
+  await title.click();
+  await expect(page).toHaveTitle(/Spot/);
+  await bound(page);
+  const [shown, wanted] = await page.evaluate(
+    (pose) => {
+      const engine = globalThis.cagework?.engine;
+      if (!engine) throw new Error("no session");
+      const shown = Array.from(engine.cagePositions());
+      engine.decodePose(Uint8Array.from(pose));
+      return [shown, Array.from(engine.cagePositions())] as const;
+    },
+    Array.from(link?.pose ?? []),
+  );
+  expect(shown).toEqual(wanted);
+  expect(largestMove(shown, await restPositions(page)), "the capture is posed").toBeGreaterThan(0.1);
+});

@@ -1,0 +1,61 @@
+/**
+ * Builds the files of the notebook widget into the Python package cagework-notebook: one script, which contains its
+ * worker, and the compressed wasm file of the build for WebGL2, from the output of `cargo xtask wasm`.
+ */
+
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { gzipSync } from "node:zlib";
+import { defineConfig, type Plugin } from "vite";
+import { FOR_NODE, findLicences, LICENCES, licencesOfWorkers } from "../vite.config";
+
+const here = import.meta.dirname;
+const source = join(here, "../package/src");
+
+/** Replaces the module that downloads the wasm file. */
+const open: Plugin = {
+  name: "open",
+  enforce: "pre",
+  resolveId: (id) => (id.endsWith("session/open") ? join(here, "open.ts") : undefined),
+};
+
+/** Removes the URLs of the wasm file and the worker, because Vite would embed both files. */
+const noAddresses = (): Plugin => ({
+  name: "no-addresses",
+  enforce: "pre",
+  transform(code, id) {
+    if (!/pkg-webgl|session\/webgl/.test(id)) return undefined;
+    return code
+      .replace(/new URL\([^)]*_bg\.wasm['"], import\.meta\.url\)(\.href)?/, '""')
+      .replace(/new Worker\([^}]*\}\)/, "undefined");
+  },
+});
+
+const compressed: Plugin = {
+  name: "compressed-wasm",
+  generateBundle() {
+    const wasm = readFileSync(join(source, "pkg-webgl/cagework_webgl_bg.wasm"));
+    this.emitFile({ type: "asset", fileName: "cagework.wasm.gz", source: gzipSync(wasm, { level: 9 }) });
+  },
+};
+
+export default defineConfig({
+  root: here,
+  plugins: [findLicences, open, noAddresses(), compressed],
+  resolve: { alias: { "@cagework/core": source } },
+  // Without `process`, Draco's decoder does not look for its files in Node's folders.
+  define: { process: "undefined" },
+  worker: { format: "iife", plugins: () => [noAddresses(), licencesOfWorkers()] },
+  build: {
+    outDir: join(here, "../../crates/cagework-py/notebook/cagework_notebook/files"),
+    emptyOutDir: true,
+    target: "es2023",
+    license: { fileName: LICENCES.page },
+    lib: { entry: join(here, "widget.ts"), formats: ["es"], fileName: () => "widget.js" },
+    rolldownOptions: {
+      onwarn: (warning, warn) => {
+        if (!FOR_NODE.test(warning.message)) warn(warning);
+      },
+    },
+  },
+});
