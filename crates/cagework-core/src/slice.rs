@@ -26,7 +26,8 @@ pub struct Slice {
     pub dims: [u32; 2],
     /// Corner at which the first cell of the slice begins, in the plane of the cell centres, object units.
     pub corner: Vec3,
-    /// Edge vector of a cell along the next axis (y for x, z for y, x for z), object units.
+    /// Edge vector of a cell along the axis that follows [`Self::axis`] in cyclic order (y after x, z after y, x after
+    /// z), object units.
     pub u: Vec3,
     /// Edge vector of a cell along the remaining axis.
     pub v: Vec3,

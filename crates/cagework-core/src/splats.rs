@@ -172,9 +172,9 @@ impl Splats {
         self.first_order_errors(field).into_iter().filter(|&error| error > MAX_FIRST_ORDER_ERROR).count()
     }
 
-    /// A triangle soup of octahedra in the place of splats, from which a cage can be generated. Transparent splats and
-    /// the largest ones are left out, unless nothing remains: captures contain haze and background. Of the small splats
-    /// in a cell of a grid, only the largest gets an octahedron.
+    /// Returns a triangle soup of octahedra that represent the splats, from which a cage can be generated. Leaves out
+    /// transparent splats and the largest ones, unless no splat remains: captures contain haze and background. Of the
+    /// small splats in a cell of a grid, only the largest gets an octahedron.
     #[must_use]
     pub fn shells(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let mut sizes: Vec<f32> = self.scales.iter().map(|s| s.max_element()).collect();
@@ -195,8 +195,8 @@ impl Splats {
 }
 
 impl Splats {
-    /// Round splats that show a point cloud. Their size is proportional to the distance between neighbouring points on
-    /// a surface. `colors`: sRGB, one per point.
+    /// Creates round splats that show a point cloud. Their size is proportional to the distance between neighbouring
+    /// points on a surface. `colors`: sRGB, one per point.
     #[must_use]
     pub fn of_points(points: &[Vec3], colors: Vec<Vec3>) -> Self {
         /// Standard deviation, as a fraction of the distance between neighbours.
@@ -257,8 +257,8 @@ pub fn shells_of_points(points: &[Vec3]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (cells.iter().flat_map(of_cell).collect(), octahedra(cells.len()))
 }
 
-/// Cells of a grid that contain points. The grid is the finest one of a cascade whose cells have six occupied
-/// neighbours or more on average, as those of a sampled surface do.
+/// Cells of a grid that contain points. The grid is the finest of several grids in which an occupied cell has at least
+/// six occupied neighbours on average, as on a sampled surface, or else the coarsest.
 #[derive(Default)]
 struct OccupiedCells {
     /// Lowest corner of cell (0, 0, 0), object units.
@@ -317,12 +317,12 @@ pub fn splat_covariance(axes: Mat3) -> [f32; 6] {
 
 /// Scales and rotation of the splat with the covariance A A^T.
 ///
-/// These are the singular values and left singular vectors of A, by one-sided Jacobi rotations of its columns
-/// (Hestenes 1958). A is not squared, so that thin splats keep the digits of their smallest scale, and the axes keep
-/// their order.
+/// These are the singular values and left singular vectors of A, by one-sided Jacobi rotations of its columns (Hestenes
+/// 1958). A A^T is not computed, so that thin splats keep the digits of their smallest scale, and the axes keep their
+/// order.
 #[must_use]
 pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
-    /// Limit on the sweeps; three or four suffice.
+    /// Largest number of sweeps; three or four suffice.
     const SWEEPS: usize = 8;
     /// Largest cosine between two columns that count as orthogonal: f32 rounding.
     const ORTHOGONAL: f32 = 1e-7;

@@ -26,7 +26,7 @@ use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeight
 /// is denormal in f32.
 const MIN_CHANGE: f32 = 1e-18;
 
-/// Right-hand side plus neighbours of a row, summed in the kernels' order.
+/// Right-hand side of a row plus the values of its neighbours, summed in the kernels' order.
 fn gather(level: &LevelTable, n_lanes: usize, row: usize, lane: usize, rhs: &[f32], field: &[f32]) -> f32 {
     let mut sum = 0.0;
     if level.rhs_of_row[row] != NO_CELL {

@@ -20,8 +20,8 @@ pub struct Team {
 }
 
 impl Team {
-    /// A team of `threads` (0: one per processor), at most four per processor. Uses only the calling thread if no pool
-    /// can be started.
+    /// Creates a team of `threads` threads (0: one per processor), at most four per processor. Uses only the calling
+    /// thread if no pool can be started.
     #[must_use]
     pub fn new(threads: usize) -> Self {
         #[cfg(feature = "parallel")]

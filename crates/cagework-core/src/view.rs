@@ -1,4 +1,4 @@
-//! What picking and dragging need of a camera: projection, rays, and the size of a pixel.
+//! Camera interface for picking and dragging: projection, rays, and the size of a pixel.
 
 use glam::{Vec2, Vec3};
 

@@ -12,7 +12,7 @@ pub struct Weights {
     data: Vec<f32>,
 }
 
-/// Why arrays do not form a CSR matrix.
+/// Reason why arrays do not form a CSR matrix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WeightsError {
     /// `indptr` is empty, does not start at 0, or is not ascending.
@@ -58,7 +58,7 @@ pub enum WeightsError {
 }
 
 impl Weights {
-    /// A CSR matrix from its arrays: `indptr` `[n_rows + 1]`, `indices` and `data` `[n_nonzeros]`.
+    /// Creates a CSR matrix from its arrays: `indptr` `[n_rows + 1]`, `indices` and `data` `[n_nonzeros]`.
     ///
     /// # Errors
     /// [`WeightsError`] if the arrays do not form a matrix with `n_columns` columns.

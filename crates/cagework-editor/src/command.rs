@@ -93,7 +93,7 @@ pub enum Command {
     MovePose {
         /// Index of the pose in the list of saved poses.
         index: usize,
-        /// Index in this list to which the pose moves.
+        /// New index of the pose in the list.
         to: usize,
     },
     /// Sets when the animation shows a saved pose. Other poses keep their times; the list is sorted by time.
@@ -358,7 +358,8 @@ impl Editor {
         poses.get(index).ok_or(missing)
     }
 
-    /// Reorders the saved poses. `order`: old index of each pose; `leads`: new lead of each pose. `[n_poses]` each
+    /// Reorders the saved poses. `order`: old index of each pose; `leads`: time from the previous pose to each pose in
+    /// the new order, seconds. `[n_poses]` each
     fn arrange(&mut self, order: &[usize], leads: &[f32]) {
         let document = self.document_mut();
         let of = |(&k, &lead): (&usize, &f32)| NamedPose { lead, ..document.poses[k].clone() };
@@ -453,7 +454,7 @@ impl Editor {
         Ok(())
     }
 
-    /// Sets a cage with one more interior control, and selects the control.
+    /// Replaces the cage by `cage`, which has one more interior control, and selects this control.
     fn add_control(&mut self, cage: RestCage) {
         let first = cage.n_cage() as u32;
         let corners = cage.controls.elements.last().map(|element| element.corners().to_vec());

@@ -190,7 +190,7 @@ impl RestCage {
                 }
             })
             .collect();
-        // Drop positions without an element.
+        // Drop positions that no element uses.
         let mut numbers = vec![None; controls.inner];
         let mut kept = Vec::new();
         for (i, number) in numbers.iter_mut().enumerate() {

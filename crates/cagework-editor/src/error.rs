@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::rest_edit::RestEditError;
 
-/// Why a command cannot be applied.
+/// Reason why a command cannot be applied.
 #[derive(Debug, Error)]
 pub enum EditError {
     /// No model is open, or none has this id.

@@ -68,7 +68,7 @@ pub struct Member {
     first_triangle: u32,
     /// Splats that show a point cloud.
     points: Option<Arc<Splats>>,
-    /// Mesh that stands for a capture of splats, or a point cloud.
+    /// Surface mesh that represents a capture of splats or a point cloud, for picking and pulling.
     stand_in: Option<Arc<TriMesh>>,
     /// Range of vertices in the joined mesh.
     pub vertices: Range<usize>,

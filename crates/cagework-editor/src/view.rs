@@ -39,7 +39,7 @@ pub struct DocumentView {
     pub selected: SelectionView,
     /// How clicks and gestures act on the cage.
     pub tools: Tools,
-    /// Number of vertices without a mirror image, in symmetric editing; otherwise 0.
+    /// Number of vertices without a mirror image; 0 unless gestures also move mirror images.
     pub unmatched: usize,
     /// Number of openings, steps, undos and redos so far.
     pub steps: u64,

@@ -1,5 +1,5 @@
-//! Random commands, undo and redo: documents are restored exactly. Damaged commands and projects are refused or
-//! applied, and leave a valid document. Nothing panics.
+//! Random commands, undo and redo: documents are restored exactly. Damaged commands and projects are rejected or
+//! applied; the document is valid in both cases. Nothing panics.
 //!
 //! `PROPTEST_CASES=100000 PROPTEST_RNG_SEED=5 cargo test -p cagework-editor --test walk` runs more sessions, from
 //! another seed.

@@ -93,7 +93,7 @@ impl GpuWeights {
 /// A kernel, the offset of its parameters in bytes, and its numbers of workgroups along x and y.
 type Step = (Launch, u32, [u32; 2]);
 
-/// Deforms one mesh repeatedly.
+/// Kernels and buffers that deform one mesh, once per pose.
 #[derive(Debug)]
 pub struct Deformer {
     cage: wgpu::Buffer,

@@ -21,10 +21,10 @@ pub struct ContextOptions {
     pub adapter: Option<String>,
     /// Upper limit on the size of a storage binding in memory plans, bytes. For tests.
     pub max_binding_bytes: Option<u64>,
-    /// Only draw, as in a browser without WebGPU. For tests; needs the feature `webgl`.
+    /// Whether the device only draws, as in a browser without WebGPU. For tests; needs the feature `webgl`.
     pub draws_only: bool,
-    /// Create pipelines on first use, to start faster. By default all pipelines are created immediately, so that
-    /// timings exclude their creation.
+    /// Whether to create pipelines on first use, to start faster. By default all pipelines are created immediately, so
+    /// that timings exclude their creation.
     pub pipelines_later: bool,
 }
 
@@ -142,7 +142,7 @@ impl GpuContext {
         })
     }
 
-    /// Creates a texture that render passes draw on. `used`: further usages of the texture.
+    /// Creates a texture that render passes draw to. `used`: further usages of the texture.
     pub(crate) fn target(
         &self,
         label: &str,

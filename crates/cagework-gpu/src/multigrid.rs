@@ -173,7 +173,7 @@ impl Multigrid {
         }
     }
 
-    /// One V(2,1) cycle, starting at level k.
+    /// Runs one V(2,1) cycle, starting at level k.
     async fn cycle(&self, stream: &mut Stream<'_>, k: usize) -> Result<(), GpuError> {
         let coarsest = self.levels.len() - 1;
         let n_quads = self.n_quads;
@@ -209,7 +209,7 @@ impl Multigrid {
         Ok(())
     }
 
-    /// Sweeps on the coarsest level. Also computes delta if the coarsest level is the only level.
+    /// Runs the sweeps on the coarsest level. Also computes delta if the coarsest level is the only level.
     async fn relax_coarsest(&self, stream: &mut Stream<'_>, only: bool) -> Result<(), GpuError> {
         let coarsest = self.levels.len() - 1;
         let LevelWork { level, field, .. } = &self.levels[coarsest];

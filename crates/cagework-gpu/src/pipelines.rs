@@ -39,7 +39,7 @@ impl Launch {
 }
 
 impl Pipelines {
-    /// Creates the pipelines of all kernels now, instead of on first use.
+    /// Creates the pipelines of all kernels immediately instead of on first use.
     pub(crate) fn make_all(&self, device: &wgpu::Device) {
         for (slot, kernel) in self.0.iter().zip(ALL) {
             slot.get_or_init(|| Pipeline::new(device, kernel));

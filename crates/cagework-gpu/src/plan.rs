@@ -27,7 +27,7 @@ pub struct Plan {
     pub field_bytes: u64,
 }
 
-/// Why a bind does not fit into the GPU's memory.
+/// Reason why a bind does not fit into the GPU's memory.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
     /// An array exceeds the binding limit.

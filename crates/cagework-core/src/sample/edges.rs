@@ -137,8 +137,8 @@ impl EdgeLists {
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
-            // If the edge lies at distance 0, of the two opposite rays only the upward one passes it. That ray does not
-            // pass the edge either if it ends at a wall there.
+            // An edge at distance 0 is passed by only one of the two opposite rays: the upward one, and only if that
+            // ray does not end at a wall there.
             let ahead = distance > 0.0 || up && distance == 0.0;
             let steps = [across, along].map(|axis| (axis, beside[axis]));
             let apart = beside[across].hypot(beside[along]);

@@ -42,7 +42,7 @@ const MIN_INNER_WINDING: f64 = 1.25;
 /// winding numbers are ambiguous on the sides of facets.
 const SIDE_OFFSET: f64 = 1e-6;
 
-/// Computes sampling stencils of vertices in an embedded grid.
+/// Sampler that computes the stencils of vertices in an embedded grid.
 #[derive(Debug)]
 pub struct Sampler<'a> {
     controls: Controls<'a>,

@@ -46,7 +46,7 @@ pub struct Stencils {
 /// Nodes, `(row of the field, weight)`, or hats, `(control, weight)`, of a vertex.
 pub type Entries<'a> = &'a [(u32, f32)];
 
-/// Stencil of a vertex under construction.
+/// Stencil of one vertex, under construction.
 #[derive(Clone, Debug, Default)]
 pub struct Stencil {
     /// Field entries: `(row of the field, weight)`.
@@ -62,12 +62,12 @@ impl Stencil {
         self.hats.clear();
     }
 
-    /// Adds weight to a row of the field.
+    /// Adds `weight` to the entry of a row of the field.
     pub fn add_node(&mut self, row: u32, weight: f64) {
         accumulate(&mut self.nodes, row, weight);
     }
 
-    /// Adds weight to a control's Dirichlet value.
+    /// Adds `weight` to the entry of a control's Dirichlet value.
     pub fn add_hat(&mut self, column: u32, weight: f64) {
         accumulate(&mut self.hats, column, weight);
     }
@@ -81,7 +81,7 @@ fn accumulate(list: &mut Vec<(u32, f64)>, key: u32, weight: f64) {
 }
 
 impl Stencils {
-    /// An empty list of stencils.
+    /// Creates an empty list of stencils.
     #[must_use]
     pub fn new() -> Self {
         Self { node_start: vec![0], hat_start: vec![0], ..Self::default() }

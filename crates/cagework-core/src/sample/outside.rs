@@ -30,9 +30,9 @@ impl<'a> OutsideSampler<'a> {
         Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
     }
 
-    /// Computes the stencil of a point outside the surface. A point inside a ball or tube takes the values of its foot
-    /// on the axis. `inside(q, stencil)` computes the stencil of a point q inside, or returns false. The result has
-    /// `vertex` 0.
+    /// Computes the stencil of a point outside the surface. A point inside a ball or tube takes the values of the
+    /// closest point on the axes of balls and tubes. `inside(q, stencil)` computes the stencil of a point q inside, or
+    /// returns false. The result has `vertex` 0.
     pub(super) fn fill(
         &self,
         point: DVec3,
@@ -51,7 +51,8 @@ impl<'a> OutsideSampler<'a> {
             return found;
         }
         if !of_cage {
-            // Where tubes meet, the closest facet may lie inside another tube: use the foot of the point on the axis.
+            // Where tubes meet, the closest facet may lie inside another tube: use the closest point on the axes of the
+            // tubes.
             if let Some(shares) = self.controls.inner().and_then(|inner| inner.foot(point)) {
                 stencil.clear();
                 let first = self.controls.cage().n_vertices() as u32;
@@ -74,7 +75,7 @@ impl<'a> OutsideSampler<'a> {
         let (at, mut other) = (at + step * inwards, Stencil::default());
         if inside(at, &mut other) {
             // If q (the point `at`) is close to another wall, its weights are those of that wall. Reduce t in that
-            // case. With t = 0, the row is w(p), as at an edge that is too sharp.
+            // case. With t = 0, the row is w(p), as beside a sharp edge.
             let depth = self.closest.find(at).distance;
             let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
             for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {

@@ -70,8 +70,8 @@ impl Blocks {
         ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
     }
 
-    /// Calls `found` for boxes that may meet the cube between centre `low` and centre `low + 1`, for some of them
-    /// repeatedly.
+    /// Calls `found` for every box that may meet the cube between centre `low` and centre `low + 1`. May call it
+    /// several times for the same box.
     #[inline]
     pub fn near(&self, low: [u32; 3], mut found: impl FnMut(u32)) {
         // The cube may extend beyond the block's upper side by a cell: visit the blocks of its lowest and highest

@@ -18,7 +18,7 @@ pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 /// A red fine cell at the centre of a coarse cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Centre {
-    /// Stencil of the cell, also if none of its arms is cut.
+    /// Stencil of the cell, even if none of its arms is cut.
     stencil: CutCell,
     /// Index among the red cut cells; [`NO_CELL`] if none of the cell's arms is cut.
     cut: u32,

@@ -44,7 +44,7 @@ pub struct ConjugateGradient {
     /// Preconditioned residual.
     z: Vec<Row>,
     direction: Vec<Row>,
-    /// Operator applied to the direction.
+    /// Product of the operator and the direction.
     image: Vec<Row>,
     cut_rhs: Vec<Row>,
     preconditioner: Option<Box<dyn Preconditioner>>,
@@ -212,7 +212,7 @@ fn expected_error(squares: &[f64]) -> f64 {
     // Latest change, estimated from the RMS change over the window: changes ripple, so the measured latest change may
     // be unusually small.
     let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
-    // Weights lie between 0 and 1.
+    // Weights lie between 0 and 1, so no error exceeds 1.
     (usual.max(latest) * rate / (1.0 - rate)).min(1.0)
 }
 

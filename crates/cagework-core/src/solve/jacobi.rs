@@ -4,7 +4,7 @@
 //! Every sweep replaces each unknown by the average of its neighbours' old values, until delta, the mean change of a
 //! cell's weight vector, falls below the tolerance tau.
 //!
-//! Changes versus the paper:
+//! Differences from the paper:
 //! - Two buffers are swapped instead of copied.
 //! - Each thread owns whole batches of columns, so no two threads write the same value. This avoids the paper's locks
 //!   and queue of cells, which made several threads slower than one.
@@ -192,7 +192,7 @@ impl ThreadBatches {
     }
 }
 
-/// A sweep of both colours, plane by plane so that both read a plane while it is cached.
+/// Sweeps both colours, plane by plane, so that both read a plane while it is cached.
 fn sweep(level: &Level, old: &[Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
     dispatch(
         #[inline(always)]

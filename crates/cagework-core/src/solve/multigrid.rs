@@ -83,19 +83,19 @@ impl Workspace {
         }
     }
 
-    /// One red-black sweep of the finest level: the unit in which benchmarks measure the cost of a solve. Call after
-    /// [`Self::solve`].
+    /// Runs one red-black sweep of the finest level, the unit in which benchmarks measure the cost of a solve. Call
+    /// after [`Self::solve`].
     pub fn sweep(&mut self, hierarchy: &Hierarchy) {
         let (level, u, f) = (&hierarchy.levels[0], &mut self.u[0], Rhs::Cut(&self.f[0]));
         relax(level, u, f);
     }
 
-    /// One V(2,1) cycle on the finest level, for benchmarks. Call after [`Self::solve`].
+    /// Runs one V(2,1) cycle on the finest level, for benchmarks. Call after [`Self::solve`].
     pub fn v_cycle(&mut self, hierarchy: &Hierarchy) {
         self.cycle(hierarchy, 0, DOWN);
     }
 
-    /// One V(2,1) cycle on level k and below, with the pre-smoothing passes `start`.
+    /// Runs one V(2,1) cycle on level k and the coarser levels, with the pre-smoothing passes `start`.
     fn cycle(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) {
         self.down(hierarchy, k, start);
         self.up(hierarchy, k, UP);
@@ -140,7 +140,7 @@ impl Workspace {
         (correction, mean_square)
     }
 
-    /// Coarse correction and post-smoothing of level k by `passes`.
+    /// Runs `passes` on level k: coarse correction and post-smoothing.
     fn up(&mut self, hierarchy: &Hierarchy, k: usize, passes: &[Pass]) {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);

@@ -57,7 +57,7 @@ pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     sum
 }
 
-/// What a kernel reads at a cell.
+/// Values that a kernel reads at a cell.
 struct Visit {
     /// Index of the cell among the cells of its colour.
     cell: usize,

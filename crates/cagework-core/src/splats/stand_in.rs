@@ -81,7 +81,7 @@ enum Kind {
 
 struct Grid {
     dims: UVec3,
-    /// x fastest. `[dims.z, dims.y, dims.x]`
+    /// Kind of each cell, x fastest. `[dims.z, dims.y, dims.x]`
     kinds: Vec<Kind>,
 }
 

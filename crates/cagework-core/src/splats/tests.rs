@@ -98,7 +98,8 @@ fn rotation_of_the_cage_equals_rotation_of_the_capture() {
         for k in 0..100 {
             let d = Quat::from_rotation_y(k as f32) * Quat::from_rotation_x(0.37 * k as f32) * Vec3::Z;
             let [a, b] = [&deformed, &expected].map(|of| value(of, splat, d));
-            // The rotated capture shows the colour of the direction rotated back.
+            // The rotated capture has, in direction d, the colour of the original in the direction that the rotation
+            // takes to d.
             let c = value(&splats, splat, rotation.inverse() * d);
             assert!((a - b).abs().max_element() <= TOLERANCE && (b - c).abs().max_element() <= TOLERANCE);
         }
@@ -158,7 +159,7 @@ fn decomposition_restores_the_covariance_and_small_scales() {
     }
 }
 
-/// In u = a x^2 e_y, the end of a half axis h along x is a h^2 away from its linear image.
+/// In u = a x^2 e_y, the end of a half axis h along x is at the distance `a h^2` from its linear image.
 #[test]
 fn first_order_error_of_a_parabola_is_a_h() {
     let lattice = Lattice::new(&cage(), 16);
@@ -185,8 +186,8 @@ fn shells_leave_out_haze_and_the_largest_splats() {
     splats.opacities[3] = 0.05;
     splats.scales[8] = Vec3::new(0.1, 40.0, 0.1);
     let (positions, triangles) = splats.shells();
-    // Splat 3 is left out because it is transparent. The size limit is the size with rank 198 of 0 to 199 (0.99 * 199,
-    // rounded up), so only the largest splat, number 8, is left out as well.
+    // Splat 3 is left out because it is transparent. The size limit is the size at index 198 (0.99 * 199, rounded up)
+    // of the 200 sizes in ascending order, so only the largest splat, number 8, is left out as well.
     assert_eq!((positions.len(), triangles.len()), (6 * 198, 8 * 198));
     let outwards = triangles[..8].iter().all(|t| {
         let [a, b, c] = t.map(|v| positions[v as usize] - splats.positions[0]);

@@ -63,9 +63,10 @@ pub struct SamplingTable {
 pub struct SlicedWeights {
     /// Start of each slice in `columns` and `weights`, divided by [`SLICE`]. `[n_slices + 1]`
     pub slices: Vec<u32>,
-    /// Columns of the entries; short lists are padded with weights of 0. `[slice][k][lane]`
+    /// Columns of the entries; short lists are padded with weights of 0. `[slice][k][lane]`, with `k` the position in a
+    /// bundle's list and `lane` the bundle's number in the slice.
     pub columns: Vec<u32>,
-    /// Weights of the bundle's rows. `[slice][k][lane]`
+    /// Weights of the bundle's rows for the entry's column. `[slice][k][lane]`
     pub weights: Vec<[f32; BUNDLE]>,
 }
 

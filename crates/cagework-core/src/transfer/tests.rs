@@ -1,4 +1,4 @@
-//! Tests that both tables hold the weights of trilinear interpolation; restriction uses its transpose.
+//! Tests that both tables contain the weights of trilinear interpolation, of which restriction uses the transpose.
 
 use std::collections::BTreeMap;
 

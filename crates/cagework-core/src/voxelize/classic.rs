@@ -2,7 +2,7 @@
 //!
 //! Source: Smith, "CSC 473 Harmonic Coordinates", section 3.1, Algorithms 1 and 2.
 //!
-//! Changes versus the paper:
+//! Differences from the paper:
 //! - A triangle is tested only against the cells that its part in each row of the grid spans (the paper proposes all
 //!   cells of its bounding box). Slices of the grid are independent, so they run in parallel, and the result does not
 //!   depend on the number of threads.
@@ -178,7 +178,7 @@ fn mark_slice(
     let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
     for &t in triangles {
         let triangle = cage.facet_corners(t);
-        // Cell coordinates from the grid's corner: a cell is [x, x + 1].
+        // Cell coordinates, measured from the grid's corner: cell x spans [x, x + 1].
         let in_cells = triangle.map(|p| (p - origin) / cell_size + DVec3::splat(0.5));
         in_slice.clear();
         in_slice.extend(in_cells);

@@ -1,9 +1,9 @@
 //! Intersections of the cage with axis-parallel grid lines through the cell centres.
 //!
-//! Watertight: a triangle covers a line by the signs of three edge functions, and an edge's function is evaluated with
-//! the same numbers in the same order for both triangles that share it. A line exactly through an edge or a vertex is
-//! treated as displaced infinitesimally, in the same direction for all edges (simulation of simplicity: Edelsbrunner
-//! and Muecke 1990), so that it crosses there exactly once or, at a silhouette, an even number of times.
+//! Watertight: the signs of three edge functions decide whether a triangle covers a line, and an edge's function is
+//! evaluated with the same numbers in the same order for both triangles that share it. A line exactly through an edge
+//! or a vertex is treated as displaced infinitesimally, in the same direction for all edges (simulation of simplicity:
+//! Edelsbrunner and Muecke 1990), so that it crosses there exactly once or, at a silhouette, an even number of times.
 //!
 //! The interior is where the winding number is positive: of overlapping parts, only walls of their union are kept, as
 //! in Jacobson et al. 2013. At a face shared by two parts, a line leaves the first part before it enters the second.

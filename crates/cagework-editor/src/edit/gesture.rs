@@ -15,7 +15,7 @@ const MIN_PLANE_SINE: f32 = 0.05;
 /// because otherwise moving by a pixel would change the factor too much.
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
-/// What a gesture does with the selection.
+/// Transformation that a gesture applies to the selection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Gesture"))]
@@ -40,7 +40,7 @@ pub enum Constraint {
     Plane(usize),
 }
 
-/// How far a gesture has moved, for a status line.
+/// Kind, amount and constraint of a gesture, for a status line.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct GestureView {
@@ -54,7 +54,8 @@ pub struct GestureView {
     pub plane: bool,
 }
 
-/// A gesture in progress. Positions are always computed from its start, so that errors do not accumulate.
+/// A gesture in progress. Positions are always computed from those at the start of the gesture, so that errors do not
+/// accumulate.
 #[derive(Clone, Debug)]
 pub struct Gesture {
     kind: GestureKind,

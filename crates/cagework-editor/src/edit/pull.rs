@@ -29,8 +29,9 @@ pub struct Pull {
 impl Pull {
     /// Shares for a selection in the pose `positions`.
     ///
-    /// With symmetry, if both vertices of a pair are selected, the side of the vertex selected last leads. `rest`, the
-    /// cage at rest, determines on which side of the mirror plane a vertex is.
+    /// With symmetry, if both vertices of a pair are selected, the side of the vertex that was selected last leads: the
+    /// other side makes its mirrored movement. `rest`, the cage at rest, determines on which side of the mirror plane a
+    /// vertex is.
     #[must_use]
     pub fn new(selection: &Selection, positions: &[Vec3], rest: &[Vec3], shared: SharedPull<'_>) -> Self {
         let n = positions.len();

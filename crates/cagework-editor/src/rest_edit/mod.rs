@@ -28,7 +28,7 @@ pub struct CageEdit {
     pub touched: Vec<u32>,
 }
 
-/// Why an edit is not possible.
+/// Reason why an edit is not possible.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RestEditError {
     /// The vertex, edge or face does not exist.
@@ -48,7 +48,7 @@ pub enum RestEditError {
     Breaks {
         /// The operation, such as `moving` or `splitting`.
         operation: &'static str,
-        /// Why the result is not a cage. Indices refer to the result.
+        /// Reason why the result is not a valid cage. Indices refer to the result.
         source: CageError,
     },
     /// The result would be inverted.

@@ -6,7 +6,7 @@ use super::{CageEdit, RestEditError, finish};
 use cagework_core::PolygonMesh;
 use cagework_core::fill::{loops, triangulate};
 
-/// Moves vertices: `(vertex, new position in object units)`.
+/// Moves vertices. `moves`: pairs of a vertex and its new position, object units.
 ///
 /// # Errors
 /// [`RestEditError`]: a vertex does not exist, a position is not finite, or the cage would become invalid.
@@ -24,7 +24,7 @@ pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<CageEd
 }
 
 /// Splits an edge at `share` of its length from the first end (clamped to 0.05 to 0.95). Adjacent triangles are
-/// divided; larger faces get another corner. The new vertex is the last one.
+/// divided; larger faces get an additional corner. The new vertex is the last one.
 ///
 /// # Errors
 /// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.

@@ -238,7 +238,7 @@ impl Camera {
     pub fn clip_from_view(&self) -> Mat4 {
         let aspect = self.viewport.x / self.viewport.y;
         let [near, far] = self.depths();
-        // Shifts the picture, so that the target is in the middle of the free part.
+        // Shift the picture so that the target is in the middle of the free part.
         let shift = 2.0 * self.free_part()[0] / self.viewport - 1.0;
         let shift = Mat4::from_translation(Vec3::new(shift.x, -shift.y, 0.0));
         let centered = match self.projection {

@@ -128,7 +128,7 @@ fn is_in_quad(p: Vec2, corners: [Vec2; 4]) -> bool {
 #[derive(Debug)]
 pub(super) struct GizmoShape {
     vertices: wgpu::Buffer,
-    /// Number of vertices in the gizmo's frame, and of the subsequent vertices in the frame that faces the eye.
+    /// Numbers of vertices in the gizmo's frame and, after them, in the frame that faces the eye.
     counts: [u32; 2],
     /// Transforms of the gizmo's two frames: its own, and the one that faces the eye.
     transforms: [FrameTransform; 2],

@@ -46,7 +46,7 @@ pub struct Surface {
     pub base_color: [f32; 4],
     /// Source of the colour, see [`surface_mode`].
     pub mode: u32,
-    /// Fragments with less alpha are discarded.
+    /// Alpha below which fragments are discarded.
     pub alpha_cutoff: f32,
     /// In the modes with a colour map, value of the map's first colour. In the other modes, 1 to blend towards the
     /// colour of paint, 0 to blend towards grey.

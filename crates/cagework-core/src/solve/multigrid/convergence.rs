@@ -50,11 +50,12 @@ impl Convergence {
     pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        // The correction is the error before the cycle minus the error after it: `1 - ratio` of the error before.
+        // The correction is the error before the cycle minus the error after it: a fraction `1 - ratio` of the error
+        // before.
         let ahead = ratio.min(CONTRACTION_BOUND);
         let extrapolated =
             if correction < ROUND_OFF { ratio.min(1.0) } else { (1.0 - CONTRACTION) * ahead / (1.0 - ahead) };
-        // Weights lie between 0 and 1.
+        // Weights lie between 0 and 1, so no error exceeds 1.
         let delta = (extrapolated.max(CONTRACTION) * correction).min(1.0);
         let done = self.report.iteration_done(&self.rule, delta, Some(residual_square.sqrt()));
         let stalls = correction < ROUND_OFF && correction > MAX_CORRECTION_RATIO * self.correction;

@@ -211,8 +211,8 @@ fn free_part_is_at_least_half_of_the_picture() {
     assert_eq!(camera.free_part(), [Vec2::new(62.5, 50.0), Vec2::new(50.0, 100.0)]);
 }
 
-/// A resized picture shows at least what the previous one showed. At the original size, the distance is again the
-/// original one.
+/// A resized picture shows at least the area at the target that the previous one showed. At the original size, the
+/// distance is again the original one.
 #[test]
 fn resizing_keeps_what_is_visible() {
     let bounds = Bounds { min: Vec3::new(-3.0, 0.0, 1.0), max: Vec3::new(1.0, 1.0, 2.0) };
