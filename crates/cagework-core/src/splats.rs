@@ -117,8 +117,8 @@ impl Splats {
         turned
     }
 
-    /// The splats after the deformation, in the form that files store. Splats that the field does not change keep all
-    /// their bits.
+    /// The splats after the deformation, in the form that files store. Scales, rotations and harmonics of splats at
+    /// which the gradient of the field is the identity stay identical to the last bit.
     #[must_use]
     pub fn deformed(&self, field: &Field) -> Self {
         struct Bent {

@@ -11,7 +11,7 @@ use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
 
-/// Skins one model repeatedly. Runs on the CPU if the device only draws ([`GpuContext::draws_only`]).
+/// Skinning of one model. Runs on the CPU if the device only draws ([`GpuContext::draws_only`]).
 #[derive(Debug)]
 pub struct Skinner {
     skin: Skin,

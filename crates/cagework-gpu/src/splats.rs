@@ -22,7 +22,7 @@ use crate::table::{Entry, Table};
 /// Number of bins of each counting sort. The sort key is the depth, a number of two digits in base `BINS`.
 pub const BINS: u32 = 4096;
 /// Number of depth steps. Splats of the same step are drawn in the order of the file. The steps are so fine that few
-/// splats share one. The picture of a capture then equals that of its export, whose bounds and steps differ.
+/// splats share one, so the picture of a capture equals that of its export, although their bounds and steps differ.
 const STEPS: u32 = BINS * BINS;
 /// Smallest number of splats per block; the last block may have fewer. A block is a range of splats with one counter
 /// per bin. With this size, the counters take at most 16 bytes per splat.
@@ -36,11 +36,11 @@ const FAR_SHARE: f32 = 0.01;
 /// itself then covers half a million steps. Farther floaters all get the first or the last depth.
 const FAR_REACH: f32 = 16.0;
 
-/// Steps of depth along the direction to the eye. Mirrors `Depths` in `shaders/depths.wgsl`.
+/// Map from positions to depths, in steps along the direction to the eye. Mirrors `Depths` in `shaders/depths.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Depths {
-    /// Steps per object unit, along the direction to the eye.
+    /// Direction to the eye, with the number of steps per object unit as length.
     pub axis: [f32; 3],
     /// Depth of the origin, steps.
     pub offset: f32,
@@ -63,7 +63,7 @@ pub struct Depths {
 }
 
 impl Depths {
-    /// Steps for the splats in a box. `backward`: unit vector to the eye.
+    /// Creates the map for splats in the box `within`. `backward`: unit vector to the eye.
     #[must_use]
     pub fn new(n_splats: usize, within: Bounds, backward: Vec3, hides: bool) -> Self {
         let n_splats = n_splats as u32;

@@ -67,7 +67,7 @@ struct Status {
     delta: Option<f32>,
 }
 
-/// Records and submits the work of one solve.
+/// Recorder of the commands of one solve, which it submits in slices.
 pub struct Stream<'a> {
     context: &'a GpuContext,
     watch: &'a Watch<'a>,

@@ -69,7 +69,7 @@ pub(crate) enum Table {
 }
 
 impl Table {
-    /// A table of `count` zeros. Lack of memory is reported when the allocator is settled.
+    /// Creates a table of `count` zeros. Lack of memory is reported when the allocator is settled.
     ///
     /// # Errors
     /// [`PlanError::Binding`] if the table exceeds the binding limit.
@@ -93,8 +93,8 @@ impl Table {
         Ok(Self::unchecked(context, what, entry, count))
     }
 
-    /// A table of `count` zeros without a check of the device's limits, for small tables. Lack of memory is reported by
-    /// the next frame.
+    /// Creates a table of `count` zeros without a check of the device's limits, for small tables. Lack of memory is
+    /// reported by the next frame.
     pub(crate) fn unchecked(context: &GpuContext, what: &'static str, entry: Entry, count: usize) -> Self {
         if !context.draws_only() {
             return Self::Buffer(context.device.create_buffer(&wgpu::BufferDescriptor {

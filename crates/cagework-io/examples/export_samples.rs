@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut mirrored_skin = skinned();
     mirrored_skin.json["nodes"][1]["scale"] = json!([-1.0, 1.0, 1.0]);
-    // Map coordinates, at which f32 numbers have steps of 0.5.
+    // Coordinates as large as those of maps: f32 numbers near 4,500,000 have steps of 0.5.
     let far = |mut model: common::Builder| {
         model.json["nodes"][0]["translation"] = json!([500_000.25, 0.125, 4_500_000.5]);
         model

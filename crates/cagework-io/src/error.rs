@@ -96,7 +96,7 @@ pub enum PoseError {
     States {
         /// Name of the pose's file.
         pose: String,
-        /// Why the clip or the morph targets cannot be read.
+        /// Reason why the clip or the morph targets cannot be read.
         source: WriteError,
     },
     /// An edge of the pose joins vertices that share no face in the cage, so the vertices are in another order.

@@ -372,7 +372,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If two faces
-    /// coincide, as where two parts touch, the segment ends at the face whose back it hits.
+    /// coincide, as they do where two parts touch, the segment ends at the face whose back it hits.
     fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near.into_iter().flatten() {

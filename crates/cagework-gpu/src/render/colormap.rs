@@ -3,14 +3,14 @@
 //! Source: Nuñez, Anderton, Renslow: Optimizing colormaps with consideration for color vision deficiency to enable
 //! accurate interpretation of scientific data. PLoS ONE 13(7), 2018. Same values as `shaders/colormap.wgsl`.
 
-/// Base 10 logarithms of the reproduction errors that the first and the last colour of the map stand for. Errors are
+/// Base 10 logarithms of the reproduction errors that the first and the last colour of the map represent. Errors are
 /// distances as fractions of the cage's diagonal.
 pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
 
 /// Weights below this value are drawn as negative. Negative weights closer to zero are rounding errors.
 pub const NEGATIVE_THRESHOLD: f32 = -1e-5;
 
-/// Lower limit on the weight for which the last colour of the map stands.
+/// Lower limit on the weight that the last colour of the map represents.
 pub const MIN_WEIGHT_RANGE: f32 = 1e-3;
 
 /// The colour map cividis at ten equidistant values, sRGB.

@@ -118,7 +118,7 @@ impl Overlay {
 /// A style and its fainter version behind surfaces.
 pub(super) fn with_behind(style: Style) -> [Style; 2] {
     let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
-    // Selected items stay fully visible.
+    // Selected items keep their full opacity behind surfaces.
     for state in [state::SELECTED, state::BOTH] {
         behind.colors[state as usize][3] /= BEHIND_OPACITY;
     }

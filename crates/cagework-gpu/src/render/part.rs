@@ -4,7 +4,7 @@ use super::pipelines::layout_of;
 use super::shaders::PART;
 use crate::device::GpuContext;
 
-/// Draws textures side by side.
+/// Pipeline that draws textures side by side.
 #[derive(Debug)]
 pub struct PartPainter {
     layout: wgpu::BindGroupLayout,

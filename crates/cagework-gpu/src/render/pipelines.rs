@@ -62,7 +62,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Shader, depth test, and whether colours are blended with what is behind.
+    /// Shader, depth test, and whether colours are blended with those behind them.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
             Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
@@ -114,7 +114,7 @@ const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true
 const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
 /// Depth test of overlays behind surfaces.
 const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
-/// No depth test: nothing is hidden.
+/// Depth test that always passes: nothing is hidden.
 const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {

@@ -7,8 +7,8 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 impl Session {
-    /// A second session on the same GPU with the same model, cage and pose, for comparing the weights of this session
-    /// with coordinates of another kind. It leaves out controls inside the cage, because mean value and Green
+    /// Creates a second session on the same GPU with the same model, cage and pose, for comparing the weights of this
+    /// session with coordinates of another kind. It leaves out controls inside the cage, because mean value and Green
     /// coordinates do not support them.
     ///
     /// # Errors

@@ -20,7 +20,7 @@ use crate::render::DrawModel;
 use crate::skin::Skinner;
 use crate::table::{Entry, Table};
 
-/// Deforms one mesh repeatedly. `tables`: positions and normals that are drawn.
+/// Deformation of one mesh, by kernels or on the CPU. `tables`: positions and normals that are drawn.
 #[derive(Debug)]
 pub(super) enum Mover {
     /// Deforms on the GPU and uploads only the cage.

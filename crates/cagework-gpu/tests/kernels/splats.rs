@@ -55,8 +55,8 @@ fn deform_splats_matches_cpu() {
     assert_close(&result, splat_rows(&expected, &[]).as_flattened(), 4e-6);
 }
 
-/// The direction from which a splat is seen is rotated into the axes of the splat. All splats are at one place, so the
-/// kernel keeps their order.
+/// The direction from which a splat is seen is rotated into the axes of the splat. All splats are at the same place, so
+/// the kernel keeps their order.
 #[test]
 fn seen_colours_match_cpu() {
     let mut rng = Rng(23);

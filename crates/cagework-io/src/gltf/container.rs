@@ -25,7 +25,7 @@ const MAX_ITEMS: u64 = 1 << 18;
 /// Lists of a document whose lengths are not limited by the size of the buffers.
 const LISTS: [&str; 9] =
     ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
-/// Limit on the values of a document's JSON; larger texts may have one for each 4 bytes. A value takes up to 200 bytes
+/// Limit on the values of a document's JSON; larger texts may have one value per 4 bytes. A value takes up to 200 bytes
 /// while it is read.
 const MAX_JSON_VALUES: u64 = 1 << 22;
 const BYTES_PER_JSON_VALUE: u64 = 4;

@@ -118,7 +118,7 @@ impl Texture {
         }
     }
 
-    /// KHR_texture_transform: scale, rotate counter-clockwise (v points down), translate.
+    /// Applies KHR_texture_transform: scales, rotates counter-clockwise (v points down), and translates.
     fn transformed(&self, uv: [f32; 2]) -> [f32; 2] {
         let (sin, cos) = self.rotation.sin_cos();
         let scaled = self.scale * Vec2::from(uv);

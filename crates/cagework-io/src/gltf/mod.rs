@@ -158,7 +158,7 @@ pub enum GltfError {
         count: u64,
         /// Required number of elements.
         expected: u64,
-        /// What the attribute belongs to: vertices or joints.
+        /// What there must be one element for: vertices, joints or splats.
         of: &'static str,
     },
     /// A position is NaN or infinite.
@@ -166,7 +166,7 @@ pub enum GltfError {
     NotFinite {
         /// Index in the document's list of accessors.
         accessor: u32,
-        /// Index of the element, counted from 0: the vertex.
+        /// Index of the vertex, from 0.
         vertex: usize,
     },
     /// The nodes do not form a forest.
@@ -401,7 +401,7 @@ fn parse(
     Ok((document, worlds))
 }
 
-/// The joints that carry vertices in a file; none if it cannot be read.
+/// Joints that influence vertices in a file; none if the file cannot be read.
 pub(crate) fn joints_with_vertices_in(
     name: &str,
     bytes: &[u8],

@@ -44,12 +44,12 @@ pub(crate) struct Pack<'a> {
 }
 
 impl<'a> Pack<'a> {
-    /// A pack for a new document, which has no buffer views.
+    /// Creates a pack for a new document, which has no buffer views.
     pub(crate) fn empty() -> Self {
         Self { views: Vec::new() }
     }
 
-    /// Buffer views of a document.
+    /// Creates a pack of the buffer views of a document.
     pub(crate) fn of(document: &'a GltfDocument) -> Self {
         let views = (0u64..).zip(&document.root.buffer_views).map(|(number, view)| {
             let bytes = view_bytes(&document.root, &document.buffers, number)?;
@@ -59,7 +59,7 @@ impl<'a> Pack<'a> {
         Self { views: views.collect() }
     }
 
-    /// Buffer views of a document whose only buffer is `bin`.
+    /// Creates a pack of the buffer views of a document whose only buffer is `bin`.
     pub(crate) fn of_bytes(json: &Value, bin: &'a [u8]) -> Self {
         let views = json["bufferViews"].as_array().into_iter().flatten().map(|view| {
             let [start, length] =
