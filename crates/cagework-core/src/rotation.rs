@@ -105,8 +105,8 @@ mod tests {
         for m in matrices() {
             let (found, expected) = (nearest_rotation(m), by_svd(m));
             assert!((found.determinant() - 1.0).abs() < 1e-12);
-            // The trace is as large as that of the reference. The rotations are equal unless two rotations are nearly
-            // equally near.
+            // The trace is as large as that of the reference. The rotations are equal unless two rotations give nearly
+            // the same trace.
             let trace = |r: DMat3| (r.transpose() * m).to_cols_array();
             let [ours, theirs] = [trace(found), trace(expected)].map(|t| t[0] + t[4] + t[8]);
             assert!(ours >= theirs - 1e-12, "{m}: {ours} {theirs}");

@@ -50,7 +50,7 @@ pub struct SliceError {
 }
 
 impl Slice {
-    /// The layer at `fraction` (0 to 1) of the length along `axis`, in the grid of a bind with `options`.
+    /// Creates the layer at `fraction` (0 to 1) of the length along `axis`, in the grid of a bind with `options`.
     ///
     /// # Panics
     /// If `axis` is above 2.

@@ -351,7 +351,8 @@ pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
         }
     }
     let scales = Vec3::from_array(columns.map(Vec3::length));
-    // The two longest columns define the rotation; the third axis completes it, also for a flat splat.
+    // The two longest columns define the rotation; the third axis is their cross product, which is defined even for a
+    // flat splat.
     let third = scales.min_position();
     let [first, second] = [(third + 1) % 3, (third + 2) % 3];
     let (long, short) = if scales[first] >= scales[second] { (first, second) } else { (second, first) };

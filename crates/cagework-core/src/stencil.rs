@@ -38,7 +38,7 @@ fn gather(level: &LevelTable, n_lanes: usize, row: usize, lane: usize, rhs: &[f3
     sum
 }
 
-/// Gauss-Seidel on the rows of one colour, in place: `u += omega ((f + sum of neighbours) / diagonal - u)`.
+/// Applies Gauss-Seidel to the rows of one colour, in place: `u += omega ((f + sum of neighbours) / diagonal - u)`.
 ///
 /// `field`: `[row][lane]`, dimensionless. GPU kernel: `shaders/relax_cells.wgsl`.
 pub fn relax_cells(
@@ -58,7 +58,7 @@ pub fn relax_cells(
     }
 }
 
-/// A Jacobi sweep (K. Smith, Algorithm 3) from `u_in` to `u_out`, both `[row][lane]`. GPU kernel:
+/// Runs a Jacobi sweep (K. Smith, Algorithm 3) from `u_in` to `u_out`, both `[row][lane]`. GPU kernel:
 /// `shaders/jacobi_cells.wgsl`.
 pub fn jacobi_cells(
     rows: Range<usize>,
@@ -75,8 +75,8 @@ pub fn jacobi_cells(
     }
 }
 
-/// Sum of the squared changes (absolute changes for [`DeltaNorm::Literal`]) of each row over the lanes. It is added to
-/// `changes` (`[row]`), or stored there for the `first` batch. GPU kernel: `shaders/change_norms.wgsl`.
+/// Adds the squared changes (absolute changes for [`DeltaNorm::Literal`]) of each row, summed over the lanes, to
+/// `changes` (`[row]`), which the `first` batch overwrites. GPU kernel: `shaders/change_norms.wgsl`.
 pub fn change_norms(
     n_lanes: usize,
     norm: DeltaNorm,
@@ -99,8 +99,8 @@ pub fn change_norms(
     }
 }
 
-/// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: the red rows and their zero row.
-/// GPU kernel: `shaders/residual.wgsl`.
+/// Computes the residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: the red rows and their zero
+/// row. GPU kernel: `shaders/residual.wgsl`.
 pub fn residual(
     n_rows: usize,
     n_lanes: usize,
@@ -118,8 +118,8 @@ pub fn residual(
     }
 }
 
-/// Restriction: the coarse right-hand side, `[coarse row][lane]`, from the red residuals around each coarse cell.
-/// GPU kernel: `shaders/restrict_residual.wgsl`.
+/// Restriction: computes the coarse right-hand side, `[coarse row][lane]`, from the red residuals around each coarse
+/// cell. GPU kernel: `shaders/restrict_residual.wgsl`.
 pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f32], coarse_rhs: &mut [f32]) {
     for (row, around) in around.iter().enumerate() {
         for lane in 0..n_lanes {
@@ -133,8 +133,8 @@ pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f
     }
 }
 
-/// Prolongation from `coarse` to the black rows of `field` listed in `entries`, with `n_sources` coarse rows each.
-/// GPU kernel: `shaders/prolong_correction.wgsl`.
+/// Prolongs `coarse` to the black rows of `field` listed in `entries`, with `n_sources` coarse rows each. GPU kernel:
+/// `shaders/prolong_correction.wgsl`.
 pub fn prolong_correction(
     n_lanes: usize,
     mode: Prolong,
@@ -159,7 +159,7 @@ pub fn prolong_correction(
     }
 }
 
-/// Weights of `vertices` for the columns `first_column..first_column + n_lanes`. `block`: `[vertex][lane]`.
+/// Samples the weights of `vertices` for the columns `first_column..first_column + n_lanes`. `block`: `[vertex][lane]`.
 /// GPU kernel: `shaders/sample_weights.wgsl`.
 pub fn sample_weights(
     vertices: Range<usize>,
@@ -186,7 +186,8 @@ pub fn sample_weights(
     }
 }
 
-/// Deformed positions, `[n_vertices]`, object units, for a posed cage. GPU kernel: `shaders/deform_vertices.wgsl`.
+/// Computes deformed positions, `[n_vertices]`, object units, for a posed cage. GPU kernel:
+/// `shaders/deform_vertices.wgsl`.
 pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [Vec3]) {
     for (number, bundle) in positions.chunks_mut(BUNDLE).enumerate() {
         let (slice, lane) = (number / SLICE, number % SLICE);
@@ -202,7 +203,7 @@ pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [
     }
 }
 
-/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU kernel:
+/// Computes area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU kernel:
 /// `shaders/vertex_normals.wgsl`.
 pub fn vertex_normals(table: &NormalTable, positions: &[Vec3], normals: &mut [Vec3]) {
     for (vertex, normal) in normals.iter_mut().enumerate() {

@@ -65,7 +65,7 @@ const CORNERS: [[i32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
 
 impl Transfer {
-    /// Transfer between `fine` and `coarse`, whose grid must be `fine.grid.coarsened()`.
+    /// Computes the transfer between `fine` and `coarse`, whose grid must be `fine.grid.coarsened()`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level) -> Self {
         let [nx, ny, nz] = fine.grid.dims;

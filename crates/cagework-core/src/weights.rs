@@ -98,7 +98,7 @@ impl Weights {
         Ok(weights)
     }
 
-    /// A matrix from arrays that are valid by construction.
+    /// Creates a matrix from arrays that are valid by construction.
     pub(crate) fn from_parts(n_columns: u32, indptr: Vec<u32>, indices: Vec<u32>, data: Vec<f32>) -> Self {
         Self { n_columns, indptr, indices, data }
     }
@@ -125,7 +125,7 @@ impl Weights {
         Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
-    /// A matrix without rows, with capacity for [`Self::append`].
+    /// Creates a matrix without rows, with capacity for [`Self::append`].
     #[must_use]
     pub fn with_room(n_columns: u32, n_rows: usize, n_nonzeros: usize) -> Self {
         let mut indptr = Vec::with_capacity(n_rows + 1);

@@ -137,7 +137,7 @@ impl Document {
     pub fn timeline(&self) -> Timeline {
         let Transition { interpolation, loops, back } = self.transition;
         let seconds = self.pose_seconds();
-        // With very many poses, even one per second exceeds `MAX_SECONDS`, and `Timeline::new` refuses the times.
+        // With very many poses, even one per second exceeds `MAX_SECONDS`, and `Timeline::new` rejects the times.
         let timeline = Timeline::new(&seconds, loops.then_some(back));
         timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation)
     }

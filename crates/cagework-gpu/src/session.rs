@@ -65,7 +65,7 @@ struct SessionBind {
 }
 
 impl Session {
-    /// A session without a model.
+    /// Creates a session without a model.
     #[must_use]
     pub fn new(context: GpuContext) -> Self {
         Self {

@@ -1,9 +1,9 @@
 //! Recursive axis interpolation: weights at a point from nearby centres and the cage.
 //!
 //! Rays from p in both directions of an axis end at the face of the cube between eight centres or at the cage,
-//! whichever is nearer, and the value at p is interpolated linearly between the two ends. An end on the cage has
-//! Dirichlet values. An end on a cube face is interpolated along the second axis in the same way, then along the third,
-//! whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the result
+//! whichever is nearer, and the value at p is interpolated linearly between the two ends. An end on the cage takes
+//! the Dirichlet values there. An end on a cube face is interpolated along the second axis in the same way, then along
+//! the third, whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the result
 //! is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even if no
 //! centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the axes
 //! are averaged. Rays next to re-entrant edges are split, see `edges.rs`.
@@ -63,8 +63,8 @@ struct Scratch {
     edges: Vec<u32>,
     /// Facets in the cube of a point beside an edge.
     here: Vec<u32>,
-    /// Facets in a second cube: that of the point one cell from the edge, or, for an edge beyond the cube of the ray,
-    /// that of the ray's point beside the edge.
+    /// Facets in a second cube: the cube of the point one cell from the edge or, for an edge beyond the cube of the
+    /// ray, the cube of the ray's point beside the edge.
     other: Vec<u32>,
     stencil: Stencil,
     /// Total weight of ray ends that lie outside the cage.
@@ -102,7 +102,7 @@ enum Stop<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    /// Sampler of the finest level.
+    /// Creates a sampler of the finest level.
     #[must_use]
     pub fn new(
         controls: Controls<'a>,

@@ -31,7 +31,7 @@ pub struct Centres {
 }
 
 impl Centres {
-    /// Centres of the coarse cells of `transfer`.
+    /// Finds the fine cells at the centres of the coarse cells of `transfer`.
     #[must_use]
     pub fn new(fine: &Level, transfer: &Transfer) -> Self {
         let [red, black] = &fine.colours;

@@ -132,7 +132,7 @@ fn visit_plane<const OLD: bool>(
     }
 }
 
-/// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
+/// Applies Gauss-Seidel to one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 ///
 /// The kernel divides instead of multiplying by the inverse: f32 rounds 1/6 up by 3e-8, so a product would bias each
 /// cell in the same direction, and the sum of the weights of a point would differ from 1 by 2.7e-5 at g = 128
@@ -142,7 +142,7 @@ pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rh
     over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
 }
 
-/// As [`over_relax_plane`], with zeros for the cells of this colour instead of their stored values.
+/// Like [`over_relax_plane`], with zeros for the cells of this colour instead of their stored values.
 #[inline(always)]
 pub fn over_relax_zeros_plane(
     level: &Level,
@@ -167,7 +167,7 @@ pub fn over_relax_zeros_plane(
     );
 }
 
-/// As [`relax_plane`] for red cells, with zeros for all cells instead of their stored values: `u = f / diagonal`.
+/// Like [`relax_plane`] for red cells, with zeros for all cells instead of their stored values: `u = f / diagonal`.
 #[inline(always)]
 pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
@@ -195,7 +195,7 @@ pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_
     }
 }
 
-/// Gauss-Seidel on one plane of one colour, with the over-relaxation factor `omega`.
+/// Applies Gauss-Seidel to one plane of one colour, with the over-relaxation factor `omega`.
 #[inline(always)]
 pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, u: &mut [Row], rhs: Rhs<'_>) {
     let (own, other) = split(level, u, colour);
@@ -260,7 +260,8 @@ pub struct Changes<'a> {
     pub of_cells: &'a mut [f32],
 }
 
-/// Jacobi on one plane of one colour, from `old` to `new`, both `[n_rows]`. Adds the cells' changes to `changes`.
+/// Applies Jacobi to one plane of one colour, from `old` to `new`, both `[n_rows]`. Adds the cells' changes to
+/// `changes`.
 #[inline(always)]
 pub fn jacobi_plane(
     level: &Level,
@@ -345,7 +346,7 @@ pub enum Prolong {
     Replace,
 }
 
-/// Prolongation to the black cells of one plane.
+/// Prolongs `coarse` to the black cells of one plane of `u`.
 #[inline(always)]
 pub fn prolong_plane(
     level: &Level,

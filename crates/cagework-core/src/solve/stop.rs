@@ -13,8 +13,8 @@ pub struct StopRule {
     pub max_iterations: u32,
 }
 
-/// Limit on V-cycles of a batch, alone or as preconditioner. Even cycles that only halve the error reach the precision
-/// of f32 before this limit.
+/// Limit on V-cycles of a batch, whether they solve alone or as a preconditioner. Even cycles that only halve the error
+/// reach the precision of f32 before this limit.
 pub const MAX_CYCLES: u32 = 60;
 
 impl StopRule {

@@ -80,7 +80,7 @@ pub struct NormalTable {
 }
 
 impl LevelTable {
-    /// Table of a level. On the `finest` level, the right-hand side has one row per cut cell.
+    /// Creates the table of a level. On the `finest` level, the right-hand side has one row per cut cell.
     #[must_use]
     pub fn new(level: &Level, finest: bool) -> Self {
         let n_rows = level.n_rows();
@@ -117,7 +117,7 @@ impl LevelTable {
 }
 
 impl TransferTable {
-    /// Table of the transfer between `fine` and `coarse`.
+    /// Creates the table of the transfer between `fine` and `coarse`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level, transfer: &Transfer) -> Self {
         let mut around = vec![[fine.zero_row(); 13]; coarse.n_rows()];
@@ -144,7 +144,7 @@ fn entries<const N: usize>(first_black: u32, rows: &[ProlongRow<N>]) -> Vec<u32>
 }
 
 impl SamplingTable {
-    /// Table of sampling stencils.
+    /// Creates the table of sampling stencils.
     #[must_use]
     pub fn new(stencils: &Stencils) -> Self {
         let mut table = Self { starts: vec![[0; 2]], ..Self::default() };
@@ -158,13 +158,13 @@ impl SamplingTable {
 }
 
 impl SlicedWeights {
-    /// Slices of a matrix of weights.
+    /// Slices a matrix of weights.
     #[must_use]
     pub fn new(weights: &Weights) -> Self {
         Self::of_rows(weights, 0..weights.n_rows())
     }
 
-    /// Slices of a range of rows of a matrix of weights.
+    /// Slices a range of rows of a matrix of weights.
     #[must_use]
     pub fn of_rows(weights: &Weights, range: Range<usize>) -> Self {
         let n_slices = range.len().div_ceil(BUNDLE * SLICE);
@@ -213,7 +213,7 @@ impl SlicedWeights {
 }
 
 impl NormalTable {
-    /// Table of a mesh; ignores triangles with indices beyond `n_vertices`.
+    /// Creates the table of a mesh; ignores triangles with indices beyond `n_vertices`.
     #[must_use]
     pub fn new(n_vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let whole = || triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < n_vertices));

@@ -11,8 +11,8 @@ use super::pull::Pull;
 /// at the eye, or in a plane that is seen almost edge-on.
 const MIN_PLANE_SINE: f32 = 0.05;
 
-/// Minimum distance between the start of a scale gesture and the centre, pixels. Shorter distances count as this one,
-/// because otherwise moving by a pixel would change the factor too much.
+/// Minimum distance between the start of a scale gesture and the centre, pixels. Shorter distances count as this
+/// distance, because otherwise moving by a pixel would change the factor too much.
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
 /// Transformation that a gesture applies to the selection.

@@ -31,7 +31,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Edges of faces, including open edges of an unfinished cage.
+    /// Collects the edges of faces, including open edges of an unfinished cage.
     #[must_use]
     pub fn new(faces: &[Vec<u32>]) -> Self {
         let mut edges: Vec<[u32; 2]> = Vec::new();

@@ -27,7 +27,7 @@ pub struct Pull {
 }
 
 impl Pull {
-    /// Shares for a selection in the pose `positions`.
+    /// Computes the shares for a selection in the pose `positions`.
     ///
     /// With symmetry, if both vertices of a pair are selected, the side of the vertex that was selected last leads: the
     /// other side makes its mirrored movement. `rest`, the cage at rest, determines on which side of the mirror plane a

@@ -11,7 +11,7 @@ use crate::device::GpuContext;
 /// Number of samples per pixel, for multisampling.
 pub(super) const SAMPLES: u32 = 4;
 
-/// Depth format: 32-bit floats, so that distant handles are still separated from the cage's faces.
+/// Depth format: 32-bit floats, which separate even distant handles from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Format of the layer of splats. Its sRGB values are blended without conversion to linear values.

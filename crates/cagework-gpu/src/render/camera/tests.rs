@@ -148,7 +148,7 @@ fn orbit_stops_at_the_poles_and_keeps_the_distance() {
     camera.orbit(Vec2::new(1.0, 10.0));
     assert_eq!(camera.pitch, FRAC_PI_2);
     assert!((camera.eye().distance(camera.target) - 5.0).abs() < UNITS);
-    // Dragging right moves the front of the scene right, hence the eye left.
+    // Dragging right moves the front of the scene right, so the eye moves left.
     let mut camera = Camera { yaw: 0.0, pitch: 0.0, ..camera };
     camera.orbit(Vec2::new(0.2, 0.0));
     let front = camera.target + 0.5 * Vec3::Z;
@@ -203,7 +203,7 @@ fn target_is_in_the_middle_of_what_overlays_leave_free() {
     }
 }
 
-/// Margins under overlays that cover more than half of a side of the picture are scaled down to half of it.
+/// Margins under overlays that cover more than half of a side of the picture are scaled down to half of that side.
 #[test]
 fn free_part_is_at_least_half_of_the_picture() {
     let mut camera = Camera::default();
