@@ -47,7 +47,7 @@ pub struct LookGroup {
     pub base_color: [f32; 4],
     /// Base colour texture, an index into [`Look::images`].
     pub image: Option<u32>,
-    /// Wrap mode along u and v.
+    /// How alpha is used: not at all, to discard fragments, or to blend.
     pub wrap: [LookWrap; 2],
     /// How alpha is used: ignored, for discarding fragments, or for blending.
     pub alpha: LookAlpha,
@@ -108,7 +108,7 @@ impl Default for LookGroup {
 }
 
 impl LookVertex {
-    /// A corner without texture coordinates, in white.
+    /// A white corner without texture coordinates.
     #[must_use]
     pub fn plain(source: u32) -> Self {
         Self { source, uv: [0.0; 2], color: [1.0; 4] }

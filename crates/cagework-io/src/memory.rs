@@ -18,7 +18,7 @@ pub struct MemoryError {
 
 const MIB: u64 = 1 << 20;
 
-/// Size to which any file may unpack, bytes.
+/// Size up to which every file may be unpacked, bytes.
 const MAX_UNPACKED: u64 = 64 * MIB;
 /// Contents above [`MAX_UNPACKED`] may have at most this many times the size of the compressed file. Compression
 /// typically shrinks the XML of models to 1/10 of its size, and splats to 1/2.
@@ -27,7 +27,7 @@ const MAX_RATIO: u64 = 100;
 /// Checks the size of the contents of a compressed file, so that a small file does not take much memory.
 ///
 /// # Errors
-/// A sentence, if the contents are above both limits.
+/// A message for the user, if the contents exceed both limits.
 pub(crate) fn check_unpacked(unpacked: u64, file: u64) -> Result<(), String> {
     if unpacked <= MAX_UNPACKED.max(file.saturating_mul(MAX_RATIO)) {
         return Ok(());

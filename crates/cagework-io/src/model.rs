@@ -164,7 +164,7 @@ impl Model {
         Self::read_from(name, bytes.into(), resolve, memory_limit, (true, false))
     }
 
-    /// Like [`Self::read_within`], also for a glTF of clips without triangles, which has no vertices.
+    /// Like [`Self::read_within`], but also accepts a glTF that contains only clips, without triangles and vertices.
     ///
     /// # Errors
     /// As [`Self::read_within`].
@@ -177,8 +177,8 @@ impl Model {
         Self::read_from(name, bytes.into(), resolve, memory_limit, (true, true))
     }
 
-    /// A model from a generated mesh whose positions are relative to `origin`; same result as reading the
-    /// mesh as an OBJ file.
+    /// Makes a model from a generated mesh whose positions are relative to `origin`; same result as reading the mesh as
+    /// an OBJ file.
     ///
     /// # Errors
     /// [`ReadError`] if the mesh has no vertices.
@@ -188,7 +188,7 @@ impl Model {
         Ok(Self { origin, ..model })
     }
 
-    /// A capture of splats, whose positions are relative to `origin`.
+    /// Makes a capture from splats whose positions are relative to `origin`.
     ///
     /// # Errors
     /// [`ReadError`] if `splats` is empty, or a number is not finite.

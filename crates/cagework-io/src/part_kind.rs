@@ -9,7 +9,7 @@ pub enum PartKind {
     Node,
     /// A glTF joint: the vertices on which it has the largest weight. Other programs call this a vertex group.
     Joint,
-    /// An object or group of an OBJ, which an `o` or `g` line begins.
+    /// An object or group of an OBJ, started by an `o` or `g` line.
     Group,
 }
 

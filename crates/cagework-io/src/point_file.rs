@@ -10,8 +10,8 @@ use crate::npz::{NpzError, npy_points, write_npy_points};
 
 /// Memory per byte of a file, bytes: the file, its text, and the written text.
 const MEMORY_PER_BYTE: u64 = 3;
-/// Memory per point, bytes: position (24), places of its numbers (48), the mapped point in three forms (64) and its
-/// written digits (60), with room for vectors that grow by doubling.
+/// Memory per point, bytes: position (24), byte ranges of its numbers (48), the mapped point in three forms (64) and
+/// its written digits (60), with room for vectors that grow by doubling.
 const MEMORY_PER_POINT: u64 = 300;
 
 /// Error of reading a file of points.

@@ -53,7 +53,7 @@ pub fn encode_pose(rest: &[Vec3], pose: &[Vec3]) -> Vec<u8> {
     bytes
 }
 
-/// Decodes a pose of [`encode_pose`]. The error is at most 1/65,534 of the largest offset. `rest`: `[n_cage]`.
+/// Decodes a pose encoded by [`encode_pose`]. The error is at most 1/65,534 of the largest offset. `rest`: `[n_cage]`.
 ///
 /// # Errors
 /// [`PoseCodeError`] if the bytes are damaged or the cage has another number of vertices.

@@ -170,7 +170,7 @@ impl Model {
         gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
     }
 
-    /// How the joints move in [`Self::write_reshaped`], for other files with the same rig.
+    /// Returns the moves of the joints in [`Self::write_reshaped`], for other files with the same rig.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite displacement per point, or if the rig cannot be read.
@@ -189,7 +189,8 @@ impl Model {
         gltf::skeleton(document, &rig, &self.triangles, (&by, &is_outside), (options, up))
     }
 
-    /// Heights of the lowest vertices of a model that is written without its rig. `posed`: `[n_vertices]`.
+    /// Heights of the lowest vertex at rest and in `posed`, for a model that is written without its rig. `posed`:
+    /// `[n_vertices]`.
     #[must_use]
     pub fn ground(&self, posed: &[Vec3]) -> Ground {
         let low = |all: &[Vec3]| all.iter().map(|p| f64::from(p.y)).fold(f64::INFINITY, f64::min);
@@ -197,8 +198,8 @@ impl Model {
         Ground::at_rest([low(&self.positions), low(posed)].map(|low| origin + low))
     }
 
-    /// Lifts or lowers a model that is written without its rig: by the lift of [`ReshapeOptions::skeleton`] if that has
-    /// one, otherwise, with [`ReshapeOptions::ground`], so that the lowest point keeps its height. `posed`:
+    /// Lifts or lowers a model that is written without its rig: by the lift of [`ReshapeOptions::skeleton`], if it has
+    /// one. Otherwise, with [`ReshapeOptions::ground`], the lowest point returns to its height at rest. `posed`:
     /// `[n_vertices]`.
     pub fn stand(&self, posed: &mut [Vec3], options: &ReshapeOptions) {
         let own = options.ground.then(|| self.ground(posed));

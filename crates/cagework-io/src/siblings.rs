@@ -59,11 +59,11 @@ impl Image {
     }
 }
 
-/// Says, as a predicate, that a file is not an image.
+/// Predicate for a message: a file is not an image.
 pub(crate) const NOT_AN_IMAGE: &str = "is not a PNG, JPEG, WebP or KTX2 image";
 
 impl<'a> Siblings<'a> {
-    /// Cache of files from `resolve`, up to `memory_limit` bytes.
+    /// Creates a cache of files from `resolve`, up to `memory_limit` bytes.
     pub(crate) fn new(resolve: &'a mut Resolve<'_>, memory_limit: u64) -> Self {
         let limit = memory_limit.min(MAX_BYTES);
         Self { resolve, files: BTreeMap::new(), images: HashMap::new(), bytes: 0, limit }
@@ -109,7 +109,8 @@ impl<'a> Siblings<'a> {
         found
     }
 
-    /// The image of this name. If it is unavailable, adds a notice with the consequence `otherwise`, once per name.
+    /// The image of this name. If it is unavailable, adds a notice that ends with `otherwise`, the consequence, once
+    /// per name.
     pub(crate) fn image(&mut self, name: &str, otherwise: &str, notices: &mut Vec<String>) -> Option<Image> {
         if let Some(known) = self.images.get(name) {
             return known.clone();

@@ -15,7 +15,7 @@ const MAX_TOTAL_PIXELS: u64 = 1 << 29;
 /// Limit on all drawn textures together, pixels: 256 MiB, and a third more on the GPU for mipmaps.
 const MAX_DRAWN_PIXELS: u64 = 1 << 26;
 
-/// Smallest remaining part of [`MAX_DRAWN_PIXELS`] with which the textures of a further model are decoded.
+/// If fewer pixels of [`MAX_DRAWN_PIXELS`] remain, the textures of an additional model are not decoded.
 const MIN_DRAWN_PIXELS: u64 = 1 << 18;
 
 /// Why an image is not decoded.

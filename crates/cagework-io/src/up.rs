@@ -88,7 +88,7 @@ const FEET: f32 = 0.005;
 const MORE_FEET: usize = 3;
 
 /// Whether a model with y up seems to lie on its back: it is longer along z than along y, and stands on a flat side at
-/// the lowest z rather than at the lowest y. A hint, not a proof.
+/// the lowest z rather than at the lowest y. This is a heuristic.
 #[must_use]
 pub fn lies_on_back(positions: &[Vec3]) -> bool {
     let Some(bounds) = Bounds::of(positions) else { return false };

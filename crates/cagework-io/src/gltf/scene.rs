@@ -166,7 +166,7 @@ pub(crate) fn instances(
     }))
 }
 
-/// Numbers of the document's elements.
+/// Counts the document's elements.
 pub(crate) fn counts(document: &GltfDocument) -> Counts {
     let count = |key: &str| document.json[key].as_array().map_or(0, Vec::len);
     let targets = document.root.meshes.iter().map(|mesh| {

@@ -37,7 +37,7 @@ const ZEROS_PER_BYTE: u64 = 8;
 /// many takes 0.8 GB.
 const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 
-/// Bytes of JSON per primitive that the estimate of the memory for writing a model contains already.
+/// Bytes of JSON per primitive that the estimate of the memory for writing a model already includes.
 const PRIMITIVE_JSON_BYTES: u64 = 6000;
 
 /// Memory of a model, bytes: per vertex, per triangle, and per primitive of a node.
@@ -56,7 +56,7 @@ const TRIANGLE_READ_BYTES: u64 = 12;
 const RIG_VERTEX_BYTES: u64 = 100;
 const SKIN_VERTEX_BYTES: u64 = 300;
 
-/// Bytes per vertex that a morph target moves: in a player, and while reshaping, for both ends of the target.
+/// Memory per vertex moved by a morph target, bytes: in a player, and for both ends of the target while reshaping.
 const MORPHED_VERTEX_BYTES: u64 = 96;
 
 /// Bytes of the matrices of a joint.

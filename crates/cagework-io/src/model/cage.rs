@@ -140,9 +140,9 @@ impl Model {
 /// Finds an edge of `pose` that cannot belong to the mesh `cage`. `n`: number of vertices of both.
 ///
 /// Exporters choose the diagonals of a polygon by its shape, so an edge that `cage` has and `pose` lacks can be a
-/// diagonal, which is no fault. Faces of `cage` are joined across such edges into regions, and an edge of `pose`
-/// between two corners of a polygonal region is accepted. A connected region of T triangles is a polygon if it has
-/// T + 2 vertices. With fewer, a vertex inside it lost all its edges, so the order differs.
+/// diagonal and is not an error. Faces of `cage` are joined across such edges into regions, and an edge of `pose`
+/// between two corners of a polygonal region is accepted. A connected region of T triangles is a polygon if it has T +
+/// 2 vertices. With fewer, a vertex inside it lost all its edges, so the order differs.
 fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 2]> {
     let edges_of = |face: &[u32]| -> Vec<[u32; 2]> {
         let ends = face.iter().zip(face.iter().cycle().skip(1));

@@ -376,10 +376,10 @@ fn extension(name: &str) -> String {
 
 #[cfg(feature = "compress")]
 impl CompactOptions {
-    /// Checks that no option is set unless the format is glTF.
+    /// Checks that all options have their defaults unless the format is glTF.
     ///
     /// # Errors
-    /// The message for the user.
+    /// A message for the user.
     pub fn require(self, format: ModelFormat) -> Result<(), String> {
         if self == Self::default() || format == ModelFormat::Gltf {
             return Ok(());

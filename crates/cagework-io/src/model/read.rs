@@ -131,7 +131,7 @@ impl Source<'_, '_> {
         }
     }
 
-    /// A capture that was not read from a file.
+    /// Makes a capture that was not read from a file.
     pub(super) fn new_capture(self, splats: Splats, origin: DVec3) -> Result<Model, ReadError> {
         let positions = splats.positions.iter().map(|p| p.as_dvec3()).collect();
         let read =

@@ -35,7 +35,7 @@ pub(super) struct NpzWriter {
 }
 
 impl NpzWriter {
-    /// A writer for arrays of `bytes` bytes in total, `longest` of them in the longest array.
+    /// Creates a writer for arrays of `bytes` bytes in total, with `longest` bytes in the longest array.
     pub(super) fn new(bytes: usize, longest: usize) -> Self {
         Self {
             zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + HEADERS_BYTES))),

@@ -13,8 +13,8 @@ use crate::origin::{Coordinate, relative};
 const VERTEX_BYTES: u64 = 24;
 const ELEMENT_BYTES: u64 = 80;
 
-/// Limit on the corners of all elements. The surface of a bind, with a face for each element at least, has up to 100,000
-/// faces.
+/// Limit on the corners of all elements. The surface of a bind has up to 100,000 faces, and at least one face for each
+/// element.
 const MAX_CORNERS: usize = 1 << 20;
 
 /// Reads controls inside a cage. Every `v` line is a control, in the file's axes, relative to `origin`; `p`, `l` and

@@ -150,9 +150,9 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     look
 }
 
-/// Source vertex of each corner: its own vertex or, where normals or smoothing groups put several surfaces at
-/// one vertex, a duplicate appended to `copies`. Corners without normal and smoothing group keep their
-/// vertex. `[n_corners]`
+/// Source vertex of each corner: its own vertex or, at a vertex where normals or smoothing groups separate several
+/// surfaces, a duplicate appended to `copies`. Corners without normal and smoothing group keep their vertex.
+/// `[n_corners]`
 fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
     let normals: Vec<Vec3> = document.corners.iter().map(|corner| document.normal(corner)).collect();

@@ -104,7 +104,8 @@ impl ObjDocument {
         surfaces
     }
 
-    /// Triangulates all faces. Returns the number of concave faces that became fans because the work limit was reached.
+    /// Triangulates all faces. Returns the number of concave faces that were split into fans because the work limit was
+    /// reached.
     pub(crate) fn triangulate(&mut self, positions: &[Vec3]) -> usize {
         let mut triangulator = Triangulator::new();
         let mut polygon = Vec::new();

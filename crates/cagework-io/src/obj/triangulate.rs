@@ -14,7 +14,7 @@ pub(crate) struct Triangulator {
     corners: Vec<u32>,
     /// Remaining share of [`MAX_CLIP_WORK`].
     left: u64,
-    /// Number of concave polygons that became fans because [`MAX_CLIP_WORK`] was used up.
+    /// Number of concave polygons that were split into fans because [`MAX_CLIP_WORK`] was used up.
     pub(crate) fans: usize,
 }
 
@@ -26,7 +26,8 @@ impl Triangulator {
     /// Appends the n - 2 triangles of `polygon` as `base` + corner numbers. `polygon`: corner positions in order.
     ///
     /// The triangles form a fan if all triangles of the fan face along the polygon's normal; otherwise ears are clipped
-    /// in the mean plane. Degenerate and self-intersecting polygons, and those beyond the work limit, become fans.
+    /// in the mean plane. Degenerate and self-intersecting polygons, and those beyond the work limit, are split into
+    /// fans.
     pub(crate) fn triangulate(&mut self, polygon: &[Vec3], base: u32, out: &mut Vec<[u32; 3]>) {
         let n = polygon.len() as u32;
         if n < 3 {
@@ -63,7 +64,7 @@ impl Triangulator {
         if self.corners.len() != 3 * (p.len() - 2) {
             return false;
         }
-        // `earcut` does not guarantee the orientation of its triangles: give each that of the polygon.
+        // `earcut` does not guarantee the orientation of its triangles: orient each like the polygon.
         for t in self.corners.chunks_exact_mut(3) {
             let [a, b, c] = [p[t[0] as usize], p[t[1] as usize], p[t[2] as usize]];
             if (b - a).cross(c - a).dot(normal) < 0.0 {

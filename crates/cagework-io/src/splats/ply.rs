@@ -274,7 +274,7 @@ impl Table {
         Ok(table)
     }
 
-    /// A table of zeros. `lines`: header lines after the format.
+    /// Creates a table of zeros. `lines`: header lines after the format.
     fn empty(lines: &str, columns: Vec<Column>, count: usize, stride: usize) -> Self {
         let mut bytes = format!("ply\nformat binary_little_endian 1.0\n{lines}\nend_header\n").into_bytes();
         let start = bytes.len();
@@ -282,7 +282,7 @@ impl Table {
         Self { bytes, start, count, stride, is_big_endian: false, columns }
     }
 
-    /// A table for new splats. `is_far`: positions need f64.
+    /// Creates a table for new splats. `is_far`: positions need f64.
     fn of_splats(count: usize, n_harmonics: usize, is_far: bool) -> Self {
         let rest = (0..3 * n_harmonics).map(|k| format!("f_rest_{k}"));
         let names = [&POSITION[..], &COLOR].concat().into_iter().map(str::to_owned).chain(rest);

@@ -1,5 +1,5 @@
 //! `.splat` files: 32 bytes per splat, without a header. Position and scale as f32, colour and opacity as bytes,
-//! rotation w, x, y, z as bytes of which 128 is 0.
+//! rotation w, x, y, z as bytes, where 128 stands for 0.
 
 use glam::{DVec3, Quat, Vec3};
 

@@ -42,7 +42,7 @@ const COLOR_SCALE: f32 = 0.15;
 const MAX_FRACTION: u8 = 20;
 /// Largest integer that can store a coordinate: positions have 24 bits per axis, with sign.
 const MAX_FIXED: f64 = 8_388_607.0;
-/// Integer that stores a component of size sqrt(1/2), which none of the three smaller components of a rotation exceeds.
+/// Integer that stores sqrt(1/2), the upper bound of the three smaller components of a rotation.
 const ROTATION_STEPS: f32 = 511.0;
 
 /// Decompressed content of a file.

@@ -173,7 +173,7 @@ impl<'a> Package<'a> {
             let mut writer = ZipArchiveWriter::new(Vec::new());
             writer.set_comment(self.comment);
             for (index, entry) in self.entries.iter().enumerate() {
-                // Names with the UTF-8 flag keep it if they need it; other names are copied byte for byte.
+                // Keep the UTF-8 flag of names that need it; copy other names byte for byte.
                 let name = match std::str::from_utf8(&entry.name) {
                     Ok(name) if entry.is_utf8 && !name.is_ascii() => EntryPath::conformant(name),
                     _ => EntryPath::verbatim(entry.name.as_slice()),

@@ -285,8 +285,8 @@ impl ModelPart {
     }
 }
 
-/// Adds a triangle, unless two of its vertices are equal, which 3MF forbids: such a triangle stays in the file only.
-/// Returns the kind of data of the triangle that is not shown.
+/// Adds a triangle, unless two of its vertices are equal, which 3MF forbids. Such triangles are kept in the file, but
+/// not shown. Returns the kind of data of the triangle that is not shown.
 fn triangle(tag: &BytesStart<'_>, object: &mut Object) -> Result<Option<&'static str>, String> {
     let mut corners = [None; 3];
     let (mut group, mut indices) = (None, [None; 3]);

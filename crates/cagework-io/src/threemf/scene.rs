@@ -23,7 +23,7 @@ pub(super) type Key = (usize, usize);
 pub(super) struct Scene {
     /// Name and content of each part; the first one has the build.
     pub(super) parts: Vec<(String, ModelPart)>,
-    /// Index of each part by [`part_name`].
+    /// Instances in the order of the components and items in the file, with children before the object's own triangles.
     part_of: HashMap<Vec<u8>, usize>,
     /// In the order in which components and items are written, children before the object's own triangles.
     pub(super) instances: Vec<Instance>,

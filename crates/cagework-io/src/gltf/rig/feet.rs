@@ -2,8 +2,8 @@
 //! model by two-bone inverse kinematics, so that feet do not slide during contacts.
 //!
 //! * **Contacts**: samples at which the ankle is at most [`MAX_HEIGHT`] above its lowest height and slower than
-//!   [`MAX_SPEED`]. In a clip on the spot the ground moves, so speeds are relative to the ground's velocity, the median
-//!   of the ankles' velocities near the ground.
+//!   [`MAX_SPEED`]. In an in-place clip, where the character walks without moving forward, the ground moves. Speeds are
+//!   therefore relative to the ground's velocity, the median of the ankles' velocities near the ground.
 //! * **Targets**: during a contact, the mean position of the ankle relative to the ground. Before and after a contact
 //!   the correction fades within [`FADE`] seconds. In a loop, where the last pose equals the first one, contacts and
 //!   fades continue across the seam.
@@ -24,11 +24,11 @@ use crate::gltf::pack::push;
 use crate::gltf::scene::{Worlds, local};
 use crate::gltf::{self, GltfDocument};
 
-/// Largest speed of a planted ankle, leg lengths per second. A walk moves its foot about ten times as fast.
+/// Largest speed of a planted ankle, leg lengths per second. The swinging foot of a walk is about ten times as fast.
 const MAX_SPEED: f64 = 0.3;
 /// Largest height of a planted ankle above its lowest height in the clip, leg lengths.
 const MAX_HEIGHT: f64 = 0.06;
-/// Shortest contact, and largest gap between two contacts that are joined, seconds.
+/// Shortest contact, and longest gap across which two contacts are joined, seconds.
 const MIN_CONTACT: f64 = 0.08;
 const MAX_GAP: f64 = 0.04;
 /// Time in which a correction fades before and after a contact, seconds.

@@ -45,7 +45,7 @@ pub(super) struct NodeUpdate {
     pub(super) nodes: Vec<Node>,
     /// World transforms, computed from the local transforms after rounding them to f32, as they are written.
     pub(super) world: Vec<DMat4>,
-    /// Displacement of each node that follows the cage. `[n_nodes]`
+    /// Displacement of each node; zero for nodes that do not follow the cage. `[n_nodes]`
     pub(super) deltas: Vec<DVec3>,
     /// Scale factor of clip translations of each node. `[n_nodes]`
     pub(super) ratios: Vec<f64>,
@@ -56,7 +56,7 @@ pub(super) struct NodeUpdate {
     pub(super) n_loose: usize,
 }
 
-/// How the nodes of a document move with the nodes of the same names in a [`Skeleton`](super::Skeleton).
+/// Moves of a document's nodes, taken from the nodes of the same names in a [`Skeleton`](super::Skeleton).
 pub(super) struct NamedMoves {
     /// Displacement of each node and scale factor of its clip translations. `[n_nodes]`
     pub(super) of_nodes: Vec<Option<(DVec3, f64)>>,
@@ -70,7 +70,7 @@ pub(super) struct Deformation<'a> {
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,
-    /// Motions of nodes whose meshes stay rigid.
+    /// Moves of nodes given by a skeleton that is shared with other files.
     pub(super) rigid: &'a HashMap<u32, Motion>,
     /// Moves that a skeleton shared with other files determines.
     pub(super) named: Option<&'a NamedMoves>,
@@ -177,7 +177,7 @@ impl Rig<'_> {
         self.follows.iter().filter(|(node, _)| props.contains(node)).map(of).collect()
     }
 
-    /// Updates the nodes that follow the cage, in `json` and in the result.
+    /// Moves the nodes that follow the cage: writes their transforms to `json` and returns their changes.
     pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
@@ -224,7 +224,7 @@ impl Rig<'_> {
             let named = given.named.and_then(|named| named.of_nodes[i]);
             let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
             let is_outside = given.is_outside[at] && named.is_none();
-            // A file of clips has no vertices, and its points are not bound.
+            // A file that contains only clips has no vertices, and its points are not bound.
             let is_loose = named.is_none() && (self.parts.is_empty() || is_outside && !holds);
             moved.n_outside += usize::from(is_outside && !is_loose);
             moved.n_loose += usize::from(is_loose);
@@ -247,7 +247,7 @@ impl Rig<'_> {
         let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
         let mut ratios = if travels { self.ratios(given, &delta) } else { vec![1.0; n] };
         if let Some(named) = given.named.filter(|_| travels) {
-            // Joints that the shared skeleton lacks get the factor of another joint.
+            // Joints that are missing in the shared skeleton get the factor of another joint.
             let one = named.of_nodes.iter().flatten().map(|(_, ratio)| *ratio).next();
             let of_nodes = ratios.iter_mut().zip(&named.of_nodes);
             of_nodes.for_each(|(own, named)| *own = named.map(|(_, ratio)| ratio).or(one).unwrap_or(*own));

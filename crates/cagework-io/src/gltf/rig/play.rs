@@ -47,8 +47,8 @@ pub struct RigPose {
 }
 
 impl Player {
-    /// A player of `document`. `like`: document that defines the vertex order, either `document` itself or the original
-    /// from which it was exported.
+    /// Creates a player of `document`. `like`: document that defines the vertex order, either `document` itself or the
+    /// original from which it was exported.
     pub(crate) fn new(
         document: &GltfDocument,
         like: &GltfDocument,

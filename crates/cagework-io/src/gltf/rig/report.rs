@@ -33,7 +33,7 @@ pub struct ReshapeReport {
     pub max_condition: f64,
     /// Number of vertices whose skinning matrix is singular; they follow their neighbours.
     pub singular_vertices: usize,
-    /// Distance by which the model was lifted so that its lowest point keeps its height, object units.
+    /// Additional lift of each clip, object units; empty unless the model is kept on its ground.
     pub lift: f64,
     /// Further lift of each clip, object units; empty unless the model is kept on its ground.
     #[serde(skip_serializing_if = "Vec::is_empty")]

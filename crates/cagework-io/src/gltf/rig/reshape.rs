@@ -58,7 +58,8 @@ pub struct ReshapeOptions {
 /// Writes the document with points displaced by `by`, and adds each of the `poses` as a morph target. With poses, `by`
 /// is zero, so that the document stays at rest.
 ///
-/// `triangles`: of the model. `is_outside`: whether each point is outside the cage. The caller checks the counts.
+/// `triangles`: of the model. `is_outside`: whether each point is outside the cage. The caller checks the lengths of
+/// the slices.
 pub(crate) fn reshape(
     document: &GltfDocument,
     rig: &Rig<'_>,

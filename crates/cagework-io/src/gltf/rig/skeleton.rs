@@ -24,7 +24,7 @@ const MAX_SAME_SCALE: f64 = 0.01;
 pub struct Skeleton {
     /// Joints that carry vertices in one of the files.
     holds: BTreeSet<String>,
-    /// For each joint of the body, the file that determines how all files move: world position at rest, displacement,
+    /// For each joint of the body, the file whose deformation all files share: world position at rest, displacement,
     /// and scale factor of clip translations.
     moves: BTreeMap<String, (DVec3, DVec3, f64)>,
     /// Lowest points of the body or of all files, which determine by how much every file is lifted. Displacements in
@@ -33,7 +33,7 @@ pub struct Skeleton {
 }
 
 impl Skeleton {
-    /// Whether joints have displacements of their own, which files without triangles need.
+    /// Whether the skeleton contains displacements of joints. Files without triangles need them.
     #[must_use]
     pub fn has_moves(&self) -> bool {
         !self.moves.is_empty()
@@ -45,7 +45,7 @@ impl Skeleton {
         self.ground.as_ref()
     }
 
-    /// The same skeleton with other lowest points, such as those of all files together.
+    /// Replaces the lowest points, for example by those of all files together.
     #[must_use]
     pub fn with_ground(self, ground: Ground) -> Self {
         Self { ground: Some(ground), ..self }
@@ -68,7 +68,7 @@ fn bare(name: &str) -> &str {
     name.strip_prefix("mixamorig").filter(|rest| !rest.is_empty()).unwrap_or(name)
 }
 
-/// The joints that carry vertices. Skins that cannot be read have none.
+/// The joints that carry vertices. Skins that cannot be read contribute none.
 pub(crate) fn joints_with_vertices(document: &GltfDocument) -> Skeleton {
     let mut skeleton = Skeleton::default();
     for instance in document.instances.iter().chain(&document.elsewhere) {
