@@ -115,7 +115,7 @@ impl LookVertex {
     }
 }
 
-/// Media type detected from the bytes. The type that the file declares is not trusted.
+/// Detects the media type of an image from its bytes. The type that the file declares is not trusted.
 pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some("image/png"),
@@ -126,7 +126,7 @@ pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// sRGB to linear (IEC 61966-2-1). Colours of OBJ files are sRGB.
+/// Converts a colour channel from sRGB to linear (IEC 61966-2-1). Colours of OBJ files are sRGB.
 pub(crate) fn linear_from_srgb(c: f32) -> f32 {
     if c <= 0.040_45 { c.max(0.0) / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }

@@ -125,8 +125,8 @@ impl Model {
         }
     }
 
-    /// Names of the external files that the model refers to: buffers, images, material libraries. Libraries of an OBJ
-    /// name textures in turn, so they are read by calling `resolve`. Empty if the file cannot be read.
+    /// Lists the names of the external files that the model refers to: buffers, images, material libraries. Libraries
+    /// of an OBJ name textures in turn, so they are read by calling `resolve`. Empty if the file cannot be read.
     pub fn named_files(
         name: &str,
         bytes: &[u8],
@@ -294,7 +294,8 @@ impl Model {
         self.capture.as_ref().map(|capture| &capture.splats)
     }
 
-    /// Splats that show a file without faces: those of a capture, or one per point. `None` for a file with faces.
+    /// Returns the splats that show a file without faces: those of a capture, or one per point. `None` for a file with
+    /// faces.
     #[must_use]
     pub fn drawn_splats(&self) -> Option<Cow<'_, Splats>> {
         match &self.capture {
@@ -306,8 +307,8 @@ impl Model {
         }
     }
 
-    /// Colours of vertices, sRGB. A vertex without a colour gets one that depends on its position, so that the shape is
-    /// visible.
+    /// Returns the colours of vertices, sRGB. A vertex without a colour gets one that depends on its position, so that
+    /// the shape is visible.
     fn point_colors(&self) -> Vec<Vec3> {
         let bounds = Bounds::of(&self.positions).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
         let size = bounds.extent().max_element().max(f32::MIN_POSITIVE);
@@ -358,7 +359,7 @@ impl Model {
         Err(ReadError::NoFaces { name: self.name.clone(), vertices: self.positions.len() })
     }
 
-    /// Copy of vertices and triangles for `cagework_core`.
+    /// Copies vertices and triangles for `cagework_core`.
     #[must_use]
     pub fn tri_mesh(&self) -> TriMesh {
         TriMesh { positions: self.positions.clone(), triangles: self.triangles.clone() }

@@ -96,8 +96,8 @@ impl Shading {
         rotations.iter().zip(&self.normal).map(|(&q, &n)| (q * n).normalize_or(n)).collect()
     }
 
-    /// Unit normal of each cluster, zero for clusters without area. Sums in f64: areas of kilometre-sized models in
-    /// millimetres exceed the precision of f32.
+    /// Computes the unit normal of each cluster, zero for clusters without area. Sums in f64: areas of kilometre-sized
+    /// models in millimetres exceed the precision of f32.
     fn area_weighted(&self, positions: &[Vec3], n_clusters: usize) -> Vec<Vec3> {
         let mut sum = vec![DVec3::ZERO; n_clusters];
         for t in &self.triangles {

@@ -90,7 +90,7 @@ impl SavedWeights {
         self.weights.n_rows().saturating_sub(self.extra_points.len())
     }
 
-    /// The weights without the rows of rig points.
+    /// Returns the weights without the rows of rig points.
     #[must_use]
     pub fn of_vertices(mut self) -> Self {
         let n = self.n_vertices() as u32;

@@ -52,7 +52,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
         return Err(fault(line.number, "it is a binary OFF file: save it as text"));
     }
     let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.into_iter())?;
-    // A vertex or face takes at least two bytes, since each has a line.
+    // A vertex or face takes at least two bytes, since each is on its own line.
     for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
         if count > n_bytes / 2 {
             return Err(PolygonsError::Count { name: name.into(), count, bytes: n_bytes });

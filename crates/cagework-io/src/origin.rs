@@ -11,8 +11,8 @@ use glam::{DVec3, Vec3};
 /// Limit on |coordinate| / extent. Beyond it, rounding to f32 (2⁻²⁴ of the coordinate) exceeds 1e-6 of the extent.
 const MAX_COORDINATE_TO_EXTENT: f32 = 16.0;
 
-/// An origin near the model, object units, exact in f32. Along an axis on which the model's centre is at most 16 times
-/// the model's extent away from zero, the origin is zero.
+/// Chooses an origin near the model, object units, exact in f32. Along an axis on which the model's centre is at most
+/// 16 times the model's extent away from zero, the origin is zero.
 #[must_use]
 pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
@@ -23,7 +23,7 @@ pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     Vec3::from_array(center.to_array().map(of_axis)).as_dvec3()
 }
 
-/// The origin as the f32 translation of a node, and the remainder.
+/// Splits the origin into the f32 translation of a node and the remainder.
 pub(crate) fn translation(origin: DVec3) -> ([f32; 3], DVec3) {
     let narrow = origin.as_vec3();
     (narrow.to_array(), origin - narrow.as_dvec3())

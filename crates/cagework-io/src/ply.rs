@@ -88,7 +88,7 @@ impl PropertyAccess for Element {
     }
 }
 
-/// Coordinate from a property of any numeric type; `None` for a list.
+/// Reads a coordinate from a property of any numeric type; `None` for a list.
 fn place(property: &Property) -> Option<f64> {
     match property {
         Property::Double(x) => Some(*x),
@@ -120,7 +120,7 @@ fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     }
 }
 
-/// Colour channel as a byte, from bytes, 16-bit integers or floats in 0 to 1.
+/// Converts a colour channel to a byte, from bytes, 16-bit integers or floats in 0 to 1.
 fn color(property: &Property) -> Option<u8> {
     match property {
         Property::UShort(x) => Some((x >> 8) as u8),
@@ -130,7 +130,8 @@ fn color(property: &Property) -> Option<u8> {
     }
 }
 
-/// Triangles of strips, separated by [`NO_VERTEX`]. Every second triangle of a strip has the opposite orientation.
+/// Iterates over the triangles of strips, which are separated by [`NO_VERTEX`]. Every second triangle of a strip has
+/// the opposite orientation.
 fn unstrip(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
     let strips = corners.split(|&v| v == NO_VERTEX);
     let triangles = strips.flat_map(|strip| strip.windows(3).enumerate());

@@ -14,7 +14,7 @@ const INFINITY_TEXT: &[u8] = b"1e999";
 const STATEMENTS: [&[u8]; 7] =
     [b"ply", b"format", b"comment", b"obj_info", b"element", b"property", b"end_header"];
 
-/// First header line with an unknown keyword, for a notice. Blender 2.47 wrote a comment without keyword.
+/// Finds the first header line with an unknown keyword, for a notice. Blender 2.47 wrote a comment without keyword.
 pub(crate) fn stray_line(bytes: &[u8]) -> Option<String> {
     for line in lines(bytes) {
         let text = &bytes[line.range];
@@ -74,7 +74,7 @@ pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
     PolygonsError::Syntax("it ends early, or its elements do not match the header".into())
 }
 
-/// The file in the form that the parser accepts. Borrows if nothing has to change.
+/// Rewrites the file in the form that the parser accepts. Borrows if nothing has to change.
 pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     // The first line shows which line end the file uses.
@@ -105,8 +105,8 @@ pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     out.into()
 }
 
-/// The header in the parser's grammar: `\n` line ends, no empty lines, ASCII only. Property names with other characters
-/// are replaced; the reader ignores such properties.
+/// Rewrites the header in the parser's grammar: `\n` line ends, no empty lines, ASCII only. Property names with other
+/// characters are replaced; the reader ignores such properties.
 fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     let mut out = Vec::with_capacity(header.len());
     for (number, line) in header.split(|&b| b == line_end).enumerate() {
@@ -130,7 +130,7 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     out
 }
 
-/// Offset of the first byte after the header; `None` if the header has no end.
+/// Finds the offset of the first byte after the header; `None` if the header has no end.
 fn end_of_header(bytes: &[u8], line_end: u8) -> Option<usize> {
     const END: &[u8] = b"end_header";
     let is_end = |word: &[u8]| word[0] == line_end && word[1..] == *END;

@@ -150,7 +150,7 @@ impl PointFile {
     }
 }
 
-/// Words of a line. A comma or semicolon separates two words, which may be empty; blanks are trimmed.
+/// Splits a line into words. A comma or semicolon separates two words, which may be empty; blanks are trimmed.
 fn words(line: &str) -> Vec<Range<usize>> {
     let is_separated = line.contains([',', ';']);
     let is_separator = |c: char| if is_separated { matches!(c, ',' | ';') } else { c.is_ascii_whitespace() };

@@ -110,7 +110,8 @@ pub(crate) struct Polygons {
 }
 
 impl Polygons {
-    /// Approximate memory of a triangle mesh with these counts, plus the `bytes` of its file.
+    /// Estimates the memory of a triangle mesh with these counts, plus the `bytes` of its file, and checks it against
+    /// `limit`.
     ///
     /// # Errors
     /// [`MemoryError`] if it exceeds `limit`.
@@ -226,7 +227,7 @@ pub(crate) fn color_bytes(color: Option<&[f32; 3]>) -> [u8; 3] {
     color.map_or([255; 3], |color| color.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8))
 }
 
-/// A syntax error in a line.
+/// Creates the error for a syntax error in a line.
 pub(crate) fn fault(line: usize, problem: &str) -> PolygonsError {
     PolygonsError::Syntax(format!("line {line}: {problem}"))
 }

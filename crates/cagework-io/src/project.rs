@@ -233,7 +233,7 @@ fn view<'a>(pack: &mut Pack<'a>, json: &mut Value, bytes: impl Into<Cow<'a, [u8]
     json!({ "bufferView": pack.push_view(json, bytes, None) })
 }
 
-/// The model as a self-contained file of its own format.
+/// Returns the model as a self-contained file of its own format.
 fn file_of(model: &Model) -> Result<Cow<'_, [u8]>, WriteError> {
     match (&model.document, model.format()) {
         (Document::Gltf(document), _) => {

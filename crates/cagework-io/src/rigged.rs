@@ -38,7 +38,7 @@ pub struct UnknownClip {
 }
 
 impl Clip {
-    /// Index of the first clip with this name. Unnamed clips have labels such as "clip 0".
+    /// Finds the index of the first clip with this name. Unnamed clips have labels such as "clip 0".
     ///
     /// # Errors
     /// [`UnknownClip`] if no clip has this name.
@@ -64,7 +64,7 @@ impl Model {
         matches!(&self.document, Document::Gltf(document) if Rig::is_needed(document))
     }
 
-    /// Points to bind after the vertices when a rigged model is reshaped: ends of morph targets, joints and
+    /// Returns the points to bind after the vertices when a rigged model is reshaped: ends of morph targets, joints and
     /// other moving nodes, and offsets stored in a VRM. Empty without a rig. Object units, `[n_points]`.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl Model {
         }
     }
 
-    /// Player for the model's skeleton, morph targets and clips. Its vertices are in the file's axes,
+    /// Creates a player for the model's skeleton, morph targets and clips. Its vertices are in the file's axes,
     /// relative to [`Self::origin`]. `None` if the model is not a glTF.
     ///
     /// # Errors
@@ -113,7 +113,7 @@ impl Model {
         }
     }
 
-    /// Player for an export of this model, with vertices in this model's order.
+    /// Creates a player for an export of this model, with vertices in this model's order.
     ///
     /// # Errors
     /// [`WriteError`] if this model is not a glTF, or `export` cannot be read.
@@ -219,7 +219,7 @@ impl Model {
         }
     }
 
-    /// Names of the joints that carry vertices in a file; none if it has no skin or cannot be read.
+    /// Lists the names of the joints that carry vertices in a file; none if it has no skin or cannot be read.
     pub fn joints_with_vertices_in(
         name: &str,
         bytes: &[u8],
@@ -236,7 +236,7 @@ impl Model {
         gltf::joints_with_vertices_in(name, bytes, resolve, memory_limit)
     }
 
-    /// Displacements of all points of the rig, in the file's axes.
+    /// Computes the displacements of all points of the rig, in the file's axes.
     fn all_moved(&self, rig: &Rig<'_>, by: &[DVec3]) -> Result<Vec<DVec3>, WriteError> {
         let expected = self.positions.len() + rig.bound().len();
         if by.len() != expected {
@@ -258,7 +258,7 @@ impl Model {
         rig.all_outside(is_outside)
     }
 
-    /// Vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
+    /// Returns the vertices and triangles that a generated cage should enclose: the rest shape, each morph target at
     /// weights 0 and 1, and frames of a clip. For splats and points, octahedra around them.
     ///
     /// # Errors
@@ -308,7 +308,7 @@ impl Model {
         (0..n).map(move |frame| self.shown_at(player, Some(clip), frame as f32 * step, &[]))
     }
 
-    /// Positions at times of a clip, seconds. `[n_times][n_vertices]`
+    /// Computes the positions at times of a clip, seconds. `[n_times][n_vertices]`
     ///
     /// # Errors
     /// [`WriteError`] if the model is not a glTF, or a part of the rig cannot be read.
@@ -317,7 +317,7 @@ impl Model {
         Ok(seconds.iter().map(|&at| self.shown_at(&player, Some(clip), at, &[])).collect())
     }
 
-    /// Positions at equal time steps from the start of a clip to its end: the frames that
+    /// Computes the positions at equal time steps from the start of a clip to its end: the frames that
     /// [`Self::write_baked`] exports. `[n_frames][n_vertices]`
     ///
     /// # Errors

@@ -58,8 +58,8 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Model {
-    /// Deformed vertices of a model that is written without its rig: with the parts of `options` held in place or rigid,
-    /// then lifted by [`Self::stand`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
+    /// Deforms the vertices of a model that is written without its rig: with the parts of `options` held in place or
+    /// rigid, then lifted by [`Self::stand`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
     /// weighted sums, which would add rounding.
     ///
     /// `weights`, `frames`: those of the model's vertices. `rest`, `posed`: `[n_controls]`, object units. Returns
@@ -85,8 +85,8 @@ impl Model {
         deformed
     }
 
-    /// Vertices of the parts called `name`, ascending. `name` starts with a kind, as in `material:skin`, `node:Buckle`,
-    /// `joint:Head` or `group:eyes`, or is unique without a kind.
+    /// Finds the vertices of the parts called `name`, ascending. `name` starts with a kind, as in `material:skin`,
+    /// `node:Buckle`, `joint:Head` or `group:eyes`, or is unique without a kind.
     ///
     /// # Errors
     /// [`SelectError`], listing the available names.
@@ -125,8 +125,8 @@ impl Model {
         names.into_iter().map(|(kind, name)| format!("{}:{name}", kind.word())).collect()
     }
 
-    /// Selects parts by name. `stay`: parts that stay in place, each with how much of it stays, 0 to 1. `rigid`: parts
-    /// whose connected pieces keep their shape.
+    /// Selects parts by name. `stay`: parts that stay in place, each with the share of its displacement that is
+    /// suppressed, 0 to 1. `rigid`: parts whose connected pieces keep their shape.
     ///
     /// # Errors
     /// [`SelectError`] if a name selects nothing.

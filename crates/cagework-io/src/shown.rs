@@ -8,8 +8,8 @@ const MAX_CONTEXT_BYTES: usize = 40;
 /// Limit on a text in a message, characters.
 const MAX_CHARS: usize = 200;
 
-/// Text of a file for a message: escaped, with the middle of long texts removed. At most 200 characters
-/// before escaping.
+/// Formats text of a file for a message: escaped, with the middle of long texts removed. At most 200 characters before
+/// escaping.
 #[must_use]
 pub fn shown(text: &str) -> String {
     let n = text.chars().take(1 << 20).count();
@@ -21,8 +21,8 @@ pub fn shown(text: &str) -> String {
     format!("{}…{}", escaped(&head.collect::<String>()), escaped(&tail))
 }
 
-/// Text of a file with control characters and characters that change the reading direction escaped, such as
-/// `\n` or `\u{1b}`.
+/// Escapes control characters in text of a file, and characters that change the reading direction, such as `\n` or
+/// `\u{1b}`.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

@@ -74,7 +74,7 @@ impl<'a> Siblings<'a> {
         self.bytes
     }
 
-    /// The file of this name. Paths are compared without `.` and empty components; files with equal content
+    /// Returns the file of this name. Paths are compared without `.` and empty components; files with equal content
     /// share memory.
     ///
     /// # Errors
@@ -109,8 +109,8 @@ impl<'a> Siblings<'a> {
         found
     }
 
-    /// The image of this name. If it is unavailable, adds a notice that ends with `otherwise`, the consequence, once
-    /// per name.
+    /// Returns the image of this name. If it is unavailable, adds a notice that ends with `otherwise`, the consequence,
+    /// once per name.
     pub(crate) fn image(&mut self, name: &str, otherwise: &str, notices: &mut Vec<String>) -> Option<Image> {
         if let Some(known) = self.images.get(name) {
             return known.clone();

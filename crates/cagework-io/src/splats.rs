@@ -84,11 +84,11 @@ pub(crate) struct Capture {
     pub(crate) splats: Splats,
     /// The file as read; empty if the splats were not read from a file.
     pub(crate) file: Vec<u8>,
-    /// Where the numbers of the splats are in the file, for the formats whose exports are patched.
+    /// Locations of the splats' numbers in the file, for formats whose exports are patched copies of the file.
     pub(crate) records: Records,
 }
 
-/// What an export in the same format reuses of the capture's file.
+/// Parts of the capture's file that an export in the same format reuses.
 #[derive(Clone, Debug)]
 pub(crate) enum Records {
     Ply(ply::Table),

@@ -89,7 +89,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     Ok(read)
 }
 
-/// Corners of the triangles of a binary file.
+/// Reads the corners of the triangles of a binary file.
 fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, PolygonsError> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES).and_then(|count| <[u8; 4]>::try_from(count).ok());
     let Some(count) = count.map(|count| u64::from(u32::from_le_bytes(count))) else {
@@ -126,7 +126,7 @@ fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, Po
 /// Names of solids, each with the index of its first triangle.
 type Solids = Vec<(String, usize)>;
 
-/// Corners and solids of a text file. Normals are ignored; some programs write them as "nan".
+/// Reads the corners and solids of a text file. Normals are ignored; some programs write them as "nan".
 fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Solids), PolygonsError> {
     let (mut corners, mut solids, mut has_ended) = (Vec::new(), Solids::new(), true);
     let mut unknown = None;

@@ -101,8 +101,8 @@ fn scaled(size: [u32; 2], side: u32) -> [u32; 2] {
 }
 
 impl LookImage {
-    /// Size of the image if it may be decoded. Subtracts its pixels from `left`, the number of pixels that may still be
-    /// decoded.
+    /// Returns the size of the image if it may be decoded. Subtracts its pixels from `left`, the number of pixels that
+    /// may still be decoded.
     fn admit(&self, left: &mut u64) -> Result<[u32; 2], TextureError> {
         if self.bytes.is_empty() {
             return Err(TextureError::Overlap);
@@ -116,7 +116,7 @@ impl LookImage {
         Ok([width, height])
     }
 
-    /// Width and height in the image's header, pixels; `None` if the header is damaged.
+    /// Reads width and height from the image's header, pixels; `None` if the header is damaged.
     #[must_use]
     pub fn size(&self) -> Option<[u32; 2]> {
         let bytes = &self.bytes;
@@ -141,7 +141,7 @@ fn u32_be(bytes: &[u8], at: usize) -> Option<u32> {
     part(bytes, at).map(u32::from_be_bytes)
 }
 
-/// Size of a JPEG from its start-of-frame segment (ITU-T T.81, B.1 and B.2.2).
+/// Reads the size of a JPEG from its start-of-frame segment (ITU-T T.81, B.1 and B.2.2).
 fn jpeg_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut at = 2;
     loop {
@@ -160,7 +160,7 @@ fn jpeg_size(bytes: &[u8]) -> Option<[u32; 2]> {
     }
 }
 
-/// Size of a WebP from its `VP8X` chunk or from its frame (RFC 9649, 2.5 to 2.7, and RFC 6386, 9.1).
+/// Reads the size of a WebP from its `VP8X` chunk or from its frame (RFC 9649, 2.5 to 2.7, and RFC 6386, 9.1).
 fn webp_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let u16_at = |at| part(bytes, at).map(|b| u32::from(u16::from_le_bytes(b)) & 0x3fff);
     match &part::<4>(bytes, 12)? {

@@ -81,7 +81,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// One pose per second, starting and ending at rest.
+    /// Creates a timeline of one pose per second that starts and ends at rest.
     #[must_use]
     pub fn every_second(n_poses: usize) -> Self {
         let pose = |k: usize| k.checked_sub(1).filter(|&pose| pose < n_poses);
@@ -89,8 +89,9 @@ impl Timeline {
         Self { interpolation: Interpolation::Linear, keys, n_poses }
     }
 
-    /// Shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at 0 s, and ends with the
-    /// last pose or, with `seconds_back`, this number of seconds later with the shape that it started with.
+    /// Creates a timeline that shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at
+    /// 0 s, and ends with the last pose or, with `seconds_back`, this number of seconds later with the shape that it
+    /// started with.
     ///
     /// # Errors
     /// If a time is outside the limits, or not later than the previous time.
@@ -106,14 +107,14 @@ impl Timeline {
         Ok(Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() })
     }
 
-    /// One pose at each key time of a clip. `seconds`: ascending, not checked.
+    /// Creates a timeline with one pose at each key time of a clip. `seconds`: ascending, not checked.
     #[must_use]
     pub fn at_keys(seconds: &[f32]) -> Self {
         let keys = seconds.iter().enumerate().map(|(k, &at)| (at, Some(k))).collect();
         Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() }
     }
 
-    /// The timeline with another interpolation.
+    /// Replaces the interpolation.
     #[must_use]
     pub fn with(self, interpolation: Interpolation) -> Self {
         Self { interpolation, ..self }
@@ -137,7 +138,7 @@ impl Timeline {
         self.keys.last().map_or(0.0, |key| key.0)
     }
 
-    /// Share of each pose in the shape at a time: `rest + sum_k share_k (pose_k - rest)`. `[n_poses]`
+    /// Computes the share of each pose in the shape at a time: `rest + sum_k share_k (pose_k - rest)`. `[n_poses]`
     #[must_use]
     pub fn shares(&self, seconds: f32) -> Vec<f32> {
         let Some(last) = self.keys.len().checked_sub(1) else { return vec![0.0; self.n_poses] };
@@ -168,7 +169,8 @@ impl Timeline {
         self.keys.iter().map(|key| key.0).collect()
     }
 
-    /// Output of a sampler of morph weights. `before`: constant weights of the targets that precede the poses.
+    /// Computes the output of a sampler of morph weights. `before`: constant weights of the targets that precede the
+    /// poses.
     pub(crate) fn weights(&self, before: &[f32]) -> Vec<f32> {
         let mut weights = Vec::new();
         for key in 0..self.keys.len() {

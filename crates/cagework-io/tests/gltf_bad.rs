@@ -292,8 +292,9 @@ fn empty_lists_are_treated_as_missing() {
     assert!(fault_of(|b| b.json["nodes"] = json!([])).contains("scene 0 refers to node 0, but there are 0"));
 }
 
-/// In a small file, many nodes can show one mesh. The limits count its elements without data, its splats, and the texts
-/// that an export repeats once per node; they also count the values of channels that share one sampler.
+/// In a small file, many nodes can show one mesh. The limits count once per node the mesh's elements without data, its
+/// splats, and the texts that an export repeats. They also count once per channel the values of a sampler that several
+/// channels share.
 #[test]
 fn what_nodes_repeat_is_in_the_price() {
     let document = |nodes: usize, mesh: &serde_json::Value| {

@@ -296,7 +296,7 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
     let expected: Vec<Vec3> =
         cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
-    // As Blender may do, cut a quad along its other diagonal, and refer to other ones of its coincident vertices.
+    // As Blender may do, cut a quad along its other diagonal, and choose other vertices among the coincident ones.
     let mut indices: Vec<u32> = (0..36).collect();
     let place = |v: u32| corners[v as usize];
     let ends = [indices[0], indices[1], indices[2]].map(place);

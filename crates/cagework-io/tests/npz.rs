@@ -105,7 +105,7 @@ fn field_is_written_with_z_as_the_fastest_axis() {
 }
 
 /// The file of [`sample`], deflated as by SciPy, with `change` applied to each array. Arrays for which `change` returns
-/// `None` are left out.
+/// `None` are omitted.
 fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
     let (weights, frames, outside) = sample();
     let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);

@@ -1,4 +1,4 @@
-//! Inverse posing: solves for the cage that brings points of the model to given places, and holds parts of the model
+//! Inverse posing: solves for the cage that brings points of the model to given positions, and holds parts of the model
 //! rigid or in place while the cage bends the rest. Also blends poses.
 //!
 //! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.

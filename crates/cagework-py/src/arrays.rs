@@ -227,8 +227,8 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
         .map_err(|e| error::array(format!("weights: {e}")))
 }
 
-/// Adds `outside`, `frames` and `offsets` to a report. Splits the offset columns off the weights, and returns those of
-/// the controls.
+/// Adds `outside`, `frames` and `offsets` to a report. Splits the offset columns off the weights, and returns the
+/// weights of the controls.
 ///
 /// # Errors
 /// Those of [`matrix_of`], if the weights have offset columns.
@@ -249,7 +249,7 @@ pub(crate) fn split_offsets<'py>(report: &Bound<'py, PyAny>, binding: Binding) -
     Ok(weights.columns(0..n_controls))
 }
 
-/// Inverse of [`split_offsets`]: appends the offset columns in a report to the weights of the controls, `own`.
+/// Inverse of [`split_offsets`]: appends the offset columns in a report to `own`, the weights of the controls.
 ///
 /// # Errors
 /// `ArrayError`; `KeyError` if the report is not one of `bind`.

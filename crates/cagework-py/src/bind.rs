@@ -11,7 +11,7 @@ use crate::cage::Cage;
 use crate::options::{dictionary, options};
 use crate::{arrays, error, work};
 
-/// Options of a bind, checked for their ranges.
+/// Reads the options of a bind and checks their ranges.
 ///
 /// # Errors
 /// `OptionError`; `TypeError` for an unknown name.

@@ -204,7 +204,7 @@ impl Request {
         let of_rig = self.of_model(&model, of_rig)?;
         let keeps_rig = model.is_rigged() && !self.is_static && format == ModelFormat::Gltf;
         if model.positions.is_empty() {
-            // A file of clips has no vertices: its joints move as those with the same names in the skeleton.
+            // A file with only clips has no vertices: its joints move like those with the same names in the skeleton.
             let by = vec![DVec3::ZERO; model.extra_points().map_err(error::model)?.len()];
             return Ok(model.write_reshaped(&by, &[], &[], &of_rig).map_err(error::model)?.0);
         }

@@ -104,7 +104,7 @@ pub(super) fn local(node: &Node) -> DMat4 {
     )
 }
 
-/// Mesh instances inside and outside the default scene, each ordered by mesh, then node. If the scene has no
+/// Lists the mesh instances inside and outside the default scene, each ordered by mesh, then node. If the scene has no
 /// mesh, all instances are used.
 ///
 /// For files that show each mesh once, this is the order of the primitives in the file, which other programs also use.

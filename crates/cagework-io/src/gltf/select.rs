@@ -8,7 +8,7 @@ use super::{GltfDocument, GltfError, Slot};
 use crate::part_kind::PartKind;
 
 impl GltfDocument {
-    /// Names of the materials, nodes and joints that have vertices.
+    /// Lists the names of the materials, nodes and joints that have vertices.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
         let (mut names, mut seen, mut known) = (Vec::new(), HashSet::new(), HashSet::new());
         let mut add = |kind: PartKind, list, number: usize| {
@@ -35,7 +35,7 @@ impl GltfDocument {
         names
     }
 
-    /// Vertices of all parts of this kind and name, unsorted.
+    /// Finds the vertices of all parts of this kind and name, unsorted.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Result<Vec<u32>, GltfError> {
         let named = |list: &str, number: u32| is_called(name, &self.json, list, number, kind.word());
         let of_slot = |slot: &Slot| slot.start..slot.start + slot.count;

@@ -134,7 +134,8 @@ fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
     instances.chunk_by(|a, b| a.mesh == b.mesh)
 }
 
-/// Memory of the text that an export repeats for each node, bytes: the JSON of its mesh, and names for each primitive.
+/// Estimates the memory of the text that an export repeats for each node, bytes: the JSON of its mesh, and names for
+/// each primitive.
 fn copied_bytes(document: &GltfDocument) -> u64 {
     let length =
         |list: &str, n: usize| document.json[list][n]["name"].as_str().map_or(0, |name| name.len() as u64);
@@ -155,7 +156,7 @@ fn copied_bytes(document: &GltfDocument) -> u64 {
     sum
 }
 
-/// Memory of skins and morph targets, bytes. An accessor that cannot be read counts by its declared size.
+/// Estimates the memory of skins and morph targets, bytes. An accessor that cannot be read counts by its declared size.
 fn rig_bytes(document: &GltfDocument) -> u64 {
     let mut moved: BTreeMap<u32, u64> = BTreeMap::new();
     let mut moved_by = |accessor: u32| {
@@ -179,7 +180,7 @@ fn rig_bytes(document: &GltfDocument) -> u64 {
     bytes
 }
 
-/// Number of values in the accessors of all clips. An accessor that several clips use counts once.
+/// Counts the values in the accessors of all clips. An accessor that several clips use counts once.
 fn keys_of(document: &GltfDocument) -> u64 {
     let animations = document.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| animation["samplers"].as_array().into_iter().flatten());
@@ -188,8 +189,8 @@ fn keys_of(document: &GltfDocument) -> u64 {
     accessors.into_iter().filter_map(|accessor| numbers_in(document, accessor)).fold(0, u64::saturating_add)
 }
 
-/// Number of values of all channels of clips. An export adapts each channel on its own, so a shared sampler counts once
-/// per channel.
+/// Counts the values of all channels of clips. An export adapts each channel on its own, so a shared sampler counts
+/// once per channel.
 fn channel_values(document: &GltfDocument) -> u64 {
     let animations = document.json["animations"].as_array().into_iter().flatten();
     let samplers = animations.flat_map(|animation| {

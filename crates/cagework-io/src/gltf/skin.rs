@@ -11,8 +11,8 @@ use super::{GltfDocument, GltfError, get};
 /// Largest number of sets `JOINTS_n` that are read, each with four joints per vertex.
 const MAX_SETS: u32 = 8;
 
-/// Transform from bind space to world space of each joint, `world_j * inverse_bind_j`; empty for unused skins. Joints
-/// are at their positions in the node hierarchy, as in viewers without animation.
+/// Computes the transform from bind space to world space of each joint, `world_j * inverse_bind_j`; empty for unused
+/// skins. Joints are at their positions in the node hierarchy, as in viewers without animation.
 pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<Vec<Vec<DMat4>>, GltfError> {
     let skins = &document.root.skins;
     let mut all = vec![Vec::new(); skins.len()];
@@ -24,7 +24,7 @@ pub(crate) fn shown_joints(document: &GltfDocument, worlds: &Worlds) -> Result<V
     Ok(all)
 }
 
-/// Transform from bind space to world space of each joint of one skin.
+/// Computes the transform from bind space to world space of each joint of one skin.
 pub(crate) fn joints(
     document: &GltfDocument,
     skin: u32,
@@ -39,7 +39,7 @@ pub(crate) fn joints(
     joints.map(joint).collect()
 }
 
-/// Inverse bind matrices of a skin's joints. Excess matrices are allowed unless they are implicit zeros.
+/// Reads the inverse bind matrices of a skin's joints. Excess matrices are allowed unless they are implicit zeros.
 pub(crate) fn inverse_binds(document: &GltfDocument, number: u32) -> Result<Vec<DMat4>, GltfError> {
     let skin = &document.root.skins[number as usize];
     let Some(accessor) = skin.inverse_bind_matrices.map(|a| a.value() as u32) else {
@@ -92,8 +92,8 @@ pub(crate) fn each_influence(
     Ok(())
 }
 
-/// Transform from mesh space to world space of each vertex of a skinned primitive, `sum_j w_j * joint_j`, and the
-/// number of vertices without positive weight, whose transform is `world`.
+/// Computes the transform from mesh space to world space of each vertex of a skinned primitive, `sum_j w_j * joint_j`,
+/// and the number of vertices without positive weight, whose transform is `world`.
 ///
 /// The transform of the mesh's node is ignored (glTF 2.0, section 3.7.3.3).
 pub(crate) fn matrices(

@@ -27,9 +27,9 @@ pub struct PoseState {
 }
 
 impl Model {
-    /// The model as a cage. Vertices and polygons are kept, except for glTF: its triangles are welded by
-    /// position, in order of first occurrence, because vertices split at seams would leave the cage open.
-    /// Triangles that collapse are dropped.
+    /// Returns the model as a cage. Vertices and polygons are kept, except for glTF: its triangles are welded by
+    /// position, in order of first occurrence, because vertices split at seams would leave the cage open. Triangles
+    /// that collapse are dropped.
     #[must_use]
     pub fn cage_mesh(&self) -> PolygonMesh {
         match &self.document {
@@ -47,7 +47,7 @@ impl Model {
         }
     }
 
-    /// Positions of `pose` for each vertex of this model's [`Self::cage_mesh`].
+    /// Returns the positions in `pose` of the vertices of this model's [`Self::cage_mesh`].
     ///
     /// The vertices of a glTF cage are welded by their rest positions, so its pose may have the vertex count from
     /// before or after welding.
@@ -58,7 +58,7 @@ impl Model {
         Ok(self.order_of(pose)?.into_iter().map(|v| pose.positions[v as usize]).collect())
     }
 
-    /// States in a pose file: the keys of its first clip with their times or, without a clip, each morph
+    /// Lists the states in a pose file: the keys of its first clip with their times or, without a clip, each morph
     /// target at weight 1. Empty for a single state, which [`Self::pose_positions`] returns.
     ///
     /// # Errors
@@ -127,7 +127,8 @@ impl Model {
         self.format == format || format.keeps(ModelProperty::Order)
     }
 
-    /// Positions of the file's vertices in a cage pose. Inverse of [`Self::pose_positions`]. `pose`: `[n_cage]`.
+    /// Returns the positions of the file's vertices in a cage pose. Inverse of [`Self::pose_positions`]. `pose`:
+    /// `[n_cage]`.
     #[must_use]
     pub fn posed_as_cage(&self, pose: &[Vec3]) -> Vec<Vec3> {
         match self.document {

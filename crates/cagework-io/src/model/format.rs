@@ -15,12 +15,12 @@ use crate::splats::{records, spz};
 use crate::up::UpAxis;
 use crate::{gltf, obj, off, ply, stl, threemf};
 
-/// Extensions, MIME types and abilities of a format, and the functions that read and write it.
+/// Extensions, MIME types and capabilities of a format, and the functions that read and write it.
 #[derive(Debug)]
 pub struct FormatFacts {
     /// Extensions of readable files, lower case, without the dot. The first one is the extension of exported files.
     pub endings: &'static [&'static str],
-    /// Extensions among `endings` that files can be read with, but not written with.
+    /// Extensions among `endings` that are supported for reading only.
     read_only: &'static [&'static str],
     /// MIME types, for file choosers that support MIME types better than extensions; the first one is that of exported
     /// files.
@@ -29,7 +29,7 @@ pub struct FormatFacts {
     pub naming: &'static [&'static str],
     /// Extensions of the other files that files of this format refer to.
     pub companions: &'static [&'static str],
-    /// Whether the bytes can only be a file of this format.
+    /// Whether the bytes identify a file of this format.
     is: fn(&[u8]) -> bool,
     /// Whether a text looks like this format. The text has no byte order mark and no leading space.
     is_text: fn(&[u8]) -> bool,
@@ -111,7 +111,7 @@ macro_rules! formats {
                 match self { $(Self::$format => $name,)+ }
             }
 
-            /// Extensions, abilities and functions of the format.
+            /// Extensions, capabilities and functions of the format.
             #[must_use]
             pub fn facts(self) -> &'static FormatFacts {
                 match self { $(Self::$format => const { &$row },)+ }
@@ -302,7 +302,7 @@ impl ModelFormat {
         names.split_last().map_or(String::new(), |(last, others)| format!("{} or {last}", others.join(", ")))
     }
 
-    /// Format for exporting to a file of this name, by its extension.
+    /// Finds the export format for a file name by its extension.
     #[must_use]
     pub fn of_export(name: &str) -> Option<Self> {
         let extension = extension(name);

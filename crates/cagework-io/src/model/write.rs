@@ -116,7 +116,7 @@ impl Model {
         })
     }
 
-    /// A sentence that lists what an export to `format` loses; `None` if it loses nothing.
+    /// Returns a sentence that lists what an export to `format` loses; `None` if it loses nothing.
     #[must_use]
     pub fn lost_in(&self, format: ModelFormat) -> Option<String> {
         let is_same = self.format == format;
@@ -195,7 +195,7 @@ impl Model {
         }
     }
 
-    /// The model with new positions, as input for the writers of PLY, STL, OFF and 3MF.
+    /// Prepares the model with new positions as input for the writers of PLY, STL, OFF and 3MF.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite position per vertex.

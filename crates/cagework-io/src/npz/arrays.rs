@@ -155,7 +155,7 @@ const PREAMBLE_BYTES: u64 = 12;
 /// Offset of the header's text in files of version 1. Later versions have two more bytes for its length.
 const HEADER_TEXT_OFFSET: usize = 10;
 
-/// Offset of the end of an `.npy` file's header, versions 1 to 3.
+/// Finds the offset of the end of an `.npy` file's header, versions 1 to 3.
 fn header_end(bytes: &[u8]) -> Option<u64> {
     let rest = bytes.strip_prefix(NPY_MAGIC)?;
     match rest.first()? {
@@ -220,7 +220,7 @@ impl NpyArray {
         Ok(Self { name, dtype, shape, data })
     }
 
-    /// The array's rows as points of three numbers, and whether the numbers have 64 bits.
+    /// Converts the array's rows to points of three numbers; also returns whether the numbers have 64 bits.
     pub(super) fn wide_points(self) -> Result<(Vec<DVec3>, bool), NpzError> {
         let is_wide = self.dtype == "<f8";
         let rows = self.rows_of(&[3])?;
@@ -261,7 +261,7 @@ impl NpyArray {
         Err(self.fault(&problem))
     }
 
-    /// Values of an integer array. Negative values and those above 32 bits are errors.
+    /// Reads the values of an integer array. Negative values and those above 32 bits are errors.
     pub(super) fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
         let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
         match self.dtype.as_str() {

@@ -20,14 +20,14 @@ pub(crate) struct Lines<'a> {
     number: usize,
 }
 
-/// Logical lines of a file, terminated by LF, CRLF or CR.
+/// Iterates over the logical lines of a file. Lines end with LF, CRLF or CR.
 pub(crate) fn lines(bytes: &[u8]) -> Lines<'_> {
     // Skip the byte order mark.
     let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     Lines { bytes, at, number: 1 }
 }
 
-/// For the physical line that starts at `at`, the end of its content and the start of the next line.
+/// For the physical line that starts at `at`, returns the end of its content and the start of the next line.
 fn physical_end(bytes: &[u8], at: usize) -> (usize, usize) {
     match bytes[at..].iter().position(|&b| b == b'\n' || b == b'\r') {
         None => (bytes.len(), bytes.len()),
@@ -76,7 +76,7 @@ fn is_blank(b: u8) -> bool {
     matches!(b, b' ' | b'\t' | b'\r' | b'\n' | 0x0b | 0x0c)
 }
 
-/// Tokens of a logical line as byte ranges. A token that starts with `#` ends the line.
+/// Iterates over the tokens of a logical line as byte ranges. A token that starts with `#` ends the line.
 pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = Range<usize>> + Clone {
     let mut at = line.start;
     let end = line.end;
@@ -99,7 +99,7 @@ pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = R
     })
 }
 
-/// Text of a token for a message: shortened, escaped, and with invalid UTF-8 replaced.
+/// Formats a token for a message: shortened, escaped, and with invalid UTF-8 replaced.
 pub(crate) fn shown(token: &[u8]) -> String {
     /// Limit on the length, characters.
     const MAX_CHARS: usize = 40;

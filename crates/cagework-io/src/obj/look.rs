@@ -69,7 +69,7 @@ pub(crate) fn read_materials(
     }
 }
 
-/// Names of an OBJ's material files and their textures.
+/// Lists the names of an OBJ's material files and their textures.
 pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Vec<String> {
     let (mut names, mut libraries) = (Vec::new(), HashSet::new());
     let mut note = |name: &str| {
@@ -92,13 +92,14 @@ pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit:
     names
 }
 
-/// Text after the keyword. Names may contain blanks.
+/// Returns the text after the keyword. Names may contain blanks.
 pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
     let rest = line.trim_ascii().strip_prefix(keyword).unwrap_or_default().trim_ascii();
     String::from_utf8_lossy(rest).into_owned()
 }
 
-/// Appearance of a document, with one [`LookVertex`] per distinct pair of source vertex and texture coordinate.
+/// Builds the appearance of a document, with one [`LookVertex`] per distinct pair of source vertex and texture
+/// coordinate.
 pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     let mut look = Look::default();
     let sources = sources(document, positions, &mut look.copies);
@@ -150,8 +151,8 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     look
 }
 
-/// Source vertex of each corner: its own vertex or, at a vertex where normals or smoothing groups separate several
-/// surfaces, a duplicate appended to `copies`. Corners without normal and smoothing group keep their vertex.
+/// Finds the source vertex of each corner: its own vertex or, at a vertex where normals or smoothing groups separate
+/// several surfaces, a duplicate appended to `copies`. Corners without normal and smoothing group keep their vertex.
 /// `[n_corners]`
 fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();

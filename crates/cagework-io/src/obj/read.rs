@@ -87,8 +87,8 @@ impl ObjDocument {
         self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)
     }
 
-    /// Smooth surface of each corner without normal, numbered from 1: its smoothing group or, with smoothing
-    /// off, its face. 0 for corners with a normal, or if the file has no `s` line. `[n_corners]`
+    /// Returns the smooth surface of each corner without normal, numbered from 1: its smoothing group or, with
+    /// smoothing off, its face. 0 for corners with a normal, or if the file has no `s` line. `[n_corners]`
     pub(crate) fn surfaces(&self) -> Vec<u32> {
         let mut surfaces = vec![0; self.corners.len()];
         let mut first_face = HashMap::new();
@@ -297,8 +297,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Memory of the data read so far, including its triangles and the weld table. Lists count twice, because their
-    /// capacity grows by doubling.
+    /// Estimates the memory of the data read so far, including its triangles and the weld table, and checks it against
+    /// the limit. Lists count twice, because their capacity grows by doubling.
     fn check_memory(&self) -> Result<u64, MemoryError> {
         let document = &self.document;
         let lists = [
@@ -493,7 +493,7 @@ pub(super) fn integer(token: &[u8]) -> Option<i64> {
     std::str::from_utf8(token).ok()?.parse().ok()
 }
 
-/// Smoothing group as written, 0 for `off`; `None` if it is neither a number nor `off`.
+/// Parses a smoothing group, 0 for `off`; `None` if it is neither a number nor `off`.
 fn smoothing_group(word: &[u8]) -> Option<u32> {
     if word == b"off" { Some(0) } else { u32::try_from(integer(word)?).ok() }
 }

@@ -6,7 +6,7 @@ use super::read::ObjDocument;
 use crate::part_kind::PartKind;
 
 impl ObjDocument {
-    /// Distinct names of materials, objects and groups.
+    /// Lists the distinct names of materials, objects and groups.
     pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
         let materials = self.materials.iter().map(|name| (PartKind::Material, name.clone()));
         let mut seen = HashSet::new();
@@ -14,7 +14,7 @@ impl ObjDocument {
         materials.chain(groups.map(|group| (PartKind::Group, group.name.clone()))).collect()
     }
 
-    /// Vertices of all parts of this kind and name, unsorted and with duplicates.
+    /// Finds the vertices of all parts of this kind and name, unsorted and with duplicates.
     pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Vec<u32> {
         let n_faces = self.face_materials.len();
         let mut is_of = vec![false; n_faces];

@@ -75,7 +75,7 @@ impl Triangulator {
     }
 }
 
-/// Newell's normal: twice the area vector of the polygon, also for concave polygons.
+/// Computes Newell's normal: twice the area vector of the polygon, also for concave polygons.
 fn newell_normal(p: &[DVec3]) -> DVec3 {
     let origin = p[0];
     p.iter().zip(p.iter().cycle().skip(1)).map(|(&a, &b)| (a - origin).cross(b - origin)).sum()

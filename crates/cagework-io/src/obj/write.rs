@@ -22,7 +22,7 @@ pub(crate) struct Pairs {
 }
 
 impl ObjDocument {
-    /// The pairs in the order of their first use. `rest`: positions of the vertices at rest.
+    /// Collects the pairs in the order of their first use. `rest`: positions of the vertices at rest.
     pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
         let mut numbers = HashMap::new();
         let (mut vertex, mut vn, mut normal, mut surface) = (vec![], vec![], vec![], vec![]);
@@ -143,7 +143,7 @@ impl PatchedNormals {
     }
 }
 
-/// Line end as read. A last line without a line end gets LF.
+/// Returns the line end as read. A last line without a line end gets LF.
 fn line_end(line: &[u8]) -> &[u8] {
     match line {
         [.., b'\r', b'\n'] => b"\r\n",

@@ -311,7 +311,7 @@ impl Table {
         Ok(found)
     }
 
-    /// Columns of the spherical harmonics, `[n_harmonics][red, green, blue]`.
+    /// Finds the columns of the spherical harmonics, `[n_harmonics][red, green, blue]`.
     fn harmonics(&self) -> Result<Vec<[usize; 3]>, SplatError> {
         let n = self.columns.iter().filter(|column| column.name.starts_with("f_rest_")).count();
         if ![0, 9, 24, 45].contains(&n) {

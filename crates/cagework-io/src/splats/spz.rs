@@ -228,7 +228,7 @@ fn read_streams<'a>(
     Ok(&bytes[HEADER_4..start])
 }
 
-/// A sentence for the user if an extension record says that the file has other axes than those of the format.
+/// Returns a sentence for the user if an extension record says that the file has other axes than those of the format.
 fn axes_notice(mut records: &[u8]) -> Option<String> {
     while let Some((head, rest)) = records.split_at_checked(8) {
         let (payload, after) = rest.split_at_checked(word(head, 4) as usize)?;

@@ -61,13 +61,13 @@ pub(super) struct Package<'a> {
     memory_limit: u64,
 }
 
-/// Name for comparisons. Names of parts do not depend on case, and may begin with a slash.
+/// Normalises a name for comparisons. Names of parts ignore case and may begin with a slash.
 pub(super) fn part_name(name: &[u8]) -> Vec<u8> {
     let slashes = name.iter().take_while(|&&byte| byte == b'/').count();
     name[slashes..].to_ascii_lowercase()
 }
 
-/// The error for a damaged part of the archive.
+/// Creates the error for a damaged part of the archive.
 ///
 /// `problem` continues the part's name: it is a predicate, such as "is missing", or begins with a colon.
 pub(super) fn fault(name: &str, problem: &str) -> PolygonsError {
@@ -75,7 +75,7 @@ pub(super) fn fault(name: &str, problem: &str) -> PolygonsError {
     PolygonsError::Syntax(format!("its part '{}'{space}{problem}", shown_start(name, MAX_NAME_CHARS)))
 }
 
-/// All files of an archive, and its comment.
+/// Lists all files of an archive; also returns its comment.
 fn entries(bytes: &[u8]) -> Result<(Vec<Entry<'_>>, Vec<u8>), Error> {
     let archive = ZipArchive::from_slice(bytes)?;
     let mut entries = Vec::new();
@@ -118,7 +118,7 @@ impl<'a> Package<'a> {
         self.index_of.get(&part_name(name.as_bytes())).copied()
     }
 
-    /// Name of the first model part.
+    /// Finds the name of the first model part.
     pub(super) fn first_part(&mut self) -> Result<String, PolygonsError> {
         let Some(index) = self.index(RELATIONSHIPS) else { return Ok(USUAL_PART.into()) };
         let text = self.text(RELATIONSHIPS, index)?;
@@ -167,7 +167,7 @@ impl<'a> Package<'a> {
         String::from_utf8(bytes).map_err(|_| fault(name, "is not UTF-8 text"))
     }
 
-    /// A copy of the archive with new texts of some entries; the others keep their compressed bytes.
+    /// Copies the archive with new texts of some entries; the others keep their compressed bytes.
     pub(super) fn with_texts(self, texts: &HashMap<usize, String>) -> Result<Vec<u8>, WriteError> {
         let copy = || -> Result<Vec<u8>, Error> {
             let mut writer = ZipArchiveWriter::new(Vec::new());

@@ -96,7 +96,7 @@ fn local(key: &str) -> &str {
     key.rsplit_once(':').map_or(key, |(_, name)| name)
 }
 
-/// The number in an attribute.
+/// Parses the number in an attribute.
 fn number<T: std::str::FromStr>(key: &str, value: &str) -> Result<T, String> {
     let quoted = || shown_start(value, MAX_NAME_CHARS);
     value.trim().parse().map_err(|_| format!("has {key}=\"{}\", which is not a number in range", quoted()))
@@ -258,7 +258,7 @@ impl ModelPart {
         }
     }
 
-    /// Identifier of a resource, if it has one.
+    /// Reads the identifier of a resource, if it has one.
     fn id_of(&mut self, tag: &BytesStart<'_>) -> Result<Option<u32>, String> {
         let Some((key, value)) = attributes(tag).find(|(key, _)| *key == "id") else { return Ok(None) };
         let id: u32 = number(key, value).map_err(|e| format!(": a resource {e}"))?;
@@ -352,7 +352,7 @@ fn plain(value: &str) -> String {
     unescape(value).map_or_else(|_| value.to_owned(), std::borrow::Cow::into_owned)
 }
 
-/// A colour `#RRGGBB` or `#RRGGBBAA`.
+/// Parses a colour `#RRGGBB` or `#RRGGBBAA`.
 fn color_of(value: &str) -> Option<[f32; 4]> {
     let digits = value
         .trim()

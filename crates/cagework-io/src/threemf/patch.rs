@@ -41,7 +41,7 @@ struct Variants<'a> {
     vertex: usize,
 }
 
-/// A copy of the archive `bytes` with new positions. `rest`: the model's positions at rest, relative to the origin of
+/// Copies the archive `bytes` with new positions. `rest`: the model's positions at rest, relative to the origin of
 /// `shape`.
 ///
 /// # Errors
@@ -145,7 +145,7 @@ impl Variants<'_> {
     }
 }
 
-/// Text of an object in one of its shapes. `copy`: number of the shape, 0 for the original.
+/// Writes the text of an object in one of its shapes. `copy`: number of the shape, 0 for the original.
 fn object_text(text: &str, variants: &Variants<'_>, variant: &Variant, copy: usize) -> String {
     let object = variants.scene.object(variant.object);
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
@@ -187,14 +187,14 @@ fn object_text(text: &str, variants: &Variants<'_>, variant: &Variant, copy: usi
     edited(text, object.span.clone(), edits)
 }
 
-/// UUID of a copy: `copy` is added to the number in the last eight digits.
+/// Derives the UUID of a copy: adds `copy` to the number in the last eight digits.
 fn other_uuid(uuid: &str, copy: usize) -> String {
     let end = uuid.len().saturating_sub(8);
     let digits = uuid.get(end..).and_then(|digits| u32::from_str_radix(digits, 16).ok());
     digits.map_or_else(|| uuid.to_owned(), |n| format!("{}{:08x}", &uuid[..end], n.wrapping_add(copy as u32)))
 }
 
-/// The bytes `range` of a text, with replacements inside it.
+/// Returns the bytes `range` of a text, with replacements applied.
 fn edited(text: &str, range: Range<usize>, mut edits: Vec<(Range<usize>, String)>) -> String {
     edits.sort_unstable_by_key(|(span, _)| span.start);
     let mut out = String::with_capacity(range.len() + range.len() / 8);

@@ -71,7 +71,7 @@ enum Measurement {
 }
 
 impl Scene {
-    /// Reads all parts that the build needs, and checks counts and memory before the instances are made.
+    /// Reads all parts that the build needs, and checks counts and memory before the instances are created.
     pub(super) fn read(bytes: &[u8], memory_limit: u64) -> Result<Self, PolygonsError> {
         let mut package = Package::open(bytes, memory_limit)?;
         let first = package.first_part()?;
@@ -133,7 +133,7 @@ impl Scene {
         &self.parts[key.0].1.objects[key.1]
     }
 
-    /// The object that a component or an item of part `part` shows.
+    /// Finds the object that a component or an item of part `part` shows.
     pub(super) fn target(&self, part: usize, place: &Placement) -> Result<Key, PolygonsError> {
         let of = place.path.as_ref().map_or(Some(part), |path| self.part(path)).unwrap_or(part);
         let index = self.parts[of].1.index_of.get(&place.object);

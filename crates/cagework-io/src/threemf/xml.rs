@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use quick_xml::events::BytesStart;
 
-/// Keys and values of a tag. Values are not unescaped.
+/// Iterates over the keys and values of a tag. Values are not unescaped.
 pub(super) fn attributes<'a>(tag: &'a BytesStart<'_>) -> impl Iterator<Item = (&'a str, &'a str)> {
     // Values borrow from the text, because quick-xml copies only values that it decodes. The check for repeated keys is
     // off, because it takes quadratic time.
@@ -21,7 +21,7 @@ pub(super) fn attributes<'a>(tag: &'a BytesStart<'_>) -> impl Iterator<Item = (&
     })
 }
 
-/// Bytes of `part`, a slice of `text`.
+/// Returns the byte range of `part`, a slice of `text`.
 pub(super) fn span_of(text: &str, part: &str) -> Range<usize> {
     let start = part.as_ptr().addr() - text.as_ptr().addr();
     start..start + part.len()

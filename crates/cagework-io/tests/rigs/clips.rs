@@ -58,8 +58,8 @@ fn clips_do_not_affect_the_reshaped_positions() {
     assert_eq!(with, without);
 }
 
-/// The map of translations also holds between the keys of a cubic spline, because the map's linear part is applied to
-/// the tangents.
+/// Translations between the keys of a cubic spline are mapped like those at the keys, because the map's linear part is
+/// applied to the tangents.
 #[test]
 fn splines_follow_the_rule_between_their_keys() {
     let mut rig = rigged();

@@ -29,7 +29,7 @@ fn ankle(side: usize, t: f32) -> (bool, Vec3) {
 }
 
 /// A figure that walks along x: hips, and thigh, shin and foot of two legs, each with a triangle. `on_spot`: the hips
-/// stay. `phase`: fraction of the cycle at which the clip starts.
+/// stay in place. `phase`: fraction of the cycle at which the clip starts.
 fn walker_from(phase: f32, on_spot: bool) -> Builder {
     let mut b = Builder::new();
     let rests = [0.0, -LENGTHS[0], -LENGTHS[0] - LENGTHS[1]];
@@ -131,8 +131,8 @@ fn slide(glb: &[u8], velocity: f32) -> f32 {
         let mut last: Option<Vec3> = None;
         for k in 0..=n {
             let t = CYCLES * CYCLE * k as f32 / n as f32;
-            // Leave out the first and last tenth of a planted phase. Contacts are detected by differences of
-            // neighbouring samples, which at both ends of the phase include the swing.
+            // Skip the first and last tenth of a planted phase. Contacts are detected by differences of neighbouring
+            // samples, which at both ends of the phase include the swing.
             let u = (t / CYCLE + 0.5 * side as f32).fract();
             let at = player.at(Some(0), t, &[]).origins[node] - vec3(velocity * t, 0.0, 0.0);
             if !(0.05..0.45).contains(&u) {
@@ -162,7 +162,8 @@ fn planted_feet_slide_less_than_a_quarter() {
         let [legs, contacts] = report.feet.unwrap();
         assert!(legs == 2 && (4..=5).contains(&contacts), "{what}");
         assert!(report.slide[1] <= 0.25 * report.slide[0] && report.slide[0] > 0.01, "{what}");
-        // On the spot, planted feet move backwards by one stride per cycle, 2.5 / 2 times as fast with the longer legs.
+        // In a walk on the spot, planted feet move backwards by one stride per cycle, 2.5 / 2 times as fast with the
+        // longer legs.
         let ratio = if keep_travel { 1.0 } else { 2.5 / 2.0 };
         let velocity = if on_spot { -STRIDE / CYCLE * ratio } else { 0.0 };
         let [before, after] = [&free, &locked].map(|glb| slide(glb, velocity));
@@ -235,8 +236,9 @@ fn clips_keep_the_height_of_their_lowest_point() {
         // The export takes the lowest point from 60 samples per second, `lowest` from 240. The tolerance covers the
         // difference.
         assert!((with - before).abs() < 2e-3, "{what}");
-        // On the spot (`sink` < 0) the hips' track is constant, so its offset from the rest position scales with the
-        // length of the hips' translation. The lift changes this length, so the two lifts do not add up exactly.
+        // In a walk on the spot (`sink` < 0) the hips' track is constant, so its offset from the rest position scales
+        // with the length of the hips' translation. The lift changes this length, so the two lifts do not add up
+        // exactly.
         if sink >= 0.0 {
             assert!((f64::from(with - without) - report.lift - report.clip_lifts[0]).abs() < 1e-5, "{what}");
         }

@@ -1,4 +1,5 @@
-//! [`Parts`] of a model bound to a cage. The motions of the pieces in a pose take no pass over the pieces' vertices.
+//! [`Parts`] of a model bound to a cage. Computing the motions of the pieces in a pose needs no pass over the pieces'
+//! vertices.
 //!
 //! Displacements are linear in the vectors of the weights' columns (controls and [`Frames`]), and so are the two sums
 //! from which Kabsch's rotation follows. These sums are precomputed per piece and column, so the motion of a piece

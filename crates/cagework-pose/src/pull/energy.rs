@@ -160,7 +160,8 @@ impl Pull {
         moments
     }
 
-    /// A grip on a control: a cage vertex or, from the number of cage vertices on, an inner control.
+    /// Creates a grip on a control: a cage vertex or, if the index is at least the number of cage vertices, an inner
+    /// control.
     ///
     /// # Errors
     /// [`PullError::Missing`] if there is no such control.

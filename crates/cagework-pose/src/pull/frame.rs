@@ -26,7 +26,7 @@ const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {
     /// Runs one frame with the grabs at `to` (`[n_grabs]`, object units). If the grabs rotate together by more than 0.5
-    /// radians, runs frames on the way there, too. Ignores targets that are not finite, so the pose stays finite.
+    /// radians, runs intermediate frames first. Ignores targets that are not finite, so the pose stays finite.
     pub fn frame(&mut self, to: &[DVec3]) {
         if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
             return;
@@ -139,8 +139,7 @@ impl Drag {
 struct GrabPath<'a> {
     from: &'a [DVec3],
     to: &'a [DVec3],
-    /// Means of `from` and `to`, and the rotation that best maps `from`, relative to its mean, to `to`, relative to its
-    /// own.
+    /// Means of `from` and `to`, and the rotation that best maps `from` to `to`, each relative to its mean.
     middles: [DVec3; 2],
     turn: DQuat,
 }

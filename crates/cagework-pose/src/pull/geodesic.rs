@@ -61,7 +61,7 @@ impl Geodesic {
         let mut distance = vec![f32::INFINITY; self.starts.len() - 1];
         let first = self.unique_of[seed as usize];
         distance[first as usize] = 0.0;
-        // Non-negative floats have the order of their bits.
+        // Non-negative floats are ordered like their bit patterns.
         let mut heap = BinaryHeap::from([Reverse((0_u32, first))]);
         while let Some(Reverse((bits, at))) = heap.pop() {
             let here = f32::from_bits(bits);

@@ -15,7 +15,7 @@ pub enum Handle {
     Vertex(u32),
     /// A point of the model: a triangle and barycentric coordinates.
     Triangle(u32, [f64; 3]),
-    /// A cage vertex or, from the number of cage vertices on, an inner control.
+    /// A cage vertex, or an inner control if the index is at least the number of cage vertices.
     Cage(u32),
 }
 
@@ -30,8 +30,8 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// Grip of a point of the model, given its weights, `[n_cage]`, and its nearest vertex. [`super::Drag::new`] checks
-    /// both.
+    /// Creates a grip at a point of the model from its weights, `[n_cage]`, and its nearest vertex.
+    /// [`super::Drag::new`] checks both.
     #[must_use]
     pub fn of_row(row: Vec<f64>, seed: u32) -> Self {
         Self { row, seed, is_cage: false }

@@ -72,7 +72,7 @@ pub(super) struct PoseTarget {
     pub(super) target: usize,
 }
 
-/// VRM data of a document. If it has both versions, that of VRM 1.
+/// Reads the VRM data of a document: VRM 1 if the document contains both versions.
 pub(crate) fn vrm(document: &GltfDocument) -> Option<Vrm> {
     let extensions = &document.json["extensions"];
     let count = |list: &Value| list.as_array().map_or(0, Vec::len);
@@ -151,7 +151,7 @@ pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result
     Ok(())
 }
 
-/// The object under a key. If the value there is not an object, it is replaced by an empty one.
+/// Returns the object under a key. Replaces a value that is not an object by an empty object.
 fn object<'v>(of: &'v mut Value, key: &str) -> &'v mut Value {
     if !of[key].is_object() {
         of[key] = json!({});

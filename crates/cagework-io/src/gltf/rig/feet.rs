@@ -134,8 +134,8 @@ impl Pose {
     }
 }
 
-/// Legs of a document: those that a VRM names, otherwise chains of two joints above a joint named like a foot, or like a
-/// hand if it is near the ground.
+/// Finds the legs of a document: those that a VRM names, otherwise chains of two joints above a joint named like a
+/// foot, or like a hand if it is near the ground.
 fn legs(document: &GltfDocument, skeleton: &NodeTree<'_>, up: DVec3) -> Vec<Leg> {
     let json = &document.json;
     let of_1 = &json["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"];
@@ -266,8 +266,8 @@ pub(super) fn lock(
     Ok((edit.finish()?, contacts))
 }
 
-/// Times of samples, seconds, ascending: equally spaced times and the keys of the clip, at most [`MAX_SAMPLES`] of
-/// either kind. Within this limit, there are at least [`RATE`] equally spaced times per second.
+/// Computes the times of samples, seconds, ascending: equally spaced times and the keys of the clip, at most
+/// [`MAX_SAMPLES`] of either kind. Within this limit, there are at least [`RATE`] equally spaced times per second.
 pub(super) fn times(clip: &Clip) -> Vec<f64> {
     let seconds = f64::from(clip.seconds);
     let n = ((seconds * RATE).ceil() as usize).clamp(2, MAX_SAMPLES);
@@ -291,7 +291,8 @@ fn step(times: &[f64], path: &[DVec3], k: usize, ground: DVec3) -> DVec3 {
     path[k + 1] - path[k] - ground * (times[k + 1] - times[k])
 }
 
-/// Horizontal velocity at each sample: the difference of the neighbouring positions divided by the time between them.
+/// Computes the horizontal velocity at each sample: the difference of the neighbouring positions divided by the time
+/// between them.
 fn velocities(times: &[f64], path: &[DVec3], up: DVec3) -> Vec<DVec3> {
     let last = path.len() - 1;
     let at = |k: usize| {
@@ -313,14 +314,14 @@ fn median(mut all: Vec<DVec3>) -> DVec3 {
     DVec3::from_array(at)
 }
 
-/// Whether each sample is at most [`MAX_HEIGHT`] above the lowest sample of the path. `length`: of the leg.
+/// Whether each sample is at most [`MAX_HEIGHT`] above the lowest sample of the path. `length`: leg length.
 fn is_low(path: &[DVec3], length: f64, up: DVec3) -> Vec<bool> {
     let low = path.iter().map(|p| p.dot(up)).fold(f64::INFINITY, f64::min);
     path.iter().map(|p| p.dot(up) - low <= MAX_HEIGHT * length).collect()
 }
 
-/// Velocity of the ground in a clip: the per-axis median of the ankles' velocities at low samples ([`is_low`]), or zero
-/// if the median is at most [`MAX_SPEED`] for the longest leg.
+/// Estimates the velocity of the ground in a clip: the per-axis median of the ankles' velocities at low samples
+/// ([`is_low`]), or zero if the median is at most [`MAX_SPEED`] for the longest leg.
 fn ground_velocity(times: &[f64], paths: &[Vec<DVec3>], lengths: &[f64], up: DVec3) -> DVec3 {
     let low = paths.iter().zip(lengths).flat_map(|(path, &length)| {
         velocities(times, path, up).into_iter().zip(is_low(path, length, up)).filter(|(_, low)| *low)
@@ -330,7 +331,7 @@ fn ground_velocity(times: &[f64], paths: &[Vec<DVec3>], lengths: &[f64], up: DVe
     if found.length() > MAX_SPEED * longest { found } else { DVec3::ZERO }
 }
 
-/// The per-axis median of the ankles' velocities during the contacts `spans`, as the velocity of the ground.
+/// Estimates the velocity of the ground: the per-axis median of the ankles' velocities during the contacts `spans`.
 fn median_velocity(times: &[f64], paths: &[Vec<DVec3>], spans: &[Vec<[usize; 2]>], up: DVec3) -> DVec3 {
     let of = |(path, spans): (&Vec<DVec3>, &Vec<[usize; 2]>)| {
         let all = velocities(times, path, up);
@@ -339,7 +340,7 @@ fn median_velocity(times: &[f64], paths: &[Vec<DVec3>], spans: &[Vec<[usize; 2]>
     median(paths.iter().zip(spans).flat_map(of).collect())
 }
 
-/// Contacts of each foot with the ground, as pairs of first and last sample.
+/// Finds the contacts of each foot with the ground, as pairs of first and last sample.
 fn spans(
     times: &[f64],
     paths: &[Vec<DVec3>],
@@ -386,9 +387,10 @@ fn is_over_seam(spans: &[[usize; 2]], n: usize) -> bool {
     matches!(spans, [first, .., last] if first[0] == 0 && last[1] + 1 == n)
 }
 
-/// Horizontal correction of an ankle at each sample: during a contact, the vector to the mean position relative to the
-/// ground; otherwise the sum of the corrections of the previous and the next contact, each faded out within [`FADE`],
-/// or an interpolation between the two if the gap is shorter than two fades. `ground`: velocity of the ground.
+/// Computes the horizontal correction of an ankle at each sample: during a contact, the vector to the mean position
+/// relative to the ground; otherwise the sum of the corrections of the previous and the next contact, each faded out
+/// within [`FADE`], or an interpolation between the two if the gap is shorter than two fades. `ground`: velocity of the
+/// ground.
 fn corrections(
     times: &[f64],
     path: &[DVec3],
@@ -457,7 +459,7 @@ fn turn_of(world: DMat4) -> DQuat {
     world.to_scale_rotation_translation().1
 }
 
-/// Local rotations of a leg whose ankle is moved by `by`, and the ankle's position.
+/// Computes the local rotations of a leg whose ankle moves by `by`, and the ankle's position.
 fn reach(pose: &Pose, parents: &[Option<usize>], leg: Leg, by: DVec3) -> ([DQuat; 3], DVec3) {
     let own = leg.map(|node| {
         let r = pose.nodes[node].rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |r| r.0.map(f64::from));

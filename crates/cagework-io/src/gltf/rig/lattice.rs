@@ -37,7 +37,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice around `points`. `size`: longest side of the bounding box of the model at rest.
+    /// Builds the lattice around `points`. `size`: longest side of the bounding box of the model at rest.
     fn new(points: &(impl Iterator<Item = DVec3> + Clone), size: f64) -> Self {
         let box_of = |[low, high]: [DVec3; 2], p| [low.min(p), high.max(p)];
         let [origin, high] = points.clone().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], box_of);
@@ -63,7 +63,7 @@ impl Lattice {
         }
     }
 
-    /// The lattice of the given cells; `None` if it has too many nodes.
+    /// Builds the lattice of the given cells; `None` if it has too many nodes.
     fn of(origin: DVec3, cell: f64, cells: &[u64]) -> Option<Self> {
         if cells.len() > MAX_NODES {
             return None;
@@ -80,14 +80,14 @@ impl Lattice {
         (nodes.len() <= MAX_NODES).then_some(lattice)
     }
 
-    /// Nodes of the cell that contains a point, and the position in the cell.
+    /// Finds the nodes of the cell that contains a point, and the point's position in the cell.
     fn around(&self, point: DVec3) -> ([u32; 8], DVec3) {
         let (cell, share) = place(self.origin, self.cell, point);
         let k = self.cells.partition_point(|&c| c < number(cell));
         (self.corners[k.min(self.corners.len() - 1)], share)
     }
 
-    /// Trilinear interpolation of nodal values.
+    /// Interpolates nodal values trilinearly.
     fn at(&self, point: DVec3, values: &[DVec3]) -> DVec3 {
         let (corners, share) = self.around(point);
         let value = |k: usize| values[corners[k] as usize];
@@ -97,7 +97,7 @@ impl Lattice {
     }
 }
 
-/// Lattice cell that contains a point, and the position of the point in this cell, 0 to 1 along each axis.
+/// Finds the lattice cell that contains a point, and the position of the point in this cell, 0 to 1 along each axis.
 fn place(origin: DVec3, cell: f64, point: DVec3) -> (U64Vec3, DVec3) {
     let at = ((point - origin) / cell).max(DVec3::ZERO);
     (at.as_u64vec3(), at.fract())
@@ -123,7 +123,7 @@ fn corners(cell: u64) -> [u64; 8] {
 }
 
 impl Rig<'_> {
-    /// The lattice that replaces the ends of morph targets, if there are more than [`MAX_ENDS`].
+    /// Builds the lattice that replaces the ends of morph targets, if there are more than [`MAX_ENDS`].
     pub(super) fn lattice(&self) -> Option<Lattice> {
         if self.n_ends <= MAX_ENDS {
             return None;
@@ -144,8 +144,8 @@ impl Rig<'_> {
         first - self.n_vertices..first - self.n_vertices + target.moved.len()
     }
 
-    /// Points to bind after the vertices: all extras or, with a lattice, the extras without the ends, then the
-    /// lattice's nodes.
+    /// Returns the points to bind after the vertices: all extras or, with a lattice, the extras without the ends, then
+    /// the lattice's nodes.
     pub(crate) fn bound(&self) -> Vec<DVec3> {
         let Some(lattice) = &self.lattice else { return self.extras.clone() };
         let (mut bound, mut next) = (Vec::new(), 0);

@@ -221,8 +221,8 @@ impl<'a> Rig<'a> {
         ends.map(|&end| relative(end, self.origin))
     }
 
-    /// Displacements of all points, with `parts` held in place or kept rigid. `by`: displacements by the cage alone.
-    /// `rest`: `[n_vertices]`.
+    /// Returns the displacements of all points, with `parts` held in place or kept rigid. `by`: displacements by the
+    /// cage alone. `rest`: `[n_vertices]`.
     pub(crate) fn held(&self, parts: &HeldParts, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
             return by;

@@ -78,7 +78,8 @@ pub(super) struct Deformation<'a> {
     pub(super) up: DVec3,
 }
 
-/// Deformation gradient at a node, by central differences. `anchor`: index of the node's first point in `by`.
+/// Computes the deformation gradient at a node by central differences. `anchor`: index of the node's first point in
+/// `by`.
 pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
     let column = |axis: usize| {
         let [plus, minus] = [1 + axis, 1 + axis + PROBE_DIRECTIONS.len() / 2].map(|k| by[anchor + k]);
@@ -160,8 +161,8 @@ impl Rig<'_> {
         named.filter(|&node| self.is_prop(node)).filter(follows).collect()
     }
 
-    /// Rigid motions of nodes whose meshes stay rigid: least squares over the vertices inside the cage or, with fewer
-    /// than [`MIN_RIGID_VERTICES`], the displacement and rotation at the node's origin.
+    /// Fits the rigid motions of nodes whose meshes stay rigid: least squares over the vertices inside the cage or,
+    /// with fewer than [`MIN_RIGID_VERTICES`], the displacement and rotation at the node's origin.
     pub(super) fn motions(&self, props: &[u32], by: &[DVec3], is_outside: &[bool]) -> HashMap<u32, Motion> {
         let of = |&(node, at): &(u32, usize)| {
             let own = self.parts.iter().filter(|part| part.instance.node == Some(node));
@@ -318,8 +319,8 @@ impl Rig<'_> {
         moved
     }
 
-    /// Scale factors of clip translations, by node. All nodes of a skeleton share one factor; otherwise, feet would
-    /// detach from legs.
+    /// Computes the scale factors of clip translations, by node. All nodes of a skeleton share one factor; otherwise,
+    /// feet would detach from legs.
     ///
     /// The factor is the height of the hips above the skeleton's lowest vertex after the deformation, divided by this
     /// height before the deformation. The hips are the node above the floor that, together with its descendants,
@@ -361,9 +362,9 @@ impl Rig<'_> {
         skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()
     }
 
-    /// Skeleton index of each node that follows the cage, and a number that is larger than all these indices. Nodes
-    /// belong to the same skeleton if their nearest ancestors that do not follow the cage are equal, or if a skin
-    /// connects them.
+    /// Returns the skeleton index of each node that follows the cage, and a number that is larger than all these
+    /// indices. Nodes belong to the same skeleton if their nearest ancestors that do not follow the cage are equal, or
+    /// if a skin connects them.
     fn skeletons(&self) -> (Vec<Option<usize>>, usize) {
         let n = self.held.len();
         let top = |above: &[usize], mut node: usize| {

@@ -177,7 +177,7 @@ pub(crate) fn reshape(
     Ok((glb, report))
 }
 
-/// How the joints of a document move when its points are displaced by `by`.
+/// Computes how the joints of a document move when its points are displaced by `by`.
 pub(crate) fn skeleton(
     document: &GltfDocument,
     rig: &Rig<'_>,
@@ -204,7 +204,7 @@ pub(crate) fn skeleton(
 }
 
 impl Rig<'_> {
-    /// Heights of the lowest visible vertex at rest, before and after the deformation.
+    /// Finds the heights of the lowest visible vertex at rest, before and after the deformation.
     fn ground(&self, by: &[DVec3], up: DVec3) -> Ground {
         let mut lows = [f64::INFINITY; 2];
         for part in self.parts.iter().filter(|part| part.slot.is_some()) {

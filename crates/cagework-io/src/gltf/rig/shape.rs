@@ -42,7 +42,8 @@ pub(super) struct SurfaceGradients<'a> {
 }
 
 impl<'a> SurfaceGradients<'a> {
-    /// Gradients are computed when first needed. `triangles`: those of the model. `by`: displacements of all points.
+    /// Stores the input; gradients are computed when first needed. `triangles`: those of the model. `by`: displacements
+    /// of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }
@@ -81,8 +82,8 @@ struct Directions {
 }
 
 impl Rig<'_> {
-    /// A primitive after the deformation; `None` if it does not change. `frame`: its skinning matrices after the
-    /// deformation.
+    /// Computes a primitive after the deformation; `None` if it does not change. `frame`: its skinning matrices after
+    /// the deformation.
     pub(super) fn shape(
         &self,
         part: &RigPrimitive,

@@ -90,7 +90,7 @@ pub(crate) fn joints_with_vertices(document: &GltfDocument) -> Skeleton {
 }
 
 impl Rig<'_> {
-    /// How the joints move in a deformation that contains the lift of `ground`.
+    /// Computes how the joints move in a deformation that contains the lift of `ground`.
     pub(super) fn skeleton(
         &self,
         given: &Deformation<'_>,
@@ -110,8 +110,8 @@ impl Rig<'_> {
         skeleton
     }
 
-    /// Moves of this document's nodes by their names. Displacements are scaled by the ratio of the sizes of the two
-    /// skeletons, measured over their common joints.
+    /// Looks up the moves of this document's nodes by their names. Displacements are scaled by the ratio of the sizes
+    /// of the two skeletons, measured over their common joints.
     pub(super) fn named(&self, skeleton: &Skeleton) -> NamedMoves {
         let names: Vec<String> =
             (0..self.held.len() as u32).map(|node| bare(&self.node_name(node)).to_owned()).collect();

@@ -131,7 +131,7 @@ fn tops(rig: &Rig<'_>) -> Vec<Option<usize>> {
     tops
 }
 
-/// Vertices that can be the lowest ones of their joint in some pose, with the node of this joint.
+/// Finds the vertices that can be the lowest ones of their joint in some pose, with the node of this joint.
 fn candidates(player: &Player) -> Vec<(u32, Option<u32>)> {
     let skin = &player.skin;
     let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
@@ -171,8 +171,8 @@ fn candidates(player: &Player) -> Vec<(u32, Option<u32>)> {
     all
 }
 
-/// The points among which the lowest one in a clip is searched; `None` without such points. `is_moved`: whether the clip
-/// moves a node.
+/// Returns the points among which the lowest one in a clip is searched; `None` without such points. `is_moved`: whether
+/// the clip moves a node.
 fn points(
     names: Option<&NamedMoves>,
     players: &[Player; 2],
@@ -191,7 +191,8 @@ fn points(
     (!own.is_empty() && fits).then(|| Points::Vertices(skins()))
 }
 
-/// Lowest heights of the points at times of a clip, before and after the deformation, relative to the model's origin.
+/// Computes the lowest heights of the points at times of a clip, before and after the deformation, relative to the
+/// model's origin.
 fn lows(
     players: &[Player; 2],
     (clip, times): (usize, &[f32]),

@@ -24,8 +24,8 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// `from` and `to`: positions of the vertices before and after the deformation. `triangles`: indices of these
-    /// vertices.
+    /// Groups coincident vertices. `from` and `to`: positions of the vertices before and after the deformation.
+    /// `triangles`: indices of these vertices.
     pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
         let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let origin = origin_near(&world);
@@ -56,8 +56,9 @@ impl Surface {
         Self { triangles, unique_of, n_unique: n_unique as usize }
     }
 
-    /// Gradient of the map from `from` to `to` at each vertex: least squares over the edges at the vertex, and over the
-    /// unit normals before and after as one more pair of vectors. `None` if no adjacent triangle has moved. `[n]`
+    /// Computes the gradient of the map from `from` to `to` at each vertex: least squares over the edges at the vertex,
+    /// and over the unit normals before and after as one more pair of vectors. `None` if no adjacent triangle has
+    /// moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
@@ -167,7 +168,7 @@ pub(super) fn cofactor(m: DMat3) -> DMat3 {
     sign * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// Nearest rotation by Newton's iteration for the polar decomposition; `None` if the matrix is singular or
+/// Computes the nearest rotation by Newton's iteration for the polar decomposition; `None` if the matrix is singular or
 /// mirrors. See Higham and Noferini (2016).
 pub(super) fn rotation(m: DMat3) -> Option<DMat3> {
     let mut turn = m * (1.0 / m.determinant().abs().cbrt());

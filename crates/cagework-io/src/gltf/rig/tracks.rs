@@ -34,7 +34,7 @@ pub(super) struct NodeChange {
     pub(super) turn: Option<DQuat>,
 }
 
-/// Target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
+/// Reads the target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
 pub(super) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
     let target = &channel["target"];
     if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str)
@@ -84,7 +84,7 @@ pub(super) fn output(edit: &Edit<'_>, sampler: &Value) -> Option<Output> {
     Some(Output { accessor, is_cubic: sampler["interpolation"] == "CUBICSPLINE", n_keys })
 }
 
-/// Index of the channel's sampler, duplicated if shared; `None` if it does not exist.
+/// Returns the index of the channel's sampler, after duplicating a shared one; `None` if the sampler does not exist.
 pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize) -> Option<usize> {
     let of = &mut edit.json["animations"][animation];
     let sampler = of["channels"][channel]["sampler"].as_u64()? as usize;
@@ -100,7 +100,7 @@ pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize)
     Some(number)
 }
 
-/// Values of a translation or rotation track; `None` if the count does not match the keys.
+/// Reads the values of a translation or rotation track; `None` if the count does not match the keys.
 pub(super) fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Vec<[f32; N]>> {
     let values = document.source().floats::<N>(output.accessor, "a track").ok()?;
     let per_key = if output.is_cubic { 3 } else { 1 };

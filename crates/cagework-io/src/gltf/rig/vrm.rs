@@ -31,7 +31,7 @@ enum VrmField {
     Radius(String),
 }
 
-/// Points of the VRM extensions in a document. Their `bound_index` is 0 until [`Rig::new`] sets it.
+/// Finds the points of the VRM extensions in a document. Their `bound_index` is 0 until [`Rig::new`] sets it.
 pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) -> Vec<VrmPoint> {
     let mut points = Vec::new();
     let json = &document.json;
