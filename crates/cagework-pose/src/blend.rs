@@ -13,9 +13,9 @@ pub struct PoseError {
     pub expected: usize,
 }
 
-/// Linear blend `rest + sum_k share_k (pose_k - rest)` of cage poses. Without inner controls, deformation is linear in
-/// the cage's vertices, so the deformed model is the same blend of the models deformed by the poses. A missing share
-/// counts as 0.
+/// Computes the linear blend `rest + sum_k share_k (pose_k - rest)` of cage poses. Without inner controls, deformation
+/// is linear in the cage's vertices, so the deformed model is the same blend of the models deformed by the poses. A
+/// missing share counts as 0.
 ///
 /// # Errors
 /// [`PoseError`] if a pose and the cage differ in their number of vertices.

@@ -37,8 +37,8 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// The rigid motion nearest to the given displacements in least squares (Kabsch 1976). `points`: `(position,
-    /// displacement)` pairs; must not be empty.
+    /// Fits the rigid motion nearest to the given displacements in least squares (Kabsch 1976). `points`:
+    /// `(position, displacement)` pairs; must not be empty.
     #[must_use]
     pub fn of(points: &[(DVec3, DVec3)]) -> Self {
         // No displacement: return exactly zero, without rounding.
@@ -56,15 +56,15 @@ impl Motion {
         Self::from_sums(centre, shift, at_rest, moved)
     }
 
-    /// Rotation about `centre`, which itself moves by `shift`.
+    /// Creates a rotation about `centre`, which itself moves by `shift`.
     #[must_use]
     pub fn about(centre: DVec3, rotation: DMat3, shift: DVec3) -> Self {
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    /// Kabsch's rotation from sums over the points: `centre`, their mean; `shift`, their mean displacement; `at_rest`,
-    /// the sum of `from from^T`; `moved`, the sum of `by from^T`, with `from` the position minus the centre and `by`
-    /// the displacement.
+    /// Computes Kabsch's rotation from sums over the points: `centre`, their mean; `shift`, their mean displacement;
+    /// `at_rest`, the sum of `from from^T`; `moved`, the sum of `by from^T`, with `from` the position minus the centre
+    /// and `by` the displacement.
     fn from_sums(centre: DVec3, shift: DVec3, at_rest: DMat3, moved: DMat3) -> Self {
         let size = at_rest.x_axis.x + at_rest.y_axis.y + at_rest.z_axis.z;
         let rotation =
@@ -104,8 +104,9 @@ impl Parts {
         self.stays.is_empty() && self.rigid.is_empty()
     }
 
-    /// The motion of vertices at `rest` that the cage displaces by `by`, `[n_vertices]`, object units, with fixed
-    /// vertices and rigid pieces. A fully fixed vertex, and a rigid piece without displacements, move by exactly zero.
+    /// Computes the motion of vertices at `rest` that the cage displaces by `by`, `[n_vertices]`, object units, with
+    /// fixed vertices and rigid pieces. A fully fixed vertex, and a rigid piece without displacements, move by exactly
+    /// zero.
     ///
     /// # Panics
     /// If a piece has a vertex outside `rest`, or the lengths differ.
@@ -125,8 +126,8 @@ impl Parts {
         }
     }
 
-    /// Deformed positions in which fixed vertices stay in place and rigid pieces move rigidly. `rest`, `deformed`:
-    /// `[n_vertices]`, object units.
+    /// Returns the deformed positions with fixed vertices kept in place and rigid pieces moved rigidly. `rest`,
+    /// `deformed`: `[n_vertices]`, object units.
     ///
     /// # Panics
     /// As [`Self::held`].
@@ -161,8 +162,8 @@ impl HeldMotion {
         self.piece_of.contains_key(&vertex) || self.stays.get(vertex as usize).is_some_and(|&s| s > 0.0)
     }
 
-    /// Constrained displacement of a vertex at the position `at` (at rest or in a morph target) that the cage would
-    /// move by `by`.
+    /// Returns the constrained displacement of a vertex at the position `at` (at rest or in a morph target) that the
+    /// cage would move by `by`.
     #[must_use]
     pub fn by(&self, vertex: u32, at: DVec3, by: DVec3) -> DVec3 {
         let by = self.piece_of.get(&vertex).map_or(by, |&piece| self.motions[piece].by(at));
@@ -175,8 +176,8 @@ impl HeldMotion {
     }
 }
 
-/// Connected pieces of a selection. Vertices are connected by triangles whose corners are all selected, and by equal
-/// positions (seams). Pieces are in order of their first vertex, vertices in ascending order.
+/// Finds the connected pieces of a selection. Vertices are connected by triangles whose corners are all selected, and
+/// by equal positions (seams). Pieces are in order of their first vertex, vertices in ascending order.
 ///
 /// # Panics
 /// If a vertex is not in `positions`.
@@ -207,7 +208,7 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
     pieces
 }
 
-/// Root of the piece that contains `place`, by union-find with path halving.
+/// Finds the root of the piece that contains `place`, by union-find with path halving.
 fn top(above: &mut [u32], mut place: u32) -> u32 {
     while above[place as usize] != place {
         above[place as usize] = above[above[place as usize] as usize];

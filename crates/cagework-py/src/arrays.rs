@@ -43,7 +43,7 @@ fn c_contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntyped
     Ok(array.call_method1("astype", (native,))?.cast_into()?)
 }
 
-/// An `ArrayError` with the actual and the expected type and shape.
+/// Creates an `ArrayError` with the actual and the expected type and shape.
 fn mismatch(name: &str, array: &Bound<'_, PyUntypedArray>, expected: &str) -> PyErr {
     let (dtype, shape) = (array.dtype(), array.shape());
     error::array(format!("{name}: expected {expected}, got {dtype} of shape {shape:?}"))

@@ -61,7 +61,7 @@ impl Field {
         Ok(Self { weights, field, cage: cage.clone().unbind() })
     }
 
-    /// The field of another pose of the same cage. Does not bind again.
+    /// Returns the field of another pose of the same cage without binding again.
     ///
     /// Raises ArrayError.
     ///
@@ -104,8 +104,8 @@ impl Field {
         self.each(py, points, |p| inverse.find(p).unwrap_or(Vec3::NAN))
     }
 
-    /// Deformation gradients at points: [n, 3] -> [n, 3, 3] float32. F[k] @ d is where a small vector d at point k
-    /// goes.
+    /// Deformation gradients at points: [n, 3] -> [n, 3, 3] float32. F[k] @ d is the image of a small vector d at point
+    /// k.
     ///
     /// Raises ArrayError.
     ///

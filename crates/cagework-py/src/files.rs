@@ -77,7 +77,7 @@ fn beside(folder: &Path, name: &str) -> Option<Result<Vec<u8>, String>> {
     Some(std::fs::read(path).map_err(|e| format!("cannot be read ({e})")))
 }
 
-/// The Python exception for an I/O error, such as `FileNotFoundError`; its message contains the file's name.
+/// Creates the Python exception for an I/O error, such as `FileNotFoundError`; its message contains the file's name.
 fn named(path: &Path, error: &io::Error) -> PyErr {
     io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
 }

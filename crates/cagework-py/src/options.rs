@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::error;
 
-/// Options from keyword arguments. Missing arguments and `None` mean the default.
+/// Reads options from keyword arguments. Missing arguments and `None` mean the default.
 ///
 /// # Errors
 /// `TypeError` for an unknown name, `OptionError` for a value of the wrong type. Ranges are checked by the core.

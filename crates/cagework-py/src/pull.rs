@@ -23,10 +23,10 @@ const FRAMES: u32 = 30;
 /// -> [n_cage, 3] float64, object units
 ///
 /// vertices: [n, 3]; triangles: [m, 3]; weights: [n, n_cage], from bind; grabs: [k] vertex indices; to: [k, 3] their
-/// targets; pins: [l] vertices that stay; report: of bind, for points with offsets; start: [n_cage, 3] initial pose, by
-/// default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size; None for
-/// automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the rest shape;
-/// options: those of bind, for the points on and near the model at which the solver samples the weights.
+/// targets; pins: [l] vertices that stay in place; report: of bind, for points with offsets; start: [n_cage, 3] initial
+/// pose, by default the cage at rest; reach: how far along the surface the model follows, as a fraction of its size;
+/// None for automatic, math.inf for the whole model; relax: 0 keeps the details of the initial pose, 1 restores the
+/// rest shape; options: those of bind, for the points on and near the model at which the solver samples the weights.
 ///
 /// Raises PullError, BindError, OptionError, ArrayError. Ctrl-C cancels the bind.
 ///

@@ -137,12 +137,12 @@ pub(crate) fn reshape<'py>(
     Ok(PyBytes::new(py, &bytes))
 }
 
-/// The value of an option with named values.
+/// Parses the value of an option with named values.
 fn word<T: FromStr<Err: Display>>(name: &str, value: &str) -> PyResult<T> {
     value.parse().map_err(|wrong| error::option(format!("{name}: {wrong}")))
 }
 
-/// The timeline of morph targets; `None` for one pose, and for expressions without times.
+/// Builds the timeline of morph targets; `None` for one pose, and for expressions without times.
 fn timeline(
     poses: &Poses,
     expressions: bool,
@@ -173,7 +173,7 @@ fn timeline(
 }
 
 impl Request {
-    /// Bytes of the deformed file.
+    /// Deforms a model, and returns the bytes of its file.
     fn reshaped(
         &self,
         source: &Source,
@@ -239,7 +239,7 @@ impl Request {
         .map_err(error::model)
     }
 
-    /// The options with the names of parts resolved for a model.
+    /// Resolves the names of parts in the options for a model.
     fn of_model(&self, model: &Model, of_rig: ReshapeOptions) -> PyResult<ReshapeOptions> {
         let props = if self.is_static { Vec::new() } else { model.props().map_err(error::model)? };
         let (rigid, others): (Vec<_>, Vec<_>) =
@@ -248,7 +248,7 @@ impl Request {
         Ok(ReshapeOptions { rigid, parts, ..of_rig })
     }
 
-    /// How the joints of a body move in a pose of the cage.
+    /// Computes how the joints of a body move in a pose of the cage.
     fn skeleton(
         &self,
         body: &Source,

@@ -90,7 +90,7 @@ impl Splats {
         PyArray1::from_vec(py, flat).reshape([self.splats.len(), 3, 3])
     }
 
-    /// The splats deformed by a field. Splats that the field does not move keep all digits.
+    /// Returns the splats deformed by a field. Splats that the field does not move keep all digits.
     ///
     /// >>> splats = cw.Splats("plant.splat")
     /// >>> cage = cw.generate_cage(*splats.shells(), target=40)
@@ -125,7 +125,7 @@ impl Splats {
     }
 
     /// Vertices and triangles of octahedra around the splats, for `generate_cage`. Transparent splats (haze) and the
-    /// largest splats (background) are left out.
+    /// largest splats (background) are omitted.
     ///
     /// >>> splats = cw.Splats("plant.splat")
     /// >>> cage = cw.generate_cage(*splats.shells(), target=40)

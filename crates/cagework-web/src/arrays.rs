@@ -5,12 +5,12 @@ use glam::Vec3;
 
 use crate::error::{Answer, ErrorName, Fault};
 
-/// Points from a flat array `[n, 3]`.
+/// Converts a flat array `[n, 3]` to points.
 pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
     flat.chunks_exact(3).map(Vec3::from_slice).collect()
 }
 
-/// Points of the flat array `posed`, `[n, 3]`: a pose of `n` controls.
+/// Converts the flat array `posed`, `[n, 3]`, to a pose of `n` controls.
 ///
 /// # Errors
 /// If the array does not have `3 n` numbers.
@@ -23,13 +23,13 @@ pub(crate) fn pose(posed: &[f32], n: usize) -> Answer<Vec<Vec3>> {
     Err(Fault::new(ErrorName::Error, message))
 }
 
-/// Flat array `[n, 3]` from points.
+/// Converts points to a flat array `[n, 3]`.
 pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(Vec3::to_array).collect()
 }
 
-/// Polygon mesh from positions `[n_vertices, 3]` and `corners`, which lists for each face its corner count and then the
-/// vertex indices of its corners.
+/// Builds a polygon mesh from positions `[n_vertices, 3]` and `corners`, which lists for each face its corner count and
+/// then the vertex indices of its corners.
 ///
 /// # Errors
 /// If `corners` ends in the middle of a face.
@@ -46,7 +46,7 @@ pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<Polygon
     Ok(PolygonMesh { positions: points(positions), faces })
 }
 
-/// Flat list of faces: for each face its corner count, then the vertex indices of its corners.
+/// Converts faces to a flat list: for each face its corner count, then the vertex indices of its corners.
 pub(crate) fn corners(faces: &[Vec<u32>]) -> Vec<u32> {
     faces.iter().flat_map(|f| std::iter::once(f.len() as u32).chain(f.iter().copied())).collect()
 }

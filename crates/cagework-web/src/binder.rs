@@ -55,8 +55,8 @@ impl Binder {
         Self { gpu: RefCell::default() }
     }
 
-    /// Harmonic coordinates of `positions`, `[n_points, 3]`. The last `extra_points` points are not vertices of the
-    /// model.
+    /// Computes the harmonic coordinates of `positions`, `[n_points, 3]`. The last `extra_points` points are not
+    /// vertices of the model.
     ///
     /// `cage`: `[n_controls, 3]`. `corners`: for each face its corner count, then its vertex indices. `controls`: as
     /// for `Engine.setCage`. `progress` is called with each progress event; returning false cancels the bind.
@@ -89,7 +89,7 @@ impl Binder {
         })
     }
 
-    /// Closed-form coordinates of the cage, ignoring its interior controls. Arrays as for `bind`.
+    /// Computes closed-form coordinates of the cage, ignoring its interior controls. Arrays as for `bind`.
     ///
     /// # Errors
     /// If the coordinates are undefined at a point, or the arrays are not a valid cage.
@@ -109,8 +109,8 @@ impl Binder {
         Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 
-    /// Coordinates at the cell centres of a slice, for `Engine.takeSlice`; undefined if no centre is inside the cage.
-    /// `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; other arguments as for `bind`.
+    /// Computes the coordinates at the cell centres of a slice, for `Engine.takeSlice`; undefined if no centre is
+    /// inside the cage. `axis`: 0 to 2; `fraction`: position along the axis, 0 to 1; other arguments as for `bind`.
     ///
     /// # Errors
     /// The errors of `bind`.
@@ -142,9 +142,9 @@ impl Binder {
         Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
-    /// Harmonic coordinates at the points of a lattice around a cage. With `cells`, the number of cells along the
-    /// longest side of the cage, the result is for `FieldMap`, otherwise for `Engine.takeLattice`. Other arguments as
-    /// for `bind`.
+    /// Computes the harmonic coordinates at the points of a lattice around a cage. With `cells`, the number of cells
+    /// along the longest side of the cage, the result is for `FieldMap`, otherwise for `Engine.takeLattice`. Other
+    /// arguments as for `bind`.
     ///
     /// # Errors
     /// The errors of `bind`.
@@ -261,7 +261,7 @@ impl Binder {
         samples::all().iter().map(|sample| sample.id.to_owned()).collect()
     }
 
-    /// The sample capture "knot", whose splats are computed by a formula, as an SPZ file.
+    /// Builds the sample capture "knot", whose splats are computed by a formula, as an SPZ file.
     ///
     /// # Errors
     /// If memory is exhausted.
@@ -288,7 +288,7 @@ impl Binder {
     }
 }
 
-/// The cage mesh without interior controls, and its number of subdivision steps.
+/// Returns the cage mesh without interior controls, and its number of subdivision steps.
 fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(PolygonMesh, u32)> {
     let mut mesh = polygon_mesh(positions, corners)?;
     let CageControls { smooth, inner, .. } = from_js(controls)?.unwrap_or_default();
@@ -297,7 +297,7 @@ fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(
 }
 
 impl Binder {
-    /// A working GPU: that of the last bind, or a new one.
+    /// Returns a working GPU: the GPU of the last bind, or a new one.
     async fn open(&self) -> Answer<GpuContext> {
         let last = self.gpu.borrow().clone();
         if let Some(gpu) = last.filter(|gpu| gpu.check().is_ok()) {

@@ -52,7 +52,7 @@ macro_rules! declarations {
     }};
 }
 
-/// Declaration of a TypeScript constant.
+/// Writes the declaration of a TypeScript constant.
 fn constant(name: &str, r#type: &str, value: impl Into<Value>) -> String {
     format!("export const {name}: {type} = {};\n", value.into())
 }

@@ -8,7 +8,7 @@ use crate::arrays::polygon_mesh;
 use crate::error::Answer;
 use crate::options::decode;
 
-/// A cage and its interior controls from arrays; see [`CageControls`]. `controls` may be undefined.
+/// Builds a cage and its interior controls from arrays; see [`CageControls`]. `controls` may be undefined.
 ///
 /// # Errors
 /// If the arrays are not a valid cage, or a control does not fit into the cage.
@@ -17,7 +17,7 @@ pub(crate) fn control_set(positions: &[f32], corners: &[u32], controls: JsValue)
     Ok(RestCage::new(mesh, from_js(controls)?.unwrap_or_default())?.set?)
 }
 
-/// Subdivision and interior controls from a JavaScript value; `None` if it is undefined.
+/// Reads subdivision and interior controls from a JavaScript value; `None` if it is undefined.
 pub(crate) fn from_js(controls: JsValue) -> Answer<Option<CageControls>> {
     if controls.is_undefined() { Ok(None) } else { decode(controls).map(Some) }
 }

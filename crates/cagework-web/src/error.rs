@@ -74,7 +74,7 @@ impl Fault {
         &self.message
     }
 
-    /// A [`ErrorName::Missing`] error: `what` is missing, `how` says what to do first.
+    /// Creates a [`ErrorName::Missing`] error: `what` is missing, `how` says what to do first.
     pub(crate) fn missing(what: &str, how: &str) -> Self {
         Self::new(ErrorName::Missing, format!("there is no {what} yet: {how}"))
     }

@@ -35,7 +35,8 @@ impl State {
         }
     }
 
-    /// Surface point under the pointer, on the posed models. During playback `None`, because other surfaces are drawn.
+    /// Finds the surface point under the pointer, on the posed models. During playback `None`, because other surfaces
+    /// are drawn.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
         if self.playing.is_some() || self.held.posed.len() != self.models().positions().len() {
             return None;
@@ -61,8 +62,8 @@ impl State {
         pins
     }
 
-    /// The pins after a click. A pin under the pointer is removed. If there is none and `may_pin` is set, a pin is
-    /// added at the surface point under the pointer. `None` if nothing changes.
+    /// Returns the pins after a click. A pin under the pointer is removed. If no pin is there and `may_pin` is set, a
+    /// pin is added at the surface point under the pointer. `None` if nothing changes.
     pub(crate) fn pins_after(&self, at: Vec2, may_pin: bool) -> Option<Vec<SurfacePoint>> {
         let mut pins = self.pins_beside(at);
         if pins.len() == self.editor.document().pins.len() {
@@ -71,8 +72,8 @@ impl State {
         Some(pins)
     }
 
-    /// Weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle, or
-    /// [`ON_CAGE`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
+    /// Returns the weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle,
+    /// or [`ON_CAGE`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
     pub(crate) fn grip_of(
         &self,
         grab: Grab,
@@ -100,8 +101,8 @@ impl State {
         Some((row, corners[most]))
     }
 
-    /// The vertex nearest to the mirror image of a surface point, at rest. `None` if no vertex is near the image, or if
-    /// the point is near the mirror plane.
+    /// Finds the vertex nearest to the mirror image of a surface point, at rest. `None` if no vertex is near the image,
+    /// or if the point is near the mirror plane.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
         let models = self.models();
         let at = point.at(models, models.positions())?;
@@ -119,8 +120,8 @@ impl State {
         Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
-    /// Marks of grabs, pins and of an interior control that is being placed. Without weights, grabs and pins are
-    /// omitted.
+    /// Returns the marks of grabs, pins and of an interior control that is being placed. Without weights, grabs and
+    /// pins are omitted.
     pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
         let place = |point: &SurfacePoint| {
             let corners = self.models().corners(point.triangle)?;

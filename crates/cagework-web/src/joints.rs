@@ -58,7 +58,7 @@ impl JointDots {
         self.outside.contains(&joint)
     }
 
-    /// Positions of the joints in a pose of the cage. `[n_joints]`
+    /// Computes the positions of the joints in a pose of the cage. `[n_joints]`
     pub(crate) fn posed(&self, rest: &[Vec3], posed: &[Vec3]) -> Vec<Vec3> {
         let mut by = displacements(&self.weights, &self.frames, rest, posed);
         for (k, joint) in self.joints.iter().enumerate() {

@@ -119,8 +119,8 @@ impl Loaded {
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
     }
 
-    /// The model as arrays, from which [`Self::restore`] recreates it in another instance of the module without reading
-    /// its file. Call it after [`Self::prepare`] and [`Self::take_next`]. The cage is not included.
+    /// Converts the model to arrays, from which [`Self::restore`] recreates it in another instance of the module
+    /// without reading its file. Call it after [`Self::prepare`] and [`Self::take_next`]. The cage is not included.
     #[must_use]
     pub fn store(self) -> Vec<Uint8Array> {
         let mut store = Store::default();
@@ -134,7 +134,7 @@ impl Loaded {
         store.into_arrays().into_iter().map(|bytes| Uint8Array::from(bytes.as_slice())).collect()
     }
 
-    /// A model from the arrays of [`Self::store`].
+    /// Rebuilds a model from the arrays of [`Self::store`].
     ///
     /// # Errors
     /// If the arrays are not those of [`Self::store`].

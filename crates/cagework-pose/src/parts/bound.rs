@@ -70,7 +70,7 @@ impl BoundParts {
         self.pieces.len()
     }
 
-    /// Motion of each piece when the controls are at `posed`, `[n_controls]`, object units. `[n_pieces]`
+    /// Computes the motion of each piece when the controls are at `posed`, `[n_controls]`, object units. `[n_pieces]`
     ///
     /// # Panics
     /// If there is not one position per control.

@@ -25,7 +25,7 @@ impl Anderson {
         self.last.clear();
     }
 
-    /// Accelerated next iterate after `from`, whose image under the map is `image`.
+    /// Computes the accelerated next iterate after `from`, whose image under the map is `image`.
     pub(super) fn next(&mut self, from: &DVector<f64>, image: DVector<f64>) -> DVector<f64> {
         let residual = &image - from;
         if self.last.last().is_some_and(|(before, _)| residual.norm() > MAX_GROWTH * before.norm()) {

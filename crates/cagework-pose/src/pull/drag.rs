@@ -330,8 +330,8 @@ pub const REACH: Number = Number {
     slider: Some(Slider { min: 0.05, max: 2.4, step: 0.05 }),
 };
 
-/// Reach in object units. Automatic: the distance that encloses 15 % of the area (30 % with two or more grabs), limited
-/// to [`REACH_RANGE`], but at least 1.2 times the largest distance between two grabs.
+/// Computes the reach in object units. Automatic: the distance that encloses 15 % of the area (30 % with two or more
+/// grabs), limited to [`REACH_RANGE`], but at least 1.2 times the largest distance between two grabs.
 fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64 {
     match reach {
         Reach::Whole => return f64::INFINITY,
@@ -365,8 +365,8 @@ fn stays(walk: f32, reach: f64) -> f64 {
     }
 }
 
-/// Share with which each group takes part in relaxation: 1 near the grabs, 0 beyond the reach. The share of a cage
-/// vertex is the mean over the samples, weighted by how far the vertex moves them. `[n_groups]`
+/// Computes the share with which each group takes part in relaxation: 1 near the grabs, 0 beyond the reach. The share
+/// of a cage vertex is the mean over the samples, weighted by how far the vertex moves them. `[n_groups]`
 fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     let shares = DVector::from_column_slice(&pull.probes.shares);
     let followed =

@@ -120,8 +120,8 @@ impl Pull {
         &self.of_model + gamma * &self.of_cage
     }
 
-    /// Vectors `d_e` of a reference cage: gradients at the samples, then edges. E measures how far the vectors `D_e c`
-    /// of a pose are from rotations of `d_e`.
+    /// Computes the vectors `d_e` of a reference cage: gradients at the samples, then edges. E measures how far the
+    /// vectors `D_e c` of a pose are from rotations of `d_e`.
     pub(super) fn references(&self, cage: &[DVec3]) -> Vec<DVec3> {
         let gradient = |e: usize| {
             let row = self.gradients.row(e);
@@ -136,8 +136,8 @@ impl Pull {
         (0..3 * samples).map(|e| e / 3).chain(self.edges.iter().map(move |[a, _]| samples + *a as usize))
     }
 
-    /// The sum `sum_e w_e D_e^T d_e` of each group: columns `3 r` to `3 r + 2` of row i are the moment of cage vertex i
-    /// and group r. `[n, 3 n_groups]`, row-major.
+    /// Computes the sum `sum_e w_e D_e^T d_e` of each group: columns `3 r` to `3 r + 2` of row i are the moment of cage
+    /// vertex i and group r. `[n, 3 n_groups]`, row-major.
     pub(super) fn moments(&self, references: &[DVec3], gamma: f64) -> Vec<f64> {
         let width = 3 * self.n_groups();
         let mut moments = vec![0.0; self.n_cage() * width];

@@ -35,9 +35,9 @@ const MIN_STEP_MOVE: f64 = 1e-8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
     /// Weight of the energy E ([`crate::pull`]) against the mean squared distance from the targets (divided by the
-    /// model's size squared), at least 0. `None`: the most likely value given the remaining distance, `n d / ((N - n)
-    /// E)`, for N points at the mean squared distance d and a cage of n vertices, limited to 1e-10 to 1e-2; with fewer
-    /// than four points per cage vertex, 1e-5.
+    /// model's size squared), at least 0. `None`: the most likely value given the remaining distance,
+    /// `n d / ((N - n) E)`, for N points at the mean squared distance d and a cage of n vertices, limited to 1e-10 to
+    /// 1e-2; with fewer than four points per cage vertex, 1e-5.
     pub lambda: Option<f64>,
 }
 
@@ -209,7 +209,7 @@ impl Pull {
         })
     }
 
-    /// Vertices of the rest cage, moved rigidly to fit the targets best. The iteration starts from them: the first
+    /// Moves the vertices of the rest cage rigidly to fit the targets best. The iteration starts from them: the first
     /// rotations are computed from these positions.
     fn align_rest(&self, goals: &Goals<'_>) -> Vec<DVec3> {
         let points = goals.used().map(|(row, _, to)| {
@@ -227,7 +227,7 @@ impl<'a> Goals<'a> {
         all.filter(|((_, share), _)| **share > 0.0).map(|((row, &share), &to)| (row, share, to))
     }
 
-    /// Root mean squared and largest distance from the targets, object units.
+    /// Computes the root mean squared and the largest distance from the targets, object units.
     fn distances(&self, cage: &[DVec3]) -> (f64, f64) {
         let (mut sum, mut largest) = (0.0, 0.0_f64);
         for (row, share, to) in self.used() {

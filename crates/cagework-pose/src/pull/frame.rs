@@ -90,9 +90,9 @@ impl Drag {
         frames
     }
 
-    /// Targets of the drag that bring the grabbed handles to `to`. A vertex outside the cage has a constant offset from
-    /// the position that its weights give, so its target is shifted by this offset. `deformed`: the model at the start
-    /// of the drag, `[n_vertices]`, object units.
+    /// Computes the targets of the drag that bring the grabbed handles to `to`. A vertex outside the cage has a
+    /// constant offset from the position that its weights give, so its target is shifted by this offset. `deformed`:
+    /// the model at the start of the drag, `[n_vertices]`, object units.
     #[must_use]
     pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
         let beside = |(grab, start): (&Handle, &DVec3)| match grab {
@@ -124,7 +124,7 @@ impl Drag {
         self.moments.iter_mut().zip(parts).for_each(|(m, (posed, more))| *m = posed + relax * more);
     }
 
-    /// One local step (rotations of the groups) and one global step (the cage that best fits these rotations).
+    /// Runs one local step (rotations of the groups) and one global step (the cage that best fits these rotations).
     fn step(&self) -> DVector<f64> {
         let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
@@ -160,7 +160,7 @@ impl<'a> GrabPath<'a> {
         self.turn.angle_between(DQuat::IDENTITY)
     }
 
-    /// Grab positions at a share of the path, 0 to 1.
+    /// Returns the grab positions at a share of the path, 0 to 1.
     fn at(&self, share: f64) -> Vec<DVec3> {
         let straight = |(a, b): (&DVec3, &DVec3)| a.lerp(*b, share);
         if self.angle() <= MIN_ARC_ANGLE {
@@ -189,7 +189,7 @@ pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> D
     DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
 }
 
-/// Dot product as eight partial sums, which the compiler vectorises.
+/// Computes a dot product as eight partial sums, which the compiler vectorises.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];

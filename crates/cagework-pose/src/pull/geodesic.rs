@@ -56,7 +56,8 @@ impl Geodesic {
         Self { unique_of, starts, neighbours }
     }
 
-    /// Distance of each vertex from `seed` along edges, object units; infinite beyond `limit`. `[n_vertices]`
+    /// Computes the distance of each vertex from `seed` along edges, object units; infinite beyond `limit`.
+    /// `[n_vertices]`
     pub(super) fn from(&self, seed: u32, limit: f32) -> Vec<f32> {
         let mut distance = vec![f32::INFINITY; self.starts.len() - 1];
         let first = self.unique_of[seed as usize];
@@ -81,7 +82,7 @@ impl Geodesic {
     }
 }
 
-/// One edge from each smaller component to the nearest node of the largest one.
+/// Finds one edge from each smaller component to the nearest node of the largest one.
 fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let mut part: Vec<u32> = (0..points.len() as u32).collect();
     for &[a, b] in edges {
@@ -111,7 +112,7 @@ fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     best.into_iter().flatten().map(|(edge, _)| edge).collect()
 }
 
-/// Root of the component that contains node `i`, by union-find with path halving.
+/// Finds the root of the component that contains node `i`, by union-find with path halving.
 fn root(part: &mut [u32], mut i: u32) -> u32 {
     while part[i as usize] != i {
         part[i as usize] = part[part[i as usize] as usize];

@@ -37,7 +37,7 @@ impl Grip {
         Self { row, seed, is_cage: false }
     }
 
-    /// Grip of a handle. `triangles` and `weights`: those of the model.
+    /// Creates the grip of a handle. `triangles` and `weights`: those of the model.
     ///
     /// # Errors
     /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another

@@ -9,13 +9,14 @@ pub(super) struct KdTree<'a> {
 }
 
 impl<'a> KdTree<'a> {
-    /// Tree of the points with the indices `order`.
+    /// Builds the tree of the points with the indices `order`.
     pub(super) fn new(points: &'a [Vec3], mut order: Vec<u32>) -> Self {
         sort(points, &mut order, 0);
         Self { points, order }
     }
 
-    /// Index and squared distance of the point nearest to `at`. `None` if this distance is not below `limit` (squared).
+    /// Finds the index and squared distance of the point nearest to `at`. `None` if this distance is not below `limit`
+    /// (squared).
     pub(super) fn find(&self, at: Vec3, limit: f32) -> Option<(u32, f32)> {
         let mut best = (u32::MAX, limit);
         self.search(&self.order, 0, at, &mut best);

@@ -38,7 +38,7 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Samples of `mesh`. `controls`: the controls at rest.
+    /// Samples `mesh`. `controls`: the controls at rest.
     ///
     /// # Errors
     /// [`PullError::Empty`], [`PullError::Cage`], or [`PullError::Missing`] if a triangle has an invalid corner.
@@ -78,9 +78,9 @@ impl Probes {
         DMatrix::from_fn(rows.len(), weights.n_columns(), |s, i| rows[s][i])
     }
 
-    /// Gradients of the weights at the samples by central differences, corrected so that the positions `cage` (`[n]`,
-    /// at rest) have the identity as their Jacobian. Row `3 s + x` is d/dx at sample s. If a probe is too far outside
-    /// the cage, the sample's rows and share are zero. `[3 * n_samples, n]`
+    /// Computes the gradients of the weights at the samples by central differences, corrected so that the positions
+    /// `cage` (`[n]`, at rest) have the identity as their Jacobian. Row `3 s + x` is d/dx at sample s. If a probe is
+    /// too far outside the cage, the sample's rows and share are zero. `[3 * n_samples, n]`
     pub(super) fn gradients(&mut self, weights: &Weights, cage: &[DVec3]) -> Vec<Vec<f64>> {
         let n = cage.len();
         let scale = 0.5 / f64::from(self.step);
@@ -121,7 +121,8 @@ pub(super) fn dense(weights: &Weights, row: usize) -> Vec<f64> {
     dense
 }
 
-/// Share of the area at each vertex: a third of the area of the vertex's triangles. Uniform if the model has no area.
+/// Computes the share of the area at each vertex: a third of the area of the vertex's triangles. Uniform if the model
+/// has no area.
 fn areas(mesh: &TriMesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -137,8 +138,8 @@ fn areas(mesh: &TriMesh) -> Vec<f64> {
     areas
 }
 
-/// Farthest-point sampling (Gonzalez 1985). Returns the samples, and the nearest sample of each vertex. `None` without
-/// vertices.
+/// Samples vertices by farthest-point sampling (Gonzalez 1985). Returns the samples, and the nearest sample of each
+/// vertex. `None` without vertices.
 fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
     let center = Bounds::of(positions)?.center();
     let farthest = |distances: &[f32]| {

@@ -1,4 +1,4 @@
-"""Rows of weights where SciPy is not installed, as in Blender."""
+"""Replacement for scipy.sparse where SciPy is not installed, such as in Blender."""
 
 import numpy as np
 

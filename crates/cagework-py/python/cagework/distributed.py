@@ -43,7 +43,7 @@ def reshape_files(
 
     Returns a dict per file, in input order: file, output, state ("written", "kept" for an output that is newer than its input, or
     "failed") and error. Duplicate inputs are processed once. A failure does not stop the other files; if the workers of a task die
-    repeatedly, all its files have failed. Raises ValueError if two files have the same output, or `out` is a folder of the inputs.
+    repeatedly, all its files count as failed. Raises ValueError if two files have the same output, or `out` is a folder of the inputs.
     """
     if files_per_task < 1:
         raise ValueError(f"files_per_task is {files_per_task}; it must be at least 1")

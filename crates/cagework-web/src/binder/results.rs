@@ -25,7 +25,7 @@ pub(crate) struct Offsets {
 }
 
 impl Offsets {
-    /// Weights and frames from the arrays of a [`Bound`] with `n_controls` controls.
+    /// Rebuilds weights and frames from the arrays of a [`Bound`] with `n_controls` controls.
     ///
     /// # Errors
     /// If the arrays do not match each other or `n_controls`.

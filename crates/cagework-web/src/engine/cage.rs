@@ -20,8 +20,8 @@ use crate::views::optional;
 
 #[wasm_bindgen]
 impl Engine {
-    /// A box around the model. Its longest side has `divisions` segments; the other sides have segments of about this
-    /// length.
+    /// Builds a box around the model. Its longest side has `divisions` segments; the other sides have segments of about
+    /// this length.
     ///
     /// # Errors
     /// If no model is open.
@@ -167,7 +167,8 @@ impl Engine {
         let _ = self.change(|state| state.editor.set_pose(points(positions)));
     }
 
-    /// The current pose and each saved pose that fits this cage, for `Binder.carryPoses`. `[n_poses, n_controls, 3]`
+    /// Returns the current pose and each saved pose that fits this cage, for `Binder.carryPoses`.
+    /// `[n_poses, n_controls, 3]`
     #[must_use]
     pub fn carriable(&self) -> Vec<f32> {
         self.read(|state| {
@@ -189,7 +190,7 @@ impl Engine {
         });
     }
 
-    /// Estimated memory of a bind, bytes.
+    /// Estimates the memory of a bind, bytes.
     ///
     /// # Errors
     /// Without a cage, or if an option is out of range.
@@ -211,8 +212,8 @@ impl Engine {
         Ok(bytes as f64)
     }
 
-    /// Estimated work of a bind, as a number of updates of one value at a grid node. A processor core does about 10^9
-    /// updates per second.
+    /// Estimates the work of a bind as a number of updates of one value at a grid node. A processor core does about
+    /// 10^9 updates per second.
     ///
     /// # Errors
     /// Without a cage, or if an option is out of range.
@@ -225,7 +226,7 @@ impl Engine {
         Ok(self.read(|state| Answer::Ok(estimate_updates(state.require_set()?, &request.options)?))?)
     }
 
-    /// Compact encoding of the current pose, in the axes of the model's file.
+    /// Encodes the current pose compactly, in the axes of the model's file.
     #[wasm_bindgen(js_name = encodePose)]
     #[must_use]
     pub fn encode_pose(&self) -> Vec<u8> {

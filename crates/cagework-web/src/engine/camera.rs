@@ -80,7 +80,7 @@ impl Engine {
         }
     }
 
-    /// Moves the camera so that the posed cage fits into the view, or without a cage the models.
+    /// Moves the camera to fit the posed cage into the view, or the models if there is no cage.
     #[wasm_bindgen(js_name = frameAll)]
     pub fn frame_all(&self) {
         self.change(super::super::state::State::frame_all);

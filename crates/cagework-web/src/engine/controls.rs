@@ -39,9 +39,9 @@ impl Engine {
         Ok(self.step(Command::ReplaceControls { positions, elements }, Some(label))?)
     }
 
-    /// Place for a new control: a point inside the rest model under the pointer, midway between the first two surfaces.
-    /// If the pointer is not on the model, the point of the pointer's ray that is nearest to the centre of model
-    /// and cage. `[3]`
+    /// Chooses the position of a new control: a point inside the rest model under the pointer, midway between the first
+    /// two surfaces. If the pointer is not on the model, the point of the pointer's ray that is nearest to the centre
+    /// of model and cage. `[3]`
     #[wasm_bindgen(js_name = middleAt)]
     #[must_use]
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {

@@ -26,7 +26,7 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// A zip archive of files, uncompressed. The names must be distinct.
+    /// Packs files into an uncompressed zip archive. The names must be distinct.
     ///
     /// # Errors
     /// If two names are equal.
@@ -38,8 +38,9 @@ impl Engine {
         Ok(write_zip(&files).ok_or_else(equal)?)
     }
 
-    /// The posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With `options.dynamic`, the
-    /// frames of the clip with the index `clip` become morph targets instead, if the model has this clip.
+    /// Exports the posed model as GLB; a rigged model keeps its skeleton, morph targets and clips. With
+    /// `options.dynamic`, the frames of the clip with the index `clip` become morph targets instead, if the model has
+    /// this clip.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -106,8 +107,8 @@ impl Engine {
         Ok(compact(bytes, request.size).map_err(Fault::from)?)
     }
 
-    /// The posed model in a format that stores only its shape, without rig or animation. With `frame`, exports the
-    /// shown frame of a clip instead of the pose, if playback shows a clip.
+    /// Exports the posed model in a format that stores only its shape, without rig or animation. With `frame`, exports
+    /// the shown frame of a clip instead of the pose, if playback shows a clip.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -147,15 +148,16 @@ impl Engine {
         Ok(bytes)
     }
 
-    /// Notices from the last export, one sentence each: changes of the rig, and data that the file format loses. Clears
-    /// them, so that each is returned once.
+    /// Returns notices from the last export, one sentence each: changes of the rig, and data that the file format
+    /// loses. Clears them, so that each is returned once.
     #[wasm_bindgen(js_name = rigNotices)]
     #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {
         std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
 
-    /// A model as GLB with a morph target for each saved pose of the cage and the animation that `playAt` shows.
+    /// Exports a model as GLB with a morph target for each saved pose of the cage and the animation that `playAt`
+    /// shows.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -187,7 +189,7 @@ impl Engine {
         })?)
     }
 
-    /// The posed cage as OBJ.
+    /// Exports the posed cage as OBJ.
     ///
     /// # Errors
     /// Without a cage.
@@ -204,7 +206,7 @@ impl Engine {
         Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
-    /// The interior controls in the current pose, as OBJ.
+    /// Exports the interior controls in the current pose, as OBJ.
     ///
     /// # Errors
     /// If the cage has no interior controls.
@@ -221,7 +223,7 @@ impl Engine {
         })?)
     }
 
-    /// Weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
+    /// Exports the weights of one model as NPZ, which `scipy.sparse.load_npz` reads.
     ///
     /// # Errors
     /// If the models are not bound.
@@ -242,7 +244,7 @@ impl Engine {
         })?)
     }
 
-    /// Project file with the document, and with the page's settings as a JSON object.
+    /// Writes a project file with the document, and with the page's settings as a JSON object.
     ///
     /// # Errors
     /// If no model is open, or the file would be too large.
@@ -272,7 +274,7 @@ impl Engine {
         self.read(|state| flat(state.models().positions()))
     }
 
-    /// Points to bind: vertices of all models, then points of their rigs. `[n_points, 3]`
+    /// Returns the points to bind: vertices of all models, then points of their rigs. `[n_points, 3]`
     ///
     /// # Errors
     /// If the rig cannot be read.
@@ -285,8 +287,8 @@ impl Engine {
         })?)
     }
 
-    /// Geometry that a cage should enclose: positions and triangles of the models at rest, with each morph target, and
-    /// in the frames of `clip` if it is given. `[n, 3]` each
+    /// Returns the geometry that a cage should enclose: positions and triangles of the models at rest, with each morph
+    /// target, and in the frames of `clip` if it is given. `[n, 3]` each
     ///
     /// # Errors
     /// If no model has this clip.
@@ -320,8 +322,8 @@ impl Engine {
 }
 
 impl Engine {
-    /// A posed capture of splats, or a posed point cloud, as a file; `None` for other models. Stores a notice of what
-    /// the format loses.
+    /// Exports a posed capture of splats, or a posed point cloud, as a file; `None` for other models. Stores a notice
+    /// of what the format loses.
     fn posed_capture(&self, id: u32, format: ModelFormat) -> Answer<Option<Vec<u8>>> {
         let (bytes, lost) = self.read(|state| {
             let model = &state.models().get(id)?.model;
@@ -350,7 +352,7 @@ impl Engine {
         Err(Fault::new(ErrorName::Error, reason))
     }
 
-    /// A posed model as GLB, and notices about its rig.
+    /// Exports a posed model as GLB; also returns notices about its rig.
     pub(super) fn posed_glb(&self, id: u32, request: &JsRigOptions) -> Answer<(Vec<u8>, Vec<String>)> {
         let pose = self.read(|state| state.pose().to_vec());
         if let Some((bytes, report)) = self.reshaped(id, &pose, &[], request)? {
@@ -366,7 +368,8 @@ impl Engine {
         })
     }
 
-    /// A model as GLB whose morph targets are the frames of a clip, each frame deformed by the cage; and notices.
+    /// Exports a model as GLB whose morph targets are the frames of a clip, each deformed by the cage; also returns
+    /// notices.
     fn baked(&self, id: u32, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
         let field = self.field()?;
         self.read(|state| {
@@ -381,8 +384,8 @@ impl Engine {
         })
     }
 
-    /// Bytes and report of a rigged model in a pose of the cage, with `poses` as morph targets. `None` if the model has
-    /// no rig, or the options omit it.
+    /// Exports a rigged model in a pose of the cage, with `poses` as morph targets. Returns the bytes of the file and a
+    /// report. `None` if the model has no rig, or the options omit it.
     fn reshaped(
         &self,
         id: u32,
@@ -431,7 +434,7 @@ impl Engine {
         })
     }
 
-    /// Options for exporting the rig of a model. With several models, joints with the same name get the same
+    /// Builds the options for exporting the rig of a model. With several models, joints with the same name get the same
     /// displacement, and the lowest point of all models determines the ground.
     fn of_rig(&self, pose: &[Vec3], request: &JsRigOptions) -> Answer<ReshapeOptions> {
         // Only `export_poses` writes saved poses, which can become expressions.
@@ -478,7 +481,8 @@ impl Engine {
         Ok(options)
     }
 
-    /// Vertices of all models in each of the cage's `poses`; their rest positions if the models are not bound.
+    /// Computes the vertices of all models in each of the cage's `poses`; their rest positions if the models are not
+    /// bound.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let (rest, controls) =
             self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
@@ -514,7 +518,7 @@ impl MovedModel {
         Ok(Self { model, rows, outside })
     }
 
-    /// Displacements of the model's vertices and of the points of its rig.
+    /// Computes the displacements of the model's vertices and of the points of its rig.
     fn by(&self, state: &State, pose: &[Vec3]) -> Answer<Vec<DVec3>> {
         let rest = &state.rest().positions;
         match &self.rows {
@@ -540,7 +544,7 @@ struct ModelRows {
 }
 
 impl State {
-    /// Weights of one model; `None` before a bind.
+    /// Copies the weights of one model; `None` before a bind.
     fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<ModelRows>> {
         let Some(all) = session.weights() else { return Ok(None) };
         let n = self.models().positions().len();

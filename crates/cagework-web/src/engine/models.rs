@@ -142,8 +142,8 @@ impl Engine {
         }))
     }
 
-    /// Brush radius of [`Engine::paint`] at the pointer, in CSS pixels; undefined if `paint` would have no effect
-    /// there.
+    /// Returns the brush radius of [`Engine::paint`] at the pointer, in CSS pixels; undefined if `paint` would have no
+    /// effect there.
     ///
     /// # Errors
     /// Without weights, or while the GPU is busy.
@@ -159,8 +159,8 @@ impl Engine {
 }
 
 impl State {
-    /// The surface point of a model under the pointer, and the brush radius in object units. `None` if the pointer is
-    /// on another model or on no model.
+    /// Finds the surface point of a model under the pointer, and the brush radius in object units. `None` if the
+    /// pointer is on another model or on no model.
     fn touched(&self, id: u32, [x, y]: [f32; 2], radius: f32) -> Option<(Vec3, f32)> {
         let (at, posed) = (self.pointer(x, y), &self.held.posed);
         if posed.len() != self.models().positions().len() {

@@ -105,9 +105,9 @@ impl Engine {
         Ok(())
     }
 
-    /// Half axes and angle, radians, of three ellipses on the screen: the splat nearest to the pointer at rest, the
-    /// unit sphere's image under the deformation gradient at this splat, and the splat in the pose. `[3, 3]`; empty if
-    /// the pointer is not on a capture.
+    /// Returns half axes and angle, radians, of three ellipses on the screen: the splat nearest to the pointer at rest,
+    /// the unit sphere's image under the deformation gradient at this splat, and the splat in the pose. `[3, 3]`; empty
+    /// if the pointer is not on a capture.
     #[wasm_bindgen(js_name = outlinesAt)]
     #[must_use]
     pub fn outlines_at(&self, x: f32, y: f32) -> Vec<f32> {
@@ -123,7 +123,7 @@ impl Engine {
         found.ok().flatten().map_or_else(Vec::new, |all| all.map(flat).concat())
     }
 
-    /// Vertices during playback, computed on the CPU for tests and pictures. `[n_vertices, 3]`
+    /// Computes the vertices during playback on the CPU, for tests and pictures. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = clipPositions)]
     #[must_use]
     pub fn clip_positions(&self) -> Vec<f32> {
@@ -219,8 +219,8 @@ impl Engine {
         Ok(self.read(|state| Playback::new(&state.editor, options, parts, field)))
     }
 
-    /// Motion of one model: that of its export, or with `dynamic` that of the original file, which the cage then
-    /// deforms.
+    /// Prepares the motion of one model: the motion of its export or, with `dynamic`, of the original file, which the
+    /// cage then deforms.
     fn part(&self, id: u32, request: &JsRigOptions) -> Answer<ModelMotion> {
         let is_gltf =
             self.read(|state| Answer::Ok(state.models().get(id)?.model.format() == ModelFormat::Gltf))?;
@@ -242,7 +242,7 @@ impl Engine {
         })
     }
 
-    /// The displacement field of the posed cage.
+    /// Computes the displacement field of the posed cage.
     ///
     /// # Errors
     /// If the lattice is not available.

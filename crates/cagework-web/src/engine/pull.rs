@@ -19,8 +19,8 @@ use crate::views::optional;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Surface point under the pointer; undefined if the pointer is not on a model, without weights, during playback,
-    /// or while the GPU is busy.
+    /// Finds the surface point under the pointer; undefined if the pointer is not on a model, without weights, during
+    /// playback, or while the GPU is busy.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     #[must_use]
     pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
@@ -28,7 +28,7 @@ impl Engine {
         optional(found)
     }
 
-    /// Posed position of a surface point; empty if the point does not exist. `[3]`
+    /// Returns the posed position of a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
     /// If `point` is not a surface point. Without weights, or while the GPU is busy.
@@ -42,9 +42,9 @@ impl Engine {
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
-    /// Weights of the controls at the points of a pull, `[n, n_controls]`, and the nearest vertex of the model for each
-    /// point, or 2^32 - 1 for a vertex of the cage. The points are `grabs`, then all pins except the one under the
-    /// pointer.
+    /// Returns the weights of the controls at the points of a pull, `[n, n_controls]`, and the nearest vertex of the
+    /// model for each point, or 2^32 - 1 for a vertex of the cage. The points are `grabs`, then all pins except the one
+    /// under the pointer.
     ///
     /// # Errors
     /// If `grabs` are neither surface points nor vertices. Without weights, or while the GPU is busy.
@@ -66,9 +66,9 @@ impl Engine {
         Ok(Array::of2(&rows, &Uint32Array::from(seeds.as_slice())).into())
     }
 
-    /// The pins after a click. A pin under the pointer is removed. If there is none and `may_pin` is set, a pin is
-    /// added at the surface point under the pointer. Undefined if nothing changes, without weights, or while the GPU
-    /// is busy.
+    /// Returns the pins after a click. A pin under the pointer is removed. If no pin is there and `may_pin` is set, a
+    /// pin is added at the surface point under the pointer. Undefined if nothing changes, without weights, or while the
+    /// GPU is busy.
     #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
     #[must_use]
     pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
@@ -76,8 +76,8 @@ impl Engine {
         optional(pins.ok().flatten())
     }
 
-    /// Vertex nearest to the mirror image of a surface point. Undefined if no vertex is near the image, or if the
-    /// point is near the mirror plane.
+    /// Finds the vertex nearest to the mirror image of a surface point. Undefined if no vertex is near the image, or if
+    /// the point is near the mirror plane.
     ///
     /// # Errors
     /// If `point` is not a `SurfacePoint`.

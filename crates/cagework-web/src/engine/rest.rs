@@ -31,7 +31,7 @@ impl Engine {
         });
     }
 
-    /// Number of vertices outside the dragged cage, in a sample of the models' vertices that is small enough to be
+    /// Counts the vertices outside the dragged cage, in a sample of the models' vertices that is small enough to be
     /// tested at every pointer event. The check of all vertices runs after the drag.
     #[must_use]
     pub fn strays(&self) -> u32 {

@@ -62,7 +62,8 @@ impl Engine {
 }
 
 impl Engine {
-    /// The largest weight in a column. `None` while the GPU uploads weights; the page calls `legend` again afterwards.
+    /// Finds the largest weight in a column. `None` while the GPU uploads weights; the page calls `legend` again
+    /// afterwards.
     fn largest_weight(&self, column: u32) -> Option<Largest> {
         self.with_session(|session| {
             let weights =

@@ -28,8 +28,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Vertices of the picked cage element, whose type the tools select: a vertex or an edge within `radius` CSS
-    /// pixels of the pointer, or the face under the pointer. Empty if there is none.
+    /// Returns the vertices of the picked cage element, whose type the tools select: a vertex or an edge within
+    /// `radius` CSS pixels of the pointer, or the face under the pointer. Empty if there is none.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {

@@ -281,7 +281,8 @@ fn separate(rig: &Rig<'_>, edit: &mut Edit<'_>) {
     }
 }
 
-/// Inverse bind matrices that keep each skinning matrix, `B' = G'^-1 G B`, rounded to f32.
+/// Writes inverse bind matrices that keep each skinning matrix, `B' = G'^-1 G B`. Returns those of all skins, rounded
+/// to f32.
 fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u32, Vec<DMat4>> {
     let mut all = rig.binds.clone();
     let mut numbers: Vec<u32> = all.keys().copied().collect();
