@@ -15,7 +15,7 @@ const RUNS: usize = 201;
 /// Number of vertices of the model.
 const VERTICES: usize = 30_000;
 
-/// Copies of the test animal side by side, truncated to [`VERTICES`] vertices.
+/// Builds a model of copies of the test animal side by side, truncated to [`VERTICES`] vertices.
 fn model() -> Model {
     let animal = creature();
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());

@@ -29,7 +29,7 @@ const SIZE: [u32; 2] = [1280, 800];
 /// Number of vertices of the mesh.
 const VERTICES: usize = 50_000;
 
-/// Four copies of the animal, scaled by 1.0 to 0.94, truncated to [`VERTICES`] vertices.
+/// Builds a mesh of four copies of the animal, scaled by 1.0 to 0.94, truncated to [`VERTICES`] vertices.
 fn mesh() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let animal = creature();
     let center = animal.positions.iter().sum::<Vec3>() / animal.positions.len() as f32;

@@ -67,7 +67,7 @@ impl Input {
         bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
     }
 
-    /// The grid levels of the input's cage by the embedded method. `grid`: cells along the cage's longest side.
+    /// Builds the grid levels of the input's cage for the embedded method. `grid`: cells along the cage's longest side.
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
@@ -75,7 +75,7 @@ impl Input {
         Hierarchy::new(&embedding.boundaries((&self.cage).into()), self.cage.n_vertices())
     }
 
-    /// Sampling stencils of the input's points on the finest level.
+    /// Computes the sampling stencils of the input's points on the finest level.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
         let overlaps = Overlaps::default();
@@ -122,7 +122,8 @@ pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
         .collect()
 }
 
-/// Minimum time of several calls, milliseconds. The minimum is robust against other load on the machine.
+/// Makes several calls and returns the shortest time of a call, milliseconds. Other load on the machine affects the
+/// shortest time least.
 pub fn fastest_ms(times: usize, mut call: impl FnMut()) -> f64 {
     let measured = (0..times.max(1)).map(|_| {
         let begin = Instant::now();

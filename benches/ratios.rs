@@ -12,7 +12,7 @@ const TIMES: usize = 60;
 /// Number of repetitions of binds that take seconds.
 const TIMES_SLOW: usize = 3;
 
-/// Sum over all batches of the minimum time of `call(batch)`, ms. The batches are called in turn, so that each batch
+/// Sums the shortest time of `call(batch)` over all batches, ms. The batches are called in turn, so that each batch
 /// finds the processor's caches as the previous batch left them.
 fn fastest_sum_ms(n_batches: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut fastest = vec![f64::INFINITY; n_batches];

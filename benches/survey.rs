@@ -234,7 +234,7 @@ const COLUMNS: [(&str, Total); 12] = [
     ("ms", largest),
 ];
 
-/// Number of positive values in a column.
+/// Counts the positive values in a column.
 fn count(of: &[f64]) -> f64 {
     of.iter().filter(|&&x| x > 0.0).count() as f64
 }
@@ -320,8 +320,8 @@ fn row(model: &TriMesh, target: u32) -> [f64; COLUMNS.len()] {
     ]
 }
 
-/// Angles in degrees between the normals of adjacent triangles: across each diagonal of a face, and across each edge
-/// the largest angle over all triangulations of its two faces.
+/// Measures the angles, in degrees, between the normals of adjacent triangles: across each diagonal of a face, and
+/// across each edge the largest angle over all triangulations of its two faces.
 fn folds(mesh: &PolygonMesh) -> Vec<f64> {
     let normal = |[a, b, c]: [u32; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.positions[v as usize].as_dvec3());

@@ -48,7 +48,7 @@ fn main() {
     times(splats, cage, &weights, &Team::new(threads));
 }
 
-/// Three test poses, each as its name and the posed positions of the cage's vertices. `diagonal`: length that
+/// Makes three test poses, each with its name and the posed positions of the cage's vertices. `diagonal`: length that
 /// displacements are relative to.
 fn poses(cage: &Cage, diagonal: f32) -> [(&'static str, Vec<Vec3>); 3] {
     let rest = cage.positions();
@@ -110,7 +110,7 @@ fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
     }
 }
 
-/// Vector from a splat's centre along its longest axis, sqrt(3) standard deviations long.
+/// Returns the vector from a splat's centre along its longest axis, sqrt(3) standard deviations long.
 fn half_axis(splats: &Splats, splat: usize) -> Vec3 {
     let axes = splats.axes(splat).to_cols_array_2d().map(Vec3::from_array);
     let longest = axes.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));

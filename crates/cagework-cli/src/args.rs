@@ -325,13 +325,13 @@ impl FromStr for ModelOutput {
     }
 }
 
-/// Help text of a model argument: `what`, followed by the supported file extensions.
+/// Composes the help text of a model argument: `what`, followed by the supported file extensions.
 fn model_help(what: &str) -> String {
     let endings = ModelFormat::ALL.map(|format| format.facts().endings).concat().join(", .");
     format!("{what} (.{endings})")
 }
 
-/// Parser of an option whose value is one word of a fixed set.
+/// Returns a parser of an option whose value is one word of a fixed set.
 fn words<T>() -> impl TypedValueParser<Value = T>
 where
     T: Choice + FromStr<Err: Error + Send + Sync> + Send + Sync,
@@ -340,7 +340,7 @@ where
     PossibleValuesParser::new(values).try_map(|word| word.parse::<T>())
 }
 
-/// Parser of a number that must be within the range of `option`.
+/// Returns a parser of a number that must be within the range of `option`.
 fn number<T>(option: Number) -> impl TypedValueParser<Value = T>
 where
     T: FromStr + Into<f64> + Copy + Send + Sync + 'static,

@@ -116,8 +116,8 @@ fn text(summary: &CheckSummary) -> String {
     out
 }
 
-/// Text that names the first faulty edge, face or vertex. `None` for self-intersections, whose message already names
-/// the faces.
+/// Returns text that names the first faulty edge, face or vertex. `None` for self-intersections, whose message already
+/// names the faces.
 fn place(p: &cagework_cage::check::Problem) -> Option<String> {
     if p.code == Code::SelfIntersection {
         return None;

@@ -95,7 +95,7 @@ pub(crate) fn rest_of(cage: &Cage, saved: &SavedWeights) -> Vec<Vec3> {
     [cage.positions(), &saved.inner_controls].concat()
 }
 
-/// Text such as " and 2 inner controls", which follows the number of cage vertices; empty if `n` is 0.
+/// Returns text such as " and 2 inner controls", which follows the number of cage vertices; empty if `n` is 0.
 pub(crate) fn inner_controls_text(n: usize) -> String {
     match n {
         0 => String::new(),

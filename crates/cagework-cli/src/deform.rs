@@ -39,7 +39,7 @@ struct DeformSummary {
     /// Length of the animation; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     animation_seconds: Option<f32>,
-    /// Changes of skeleton, morph targets and clips; `None` if the model has no rig or `--static` drops it.
+    /// Changes to skeleton, morph targets and clips; `None` if the model has no rig or `--static` drops it.
     #[serde(flatten)]
     rig: Option<ReshapeReport>,
     /// Time to compute all poses, without reading and writing files, ms.
@@ -223,8 +223,8 @@ fn check_names(args: &DeformArgs) -> Result<(), CliError> {
     }
 }
 
-/// Time at which the animation shows each pose; `None` if the output gets no animation: for a single pose, and for
-/// expressions without `--times` and `--interpolation`. `seconds`: key times of the poses that are keyframes.
+/// Returns the times at which the animation shows the poses; `None` if the output gets no animation: for a single pose,
+/// and for expressions without `--times` and `--interpolation`. `seconds`: key times of the poses that are keyframes.
 fn timeline(args: &DeformArgs, seconds: &[f32], n_poses: usize) -> Result<Option<Timeline>, CliError> {
     let DeformArgs { times, interpolation, .. } = args;
     let is_plain = times.is_empty() && interpolation.is_none();
@@ -361,7 +361,7 @@ pub(crate) fn load_weights(
     })
 }
 
-/// Name of a pose: its file name without folder and extension.
+/// Returns the name of a pose: its file name without folder and extension.
 pub(crate) fn pose_name(path: &Path) -> String {
     path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
 }

@@ -71,13 +71,13 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
     print(&text(folder, &sample, &posed_cage, &binding.report, &files.written, total_ms))
 }
 
-/// File name of a pose: its name as lower-case words joined by hyphens.
+/// Returns the file name of a pose: its name as lower-case words joined by hyphens.
 fn file_stem(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// Writes files into one folder, and records their paths.
+/// Writer of files into one folder, which records their paths.
 struct Files<'a> {
     folder: &'a Path,
     written: Vec<PathBuf>,

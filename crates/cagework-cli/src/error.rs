@@ -78,7 +78,7 @@ impl CliError {
         Self::File { path: path.to_path_buf(), source: source.into() }
     }
 
-    /// The error and its chain of causes, each cause once.
+    /// Returns the error's message, followed by its chain of causes, each cause once.
     pub(crate) fn message(&self) -> String {
         let mut text = self.to_string();
         let mut cause = self.source();
@@ -93,7 +93,7 @@ impl CliError {
         text
     }
 
-    /// Advice about what the user can do.
+    /// Returns advice about what the user can do.
     pub(crate) fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Mismatch { hint, .. } => Some(hint),

@@ -174,8 +174,8 @@ pub(crate) fn field_of_deform(args: &DeformArgs, model: &Model) -> Result<(Cage,
     Ok((cage.cage, field))
 }
 
-/// The field of a pose of a cage. `held`: memory in use, bytes. `cells`: number of lattice cells along the longest
-/// side.
+/// Computes the field of a pose of a cage. `held`: memory in use, bytes. `cells`: number of lattice cells along the
+/// longest side.
 fn field_of(
     cage: &LoadedCage,
     pose: &Path,

@@ -95,7 +95,8 @@ fn record_input(path: &Path) {
     INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner).push(FileIdentity::new(path));
 }
 
-/// Options for opening files to read. They are non-blocking, because opening a pipe would otherwise wait for a writer.
+/// Returns the options for opening files to read. Opening is non-blocking, because opening a pipe would otherwise wait
+/// for a writer.
 fn to_read() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.read(true).nonblock(true);

@@ -114,8 +114,8 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Targets of all vertices of the bound model: the vertices of `target` with the same indices. Vertices outside the
-/// cage get importance 0.
+/// Collects the targets of all vertices of the bound model: the vertices of `target` with the same indices. Vertices
+/// outside the cage get importance 0.
 fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, CliError> {
     let (given, expected) = (target.positions.len(), bound.model.positions.len());
     if given != expected {
@@ -144,7 +144,8 @@ fn vertices(bound: &BoundModel, target: Model, areas: &[f64]) -> Result<Goals, C
     Ok(Goals { weights: bound.rows(), importance, to: target.positions, notices })
 }
 
-/// Weighted root mean square and maximum of the distances of points from their targets, both divided by `size`.
+/// Computes the weighted root mean square and maximum of the distances of points from their targets, both divided by
+/// `size`.
 fn distances(weights: &Weights, cage: &[Vec3], importance: &[f64], to: &[Vec3], size: f64) -> (f64, f64) {
     let (mut sum, mut total, mut largest) = (0.0, 0.0, 0.0_f64);
     for (((indices, data), share), to) in
@@ -184,7 +185,7 @@ fn text(summary: &FitSummary) -> String {
     out
 }
 
-/// An error about a file with valid JSON but invalid values.
+/// Creates an error about a file with valid JSON but invalid values.
 fn wrong(path: &std::path::Path, what: &str) -> CliError {
     CliError::Mismatch {
         message: format!("{}: {what}", shown_path(path)),

@@ -174,8 +174,8 @@ fn median(mut numbers: Vec<f32>) -> f32 {
     if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
-/// World position with Y up. Along axes on which the origin is 0, converts the `f32` through its shortest decimal, so
-/// that 0.1 in the file is printed as 0.1.
+/// Converts a position to world coordinates with Y up. Along axes on which the origin is 0, converts the `f32` through
+/// its shortest decimal, so that 0.1 in the file is printed as 0.1.
 fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     let origin = model.up().vector_turned(model.origin()).to_array();
     let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
@@ -261,8 +261,7 @@ fn text(info: &Info) -> String {
     out
 }
 
-/// The names separated by commas. After [`MAX_LISTED_NAMES`], only the number of further names follows; `--json` lists
-/// all.
+/// Joins names with commas. After [`MAX_LISTED_NAMES`], only the number of further names follows; `--json` lists all.
 fn listed(names: &[String]) -> String {
     let first = escaped(&names[..names.len().min(MAX_LISTED_NAMES)].join(", "));
     match names.len().saturating_sub(MAX_LISTED_NAMES) {

@@ -41,7 +41,7 @@ pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<
     Ok(model)
 }
 
-/// The faces of a model as a polygon mesh, not yet checked to be a valid cage.
+/// Returns the faces of a model as a polygon mesh, without checking that it is a valid cage.
 ///
 /// # Errors
 /// If the model has more than [`MAX_FACES`] faces.
@@ -67,7 +67,7 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
 /// Reads a model, or a glTF of clips without triangles.
 ///
 /// # Errors
-/// As [`load_any`].
+/// The errors of [`load_any`].
 pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let mut beside = |relative: &str| read_beside(path, relative);
@@ -149,8 +149,8 @@ pub(crate) fn load_cage_file(
     LoadedCage::new(model, up, memory, controls)
 }
 
-/// Vertices and triangles of a model that a cage should enclose: at rest, in its morph targets and in the frames of a
-/// clip.
+/// Collects the vertices and triangles of a model that a cage should enclose: at rest, in its morph targets and in the
+/// frames of a clip.
 ///
 /// # Errors
 /// If the model has no clip with this name.
@@ -171,8 +171,8 @@ pub(crate) fn generate_for(
     Ok((made.cage.to_polygon_mesh(), made.report))
 }
 
-/// A subdivided box around positions. `margin`: distance from the box to the positions, as a fraction of their bounding
-/// box's diagonal.
+/// Builds a subdivided box around positions. `margin`: distance from the box to the positions, as a fraction of their
+/// bounding box's diagonal.
 ///
 /// # Errors
 /// If `positions` is empty, or the box overflows or degenerates in `f32`.

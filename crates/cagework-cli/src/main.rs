@@ -36,8 +36,8 @@ use args::{Cli, Command};
 use clap::Parser as _;
 
 /// Allocator that reuses large freed blocks. A bind allocates and frees about 30 MB within milliseconds. The system
-/// allocator returned such blocks to the kernel each time, and the resulting page faults took a fifth of the bind's
-/// time at g = 64.
+/// allocator returns such blocks to the kernel each time, and the resulting page faults would take a fifth of the
+/// bind's time at g = 64.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -26,7 +26,7 @@ pub(crate) struct BoundModel {
 }
 
 impl BoundModel {
-    /// The weights with the [`Frames`] folded in, so that deformed positions are linear in the positions of the
+    /// Returns the weights with the [`Frames`] folded in, so that deformed positions are linear in the positions of the
     /// controls. `[n_vertices, n_controls]`
     pub(crate) fn rows(&self) -> Weights {
         self.frames.folded(&self.weights)

@@ -181,7 +181,7 @@ fn check_pictures(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Positions of the vertices at each time of the clip; empty without a clip. `[n_times][n_vertices]`
+/// Computes the positions of the vertices at each time of the clip; empty without a clip. `[n_times][n_vertices]`
 fn frames(args: &RenderArgs, model: &Model) -> Result<Vec<Vec<Vec3>>, CliError> {
     let Some(name) = &args.clip else { return Ok(Vec::new()) };
     let clips = model.clips();
@@ -244,8 +244,8 @@ fn half(width: u32) -> u32 {
     (width - DIVIDER_WIDTH) / 2
 }
 
-/// Points on the rims of a vertical cylinder that contains `points`. Its axis goes through the centre of their bounding
-/// box.
+/// Returns points on the rims of a vertical cylinder that contains `points`. Its axis goes through the centre of their
+/// bounding box.
 fn cylinder(points: &[Vec3]) -> Vec<Vec3> {
     let Some(bounds) = Bounds::of(points) else { return Vec::new() };
     let middle = bounds.center();
@@ -266,7 +266,7 @@ fn beside(pictures: &[Vec<u8>], part: u32, divider: u32) -> Vec<u8> {
     rows.flat_map(|parts| parts.join(line.as_slice())).collect()
 }
 
-/// Scene options that depend only on the arguments.
+/// Returns the scene options that depend only on the arguments.
 fn scene_of(args: &RenderArgs) -> SceneOptions {
     let column = args.column;
     let mesh = match args.show {

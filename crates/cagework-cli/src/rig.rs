@@ -40,7 +40,7 @@ pub(crate) fn write(
     model.write_reshaped(&rest, outside, &poses, options).map_err(wrong)
 }
 
-/// Points to bind: the vertices, then the points of the rig. Also returns the number of points of the rig.
+/// Lists the points to bind: the vertices, then the points of the rig. Also returns the number of points of the rig.
 ///
 /// # Errors
 /// If the rig cannot be read.

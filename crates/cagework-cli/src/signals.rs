@@ -32,8 +32,8 @@ impl Drop for CancelGuard {
 
 /// Installs the signal handlers. The first Ctrl-C, SIGTERM or SIGHUP cancels the work if an operation polls for it.
 /// Otherwise, these signals end the process through `abandon`, which deletes the partial file. A second such signal,
-/// SIGQUIT, SIGXCPU and SIGUSR1 always end the process in this way. SIGXFSZ (`ulimit -f`) is ignored, so that the write
-/// fails with an error.
+/// as well as SIGQUIT, SIGXCPU and SIGUSR1, always ends the process in this way. SIGXFSZ (`ulimit -f`) is ignored, so
+/// that the write fails with an error.
 #[cfg(unix)]
 pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU, SIGXFSZ};

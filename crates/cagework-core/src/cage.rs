@@ -90,8 +90,9 @@ impl Cage {
         Ok(Self::assembled(mesh.positions.clone(), faces, polygons, component, bounds, notices))
     }
 
-    /// This cage with walls inside it: additional faces that are not checked and need not enclose a volume. A face has
-    /// values on its outer side only. A wall with values on both sides has each face twice, with opposite orientations.
+    /// Returns this cage with walls inside it: additional faces that are not checked and need not enclose a volume. A
+    /// face has values on its outer side only. A wall with values on both sides has each face twice, with opposite
+    /// orientations.
     ///
     /// `positions`: additional vertices, appended to those of the cage; `faces`: vertex indices into the combined list;
     /// `parts`: index of the connected component of each face.
@@ -122,7 +123,7 @@ impl Cage {
         Ok(Self::assembled(all, faces, polygons, parts, self.bounds, self.notices.clone()))
     }
 
-    /// A cage from faces that have been checked.
+    /// Builds a cage from faces that have been checked.
     fn assembled(
         positions: Vec<Vec3>,
         faces: Vec<Vec<u32>>,
@@ -269,10 +270,10 @@ impl Cage {
         PolygonMesh { positions: self.positions.clone(), faces: self.faces.clone() }
     }
 
-    /// Dirichlet values ("hats") of the cage vertices at a point of the surface, given by one of [`Self::facets`] and
-    /// barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. The values sum to 1 and
-    /// reproduce the point; on a bent quad, with an error of up to 2 % of the distance of one corner from the plane of
-    /// the others.
+    /// Computes the Dirichlet values ("hats") of the cage vertices at a point of the surface, given by one of
+    /// [`Self::facets`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. The
+    /// values sum to 1 and reproduce the point; on a bent quad, with an error of up to 2 % of the distance of one
+    /// corner from the plane of the others.
     ///
     /// Hats are linear on triangles. On convex planar quads they are the coordinates of Meyer et al. 2002 (bilinear on
     /// a rectangle), blended with pseudo-harmonic coordinates if a corner is nearly straight. On all other planar
@@ -313,7 +314,7 @@ impl Cage {
     }
 }
 
-/// Triangulation of a face, as indices of its corners. `diagonal`: diagonal of the cage, object units.
+/// Triangulates a face. Returns triangles as indices of its corners. `diagonal`: diagonal of the cage, object units.
 pub fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Polygon::new(corners, diagonal).map(|polygon| polygon.triangles)
 }

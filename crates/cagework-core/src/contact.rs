@@ -1,7 +1,8 @@
 //! Intersection of triangles of one surface, apart from shared vertices and edges.
 //!
-//! Triangles without common vertices meet if they are at most a gap apart (separating axes). Triangles with one common
-//! vertex meet if they also touch elsewhere, and triangles with a common edge if they are folded onto each other.
+//! Triangles without common vertices meet if they are at most the distance `gap` apart (separating axes). Triangles
+//! with one common vertex meet if they also touch elsewhere, and triangles with a common edge if they are folded onto
+//! each other.
 
 use std::ops::ControlFlow;
 
@@ -58,7 +59,7 @@ impl Corners {
         (shared == 2).then(|| self.normal().normalize_or_zero().dot(other.normal().normalize_or_zero()))
     }
 
-    /// The triangle with a vertex moved to `at`.
+    /// Returns the triangle with a vertex moved to `at`.
     pub fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
         let mut moved = *self;
         for (i, p) in moved.index.iter().zip(&mut moved.at) {
@@ -69,7 +70,7 @@ impl Corners {
         moved
     }
 
-    /// Corners in cyclic order from corner `k`.
+    /// Returns the corners in cyclic order from corner `k`.
     fn turned_to(&self, k: usize) -> [DVec3; 3] {
         [self.at[k], self.at[(k + 1) % 3], self.at[(k + 2) % 3]]
     }
@@ -100,15 +101,15 @@ pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     }
 }
 
-/// Sort key by `x` (`f64::total_cmp`), then by `number`. It is a `[u32; 3]`, which the crate also sorts elsewhere: the
-/// sort of another type would be compiled separately and add 2 kB to the wasm module.
+/// Returns a sort key by `x` (`f64::total_cmp`), then by `number`. It is a `[u32; 3]`, which the crate also sorts
+/// elsewhere: the sort of another type would be compiled separately and add 2 kB to the wasm module.
 fn ascending(x: f64, number: u32) -> [u32; 3] {
     let bits = x.to_bits();
     let key = if bits >> 63 == 1 { !bits } else { bits | 1 << 63 };
     [(key >> 32) as u32, key as u32, number]
 }
 
-/// Pairs of triangles of one surface that [`meet`], each once, in order; at most 100,000.
+/// Lists the pairs of triangles of one surface that [`meet`], each once, in order; at most 100,000.
 pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     each_meeting(triangles, |pair| {

@@ -82,8 +82,8 @@ impl<'a> Controls<'a> {
         self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
     }
 
-    /// Edges of the inner controls, and three edges from each inner control to the nearest cage triangle, so that all
-    /// controls are connected.
+    /// Returns the edges of the inner controls, and three edges from each inner control to the nearest cage triangle,
+    /// so that all controls are connected.
     #[must_use]
     pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let Some(inner) = self.inner() else { return Vec::new() };
@@ -106,7 +106,7 @@ impl<'a> Controls<'a> {
         self.origins.map_or(Some(face), |origins| origins[face as usize])
     }
 
-    /// Dirichlet values at a point of the surface, given by one of the surface's facets (`triangle`, see
+    /// Computes the Dirichlet values at a point of the surface, given by one of the surface's facets (`triangle`, see
     /// [`Cage::facets`]) and barycentric coordinates in it. Calls `each(control, value)` for non-zero values, possibly
     /// several times per control. All values sum to 1.
     ///

@@ -58,8 +58,8 @@ impl Coordinates {
         self.row().2.map_or(cage.n_vertices(), |form| form.n_columns(cage))
     }
 
-    /// Vectors that the columns multiply, for controls at `positions`: the positions themselves or, for forms with
-    /// columns for triangles, the cage's vertices and one vector per triangle.
+    /// Returns the vectors that the columns multiply, for controls at `positions`: the positions themselves or, for
+    /// forms with columns for triangles, the cage's vertices and one vector per triangle.
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.
@@ -71,7 +71,8 @@ impl Coordinates {
         }
     }
 
-    /// Coordinates at `points` (`[n_points]`, object units) by a closed form, dense. `[n_points, n_columns]`
+    /// Computes the coordinates at `points` (`[n_points]`, object units) by a closed form. All entries are stored.
+    /// `[n_points, n_columns]`
     ///
     /// # Errors
     /// [`ClosedFormError`]: the kind has no closed form, a point is not finite or has no coordinates, the weights

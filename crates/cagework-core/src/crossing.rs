@@ -30,22 +30,22 @@ pub struct Crossings {
     pub message: String,
 }
 
-/// Notices about a cage, one sentence each: repairs and self-intersections.
+/// Returns notices about a cage, one sentence each: repairs and self-intersections.
 #[must_use]
 pub fn notices(cage: &Cage) -> Vec<String> {
     let crossing = crossings_of(cage).map(|found| found.message);
     cage.notices().iter().map(ToString::to_string).chain(crossing).collect()
 }
 
-/// Intersecting faces of a cage; `None` if none are found.
+/// Finds the intersecting faces of a cage; `None` if none are found.
 #[must_use]
 pub fn crossings_of(cage: &Cage) -> Option<Crossings> {
     let all: Vec<u32> = (0..cage.faces().len() as u32).collect();
     crossings(&cage.to_polygon_mesh(), Some(cage.component_of_face()), &all)
 }
 
-/// Intersecting faces among the faces with the indices `sound`, which must be valid. `parts`: component of each face of
-/// a cage. `None` if none are found.
+/// Finds the intersecting faces among the faces with the indices `sound`, which must be valid. `parts`: component of
+/// each face of a cage. `None` if none are found.
 #[must_use]
 pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Option<Crossings> {
     let mut of_parts = parts.is_some();
@@ -80,7 +80,7 @@ pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Op
     })
 }
 
-/// Triangulation of the valid faces, with the face of each triangle.
+/// Triangulates the valid faces. Also returns the face of each triangle.
 fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     let diagonal = mesh.diagonal();
     let (mut triangles, mut face_of) = (Vec::new(), Vec::new());
@@ -111,13 +111,13 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// A point near the intersection of two triangles: the centre of the overlap of their bounding boxes.
+/// Returns a point near the intersection of two triangles: the centre of the overlap of their bounding boxes.
 fn between(a: &Corners, b: &Corners) -> DVec3 {
     0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
-/// For each vertex, the first vertex at the same position; and the number of vertices at the position of an earlier
-/// vertex.
+/// Returns, for each vertex, the first vertex at the same position, and the number of vertices at the position of an
+/// earlier vertex.
 #[must_use]
 pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     let reach = WELD_DISTANCE * mesh.diagonal();
@@ -153,8 +153,8 @@ pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     (first, joined)
 }
 
-/// Message about intersecting pairs of triangles. `listed`: pairs in the list; `all`: pairs found, a lower bound unless
-/// `complete`. The last argument holds the faces and the location of the first pair.
+/// Composes the message about intersecting pairs of triangles. `listed`: pairs in the list; `all`: pairs found, a lower
+/// bound unless `complete`. The last argument holds the faces and the location of the first pair.
 fn sentence(
     [listed, all]: [usize; 2],
     complete: bool,

@@ -20,8 +20,8 @@ pub struct OutsideVertex {
     pub share: f32,
 }
 
-/// One sentence on the vertices outside a cage with this diagonal (object units): number, distance, and how many stay
-/// in place. `None` if `outside` is empty.
+/// Describes in one sentence the vertices outside a cage with this diagonal (object units): number, distance, and how
+/// many stay in place. `None` if `outside` is empty.
 #[must_use]
 pub fn outside_in_words<'a>(
     outside: impl Iterator<Item = &'a OutsideVertex>,
@@ -49,7 +49,7 @@ pub fn outside_in_words<'a>(
     ))
 }
 
-/// Positions of all mesh vertices for a posed cage: `v' = sum_i w_i(v) c_i'` (Joshi et al. 2007, Eq. 1).
+/// Computes the positions of all mesh vertices for a posed cage: `v' = sum_i w_i(v) c_i'` (Joshi et al. 2007, Eq. 1).
 ///
 /// `cage_positions`: `[n_cage]`, object units. Returns `[n_rows]`.
 ///
@@ -69,7 +69,8 @@ pub fn deform_vertices(weights: &Weights, cage_positions: &[Vec3]) -> Vec<Vec3> 
         .collect()
 }
 
-/// [`deform_vertices`] of a bind's weights, whose columns are the controls and then `frames`.
+/// Computes the positions of bound points, like [`deform_vertices`], from the weights of a bind, whose columns are the
+/// controls and then `frames`.
 ///
 /// `controls`: `[n_controls]`, object units. Returns `[n_rows]`.
 ///
@@ -80,7 +81,7 @@ pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Ve
     deform_vertices(weights, &frames.columns(controls))
 }
 
-/// A pose moves a point beyond the range of 32-bit floats.
+/// Error of a pose that moves a point beyond the range of 32-bit floats.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
     "the pose moves point {point} to {to}, but 32-bit floats end at {:e}: use smaller coordinates",
@@ -93,7 +94,8 @@ pub struct NotFinite {
     pub to: Vec3,
 }
 
-/// [`deform_bound`] of a pose from outside the program.
+/// Computes the positions of bound points, like [`deform_bound`], and checks that they are finite. Meant for poses that
+/// come from outside the program.
 ///
 /// # Errors
 /// [`NotFinite`] for the first point whose position is not finite.
@@ -108,8 +110,8 @@ pub fn deform_finite(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> R
     }
 }
 
-/// Displacement of each bound point: `sum_i w_i (c_i' - c_i)` over all columns. It is exactly zero if no column with a
-/// weight of the point has moved, unlike the difference of two deformed shapes.
+/// Computes the displacement of each bound point: `sum_i w_i (c_i' - c_i)` over all columns. It is exactly zero if no
+/// column with a weight of the point has moved, unlike the difference of two deformed shapes.
 ///
 /// `rest`, `posed`: `[n_controls]`, object units. Returns `[n_rows]`.
 ///
@@ -126,7 +128,7 @@ pub fn displacements(weights: &Weights, frames: &Frames, rest: &[Vec3], posed: &
     weights.rows().map(of_row).collect()
 }
 
-/// Area-weighted unit vertex normals; zero for a vertex without triangles. `[n_vertices]`
+/// Computes area-weighted unit vertex normals; zero for a vertex without triangles. `[n_vertices]`
 #[must_use]
 pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; positions.len()];

@@ -38,15 +38,15 @@ impl Enclosure {
         Self { points: points.to_vec(), cage: cage.clone(), winding }
     }
 
-    /// Points outside the cage in its rest pose, ascending.
+    /// Returns the points outside the cage in its rest pose, ascending.
     #[must_use]
     pub fn outside(&self) -> Vec<u32> {
         let outside = self.winding.iter().enumerate().filter(|(_, w)| **w <= MIN_INSIDE_WINDING);
         outside.map(|(v, _)| v as u32).collect()
     }
 
-    /// Points outside the cage with its vertices at `positions` (`[n_cage]`, object units), ascending. Updates only the
-    /// points near triangles that have changed, by the terms of these triangles.
+    /// Finds the points outside the cage with its vertices at `positions` (`[n_cage]`, object units), ascending.
+    /// Updates only the points near triangles that have changed, by the terms of these triangles.
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.

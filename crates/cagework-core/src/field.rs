@@ -78,7 +78,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice around a cage in its rest pose, with `cells` cells along the longest side of the cage's box.
+    /// Creates the lattice around a cage in its rest pose, with `cells` cells along the longest side of the cage's box.
     #[must_use]
     pub fn new(cage: &Cage, cells: u32) -> Self {
         let (cell, margin, dims) = Self::size(cage, cells);
@@ -89,7 +89,8 @@ impl Lattice {
         lattice
     }
 
-    /// Edge of a cell, cells of the margin on each side, and nodes along each axis.
+    /// Returns the edge of a cell, the number of cells of the margin on each side, and the number of nodes along each
+    /// axis.
     fn size(cage: &Cage, cells: u32) -> (f32, f32, UVec3) {
         let size = cage.bounds().extent();
         let cell = size.max_element() / cells as f32;
@@ -109,23 +110,23 @@ impl Lattice {
         self.origin + self.cell * self.node(index).as_vec3()
     }
 
-    /// Cell that contains a point, clamped to the lattice: its first node, and the point's coordinates in the cell, 0
-    /// to 1.
+    /// Finds the cell that contains a point, clamped to the lattice: its first node, and the point's coordinates in the
+    /// cell, 0 to 1.
     fn place(&self, point: Vec3) -> (usize, Vec3) {
         let at = (point - self.origin) / self.cell;
         let first = at.floor().clamp(Vec3::ZERO, (self.dims - 2).as_vec3());
         (self.index(first.as_uvec3()), (at - first).clamp(Vec3::ZERO, Vec3::ONE))
     }
 
-    /// Cell of a point, as in [`Self::place`]; `None` for points outside the lattice.
+    /// Finds the cell of a point, as in [`Self::place`]; `None` for points outside the lattice.
     pub(crate) fn cell_of(&self, point: Vec3) -> Option<(usize, Vec3)> {
         let at = (point - self.origin) / self.cell;
         let is_inside = at.cmpge(Vec3::ZERO).all() && at.cmple((self.dims - 1).as_vec3()).all();
         is_inside.then(|| self.place(point))
     }
 
-    /// Nodes inside the cage or near it, ascending. A flood fill from the first node spreads over nodes that are
-    /// farther than `BOUND_CELLS` cells from the cage; the nodes that it does not visit are returned.
+    /// Finds the nodes inside the cage or near it, ascending. A flood fill from the first node spreads over nodes that
+    /// are farther than `BOUND_CELLS` cells from the cage; the nodes that it does not visit are returned.
     fn around(&self, cage: &Cage) -> Vec<u32> {
         let n = self.dims.element_product();
         let (origin, cell, reach) = (self.origin.as_dvec3(), f64::from(self.cell), f64::from(BOUND_CELLS));
@@ -261,7 +262,7 @@ impl FieldWeights {
         Self { lattice, weights, frames }
     }
 
-    /// The field of a pose. `rest`, `posed`: positions of the controls, `[n_controls]`, object units.
+    /// Computes the field of a pose. `rest`, `posed`: positions of the controls, `[n_controls]`, object units.
     ///
     /// # Panics
     /// If the lengths do not match the columns of the weights.
@@ -298,7 +299,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field with the given displacements, laid out as in [`Self::values`].
+    /// Creates a field with the given displacements, laid out as in [`Self::values`].
     #[must_use]
     pub fn of_values(lattice: Lattice, values: Vec<Vec4>) -> Self {
         Self { lattice, values, gradients: OnceLock::new() }
@@ -342,7 +343,7 @@ impl Field {
         point + self.displacement(point)
     }
 
-    /// Displacement at a point, and the derivative of the trilinear interpolation there.
+    /// Computes the displacement at a point, and the derivative of the trilinear interpolation there.
     fn linearized(&self, point: DVec3) -> (DVec3, DMat3) {
         let (first, share) = self.lattice.place(point.as_vec3());
         let cell = f64::from(self.lattice.cell);
@@ -362,8 +363,7 @@ impl Field {
         (by, gradient * cell.recip())
     }
 
-    /// Trilinear interpolation of nodal values. A point outside the lattice gets the value at the nearest boundary
-    /// point.
+    /// Interpolates nodal values trilinearly. A point outside the lattice gets the value at the nearest boundary point.
     fn interpolated<T>(&self, point: Vec3, value: impl Fn(usize) -> T) -> T
     where
         T: std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>,
@@ -384,8 +384,8 @@ impl Field {
         self.gradients.get_or_init(|| self.node_gradients())
     }
 
-    /// F - I at each node: central differences, or one-sided ones at the boundary of the lattice and, at bound nodes,
-    /// beside nodes that are not bound.
+    /// Computes F - I at each node by central differences, or by one-sided ones at the boundary of the lattice and, at
+    /// bound nodes, beside nodes that are not bound.
     fn node_gradients(&self) -> Vec<Mat3> {
         let Lattice { dims, cell, .. } = self.lattice;
         let mut gradients = Vec::with_capacity(self.values.len());
@@ -433,8 +433,8 @@ impl Field {
         }
     }
 
-    /// One Gauss-Seidel sweep over the nodes of a stride that are not bound; at stride 1, over [`Lattice::relaxed`].
-    /// Nodes on the lattice's boundary stay 0.
+    /// Performs a Gauss-Seidel sweep over the nodes of a stride that are not bound; at stride 1, over
+    /// [`Lattice::relaxed`]. Nodes on the lattice's boundary stay 0.
     fn relax(&mut self, stride: u32) {
         let dims = self.lattice.dims;
         if stride == 1 {
@@ -486,8 +486,8 @@ impl<'a> InverseField<'a> {
         inverse
     }
 
-    /// The point that [`Field::map`] moves to `target`. `None` if Newton's method does not converge, for example where
-    /// the deformation folds.
+    /// Finds the point that [`Field::map`] moves to `target`. `None` if Newton's method does not converge, for example
+    /// where the deformation folds.
     #[must_use]
     pub fn find(&self, target: Vec3) -> Option<Vec3> {
         let start = self.closest_node(target).map(|node| self.field.lattice.position(node));
@@ -513,7 +513,8 @@ impl<'a> InverseField<'a> {
         (best.0 <= MAX_INVERSE_ERROR * size).then(|| best.1.as_vec3())
     }
 
-    /// The bound node whose deformed position is closest to the target, among those in the 27 cells around the target.
+    /// Finds the bound node whose deformed position is closest to the target, among those in the 27 cells around the
+    /// target.
     fn closest_node(&self, target: Vec3) -> Option<u32> {
         let cell = self.cell_of(target)?;
         let steps = (0..27).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
@@ -530,7 +531,8 @@ impl<'a> InverseField<'a> {
         self.field.lattice.position(node) + self.field.values[node as usize].truncate()
     }
 
-    /// Sorting cell that contains a deformed position. `None` if an index of the cell exceeds `MAX_CELL_INDEX`.
+    /// Returns the sorting cell that contains a deformed position. `None` if an index of the cell exceeds
+    /// `MAX_CELL_INDEX`.
     fn cell_of(&self, position: Vec3) -> Option<IVec3> {
         let lattice = &self.field.lattice;
         let cell = ((position - lattice.origin) / (INVERSE_CELLS * lattice.cell)).floor();

@@ -8,7 +8,8 @@ use glam::DVec3;
 /// usually intended.
 const MAX_EDGES: usize = 64;
 
-/// Closed loops of edges. Each loop has the direction of the majority of its edges. Ignores edges that are in no loop.
+/// Finds the closed loops of edges. Each loop has the direction of the majority of its edges. Ignores edges that are in
+/// no loop.
 pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     // Store edges without direction, as a face next to the hole may be inverted.
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -57,8 +58,8 @@ const FOLD_COST: f64 = 1.0;
 /// Cosine of the angle between two faces above which they are folded onto each other (8 degrees).
 const MAX_FOLD_COSINE: f64 = 0.99;
 
-/// Minimum-area triangulation of an outline, with the outline's orientation. It avoids folding onto the `faces` around
-/// the hole. `None` if the outline has too many corners.
+/// Computes a minimum-area triangulation of an outline, with the outline's orientation. It avoids folding onto the
+/// `faces` around the hole. `None` if the outline has too many corners.
 ///
 /// Source: Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
 pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
@@ -110,8 +111,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
     Some(triangles)
 }
 
-/// For each side of an outline, the unit direction from the side across the neighbouring face. Zero if the side has no
-/// such face.
+/// Returns, for each side of an outline, the unit direction from the side across the neighbouring face. Zero if the
+/// side has no such face.
 fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
     let n = outline.len();
     let key = |a: u32, b: u32| [a.min(b), a.max(b)];

@@ -46,7 +46,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Frames without holds, of a cage with its vertices at `rest`, object units.
+    /// Creates frames without holds, for a cage with its vertices at `rest`, object units.
     #[must_use]
     pub fn of_cage(rest: &[Vec3]) -> Self {
         let rest = || rest.iter().map(|p| p.as_dvec3());
@@ -96,7 +96,8 @@ impl Frames {
         })
     }
 
-    /// Vectors of all columns for controls at `controls` (`[n_controls]`, object units): the controls, then the frames.
+    /// Computes the vectors of all columns for controls at `controls` (`[n_controls]`, object units): the controls,
+    /// then the frames.
     ///
     /// # Panics
     /// If there are fewer controls than these frames refer to.
@@ -121,7 +122,7 @@ impl Frames {
         Cow::Owned(columns)
     }
 
-    /// Position of a joint moved by the cage alone, and the Jacobian of that motion.
+    /// Computes the position of a joint moved by the cage alone, and the Jacobian of that motion.
     fn moved(&self, joint: usize, controls: &[Vec3]) -> (DVec3, DMat3) {
         let n = self.plain.len() / self.joints.len();
         let (mut at, mut matrix) = (DVec3::ZERO, DMat3::ZERO);
@@ -149,8 +150,8 @@ impl Frames {
         turns
     }
 
-    /// Weights of the controls alone that move vertices as `weights` do while no bone rotates, for solvers whose
-    /// unknowns are the controls. Omits constant offsets.
+    /// Folds the columns of the frames into the columns of the controls, for solvers whose unknowns are the controls.
+    /// The result moves vertices as `weights` do while no bone rotates, except that it omits constant offsets.
     ///
     /// # Panics
     /// If `weights` has fewer columns than these frames.

@@ -19,7 +19,7 @@ pub struct ClosestPoint {
     pub barycentric: [f64; 3],
 }
 
-/// Closest point of `triangle` to `point`. Degenerate triangles are treated as a segment or point.
+/// Finds the closest point of `triangle` to `point`. Degenerate triangles are treated as a segment or point.
 ///
 /// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster method of section 5.1.5
 /// may choose the wrong edge of a degenerate triangle.
@@ -43,8 +43,8 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
     ClosestPoint { point: u * a + v * b + w * c, barycentric }
 }
 
-/// Distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if the ray
-/// misses.
+/// Computes the distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if
+/// the ray misses.
 ///
 /// Source: Moeller and Trumbore 1997, "Fast, minimum storage ray-triangle intersection".
 #[must_use]
@@ -56,7 +56,8 @@ pub fn distance_along(from: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && s >= 0.0).then_some(s)
 }
 
-/// Barycentric coordinates of the projection of `point`, if it lies in the triangle and the triangle has an area.
+/// Returns the barycentric coordinates of the projection of `point`, if it lies in the triangle and the triangle has an
+/// area.
 fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
@@ -71,7 +72,7 @@ fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     (u >= 0.0 && v >= 0.0 && w >= 0.0).then_some([u, v, w])
 }
 
-/// Parameter, 0 at `p` to 1 at `q`, of the point of the segment that is closest to `point`.
+/// Returns the parameter, 0 at `p` to 1 at `q`, of the point of the segment that is closest to `point`.
 fn share_of_segment(point: DVec3, p: DVec3, q: DVec3) -> f64 {
     let way = q - p;
     let length_squared = way.length_squared();
@@ -107,8 +108,8 @@ pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -
     })
 }
 
-/// Winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1 inside (also of
-/// a solid with cavities), 0 outside, in between on the surface.
+/// Computes the winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1
+/// inside (also of a solid with cavities), 0 outside, in between on the surface.
 ///
 /// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle". Each half solid angle is the argument
 /// of a complex number. The product of these numbers has the sum of the angles as its argument, apart from full turns,

@@ -23,7 +23,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Cubic cells around `bounds`: `g` along the longest side of `bounds`, plus one layer of cells on all sides.
+    /// Creates a grid of cubic cells around `bounds`: `g` along the longest side of `bounds`, plus one layer of cells
+    /// on all sides.
     #[must_use]
     pub fn cubic(bounds: Bounds, g: u32) -> Self {
         let (min, extent) = (bounds.min.as_dvec3(), bounds.extent().as_dvec3());
@@ -33,7 +34,7 @@ impl Grid {
         Self { dims, origin: min + h * (SHIFT - 0.5), cell: DVec3::splat(h) }
     }
 
-    /// The grid of every second centre along each axis: its cell (x, y, z) has the centre of this grid's cell
+    /// Returns the grid of every second centre along each axis: its cell (x, y, z) has the centre of this grid's cell
     /// (2x, 2y, 2z).
     #[must_use]
     pub fn coarsened(&self) -> Self {

@@ -194,7 +194,7 @@ impl Level {
     }
 }
 
-/// The finest level and the coarser ones that `coarsen` makes from it, down to the first level with at most
+/// Returns the finest level and the coarser ones that `coarsen` makes from it, down to the first level with at most
 /// `COARSEST_UNKNOWNS` unknowns. Ends earlier if the next level has none.
 pub fn coarsened_until_few<C>(
     finest: C,

@@ -14,7 +14,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Bounds of `points`; `None` if empty.
+    /// Computes the bounds of `points`; `None` if there are no points.
     #[must_use]
     pub fn of(points: &[Vec3]) -> Option<Self> {
         let first = *points.first()?;
@@ -74,7 +74,7 @@ impl PolygonMesh {
     }
 }
 
-/// Groups vertices that share a position, so that a vertex split at a UV or normal seam is bound once.
+/// Groups of vertices that share a position. A vertex that is split at a UV or normal seam is thus bound once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Weld {
     /// First input vertex of each distinct position. `[n_unique]`

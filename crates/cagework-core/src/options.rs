@@ -232,7 +232,7 @@ pub const MAX_ITERATIONS: Number = Number {
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
     slider: Some(Slider { min: 1.0, max: 1e6, step: 1.0 }),
 };
-/// The `sparsify` option: total weight dropped per row.
+/// The `sparsify` option: limit on the total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
     help: "In each row, drop the smallest weights up to this total, then restore the row's sum and rest position",
@@ -317,7 +317,7 @@ pub struct BindOptions {
     pub tau: f32,
     /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
     pub max_iterations: u32,
-    /// Total of the smallest weights that are dropped from each row, after which the row's sum and rest position are
+    /// Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
     /// restored. 0 drops none. Default 0.
     pub sparsify: f32,
     /// Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together

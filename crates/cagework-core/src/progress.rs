@@ -64,7 +64,7 @@ impl<F: Fn(ProgressEvent) -> ControlFlow<()> + Sync> Progress for F {
     }
 }
 
-/// Ignores progress and never cancels.
+/// A [`Progress`] that ignores reports and never cancels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 
@@ -74,7 +74,7 @@ impl Progress for Silent {
     }
 }
 
-/// The work was cancelled through [`Progress`].
+/// Error of work that was cancelled through [`Progress`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("cancelled")]
 pub struct Cancelled;

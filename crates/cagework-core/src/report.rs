@@ -102,8 +102,8 @@ fn one() -> u32 {
 pub struct CellCounts {
     /// Cells inside the cage, without the boundary cells.
     pub interior: u64,
-    /// Classic method: cells that the cage's surface intersects. Embedded method: cells with their centre inside the
-    /// cage and less than a cell from it along an axis.
+    /// Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
+    /// and less than a cell from its surface along an axis.
     pub boundary: u64,
     /// Cells outside the cage.
     pub exterior: u64,

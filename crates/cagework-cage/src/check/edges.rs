@@ -22,8 +22,8 @@ impl Edges {
         self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
     }
 
-    /// Open edges (edges with exactly one face), each in the direction in which a face that fills the hole would
-    /// traverse it.
+    /// Returns the open edges (edges with exactly one face), each in the direction in which a face that fills the hole
+    /// would traverse it.
     pub(super) fn open(&self) -> Vec<[u32; 2]> {
         self.groups()
             .filter(|g| g.len() == 1)
@@ -103,7 +103,7 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
     }
 }
 
-/// Non-manifold vertices, whose faces form more than one fan.
+/// Finds the non-manifold vertices, whose faces form more than one fan.
 fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     // Entries `[vertex, previous, next]`, one for each corner of a face.
     let mut corners: Vec<[u32; 3]> = Vec::new();
@@ -133,7 +133,7 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     pinched
 }
 
-/// Root of the set that contains `k`, by union-find with path halving.
+/// Finds the root of the set that contains `k` in a union-find structure, with path halving.
 fn find(root: &mut [u32], mut k: u32) -> u32 {
     while root[k as usize] != k {
         root[k as usize] = root[root[k as usize] as usize];

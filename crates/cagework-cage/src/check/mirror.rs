@@ -15,7 +15,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The plane that contains all `open` edges, if there is one and the whole mesh lies on one side of it.
+    /// Returns the plane that contains all `open` edges, if there is one and the whole mesh lies on one side of it.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
         let reach = (PLANE_TOLERANCE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];

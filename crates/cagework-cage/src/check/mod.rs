@@ -144,7 +144,7 @@ pub struct CageCheck {
 }
 
 impl CageCheck {
-    /// The problem with this code, if there is one.
+    /// Returns the problem with this code, if there is one.
     #[must_use]
     pub fn problem(&self, code: Code) -> Option<&Problem> {
         self.problems.iter().find(|p| p.code == code)
@@ -160,7 +160,8 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     check_smooth(mesh, model, grid, 0)
 }
 
-/// [`check`] of a cage that is subdivided `smooth` times. Enclosure and thickness are those of the subdivided surface.
+/// Checks a cage that is subdivided `smooth` times, like [`check`]. Enclosure and thickness are measured on the
+/// subdivided surface.
 #[must_use]
 pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>, smooth: u32) -> CageCheck {
     let mut found = Vec::new();
@@ -250,7 +251,7 @@ fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool
     false
 }
 
-/// A problem without locations and remedies.
+/// Creates a problem without locations and remedies.
 fn problem(code: Code, severity: Severity, count: usize) -> Problem {
     let message = sentences::of(code, count);
     Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }

@@ -18,7 +18,7 @@ pub(super) struct Component {
     pub(super) one_sided: Option<[u32; 2]>,
 }
 
-/// Components in order of their first faces, with the orientation of their faces.
+/// Finds the components, in the order of their first faces, and decides which of their faces must be flipped.
 pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Vec<Component> {
     let n = mesh.faces.len();
     let mut neighbours: Vec<Vec<(u32, bool, [u32; 2])>> = vec![Vec::new(); n];
@@ -100,7 +100,7 @@ fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     }
 }
 
-/// Consistently oriented triangle fans of a component's faces. Fan triangles of a concave face overlap, but the
+/// Cuts a component's faces into consistently oriented triangle fans. Fan triangles of a concave face overlap, but the
 /// overlaps cancel in signed volumes and winding numbers.
 fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
     let mut triangles = Vec::new();

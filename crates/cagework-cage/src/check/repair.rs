@@ -100,10 +100,11 @@ pub fn repair(
     repair_smooth(mesh, repairs, model, 0)
 }
 
-/// [`repair`] of a cage that is subdivided `smooth` times: growing makes its subdivided surface enclose the model.
+/// Repairs a cage that is subdivided `smooth` times, like [`repair`]. [`Repair::Grow`] makes the subdivided surface
+/// enclose the model.
 ///
 /// # Errors
-/// As [`repair`].
+/// The errors of [`repair`].
 pub fn repair_smooth(
     mesh: &PolygonMesh,
     repairs: &[Repair],

@@ -3,7 +3,7 @@
 use super::Code;
 use cagework_core::words::counted;
 
-/// Message of a problem that is described by its code and count.
+/// Returns the message of a problem that its code and count describe.
 pub(super) fn of(code: Code, n: usize) -> String {
     let with = |one: &str, many: &str| counted(n, one, many);
     match code {
@@ -52,7 +52,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
     }
 }
 
-/// Message for `n` model vertices of `all` outside the cage.
+/// Composes the message for `n` model vertices of `all` outside the cage.
 pub(super) fn outside(n: usize, all: usize) -> String {
     format!(
         "{n} of {} {} outside the cage: {} would follow it less and less with distance.",
@@ -62,7 +62,7 @@ pub(super) fn outside(n: usize, all: usize) -> String {
     )
 }
 
-/// Message for `n` of the `all` faces of a component that point inwards.
+/// Composes the message for `n` of the `all` faces of a component that point inwards.
 pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
     if n == all {
         return format!("Component {component} is inside out: all its {all} faces point into the solid.");
@@ -71,12 +71,13 @@ pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
     format!("In component {component}, {n} of {all} faces {points} inwards.")
 }
 
-/// Message for a component that cannot be oriented.
+/// Composes the message for a component that cannot be oriented.
 pub(super) fn one_sided(component: usize) -> String {
     format!("Component {component} has no inside: its faces cannot be turned consistently.")
 }
 
-/// Message for thin places. `cells`: number of cells of a grid that resolves them, if it is within the limit.
+/// Composes the message for thin places. `cells`: number of cells of a grid that resolves them, if it is within the
+/// limit.
 pub(super) fn thin(places: usize, cells: Option<u32>) -> String {
     let places = counted(places, "place", "places");
     let advice = cells.map_or("make the cage thicker".into(), |cells| format!("use a grid of {cells} cells"));

@@ -22,8 +22,8 @@ const MIN_CELLS: f64 = 1.0;
 /// degrees. Faces at a larger angle form a corner of the cage, near which their distance tends to zero.
 const MIN_OPPOSITION_COSINE: f64 = 0.3;
 
-/// Indices of valid faces: they have existing, finite, distinct vertices and an area, and differ from earlier faces.
-/// Reports the faults of all other faces.
+/// Returns the indices of the valid faces, and reports the faults of all other faces. The vertices of a valid face
+/// exist, are finite and distinct; the face has an area and differs from all earlier faces.
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
@@ -125,7 +125,8 @@ pub(super) fn report_thickness(
     thinnest.is_finite().then_some(thinnest as f32)
 }
 
-/// Distance from a point along a unit direction to a triangle; `None` if the ray misses (Moeller and Trumbore 1997).
+/// Computes the distance from a point along a unit direction to a triangle; `None` if the ray misses (Moeller and
+/// Trumbore 1997).
 fn distance_along(from: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
     let (ab, ac) = (*b - *a, *c - *a);
     let p = direction.cross(ac);

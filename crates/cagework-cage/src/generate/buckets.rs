@@ -18,7 +18,7 @@ pub(super) struct Buckets {
 }
 
 impl Buckets {
-    /// An empty grid of size `2 * half` around the origin, for `n` triangles.
+    /// Creates an empty grid of size `2 * half` around the origin, for `n` triangles.
     pub(super) fn new(half: DVec3, n: usize) -> Self {
         let dims = half.to_array().map(|h| (2.0 * h / BUCKET_EDGE).ceil() as usize + 1);
         Self {
@@ -89,7 +89,7 @@ impl Buckets {
     }
 }
 
-/// Range of buckets along each axis that a box overlaps, clamped to the grid.
+/// Returns the range of buckets along each axis that a box overlaps, clamped to the grid.
 fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| {
         let at = |p: DVec3| (((p[k] - origin[k]) / BUCKET_EDGE).max(0.0) as usize).min(dims[k] - 1);
@@ -97,7 +97,7 @@ fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]
     })
 }
 
-/// Box of a bucket. Outermost buckets extend to infinity.
+/// Returns the box of a bucket. Outermost buckets extend to infinity.
 fn bucket_bounds(origin: DVec3, dims: [usize; 3], at: [usize; 3]) -> [DVec3; 2] {
     let [mut min, mut max] = [DVec3::NEG_INFINITY, DVec3::INFINITY];
     for k in 0..3 {

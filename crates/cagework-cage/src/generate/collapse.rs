@@ -53,7 +53,8 @@ impl PartialOrd for HeapEdge {
 }
 
 impl Ord for HeapEdge {
-    /// Reversed cost, so that the heap pops the cheapest edge; ties by index keep runs deterministic.
+    /// Orders by descending cost, so that the heap pops the cheapest edge first. Equal costs are ordered by vertex
+    /// indices, so that runs are deterministic.
     fn cmp(&self, other: &Self) -> Ordering {
         other.cost.total_cmp(&self.cost).then_with(|| other.edge.cmp(&self.edge))
     }
@@ -89,7 +90,7 @@ struct Scratch {
     new: Vec<Corners>,
 }
 
-/// Quality of a triangle, `4 sqrt(3) area / sum of squared edges`: 1 if equilateral, 0 if degenerate.
+/// Computes the quality of a triangle, `4 sqrt(3) area / sum of squared edges`: 1 if equilateral, 0 if degenerate.
 pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
     let edges =
         (t[1] - t[0]).length_squared() + (t[2] - t[1]).length_squared() + (t[0] - t[2]).length_squared();
@@ -183,12 +184,13 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Ok(self.count)
     }
 
-    /// The vertex that remains, and the vertex that is removed; a vertex on the mirror plane remains.
+    /// Returns the vertex that remains when the edge is collapsed, then the vertex that is removed. A vertex on the
+    /// mirror plane remains.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         if self.surface.on_mirror[b as usize] { (b, a) } else { (a, b) }
     }
 
-    /// The mirror axis, if the merged vertex must lie on the mirror plane.
+    /// Returns the mirror axis if the merged vertex must lie on the mirror plane.
     fn pinned(&self, kept: u32) -> Option<usize> {
         self.surface.mirror.filter(|_| self.surface.on_mirror[kept as usize])
     }
@@ -197,7 +199,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.quadrics[a as usize].plus(&self.quadrics[b as usize])
     }
 
-    /// Minimum of an edge's quadric if that is near the edge, otherwise the middle of the edge.
+    /// Returns the point at which an edge's quadric is minimal if it is near the edge, otherwise the middle of the
+    /// edge.
     fn optimum(&self, a: u32, b: u32) -> DVec3 {
         let (kept, _) = self.ordered(a, b);
         let pinned = self.pinned(kept);
@@ -358,8 +361,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
             || (self.keeps_plates && spacings().filter(|spacing| spacing.along.is_none()).any(is_too_far))
     }
 
-    /// The stricter spacing of two vertices: the one on a plate, which limits all directions, otherwise the smaller
-    /// one.
+    /// Returns the stricter spacing limit of two vertices: the one on a plate, which limits all directions, otherwise
+    /// the smaller one.
     fn spacing_of(&self, a: u32, b: u32) -> Option<Spacing> {
         let spacings = [a, b].into_iter().filter_map(|v| self.spacings[v as usize]);
         spacings

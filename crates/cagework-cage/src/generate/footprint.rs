@@ -37,7 +37,7 @@ struct RowBound {
 }
 
 impl Footprint {
-    /// Footprint of a triangle in voxel units, for voxels enlarged by `grow` on all sides.
+    /// Computes the footprint of a triangle in voxel units, for voxels enlarged by `grow` on all sides.
     pub(crate) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
         let half = 0.5 + grow + ROUNDING_MARGIN;
         let [a, b, c] = triangle;
@@ -148,7 +148,7 @@ pub(super) fn any_run(
     false
 }
 
-/// Half-open range of the voxels whose centres lie in a box, along each axis.
+/// Returns the half-open range of the voxels whose centres lie in a box, along each axis.
 fn rows(min: DVec3, max: DVec3, dims: [usize; 3]) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + ROUNDING_MARGIN).min(dims[k])])
 }

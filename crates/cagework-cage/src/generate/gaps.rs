@@ -150,8 +150,9 @@ pub(super) fn narrow_gaps(
     Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
 }
 
-/// Resolution (longest side divided by voxel thickness) that leaves open the narrow parts of the large gaps across the
-/// thin axis of `stretch`. Ignores gaps whose narrow part is at most two clearances wide; 0 if no gap is left.
+/// Computes the resolution (longest side divided by voxel thickness) that leaves open the narrow parts of the large
+/// gaps across the thin axis of `stretch`. Ignores gaps whose narrow part is at most two clearances wide; 0 if no gap
+/// is left.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -178,13 +179,13 @@ fn resolution_of_narrows(
     Ok(n * stretch.max_element() * MIN_OPEN_NARROW_WIDTH / narrowest)
 }
 
-/// Limit on voxels along the longest side of a lattice that is refined for gaps.
+/// Returns the limit on voxels along the longest side of a lattice that is refined for gaps.
 fn most_voxels(stretch: DVec3) -> usize {
     if stretch == DVec3::ONE { usize::MAX } else { (MAX_STRETCHED_SHARE * MAX_VOXELS as f64) as usize }
 }
 
-/// Stretch of the voxels. If most gaps have the same direction, a lattice of voxels that are thin in this direction
-/// needs fewer voxels than a lattice of cubes.
+/// Chooses the stretch of the voxels. If most gaps have the same direction, a lattice of voxels that are thin in this
+/// direction needs fewer voxels than a lattice of cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
     // Number of gaps that stay closed, and number of voxels with which all other gaps stay open.
     let closed_and_finest = |stretch: DVec3| {
@@ -202,13 +203,14 @@ fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
 }
 
 impl ModelGap {
-    /// Smallest number of voxels with this stretch along the model's longest side with which the gap stays open.
+    /// Returns the smallest number of voxels with this stretch along the model's longest side with which the gap stays
+    /// open.
     fn voxels_of(&self, stretch: DVec3) -> usize {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// A sentence with the gap's position and a remedy if the cage, made with `voxels` voxels along the longest side,
-    /// closes the gap; otherwise `None`.
+    /// Returns a sentence with the gap's position and a remedy if the cage, made with `voxels` voxels along the longest
+    /// side, closes the gap; otherwise `None`.
     pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
@@ -260,7 +262,8 @@ fn voxel(dims: [usize; 3], i: usize) -> [usize; 3] {
     [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]]
 }
 
-/// Gaps of a solid that are at most `2 * reach` voxels wide, largest first. Voxels of `closed` belong to no gap.
+/// Finds the gaps of a solid that are at most `2 * reach` voxels wide, largest first. Voxels of `closed` belong to no
+/// gap.
 pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     let dims = solid.dims;
     let wall = nearest(solid, reach);
@@ -307,8 +310,8 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     gaps
 }
 
-/// Approximate nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere. A voxel
-/// chooses among the results of its neighbours, which may not include its own nearest solid voxel.
+/// Finds approximately the nearest solid voxel of each outside voxel, up to `reach` voxels away; [`NO_WALL`] elsewhere.
+/// A voxel chooses among the results of its neighbours, which may not include its own nearest solid voxel.
 fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     let dims = solid.dims;
     let square = |i: u32, v: [usize; 3]| {
@@ -335,7 +338,8 @@ fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     wall
 }
 
-/// Graph distance within a sheet from each voxel to the crease where its walls meet; `usize::MAX` if they do not meet.
+/// Computes the graph distance within a sheet from each voxel to the crease where its walls meet; `usize::MAX` if they
+/// do not meet.
 fn depths(sheet: &Voxels, closed: &Voxels, to_wall: &dyn Fn(usize) -> DVec3) -> Vec<usize> {
     let dims = sheet.dims;
     let mut depth = vec![usize::MAX; dims.iter().product()];

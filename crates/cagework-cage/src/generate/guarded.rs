@@ -38,7 +38,7 @@ impl Obstacle {
         !overlaps(&self.voxels, triangle, self.clearance)
     }
 
-    /// A triangle (centred coordinates) scaled so that its angles are those in object units.
+    /// Scales a triangle (centred coordinates) so that its angles are those in object units.
     pub(super) fn unstretched(&self, triangle: &Corners) -> Corners {
         Corners { at: triangle.at.map(|p| p / self.stretch), ..*triangle }
     }
@@ -158,7 +158,7 @@ impl<'a> GuardedSurface<'a> {
         self.has_band
     }
 
-    /// The current surface, compacted.
+    /// Returns the current surface without unused indices.
     pub(super) fn surface(&self) -> Surface {
         let mut number = vec![u32::MAX; self.positions.len()];
         let mut surface = Surface { mirror: self.mirror, ..Surface::default() };
@@ -188,14 +188,14 @@ impl<'a> GuardedSurface<'a> {
         self.buckets.add(triangle, min, max);
     }
 
-    /// Smallest cosine between the normals of neighbours: among `triangles`, between them and `others`, and across the
-    /// mirror.
+    /// Returns the smallest cosine between the normals of neighbours: among `triangles`, between them and `others`, and
+    /// across the mirror.
     fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
         self.folds(triangles, others).into_iter().fold(1.0, f64::min)
     }
 
-    /// Sum of the amounts by which the fold cosines around `triangles` fall below [`MIN_FOLD_COSINE`]. The triangles
-    /// are in the surface or would replace the triangles with the indices `gone`.
+    /// Sums the amounts by which the fold cosines around `triangles` fall below [`MIN_FOLD_COSINE`]. The triangles are
+    /// in the surface or would replace the triangles with the indices `gone`.
     pub(super) fn excess(&self, triangles: &[Corners], gone: &[u32]) -> f64 {
         let around = triangles.iter().flat_map(|t| t.index).flat_map(|i| &self.around[i as usize]);
         let mut others: Vec<u32> = around.copied().filter(|t| !gone.contains(t)).collect();
@@ -205,8 +205,8 @@ impl<'a> GuardedSurface<'a> {
         self.folds(triangles, &others).into_iter().map(|cosine| (MIN_FOLD_COSINE - cosine).max(0.0)).sum()
     }
 
-    /// Cosines between the normals of `triangles` and those of their neighbours, which are found among `triangles`,
-    /// `others` and the mirror images.
+    /// Computes the cosines between the normals of `triangles` and those of their neighbours, which are found among
+    /// `triangles`, `others` and the mirror images.
     fn folds(&self, triangles: &[Corners], others: &[Corners]) -> Vec<f64> {
         let real = |t: &Corners| self.obstacle.unstretched(t);
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
@@ -266,7 +266,7 @@ impl<'a> GuardedSurface<'a> {
         fold >= MIN_FOLD_COSINE || fold >= self.sharpest(&before(), &others)
     }
 
-    /// Vertices of triangles that intersect other triangles, or come closer to them than [`MIN_GAP`].
+    /// Finds the vertices of triangles that intersect other triangles, or come closer to them than [`MIN_GAP`].
     pub(super) fn offenders(&mut self) -> Vec<u32> {
         let mut offenders = Vec::new();
         for t in 0..self.triangles.len() as u32 {
@@ -313,9 +313,10 @@ impl<'a> GuardedSurface<'a> {
         self.place(kept, at);
     }
 
-    /// Flip of the edge from corner `k` of triangle `t`. Returns the triangle on the other side of the edge `a`-`b`,
-    /// and the two triangles `[a, d, c]` and `[d, b, c]` that have the edge between the opposite corners `c` and `d`
-    /// instead. `None` if the surface would no longer be a manifold (with a mirror, half of one).
+    /// Computes the flip of the edge `a`-`b` that starts at corner `k` of triangle `t`, without changing the surface.
+    /// Returns the triangle on the other side of the edge, and the two new triangles `[a, d, c]` and `[d, b, c]`, which
+    /// share the edge between the opposite corners `c` and `d`. `None` if the flipped surface would not be a manifold
+    /// (with a mirror, half of one).
     pub(super) fn swapped(&self, t: u32, k: usize) -> Option<(u32, [Corners; 2])> {
         let first = self.triangles[t as usize];
         let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
@@ -349,7 +350,7 @@ impl<'a> GuardedSurface<'a> {
         }
     }
 
-    /// Vertices that share an edge with `vertex`, sorted.
+    /// Writes to `out` the vertices that share an edge with `vertex`, sorted.
     pub(super) fn neighbours(&self, vertex: u32, out: &mut Vec<u32>) {
         out.clear();
         for &t in &self.around[vertex as usize] {

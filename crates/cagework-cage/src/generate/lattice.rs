@@ -40,8 +40,8 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// A lattice whose voxels divide the longest side of `min`..`max` into `n`, with `pad` additional voxels on every
-    /// side.
+    /// Creates a lattice whose voxels divide the longest side of `min`..`max` into `n`, with `pad` additional voxels on
+    /// every side.
     pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
         let extent = max - min;
         let largest = min.abs().max(max.abs()).max_element();
@@ -65,22 +65,22 @@ impl Lattice {
         DVec3::from_array(self.dims.map(|n| 0.5 * n as f64))
     }
 
-    /// Lattice coordinates of a point in object units.
+    /// Converts a point from object units to lattice coordinates.
     pub(super) fn lattice(&self, p: Vec3) -> DVec3 {
         self.centred(p) + self.half()
     }
 
-    /// Centred coordinates of a point in object units.
+    /// Converts a point from object units to centred coordinates.
     pub(super) fn centred(&self, p: Vec3) -> DVec3 {
         (p.as_dvec3() - self.center) * self.stretch / self.cell
     }
 
-    /// Position in object units of a point in centred coordinates.
+    /// Converts a point from centred coordinates to object units.
     pub(super) fn object(&self, p: DVec3) -> Vec3 {
         (self.center + p * self.cell / self.stretch).as_vec3()
     }
 
-    /// Voxels that a triangle or a vertex overlaps.
+    /// Finds the voxels that overlap a triangle or contain a vertex.
     ///
     /// # Errors
     /// If `go_on` cancels.

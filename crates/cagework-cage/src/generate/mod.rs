@@ -69,8 +69,8 @@ const N_NARROW_BANDS: usize = 3;
 /// walls of gaps cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// Estimate of the number of vertices after the collapses within the allowed distance, divided by the final number.
-/// Predicts the final number where [`MAX_FIRST_RATIO`] ends the passes.
+/// Estimated ratio of the number of vertices after the collapses within the allowed distance to the final number. If
+/// [`MAX_FIRST_RATIO`] ends the passes early, this ratio predicts the final number.
 const LATER_RATIO: f64 = 3.7;
 
 /// Estimated number of vertices per open gap: a ring on each side.
@@ -108,7 +108,7 @@ pub fn generate(
     generate_plain(positions, triangles, options, progress)
 }
 
-/// A cage that encloses the model without subdivision.
+/// Generates a cage that encloses the model without subdivision.
 fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -188,8 +188,8 @@ fn generate_plain(
     Err(CageGenError::Unresolved)
 }
 
-/// Initial number of voxels along the longest side. It grows with the target, as a cage of few vertices cannot follow
-/// small gaps.
+/// Returns the initial number of voxels along the longest side. It grows with the target, as a cage of few vertices
+/// cannot follow small gaps.
 fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }

@@ -171,7 +171,7 @@ impl Default for CageOptions {
 }
 
 impl CageOptions {
-    /// [`CageOptions::clearance`] as a distance in object units, for a model with the box `min`..`max`.
+    /// Converts [`CageOptions::clearance`] to a distance in object units, for a model with the box `min`..`max`.
     pub(super) fn distance(&self, [min, max]: [DVec3; 2]) -> f64 {
         f64::from(self.clearance) * max.distance(min)
     }

@@ -51,14 +51,14 @@ pub(super) fn places(surface: &GuardedSurface<'_>, quad: &Quad) -> [DVec3; 4] {
     })
 }
 
-/// Deviation of a quad from a plane: the distance between its diagonals, divided by its mean side.
+/// Computes the deviation of a quad from a plane: the distance between its diagonals, divided by its mean side.
 pub(super) fn warp(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let side = 0.25 * (0..4).map(|k| p[k].distance(p[(k + 1) % 4])).sum::<f64>();
     normal.dot(p[0] - p[1] + p[2] - p[3]).abs() / (2.0 * side.max(1e-12))
 }
 
-/// Shape penalty of a quad: 0 for a rectangle; larger if bent, slanted, tapered or not convex.
+/// Computes the shape penalty of a quad: 0 for a rectangle; larger if bent, slanted, tapered or not convex.
 pub(super) fn badness(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let (mut slant, mut dent) = (0.0, 0.0);
@@ -72,7 +72,7 @@ pub(super) fn badness(p: &[DVec3; 4]) -> f64 {
     1.5 * slant + 3.0 * warp(p).powi(2) + dent + 0.15 * taper
 }
 
-/// The quad of a triangle and its partner; `None` if they do not share exactly one edge.
+/// Returns the quad of a triangle and its partner; `None` if they do not share exactly one edge.
 pub(super) fn quad_of(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> Option<Quad> {
     let x = surface.triangles[t as usize];
     let edge = |is_shared: &dyn Fn(u32, u32, u32) -> bool| {
@@ -94,7 +94,8 @@ pub(super) fn quad_of(surface: &GuardedSurface<'_>, t: u32, partner: Partner) ->
     }
 }
 
-/// The two triangles of a quad when it is cut along its other diagonal.
+/// Returns the two triangles of a quad when it is cut along its other diagonal; `None` if `t` and `u` do not form a
+/// quad.
 pub(super) fn other_cut(surface: &GuardedSurface<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
     let [a, b, c, d] = quad_of(surface, t, Partner::Triangle(u))?.map(|corner| corner.0);
     let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| surface.positions[i as usize]) };
@@ -107,7 +108,7 @@ pub(super) fn is_free(surface: &mut GuardedSurface<'_>, t: u32, partner: Partner
     other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
 }
 
-/// Weight of a quad in the matching; 0 if the quad is not allowed.
+/// Computes the weight of a quad in the matching; 0 if the quad is not allowed.
 pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f64 {
     let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
     let [_, (b, _), _, (d, _)] = quad;
@@ -182,7 +183,7 @@ pub(super) fn pair(surface: &mut GuardedSurface<'_>, before: &Pairing, strict: b
     pairing
 }
 
-/// Xorshift pseudo-random number generator (Marsaglia 2003).
+/// Advances an xorshift pseudo-random number generator (Marsaglia 2003) and returns its next number.
 fn next(state: &mut u64) -> u64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;

@@ -26,13 +26,13 @@ impl Default for Quadric {
 }
 
 impl Quadric {
-    /// Squared distance to a triangle's plane, weighted by a third of the triangle's area.
+    /// Creates the quadric of the squared distance to a triangle's plane, weighted by a third of the triangle's area.
     pub(super) fn of_plane(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, 0.0)
     }
 
-    /// Squared distance to a triangle's plane, plus [`POINT_WEIGHT`] times the squared distance to its corner, weighted
-    /// by a third of the triangle's area.
+    /// Creates the quadric of the squared distance to a triangle's plane, plus [`POINT_WEIGHT`] times the squared
+    /// distance to its corner, weighted by a third of the triangle's area.
     pub(super) fn of_corner(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, POINT_WEIGHT)
     }
@@ -54,7 +54,8 @@ impl Quadric {
         }
     }
 
-    /// The quadric with distances measured in a unit `unit` times as long. Positions keep their unit.
+    /// Converts the quadric so that it measures distances in a unit that is `unit` times as long. Positions keep their
+    /// unit.
     pub(super) fn in_units(&self, unit: f64) -> Self {
         let scale = 1.0 / (unit * unit);
         Self { a: self.a * scale, b: self.b * scale, c: self.c * scale, area: self.area }
@@ -68,14 +69,14 @@ impl Quadric {
         (p.dot(self.a * p) - 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 
-    /// Cost of a vertex at `p`: area times the fourth power of the RMS distance. With the squared distance alone, thin
-    /// limbs, whose area is small, would cost too little, and webs would grow between them.
+    /// Computes the cost of a vertex at `p`: area times the fourth power of the RMS distance. With the squared distance
+    /// alone, thin limbs, whose area is small, would cost too little, and webs would grow between them.
     pub(super) fn cost(&self, p: DVec3) -> f64 {
         self.at(p).powi(2) / self.area.max(1e-12)
     }
 
-    /// Point at which the quadric is minimal, restricted to `p[axis] = 0` if an axis is given; `None` if there is no
-    /// single minimum.
+    /// Returns the point at which the quadric is minimal, restricted to `p[axis] = 0` if an axis is given; `None` if
+    /// there is no single minimum.
     pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
         let (mut a, mut b) = (self.a, self.b);
         if let Some(axis) = on_mirror {

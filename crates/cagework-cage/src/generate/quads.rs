@@ -98,15 +98,15 @@ impl Star {
             + HALF_WEIGHT * self.all.iter().map(inverse).sum::<f64>()
     }
 
-    /// Penalty of quads that may not be cut along the other diagonal.
+    /// Computes the penalty of quads that may not be cut along the other diagonal.
     fn penalty(&self, surface: &mut GuardedSurface<'_>) -> f64 {
         let bound = self.pairs.iter().filter(|[t, u]| !is_free(surface, *t, Partner::Triangle(*u)));
         SINGLE_CUT_PENALTY * bound.count() as f64
     }
 
-    /// Candidate positions of the vertex: those that make each quad planar, the mean of those that make each quad a
-    /// parallelogram, the mean of the neighbours, the minimum of the quadric, the mean of these candidates, and a step
-    /// outward.
+    /// Lists candidate positions of the vertex: those that make each quad planar, the mean of those that make each quad
+    /// a parallelogram, the mean of the neighbours, the minimum of the quadric, the mean of these candidates, and a
+    /// step outward.
     fn goals(&self, surface: &GuardedSurface<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
         let here = surface.positions[v as usize];
         let mut goals = Vec::new();
@@ -212,7 +212,7 @@ pub(super) struct Faces {
     pub(super) first: Vec<u32>,
 }
 
-/// Faces of the whole surface with quads for paired triangles.
+/// Builds the faces of the whole surface, with quads for paired triangles.
 pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
     let mut positions = Vec::new();
     // New indices of each vertex and of its mirror image.

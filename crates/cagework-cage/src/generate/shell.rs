@@ -117,8 +117,8 @@ pub(super) struct Shell {
 }
 
 impl Shell {
-    /// Hull of a model on a lattice of `n` voxels along the model's longest side, with the given stretch. `go_on` may
-    /// cancel.
+    /// Builds the hull of a model on a lattice of `n` voxels along the model's longest side, with the given stretch.
+    /// `go_on` may cancel.
     pub(super) fn new(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
@@ -198,12 +198,12 @@ impl Shell {
         self.gaps = found.take(most).collect();
     }
 
-    /// The voxels of the hull, dilated by `layers` voxels.
+    /// Returns the voxels of the hull, dilated by `layers` voxels.
     pub(super) fn band(&self, layers: usize) -> Voxels {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
     }
 
-    /// Spacing limit at each vertex of the hull, if it lies on a limb or plate.
+    /// Computes the spacing limit at each vertex of the hull; `None` for a vertex on neither a limb nor a plate.
     pub(super) fn spacings(&self) -> Vec<Option<Spacing>> {
         let mut normals = vec![DVec3::ZERO; self.hull.positions.len()];
         for t in &self.hull.triangles {
@@ -249,8 +249,8 @@ impl Shell {
         spacings
     }
 
-    /// Voxels of the sheets that span the open gaps, for gaps with at least the share `least` of the largest gap's
-    /// area.
+    /// Returns the voxels of the sheets that span the open gaps, for gaps with at least the share `least` of the
+    /// largest gap's area; `None` if there are no gaps.
     pub(super) fn sheets(&self, least: f64) -> Option<Voxels> {
         let largest = self.gaps.first()?.area;
         let mut sheets = Voxels::new(self.filled.dims);
@@ -260,7 +260,7 @@ impl Shell {
     }
 }
 
-/// The solid dilated by `layers`, with filled cavities and a 2-manifold boundary.
+/// Dilates the solid by `layers` voxels, fills cavities, and makes the boundary a 2-manifold.
 fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     let mut hull = solid.clone();
     for _ in 0..layers {
@@ -278,7 +278,7 @@ fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     }
 }
 
-/// Smoothed hull. Vertices of triangles that intersect others return to their unsmoothed positions until none
+/// Smooths the hull. Vertices of triangles that intersect others return to their unsmoothed positions until none
 /// intersect.
 fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     let mut smooth = stairs.clone();
@@ -297,8 +297,8 @@ fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     }
 }
 
-/// Axis of the mirror: the requested one, or the first of x, z, y along which the solid is symmetric up to scattered
-/// voxels. `longest`: number of voxels along the model's longest side.
+/// Finds the axis of the mirror: the requested one, or the first of x, z, y along which the solid is symmetric up to
+/// scattered voxels. `longest`: number of voxels along the model's longest side.
 fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
     match symmetry {
         Symmetry::None => None,
@@ -410,8 +410,8 @@ impl JoinedVoxels<'_> {
     }
 }
 
-/// Voxels inside the model's 26-DOP: the intersection of 13 slabs, normal to the directions from the centre of a cube
-/// to its faces, edges and corners (Klosowski et al. 1998).
+/// Returns the voxels inside the model's 26-DOP: the intersection of 13 slabs, normal to the directions from the centre
+/// of a cube to its faces, edges and corners (Klosowski et al. 1998).
 fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
     let mut axes = Vec::new();
     for x in -1..=1 {

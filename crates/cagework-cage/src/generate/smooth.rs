@@ -15,7 +15,7 @@ use cagework_core::progress::Progress;
 /// reserve: 0.05 suffices for all test models.
 const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
 
-/// [`super::generate`] with `options.smooth` subdivision steps.
+/// Generates a cage whose surface encloses the model after `options.smooth` subdivision steps.
 pub(super) fn generate(
     positions: &[Vec3],
     triangles: &[[u32; 3]],

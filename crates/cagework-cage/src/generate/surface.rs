@@ -23,7 +23,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Boundary of a well-composed voxel set.
+    /// Extracts the boundary of a well-composed voxel set.
     pub(super) fn of(voxels: &Voxels, mirror: Option<usize>) -> Self {
         let dims = voxels.dims;
         let corners = dims.map(|n| n + 1);
@@ -73,7 +73,7 @@ impl Surface {
         surface
     }
 
-    /// Laplacian smoothing. Each vertex moves by at most [`SMOOTHING_REACH`] along each axis.
+    /// Applies Laplacian smoothing. Each vertex moves by at most [`SMOOTHING_REACH`] along each axis.
     pub(super) fn smooth(&mut self) {
         let stairs = self.positions.clone();
         let mut sum = vec![DVec3::ZERO; stairs.len()];

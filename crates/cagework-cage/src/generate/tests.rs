@@ -204,8 +204,8 @@ fn a_gap_that_no_lattice_resolves_is_reported() {
 
 /// A clearance closes narrow gaps on any lattice, so the lattice must not be refined for such gaps. Otherwise, the
 /// voxels become so thin across the gap that the clearance takes hundreds of layers. Along the other axes, where voxels
-/// are several times longer, the same number of layers dilates the hull several times too far. Such a hull
-/// took 17 GB of memory.
+/// are several times longer, the same number of layers dilates the hull several times too far. Such a hull takes 17 GB
+/// of memory.
 #[test]
 fn clearance_that_closes_a_gap_asks_for_no_finer_lattice() {
     let (positions, triangles) = mannequin(0.03, 0.07);
@@ -331,7 +331,7 @@ fn clearance_is_kept() {
     for clearance in [0.0, 0.02, 0.1] {
         let made = make(&soup, &CageOptions { clearance, ..options(60) });
         assert!(made.report.clearance >= clearance * 2.0, "the diagonal is longer than 2");
-        // Every cage triangle keeps the clearance along some axis, so vertices keep it nearly as a distance.
+        // Each cage vertex keeps the clearance along some axis, up to rounding, so its distance is about that or more.
         for c in made.cage.positions() {
             let nearest = soup.0.iter().map(|p| p.distance(*c)).fold(f32::MAX, f32::min);
             assert!(nearest >= 0.97 * made.report.clearance, "{nearest} < {}", made.report.clearance);
@@ -415,7 +415,7 @@ proptest! {
     }
 }
 
-/// The smooth surface encloses the model by winding number; the cage itself need not enclose it.
+/// Winding numbers show that the smooth surface encloses the model; the cage itself need not enclose it.
 #[test]
 fn the_smooth_surface_of_a_cage_encloses_the_model() {
     for (soup, smooth) in [(trousers(), 1), (trousers(), 2), (ring(), 2)] {

@@ -20,8 +20,9 @@ const MIN_FACET_CLEARANCE_SHARE: f64 = 0.1;
 /// Largest allowed distance of a winding number from 1; off the surface, winding numbers are integers.
 const WINDING_TOLERANCE: f64 = 1e-3;
 
-/// The cage of a whole surface if it passes verification: closed, manifold, outward, free of self-intersections, clear
-/// of the solid, and enclosing every part of the solid. The solid contains the model, so the cage strictly encloses it.
+/// Builds the cage of a whole surface; `None` unless it passes verification: closed, manifold, outward, free of
+/// self-intersections, clear of the solid, and enclosing every part of the solid. The solid contains the model, so the
+/// cage strictly encloses it.
 pub(super) fn verify_surface(shell: &Shell, surface: &Surface) -> Option<Cage> {
     let whole = surface.whole();
     verify_faces(shell, &whole.positions, whole.triangles.iter().map(|t| t.to_vec()).collect()).ok()
@@ -117,9 +118,9 @@ impl Cut {
         !self.is_half[t] || self.is_ours[t] == ours
     }
 
-    /// Faces that intersect others or, when cut along the diagonal that the cage does not use, form a sharp fold with
-    /// others. Of two intersecting faces, lists the one that is cut along that diagonal: the first if both are, both if
-    /// neither is.
+    /// Finds faces that intersect others or that, when cut along the diagonal that the cage does not use, form a sharp
+    /// fold with others. Of two intersecting triangles, lists the face of the one that this other cut made: the face of the
+    /// first if the other cut made both, and both faces if it made neither.
     fn wrong(&self, obstacle: &Obstacle) -> Vec<u32> {
         let mut wrong = Vec::new();
         for pair in meeting(&self.triangles) {

@@ -76,12 +76,12 @@ impl Voxels {
         Self { bits: self.bits.iter().map(|w| !w).collect(), ..*self }
     }
 
-    /// Difference with another set in the same box.
+    /// Returns the voxels of this set that are not in `other`, a set in the same box.
     pub(super) fn without(&self, other: &Self) -> Self {
         Self { bits: self.bits.iter().zip(&other.bits).map(|(a, b)| a & !b).collect(), ..*self }
     }
 
-    /// Mirror image about the middle of `axis`.
+    /// Returns the mirror image about the middle of `axis`.
     pub(super) fn mirrored(&self, axis: usize) -> Self {
         let mut mirrored = Self::new(self.dims);
         self.for_each(|mut voxel| {
@@ -91,7 +91,7 @@ impl Voxels {
         mirrored
     }
 
-    /// Dilation by the 26 neighbours. The outermost layer of the box must be empty.
+    /// Dilates the set by the 26 neighbours of each voxel. The outermost layer of the box must be empty.
     pub(super) fn dilated(&self) -> Self {
         let mut along_x = self.bits.clone();
         for (k, wide) in along_x.iter_mut().enumerate() {
@@ -112,8 +112,8 @@ impl Voxels {
         wide
     }
 
-    /// The set with its cavities filled: the complement of the outside voxels that are face-connected to the box's
-    /// corner.
+    /// Returns the set with its cavities filled: the complement of the outside voxels that are face-connected to the
+    /// box's corner.
     pub(super) fn filled(&self) -> Self {
         let mut all = Self::new(self.dims);
         for z in 0..self.dims[2] {
@@ -237,7 +237,7 @@ impl Voxels {
         changed
     }
 
-    /// Voxels x and x + 1 of a row, as two bits.
+    /// Returns voxels x and x + 1 of a row as two bits.
     fn pair(&self, x: usize, y: usize, z: usize) -> usize {
         let row = self.row(y, z);
         let (word, bit) = (x / WORD, x % WORD);
@@ -245,7 +245,7 @@ impl Voxels {
         ((row[word] >> bit | above) & 3) as usize
     }
 
-    /// One voxel of each face-connected component.
+    /// Returns one voxel of each face-connected component.
     pub(super) fn parts(&self) -> Vec<[usize; 3]> {
         let (mut seen, mut waiting) = (Self::new(self.dims), vec![false; self.dims[1] * self.dims[2]]);
         let mut parts = Vec::new();
@@ -261,7 +261,7 @@ impl Voxels {
         parts
     }
 
-    /// The voxels of each face-connected component.
+    /// Returns the voxels of each face-connected component.
     pub(super) fn islands(&self) -> Vec<Vec<[usize; 3]>> {
         let mut seen = Self::new(self.dims);
         let mut islands = Vec::new();
@@ -286,7 +286,7 @@ impl Voxels {
         islands
     }
 
-    /// The voxels of the box that share a face with a voxel.
+    /// Returns the voxels of the box that share a face with a voxel.
     pub(super) fn neighbours(&self, voxel: [usize; 3]) -> impl Iterator<Item = [usize; 3]> + use<> {
         let dims = self.dims;
         (0..6).filter_map(move |side| {
@@ -298,7 +298,7 @@ impl Voxels {
     }
 }
 
-/// Bits of word `w` of a row for voxels `first..=last`.
+/// Returns the bits of word `w` of a row that stand for the voxels `first..=last`.
 fn run_mask(w: usize, first: usize, last: usize) -> u64 {
     let low = first.saturating_sub(w * WORD).min(WORD - 1);
     let high = (last - w * WORD).min(WORD - 1);

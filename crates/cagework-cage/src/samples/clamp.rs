@@ -15,7 +15,7 @@ const BRASS: [u8; 3] = [198, 156, 76];
 /// Half of the cage's extent along z.
 const THICKNESS: f32 = 0.27;
 
-/// Hinge of the poses: the middle of the back.
+/// Centre of the lower jaw's rotation in poses: the middle of the clamp's back.
 const HINGE: Vec3 = vec3(-0.8, 0.0, 0.0);
 
 pub(super) fn recipe() -> Recipe {
@@ -109,8 +109,8 @@ fn cage() -> PolygonMesh {
     mesh
 }
 
-/// Share of the lower jaw's motion with which a point moves: 0 at the back and in the upper half, 1 along the lower
-/// jaw.
+/// Returns the share of the lower jaw's motion that a point follows: 0 at the back and in the upper half, 1 along the
+/// lower jaw.
 fn share_of_jaw(p: Vec3) -> f32 {
     if p.y >= -0.01 {
         return 0.0;

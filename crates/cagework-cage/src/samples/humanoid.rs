@@ -88,7 +88,7 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton, and the bone indices of arms and legs (left, right).
+/// Builds the skeleton. Also returns the bone indices of arms and legs (left, right).
 fn skeleton() -> (Skeleton, [Vec<usize>; 2], [Vec<usize>; 2]) {
     let mut skeleton = Skeleton::default();
     let trunk = skeleton.add_chain(&TRUNK, 0);
@@ -119,7 +119,7 @@ const NAMES: [&str; 16] = [
     "foot.R",
 ];
 
-/// A rig with a looping walk on the spot: two steps in two seconds.
+/// Builds a rig with a looping walk on the spot: two steps in two seconds.
 fn walk(vertices: &[Vec3]) -> Rig {
     const SECONDS: f32 = 2.0;
     const KEYS: usize = 17;

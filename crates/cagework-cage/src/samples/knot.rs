@@ -25,7 +25,7 @@ const SHEEN: [f32; 3] = [0.3, 0.15, 0.4];
 /// Largest value of the spherical harmonics of band 1: sqrt(3 / (4 pi)).
 const BAND_1: f32 = 0.488_602_5;
 
-/// The splats. y is up, and the knot lies in the plane of x and y, two units wide.
+/// Creates the splats of the knot. y is up. The knot lies in the plane of x and y and is two units wide.
 #[must_use]
 pub fn knot() -> Splats {
     let mut splats = Splats { degree: 1, ..Splats::default() };
@@ -51,7 +51,8 @@ pub fn knot() -> Splats {
     splats
 }
 
-/// Centre of the strand at a parameter from 0 to 2 pi, its direction, and the normal of the torus that it winds around.
+/// Returns the centre of the strand at a parameter from 0 to 2 pi, its direction, and the normal of the torus that it
+/// winds around.
 fn strand(t: f32) -> (Vec3, Vec3, Vec3) {
     let ((sin_2, cos_2), (sin_3, cos_3)) = ((2.0 * t).sin_cos(), (3.0 * t).sin_cos());
     let ring = 2.0 + cos_3;

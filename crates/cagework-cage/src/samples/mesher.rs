@@ -14,7 +14,7 @@ const BLOCK: u32 = 4;
 /// than 1e-3 of a cell.
 const STEPS: usize = 2;
 
-/// Mesh of a body's surface on cells of edge `cell`, with vertex colours.
+/// Meshes a body's surface on cells of edge `cell`. Also returns vertex colours.
 ///
 /// Source: surface nets (Gibson 1998) from the crate `fast-surface-nets`; vertices are then projected onto the surface.
 pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
@@ -83,13 +83,14 @@ impl Blocks {
         ((block.z * self.n_blocks.y + block.y) * self.n_blocks.x + block.x) as usize
     }
 
-    /// The body near a point in lattice coordinates; `None` far from the surface.
+    /// Returns the body near a point in lattice coordinates; `None` far from the surface.
     fn at(&self, p: Vec3) -> Option<&Body> {
         let block = (p.as_uvec3() / BLOCK).min(self.n_blocks - 1);
         self.blocks[self.number(block)].1.as_ref()
     }
 
-    /// Distances at the lattice points, x fastest. A block that the surface cannot reach gets its centre's distance.
+    /// Samples the distance at the lattice points, x fastest. A block that the surface cannot reach gets its centre's
+    /// distance.
     fn sample(&self) -> Vec<f32> {
         let n = self.n;
         let mut samples = Vec::with_capacity((n.x * n.y * n.z) as usize);

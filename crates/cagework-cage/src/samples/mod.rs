@@ -54,7 +54,7 @@ pub struct Sample {
 
 const SAMPLES: [SampleInfo; 4] = [rat::INFO, humanoid::INFO, clamp::INFO, strider::INFO];
 
-/// All samples; the first one is the default.
+/// Lists all samples; the first one is the default.
 #[must_use]
 pub fn all() -> &'static [SampleInfo] {
     &SAMPLES
@@ -129,7 +129,7 @@ impl PulledPose {
     }
 }
 
-/// Maps rest positions of a cage to posed positions.
+/// Function that maps the rest positions of a cage to posed positions.
 type Pose = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
 
 #[cfg(test)]

@@ -115,7 +115,8 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton, and the bone indices of spine, tail and legs (left front, right front, left hind, right hind).
+/// Builds the skeleton. Also returns the bone indices of spine, tail and legs (left front, right front, left hind,
+/// right hind).
 fn skeleton() -> (Skeleton, Vec<usize>, Vec<usize>, Vec<Vec<usize>>) {
     let mut skeleton = Skeleton::default();
     let spine = skeleton.add_chain(&SPINE, 0);

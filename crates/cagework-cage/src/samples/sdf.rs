@@ -48,7 +48,7 @@ impl Solid {
         }
     }
 
-    /// Lipschitz constant of the distance.
+    /// Returns the Lipschitz constant of the distance function.
     fn steepness(&self) -> f32 {
         match *self {
             Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
@@ -108,13 +108,13 @@ impl Body {
         }
     }
 
-    /// Signed distance to the surface, negative inside; approximate away from the surface.
+    /// Computes the signed distance to the surface, negative inside; approximate away from the surface.
     pub(super) fn distance(&self, p: Vec3) -> f32 {
         self.parts.iter().fold(f32::MAX, |d, part| smooth_min(d, part.solid.distance(p), part.blend).0)
     }
 
-    /// The solids that affect distance and colour within `reach` of a point. Within `reach`, results equal the whole
-    /// body's.
+    /// Selects the solids that affect distance and colour within `reach` of a point. There, their union gives the same
+    /// results as the whole body.
     pub(super) fn near(&self, p: Vec3, reach: f32) -> Self {
         let mut parts = Vec::new();
         let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
@@ -157,7 +157,7 @@ impl Body {
     }
 }
 
-/// Polynomial smooth minimum of two distances, and the share of the second distance in it.
+/// Computes the polynomial smooth minimum of two distances, and the share of the second distance in it.
 fn smooth_min(a: f32, b: f32, blend: f32) -> (f32, f32) {
     if blend <= 0.0 || a - b >= blend {
         return if b < a { (b, 1.0) } else { (a, 0.0) };

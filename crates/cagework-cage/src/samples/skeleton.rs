@@ -41,8 +41,8 @@ impl Skeleton {
             .collect()
     }
 
-    /// Positions of points after bones have rotated. `turns`: (bone, rotation vector in radians about rest axes).
-    /// `[n_points]`
+    /// Computes the positions of points after bones have rotated. `turns`: (bone, rotation vector in radians about rest
+    /// axes). `[n_points]`
     pub(super) fn pose(&self, points: &[Vec3], turns: &[(usize, Vec3)]) -> Vec<Vec3> {
         let mut motion: Vec<Affine3A> = Vec::with_capacity(self.bones.len());
         for (k, bone) in self.bones.iter().enumerate() {
@@ -59,7 +59,7 @@ impl Skeleton {
         points.iter().map(|&p| self.moved(p, &motion)).collect()
     }
 
-    /// Weighted mean of a point's images under all bones.
+    /// Computes the weighted mean of a point's images under all bones.
     fn moved(&self, p: Vec3, motion: &[Affine3A]) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for (weight, m) in self.weights(p).into_iter().zip(motion) {
@@ -68,7 +68,7 @@ impl Skeleton {
         sum
     }
 
-    /// Weights of the bones at a point; they sum to 1.
+    /// Computes the weights of the bones at a point; they sum to 1.
     fn weights(&self, p: Vec3) -> Vec<f32> {
         let distances = self.bones.iter().map(|bone| {
             let axis = bone.to - bone.from;
@@ -82,9 +82,9 @@ impl Skeleton {
         weights.into_iter().map(|weight| weight / total).collect()
     }
 
-    /// A rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: names of the
-    /// bones; `clip`: name and times of the keys, seconds; `turns`: rotation vector of a bone at a time, radians;
-    /// `lift`: position of the root at a time.
+    /// Builds a rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: names
+    /// of the bones; `clip`: name and times of the keys, seconds; `turns`: rotation vector of a bone at a time,
+    /// radians; `lift`: position of the root at a time.
     pub(super) fn rig(
         &self,
         names: &[&'static str],

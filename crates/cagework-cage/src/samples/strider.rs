@@ -38,7 +38,7 @@ pub(super) fn recipe() -> Recipe {
     }
 }
 
-/// A left leg: hip, knee, ankle and foot, with radii.
+/// Returns the points of a left leg (hip, knee, ankle and foot) with their radii.
 fn leg(angle: f32, reach: f32) -> [(Vec3, f32); 4] {
     let out = |along: f32, y: f32| vec3(angle.sin() * along, y, angle.cos() * along);
     [
@@ -62,7 +62,7 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton, and the bone indices of the legs: left ones from the front, then right ones.
+/// Builds the skeleton. Also returns the bone indices of the legs: left ones from the front, then right ones.
 fn skeleton() -> (Skeleton, Vec<Vec<usize>>) {
     let mut skeleton = Skeleton::default();
     let trunk = skeleton.add(vec3(0.0, 0.54, -0.4), vec3(0.0, 0.54, 0.25), 0.2, 0);

@@ -116,7 +116,7 @@ impl RenderArgs {
     }
 }
 
-/// Parser of a finite number.
+/// Parses a finite number.
 fn finite(text: &str) -> Result<f32, String> {
     text.trim().parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "not a number".into())
 }
@@ -124,7 +124,7 @@ fn finite(text: &str) -> Result<f32, String> {
 /// Value of `--compare` that selects the harmonic coordinates of the cage, without `--smooth` and `--controls`.
 const PLAIN: &str = "plain";
 
-/// Parser of the word that selects the coordinates to compare with.
+/// Returns a parser of the word that selects the coordinates to compare with.
 fn compared() -> impl TypedValueParser<Value = Coordinates> {
     let forms =
         Coordinates::ALL.iter().filter(|(_, kind)| *kind != Coordinates::Harmonic).map(|(word, kind)| {
@@ -159,7 +159,7 @@ pub(crate) enum ShowArg {
     Slice,
 }
 
-/// Parser of the index of a coordinate axis.
+/// Returns a parser of the index of a coordinate axis.
 fn axis() -> impl TypedValueParser<Value = usize> {
     PossibleValuesParser::new(["x", "y", "z"]).map(|name| "xyz".find(&name).unwrap_or(2))
 }

@@ -35,7 +35,7 @@ fn mask(text: &str) -> Result<(String, f32), String> {
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
     /// Joints, and other nodes that clips animate or that carry meshes: follow moves them with the cage and keeps their rotations; stay leaves
-    /// them, for skeletons that several files share; turn also rotates them with the shape.
+    /// them at rest, for skeletons that several files share; turn also rotates them with the shape.
     #[arg(long, default_value_t, value_parser = super::words::<Joints>())]
     joints: Joints,
     /// Keep the travel distance of clips; by default it is scaled with the height of the hips.
@@ -56,7 +56,7 @@ pub(crate) struct RigArgs {
 }
 
 impl RigArgs {
-    /// Options for deforming a rigged model, and notices about ambiguous part names.
+    /// Returns options for deforming a rigged model, and notices about ambiguous part names.
     ///
     /// # Errors
     /// If no part of the model has a given name.
@@ -68,8 +68,8 @@ impl RigArgs {
         self.options_with(model, path, &self.parts)
     }
 
-    /// Options for deforming one of many models, the names of `--rigid` and `--mask` that this model lacks, and notices
-    /// about ambiguous part names.
+    /// Returns options for deforming one of many models, the names of `--rigid` and `--mask` that this model lacks, and
+    /// notices about ambiguous part names.
     ///
     /// # Errors
     /// If the rig cannot be read.
@@ -120,7 +120,7 @@ impl RigArgs {
         self.joints == Joints::Stay
     }
 
-    /// Part names that `--rigid` and `--mask` give.
+    /// Returns the part names that `--rigid` and `--mask` give.
     pub(crate) fn part_names(&self) -> impl Iterator<Item = &String> {
         self.parts.rigid.iter().chain(self.parts.mask.iter().map(|(name, _)| name))
     }
@@ -152,7 +152,8 @@ impl RigArgs {
     }
 }
 
-/// The part name. If parts of several kinds share it, prefixes the first kind and adds a notice about the others.
+/// Returns the part name. If parts of several kinds share it, prefixes it with the first kind, and adds a notice about
+/// the others.
 fn with_kind(model: &Model, name: &str, notices: &mut Vec<String>) -> String {
     let Err(SelectError::Ambiguous { choices, .. }) = model.select(name) else { return name.to_owned() };
     let names: Vec<&str> = choices.iter().map(|choice| choice.trim_matches('\'')).collect();

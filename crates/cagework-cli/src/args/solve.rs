@@ -31,7 +31,7 @@ impl MemoryArgs {
 /// Arguments of the solver. All commands that bind share them.
 #[derive(Args, Debug)]
 pub(crate) struct SolveArgs {
-    /// Boundary of the grid: embedded takes the exact intersections of grid lines with the cage, classic whole cells, as published.
+    /// Boundary of the grid: embedded uses the exact intersections of grid lines with the cage; classic uses whole cells, as published.
     #[arg(long, default_value_t, value_parser = words::<Method>())]
     method: Method,
     /// Solver of Laplace's equation [default: multigrid; jacobi with --method classic].
@@ -70,7 +70,7 @@ impl SolveArgs {
         self.backend == Backend::Gpu
     }
 
-    /// Bind options for `grid` cells along the cage's longest side, and this memory limit.
+    /// Returns bind options with `grid` cells along the cage's longest side and this memory limit.
     pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
         BindOptions {
             grid,

@@ -126,8 +126,8 @@ impl Run {
         Some(Self { implementation, report, total_ms })
     }
 
-    /// (Milliseconds of solving, delta) pairs at the iterations that report delta, assuming that all iterations take
-    /// the same time.
+    /// Returns (milliseconds of solving, delta) pairs at the iterations that report delta, assuming that all iterations
+    /// take the same time.
     pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
         let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
         let every = f64::from(self.report.delta_interval);
@@ -280,19 +280,20 @@ impl Evaluation {
         })
     }
 
-    /// The timed run of an implementation for one grid and threshold.
+    /// Returns the timed run of an implementation for one grid and threshold.
     pub(super) fn timed(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<&Run> {
         self.timed.iter().find(|run| {
             run.implementation == implementation && run.report.grid == grid && run.report.tau == tau
         })
     }
 
-    /// The run of an implementation whose delta figure 7 shows.
+    /// Returns the run of an implementation whose delta figure 7 shows.
     pub(super) fn delta_run(&self, implementation: Implementation) -> Option<&Run> {
         self.timed(implementation, self.grids.middle, 1e-5)
     }
 
-    /// Mean rest error of an implementation for one grid and threshold, as a fraction of the cage's diagonal.
+    /// Returns the mean rest error of an implementation for one grid and threshold, as a fraction of the cage's
+    /// diagonal.
     pub(super) fn mean_rel(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<f64> {
         self.errors
             .iter()

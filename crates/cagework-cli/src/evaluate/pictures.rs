@@ -18,7 +18,7 @@ const SIZE: [u32; 2] = [720, 540];
 /// Angle by which the cage of figure 6 is bent over its whole length, radians.
 const BEND_ANGLE: f32 = 0.9;
 
-/// All pictures as (file name, PNG bytes) pairs.
+/// Draws all pictures. Returns (file name, PNG bytes) pairs.
 ///
 /// # Errors
 /// If the GPU fails.
@@ -53,7 +53,8 @@ pub(super) fn all(
     Ok(pictures)
 }
 
-/// The cage bent upwards at both ends along its longest horizontal axis. `[n_cage]`, object units.
+/// Bends the cage upwards at both ends of its longest horizontal axis. Returns the positions of its vertices,
+/// `[n_cage]`, object units.
 fn bent_cage(cage: &Cage) -> Vec<Vec3> {
     let bounds = cage.bounds();
     let (center, extent) = (bounds.center(), bounds.extent());

@@ -25,7 +25,7 @@ const FONT: (&str, u32) = ("sans-serif", 15);
 
 type Plot = Result<String, Box<dyn std::error::Error>>;
 
-/// All plots as (file name, SVG text) pairs.
+/// Draws all plots. Returns (file name, SVG text) pairs.
 ///
 /// # Errors
 /// If a plot cannot be drawn.
@@ -202,7 +202,7 @@ fn lines(
     Ok(svg)
 }
 
-/// Powers of ten below and above all positive values.
+/// Returns the powers of ten below and above all positive values.
 fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) =
         values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));

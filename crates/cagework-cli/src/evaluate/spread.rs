@@ -25,7 +25,7 @@ pub(super) enum Comparison {
 }
 
 impl Spread {
-    /// Range of `values`; `None` if there are no values.
+    /// Returns the range of `values`; `None` if there are no values.
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         values.fold(None, |spread, value| {
             let Self { n, min, max } = spread.unwrap_or(Self { n: 0, min: value, max: value });

@@ -1,12 +1,12 @@
-//! Writes the report, which says which findings of the paper that the parent module names hold in this run.
+//! Writes the report: which findings of the paper hold in this run. The parent module names the paper.
 
 use std::fmt::Write as _;
 
 use super::cases::{ERROR_TAUS, Evaluation, Implementation, Run, TIMED_TAUS};
 use super::spread::{Comparison, Spread};
 
-/// Findings about each claim of the paper, one per line. A time is called shorter only if the ranges of times do not
-/// overlap.
+/// Composes the findings about each claim of the paper, one per line. A time is called shorter only if the ranges of
+/// times do not overlap.
 pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     let mut out = String::new();
     for grid in evaluation.grids.timed() {
@@ -70,15 +70,15 @@ fn verdict_of_slower(new: &Run, old: &Run) -> &'static str {
     }
 }
 
-/// The median time, followed by the range if there are several measurements.
+/// Formats the median time, followed by the range if there are several measurements.
 fn times(run: &Run) -> String {
     let Spread { n, min, max } = run.total_ms;
     let median = run.report.timings_ms.total;
     if n < 2 { format!("{median:.1} ms") } else { format!("{median:.1} ms ({min:.1} to {max:.1})") }
 }
 
-/// End of a sentence that compares the times of `new` and `old`: the factor if `new` is faster, otherwise that `new` is
-/// slower or that the difference is not certain.
+/// Formats the end of a sentence that compares the times of `new` and `old`: the factor if `new` is faster, otherwise
+/// that `new` is slower or that the difference is not certain.
 fn factors(new: &Run, old: &Run) -> String {
     match new.total_ms.against(old.total_ms) {
         Comparison::Faster { least, most } => {
@@ -156,7 +156,8 @@ fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Findings about errors. Binds with the same options give identical bits, so one bind per case is enough.
+/// Writes the findings about errors to `out`. Binds with the same options give identical bits, so one bind per case is
+/// enough.
 fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
     let fine = evaluation.grids.fine;
     let paper = |tau| evaluation.mean_rel(Implementation::PaperThreads, fine, tau);
@@ -180,7 +181,7 @@ fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Contents of `report.md`.
+/// Composes the contents of `report.md`.
 pub(super) fn report(evaluation: &Evaluation) -> String {
     let mut out = format!(
         "# The paper's evaluation, repeated\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
@@ -225,7 +226,7 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
     out
 }
 
-/// Phrase of the report that says how a time was measured.
+/// Returns the phrase of the report that says how a time was measured.
 fn measured(runs: u32) -> String {
     match runs {
         1 => "a single bind, without a range".to_owned(),

@@ -171,7 +171,8 @@ fn open_for_append(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).open(path)
 }
 
-/// Number of the descriptor of this process that a path leads to through symbolic links; `None` for other paths.
+/// Returns the number of this process's descriptor to which a path leads through symbolic links; `None` for other
+/// paths.
 #[cfg(target_os = "linux")]
 fn descriptor(path: &Path) -> Option<i32> {
     let own = fs::canonicalize("/proc/self/fd").ok()?;

@@ -138,7 +138,7 @@ fn surface_point(bound: &BoundModel, landmark: &LandmarkJson) -> Result<SurfaceP
     }
 }
 
-/// Closest point on the model's surface. `None` if the model has no triangles.
+/// Finds the closest point on the model's surface. `None` if the model has no triangles.
 fn nearest(bound: &BoundModel, at: DVec3) -> Option<SurfacePoint> {
     let model = &bound.model;
     let mut best = (f64::INFINITY, None);

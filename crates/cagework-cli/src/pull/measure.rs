@@ -21,7 +21,7 @@ pub(super) struct Stretches {
     pub(super) stretch_1: f64,
 }
 
-/// Stretch of all edges of a model. An edge of several triangles counts once.
+/// Measures the stretch of all edges of a model. An edge of several triangles counts once.
 pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
@@ -51,8 +51,8 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     Stretches { stretch_max: at(1.0), stretch_99: at(0.99), stretch_1: at(0.01) }
 }
 
-/// Mean displacement, object units, of the vertices farther than [`FAR_REACH_RATIO`] times the reach from the grabs
-/// along the surface; `None` if no vertex is that far.
+/// Computes the mean displacement, object units, of the vertices farther than [`FAR_REACH_RATIO`] times the reach from
+/// the grabs along the surface; `None` if no vertex is that far.
 pub(super) fn far_mean(drag: &Drag, before: &[Vec3], after: &[Vec3]) -> Option<f64> {
     let limit = FAR_REACH_RATIO * drag.reach_length();
     let moves = drag.walks().iter().zip(before.iter().zip(after));

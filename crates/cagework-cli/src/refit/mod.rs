@@ -39,7 +39,7 @@ struct Job {
     output: ModelOutput,
 }
 
-/// Binds models to one cage.
+/// State for binding models to one cage.
 struct Binder<'a> {
     args: &'a RefitArgs,
     controls: Controls<'a>,
@@ -166,8 +166,8 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-/// All models to read, and the files to write them to. `shared`: files of the cage and the pose, which are left out if
-/// a folder of models contains them.
+/// Lists all models to read, and the files to write them to. `shared`: files of the cage and the pose, which are left
+/// out if a folder of models contains them.
 ///
 /// # Errors
 /// If the manifest cannot be read or names no model, or two models have the same output.
@@ -287,9 +287,9 @@ impl Binder<'_> {
         Ok(DeformedModel { job, model, deformation, options, report, started })
     }
 
-    /// The skeleton that all models share, with joints identified by name: how the joints of the `--skeleton` body
-    /// move, or, without `--skeleton`, which joints carry vertices in any of the models. `None` if the joints of each
-    /// model depend on that model alone.
+    /// Builds the skeleton that all models share, with joints identified by name: how the joints of the `--skeleton`
+    /// body move, or, without `--skeleton`, which joints carry vertices in any of the models. `None` if the joints of
+    /// each model depend on that model alone.
     fn skeleton_of(&self, jobs: &[Job], poses: &Poses) -> Result<Option<Skeleton>, CliError> {
         let Self { args, .. } = self;
         let (up, memory) = (args.read.axis(), args.read.memory);

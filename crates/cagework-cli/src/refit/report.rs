@@ -67,7 +67,7 @@ impl Outcome {
     }
 }
 
-/// The error message, with the model's path in front of it unless the message already contains the path.
+/// Returns the error message, with the model's path in front of it unless the message already contains the path.
 fn named(error: &CliError, model: &Path) -> String {
     let (message, name) = (error.message(), shown_path(model));
     if message.contains(&name) { message } else { format!("{name}: {message}") }

@@ -51,7 +51,7 @@ fn vertices_of_models_and_clouds_are_mapped() {
     sandbox.run("map mesh.obj --cage cage.obj --pose posed.obj -o out.obj").success();
     let expected: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(affine).collect();
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
-    // With --up z, cage, pose and model are turned alike, so the map in the file's axes is still `affine`.
+    // With --up z, cage, pose and model are rotated in the same way, so the map in the file's axes is still `affine`.
     sandbox.run("map mesh.obj --up z --cage cage.obj --pose posed.obj -o z.obj").success();
     assert_close(&obj_positions(&sandbox.read("z.obj")), &expected, TOLERANCE);
     sandbox.run("map probes.csv --up z --cage cage.obj --pose posed.obj -o z.csv").success();

@@ -77,13 +77,13 @@ impl Columns {
         self.exact[0].len()
     }
 
-    /// A point in the scaled coordinates of the columns.
+    /// Converts a point to the scaled coordinates of the columns.
     #[must_use]
     pub fn scale(&self, point: DVec3) -> DVec3 {
         (point - self.center) / self.diagonal
     }
 
-    /// Sum of the weights of a row, `[n_batches]`, and distance of `sum w c` from the scaled `target`
+    /// Computes the sum of the weights of a row, `[n_batches]`, and the distance of `sum w c` from the scaled `target`
     /// ([`Self::scale`]).
     #[inline(always)]
     #[must_use]
@@ -92,7 +92,7 @@ impl Columns {
         Sums { sum, miss: (point - target).length() }
     }
 
-    /// `(sum w, sum w c)` of a row, `[n_batches]`, in scaled coordinates.
+    /// Computes `(sum w, sum w c)` of a row, `[n_batches]`, in scaled coordinates.
     // Inlined where callers are compiled for several instruction sets; wasm keeps one copy to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]

@@ -32,7 +32,7 @@ pub struct RawRow {
 }
 
 impl RowFacts {
-    /// Statistics of a row (`[n_batches]`) with the given `sums`. `raw`: as in [`Self::raw`].
+    /// Computes the statistics of a row (`[n_batches]`) with the given `sums`. `raw`: as in [`Self::raw`].
     // wasm keeps one copy for all callers to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
@@ -58,8 +58,8 @@ impl RowFacts {
 }
 
 impl AssembledWeights {
-    /// Rest error after correction, error before correction of the rows without offsets, and statistics of the weights.
-    /// `diagonal`: diagonal of the cage, object units.
+    /// Computes the rest error after correction, the error before correction of the rows without offsets, and
+    /// statistics of the weights. `diagonal`: diagonal of the cage, object units.
     #[must_use]
     pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {
         let mut errors: Vec<f32> = self.facts.iter().filter_map(|facts| facts.error).collect();

@@ -42,11 +42,12 @@ const MAX_CHANGE: f32 = 5.0;
 /// Options of [`assemble`].
 #[derive(Clone, Copy, Debug)]
 pub struct RowOptions {
-    /// Drops the smallest weights of a row while their sum is at most this; 0 keeps all non-zero weights. Correction
-    /// then restores the row's sum and rest position. If that would change the row too much, it keeps its weights.
+    /// Limit on the sum of the weights dropped from a row, smallest first; 0 keeps all non-zero weights. Correction
+    /// then restores the row's sum and rest position. If that would change the row too much, the row keeps all its
+    /// weights.
     pub threshold: f32,
-    /// Restores sum and rest position of every row. Off for the classic method, which reproduces the method of K. Smith
-    /// (`docs/method.md`, sources) with its errors.
+    /// Whether to restore sum and rest position of every row. False for the classic method, which reproduces the method
+    /// of K. Smith (`docs/method.md`, sources) with its errors.
     pub preserve_affine: bool,
 }
 
@@ -137,8 +138,8 @@ pub fn assemble(
     }
 }
 
-/// [`assemble`] on one thread without a threshold. Rows are nearly full and are appended without counting first, which
-/// writes a third less memory.
+/// Assembles the weight matrix, like [`assemble`], on one thread and without a threshold. Rows are nearly full and are
+/// appended without counting first, which writes a third less memory.
 fn assemble_alone(
     controls: Controls<'_>,
     columns: &Columns,
@@ -313,8 +314,8 @@ impl VertexRun<'_> {
     }
 }
 
-/// Largest threshold such that the weights below it sum to at most `most`. Bisects over the bit patterns of f32, which,
-/// for positive numbers, have the order of the numbers.
+/// Finds the largest threshold such that the weights below it sum to at most `most`. Bisects over the bit patterns of
+/// f32, which, for positive numbers, have the order of the numbers.
 fn least_kept(row: &[Row], most: f32) -> f32 {
     let (mut low, mut high) = (0, most.to_bits() + 1);
     while high - low > 1 {

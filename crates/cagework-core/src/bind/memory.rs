@@ -42,8 +42,8 @@ const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 /// Bytes per grid cell while lines and levels are built.
 const CELL_BYTES: f64 = 30.0;
 
-/// Bytes of the weights of `n_rows` vertices if no weight is dropped. The share of small weights is unknown before the
-/// solve: a threshold of 1e-5 keeps a third of the weights with 110 columns, and all of them with 8.
+/// Returns the size of the weights of `n_rows` vertices in bytes if no weight is dropped. The share of small weights is
+/// unknown before the solve: a threshold of 1e-5 keeps a third of the weights with 110 columns, and all of them with 8.
 #[must_use]
 pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
     n_rows as u64 * (n_columns as u64 * 8 + 4)
@@ -137,7 +137,7 @@ pub(super) fn estimate(
     MemoryEstimate { bytes: bytes as u64, of_points: of_points as u64 }
 }
 
-/// Estimated number of updates of single values in a solve: unknowns times columns times sweeps.
+/// Estimates the number of updates of single values in a solve: unknowns times columns times sweeps.
 pub(super) fn updates(controls: Controls<'_>, grid: &Grid, options: &BindOptions) -> f64 {
     /// Work of a multigrid solve, in sweeps of the finest level (benches/README.md).
     const MULTIGRID_SWEEPS: f64 = 18.0;
@@ -161,7 +161,7 @@ pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
     (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
 }
 
-/// Estimated numbers of unknowns and of cut cells.
+/// Estimates the numbers of unknowns and of cut cells.
 fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
     let (volume, area) = volume_and_area(controls.surface());
     let (cell, n_cells) = (grid.cell, grid.n_cells() as f64);
@@ -169,7 +169,7 @@ fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
     ((volume / of_cell).min(n_cells), (CUT_PER_AREA * area / of_cell.powf(2.0 / 3.0)).min(n_cells))
 }
 
-/// Enclosed volume (divergence theorem) and area of the cage.
+/// Computes the enclosed volume of the cage (divergence theorem), and its area.
 fn volume_and_area(cage: &Cage) -> (f64, f64) {
     let origin = cage.bounds().center().as_dvec3();
     (0..cage.triangles().len() as u32).fold((0.0, 0.0), |(volume, area), t| {

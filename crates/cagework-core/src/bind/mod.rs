@@ -127,7 +127,7 @@ pub fn bind<'a>(
     pipeline::run(positions, controls.into(), options, progress)
 }
 
-/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU. Allocates nothing. The actual peak
+/// Estimates the working memory of a bind of `n_points` vertices on the CPU, bytes. Allocates nothing. The actual peak
 /// may be a third lower or higher, and lower still if [`BindOptions::sparsify`] drops most of the weights.
 ///
 /// # Errors
@@ -144,8 +144,8 @@ pub fn estimate_memory<'a>(
     Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }
 
-/// Estimated work of a solve: number of updates of single values, which is unknowns times columns times sweeps. A
-/// thread does about 10^9 per second. Allocates nothing.
+/// Estimates the work of a solve: the number of updates of single values, which is unknowns times columns times sweeps.
+/// A thread does about 10^9 per second. Allocates nothing.
 ///
 /// # Errors
 /// [`BindError::Option`] if an option is out of range.

@@ -136,7 +136,8 @@ impl<'a> JointPoints<'a> {
         Some(Self { inner, joints, radius })
     }
 
-    /// Each joint, and the six points around it for central differences over the radius. `[7 * n_joints]`
+    /// Returns each joint, followed by the six points around it, at the distance of the radius, for central
+    /// differences. `[7 * n_joints]`
     pub(super) fn points(&self) -> Vec<Vec3> {
         let steps = Vec3::AXES.map(|axis| self.radius * axis);
         let around = |at: Vec3| {
@@ -145,7 +146,7 @@ impl<'a> JointPoints<'a> {
         self.joints.iter().flat_map(|&j| around(self.inner.positions[j as usize])).collect()
     }
 
-    /// Frames from the weights of [`Self::points`] in the cage without inner controls.
+    /// Builds the frames from the weights of [`Self::points`] in the cage without inner controls.
     fn frames(self, controls: Controls<'_>, weights: &Weights) -> Frames {
         let Self { inner, joints, radius } = self;
         let number = |i: u32| joints.partition_point(|&j| j < i) as u32;

@@ -108,14 +108,15 @@ pub(super) fn refuse_outside(
     }
 }
 
-/// The [`BindError::NoneInside`] for a model whose vertices are all outside. `positions` must not be empty.
+/// Creates the [`BindError::NoneInside`] for a model whose vertices are all outside. `positions` must not be empty.
 fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     let model = Bounds::of(positions).unwrap_or(cage.bounds());
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
-/// Notice that the cage is so much larger than the enclosed part of the model that this part has nearly the same
-/// weights everywhere. `positions`: vertices of the model, the first rows of `weights`; vertices `outside` are ignored.
+/// Returns a notice if the cage is so much larger than the enclosed part of the model that this part has nearly the
+/// same weights everywhere. `positions`: vertices of the model, the first rows of `weights`; vertices `outside` are
+/// ignored.
 pub(super) fn oversized(
     cage: Bounds,
     positions: &[Vec3],

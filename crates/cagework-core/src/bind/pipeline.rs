@@ -165,7 +165,8 @@ impl<'a> PreparedBind<'a> {
         self.reported((rows, frames), blocks_bytes, solved, sampled, watch)
     }
 
-    /// Binding of all vertices, with the report. `sampled`: time at which sampling ended, on the watch's clock.
+    /// Builds the binding of all vertices, with its report. `sampled`: time at which sampling ended, on the watch's
+    /// clock.
     fn reported(
         self,
         (rows, frames): (AssembledWeights, Frames),
@@ -249,8 +250,8 @@ impl<'a> PreparedBind<'a> {
     }
 }
 
-/// Joints of the inner balls and tubes, and the weights of their points in the cage without inner controls. `None` if
-/// there are no balls and tubes.
+/// Collects the joints of the inner balls and tubes, and binds their points to the cage without inner controls. `None`
+/// if there are no balls and tubes.
 ///
 /// # Errors
 /// As [`super::bind`].
@@ -278,7 +279,7 @@ fn bound_joints<'a>(
     Ok(Some((joints, bound.weights)))
 }
 
-/// Progress of the bind in [`bound_joints`]: polls for cancellation but reports nothing.
+/// Progress of the bind in [`bound_joints`], which polls for cancellation but reports nothing.
 struct PollOnly<'a>(&'a Watch<'a>);
 
 impl Progress for PollOnly<'_> {
@@ -294,7 +295,7 @@ impl Progress for PollOnly<'_> {
     }
 }
 
-/// Stencils of all points, computed on all threads in runs of `VERTEX_RUN` points.
+/// Computes the stencils of all points on all threads, in runs of `VERTEX_RUN` points.
 fn sampling_stencils(
     controls: Controls<'_>,
     voxelized: &VoxelizedCage,
@@ -322,7 +323,8 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-/// Vertices outside the cage, and the number of vertices among the first `n_vertices` that lie inside a ball or tube.
+/// Returns the vertices outside the cage, and the number of vertices among the first `n_vertices` that lie inside a
+/// ball or tube.
 fn outside_of(
     controls: Controls<'_>,
     points: &[OutsidePoint],
@@ -344,8 +346,8 @@ fn outside_of(
     (outside, n_held)
 }
 
-/// Notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side, and
-/// vertices that no element uses.
+/// Returns notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side,
+/// and vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let Some(inner) = controls.inner() else { return Vec::new() };
     let mut notices = Vec::new();

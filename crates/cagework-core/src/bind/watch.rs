@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 
-/// Range of the whole bind's progress that a stage covers.
+/// Returns the range of the whole bind's progress that a stage covers.
 fn span(stage: Stage) -> [f32; 2] {
     match stage {
         Stage::Voxelize => [0.0, 0.1],
@@ -16,7 +16,7 @@ fn span(stage: Stage) -> [f32; 2] {
     }
 }
 
-/// Forwards progress from any thread, and remembers cancellation.
+/// Wrapper of a [`Progress`] that forwards reports from any thread and remembers cancellation.
 pub struct Watch<'a> {
     progress: &'a dyn Progress,
     cancelled: AtomicBool,
@@ -26,7 +26,7 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// A watch that reports to `progress`.
+    /// Creates a watch that reports to `progress`.
     #[must_use]
     pub fn new(progress: &'a dyn Progress) -> Self {
         Self {

@@ -6,9 +6,9 @@
 //! 2011, "Positive Gordon-Wixom coordinates".
 //!
 //! Changes: the quotients of Meyer et al. are multiplied by the areas of the triangles of the point and all sides,
-//! which avoids division by zero on a side. Chords end at the nearest sides, which a sweep finds, and have weights
-//! other than in the sources. The mean over chords is taken by quadrature; on each chord, values sum to 1, are not
-//! negative and reproduce linear functions, so their mean does, too.
+//! which avoids division by zero on a side. Each chord ends at the nearest sides, which a sweep finds. The weights of
+//! chords differ from those in the sources. The mean over chords is taken by quadrature; on each chord, values sum to
+//! 1, are not negative and reproduce linear functions, so their mean does, too.
 
 use std::f64::consts::PI;
 
@@ -22,8 +22,8 @@ const OUTLINE_TOLERANCE: f64 = 1e-15;
 /// Nodes of Gauss quadrature on `[0, 1]`: `(1 ± 1 / sqrt(3)) / 2`.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Wachspress coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum
-/// 1; `areas`: `[n]`, scratch. A point that is outside by rounding is treated as on the side.
+/// Computes the Wachspress coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`,
+/// non-negative, sum 1; `areas`: `[n]`, scratch. A point that is outside by rounding is treated as on the side.
 pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], areas: &mut [f64]) {
     let n = outline.len();
     let before = |k: usize| if k == 0 { n - 1 } else { k - 1 };
@@ -53,11 +53,11 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     normalize(values);
 }
 
-/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that contains it: the mean over all
-/// chords through the point of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))`
-/// with the distances r and s to the ends. The weight `1 / (r s)` would make them harmonic on a circle; the root
-/// reduces the influence of distant corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))` if a line through
-/// the point crosses `c` sides.
+/// Computes the pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that contains it: the mean
+/// over all chords through the point of the linear interpolation between the chord's ends, weighted by
+/// `1 / (r s sqrt(r + s))` with the distances r and s to the ends. The weight `1 / (r s)` would make them harmonic on a
+/// circle; the root reduces the influence of distant corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))`
+/// if a line through the point crosses `c` sides.
 pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
     let n = outline.len();
     let next = |k: usize| if k + 1 == n { 0 } else { k + 1 };

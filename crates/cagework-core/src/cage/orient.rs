@@ -7,7 +7,7 @@ use super::polygon::{MIN_FACE_HEIGHT, Polygon};
 use super::topology::Surface;
 use crate::geometry::winding_number;
 
-/// Number of sample points of a component in the test whether it lies inside another one. Odd, so that inside or
+/// Number of sample points of a component for the test of whether it lies inside another one. Odd, so that inside or
 /// outside has the majority; large, because samples disagree where components touch or overlap.
 const NESTING_SAMPLES: usize = 31;
 

@@ -21,7 +21,7 @@ pub(super) struct Facets {
     pub(super) facets: Vec<[u32; 3]>,
 }
 
-/// Facets of a strictly convex polygon, counter-clockwise.
+/// Cuts a strictly convex counter-clockwise polygon into facets along [`RINGS`].
 pub(super) fn rings(outline: &[DVec2]) -> Facets {
     let n = outline.len();
     let middle = outline.iter().sum::<DVec2>() / n as f64;
@@ -53,8 +53,8 @@ pub(super) fn rings(outline: &[DVec2]) -> Facets {
     Facets { inner, facets }
 }
 
-/// Facets of a simple polygon with the triangulation `triangles`. Each triangle becomes a fan around its centroid; the
-/// diagonals of the polygon are halved.
+/// Cuts a simple polygon with the triangulation `triangles` into facets. Each triangle becomes a fan around its
+/// centroid; the diagonals of the polygon are halved.
 pub(super) fn fans(outline: &[DVec2], triangles: &[[u32; 3]]) -> Facets {
     let n = outline.len() as u32;
     let (mut inner, mut facets) = (Vec::new(), Vec::new());

@@ -104,7 +104,7 @@ impl Polygon {
         Self { outline: Vec::new(), meyer: 0.0, facets, triangles, inner: Vec::new() }
     }
 
-    /// Hats of the corners at a point of the plane, non-negative. `values`: `[n_corners]`, zero on entry.
+    /// Computes the hats of the corners at a point of the plane, non-negative. `values`: `[n_corners]`, zero on entry.
     pub(super) fn values(&self, point: DVec2, values: &mut [f64]) {
         let outline = &self.outline[..values.len()];
         if self.meyer < 1.0 {
@@ -120,7 +120,8 @@ impl Polygon {
     }
 }
 
-/// Share of Meyer's coordinates on a quad: smoothstep from 0 at a straight corner to 1 at [`MIN_MEYER_SINE`].
+/// Computes the share of Meyer's coordinates on a quad: smoothstep from 0 at a straight corner to 1 at
+/// [`MIN_MEYER_SINE`].
 fn meyer_share(quad: &[DVec2]) -> f64 {
     let turns = (0..4).map(|k| {
         let [before, after] =
@@ -134,8 +135,8 @@ fn meyer_share(quad: &[DVec2]) -> f64 {
     if share < MIN_SHARE { 0.0 } else { share }
 }
 
-/// Coordinates in the plane with this normal, with an axis along the longest side, so that rectangles remain
-/// axis-aligned.
+/// Projects points to the plane with this normal. One axis of the plane is along the longest side, so that rectangles
+/// remain axis-aligned.
 fn project(arms: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let n = arms.len();
     let side = (0..n)
@@ -161,7 +162,7 @@ fn is_convex(outline: &[DVec2]) -> bool {
     total < 3.0 * std::f64::consts::PI
 }
 
-/// Sine of the exterior angle at `b` of the path `a`, `b`, `c`; positive for a turn to the left.
+/// Returns the sine of the exterior angle at `b` of the path `a`, `b`, `c`; positive for a turn to the left.
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).normalize_or_zero().perp_dot((c - b).normalize_or_zero())
 }

@@ -7,8 +7,8 @@ use crate::mesh::{Bounds, PolygonMesh};
 /// Minimum thickness of the box, as a fraction of the model's diagonal, so that a flat model gets a cage with a volume.
 const MIN_THICKNESS: f32 = 0.01;
 
-/// A box around `bounds` with shared vertices and outward faces. `divisions`: number of quads along x, y and z, at
-/// least one. `margin`: distance from the bounds, as a fraction of their diagonal; negative values count as 0.
+/// Builds a box around `bounds` with shared vertices and outward faces. `divisions`: number of quads along x, y and z,
+/// at least one. `margin`: distance from the bounds, as a fraction of their diagonal; negative values count as 0.
 #[must_use]
 pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> PolygonMesh {
     // A single point has no diagonal: use one object unit.

@@ -21,7 +21,7 @@ pub struct Side {
     pub forward: bool,
 }
 
-/// Sides of the faces with the indices `some`, sorted by edge.
+/// Lists the sides of the faces with the indices `some`, sorted by edge.
 #[must_use]
 pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
     // Sort `[u32; 3]`, as other code of the crate does: the sort of another type would be compiled separately and add
@@ -88,7 +88,7 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
     agree(faces, &sides)
 }
 
-/// All sides, sorted by edge; checks that each edge has two.
+/// Checks that each edge has two sides. Returns all sides, sorted by edge.
 fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
     check_duplicates(faces)?;
     let sides = sides_of(faces, 0..faces.len() as u32);
@@ -121,7 +121,7 @@ fn check_duplicates(faces: &[Vec<u32>]) -> Result<(), CageError> {
     Ok(())
 }
 
-/// Canonical corner sequence of a face, independent of its start and direction.
+/// Returns the canonical corner sequence of a face, independent of its start and direction.
 fn outline(face: &[u32]) -> Vec<u32> {
     let n = face.len();
     let start = (0..n).min_by_key(|&k| face[k]).unwrap_or(0);
@@ -234,7 +234,7 @@ fn agree(faces: Vec<Vec<u32>>, sides: &[Side]) -> Result<Surface, CageError> {
     Ok(surface)
 }
 
-/// Notices about vertices without faces, or with more than one fan of faces.
+/// Adds notices about vertices without faces, or with more than one fan of faces.
 pub(super) fn note_vertices(mesh: &PolygonMesh, surface: &Surface, notices: &mut Vec<CageNotice>) {
     // The surface is closed and oriented, so the previous neighbour of a corner identifies the next face around the
     // vertex. Walking from the first corner visits one fan.

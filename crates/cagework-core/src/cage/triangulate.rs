@@ -5,8 +5,8 @@ use glam::DVec2;
 
 use super::defects::FaceDefect;
 
-/// Largest number of remaining corners for which the best-shaped ear is searched. Above, the first ear is taken,
-/// because the search costs `n^3`.
+/// Largest number of remaining corners for which the best-shaped ear is searched. With more corners, the first ear is
+/// taken, because the search costs `n^3`.
 const MAX_CORNERS_FOR_SEARCH: usize = 128;
 
 /// An ear counts as degenerate (its corners are collinear) if twice its area is below this fraction of the polygon's
@@ -18,7 +18,7 @@ pub(super) fn cross(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// Triangulation of a counter-clockwise polygon, as corner indices. `[n - 2]`
+/// Triangulates a counter-clockwise polygon. Returns triangles as corner indices. `[n - 2]`
 pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
     let extent = outline.iter().map(|p| p.length()).fold(0.0, f64::max);
     let straight = MIN_EAR_AREA * extent * extent;
@@ -36,14 +36,14 @@ pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Ok(triangles.iter().map(|t| t.map(|k| k as u32)).collect())
 }
 
-/// The triangle at the `k`-th remaining corner.
+/// Returns the triangle at the `k`-th remaining corner.
 fn ear(left: &[usize], k: usize) -> [usize; 3] {
     let n = left.len();
     [left[(k + n - 1) % n], left[k], left[(k + 1) % n]]
 }
 
-/// Position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no other corner.
-/// A corner on the ear's boundary counts as contained, unless straight ears are allowed.
+/// Returns the position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no
+/// other corner. A corner on the ear's boundary counts as contained, unless straight ears are allowed.
 fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
     let rim = -min_area;
     let mut best: Option<(f64, usize)> = None;

@@ -169,8 +169,8 @@ impl InnerControls {
         rounded.flat_map(InnerElement::corners).any(|&i| i as usize == control)
     }
 
-    /// Point on the axes of balls and tubes that is closest to `place`, as two controls with their shares. `None`
-    /// without balls and tubes.
+    /// Finds the point on the axes of balls and tubes that is closest to `place`, as two controls with their shares.
+    /// `None` without balls and tubes.
     pub(crate) fn foot(&self, place: DVec3) -> Option<[(u32, f64); 2]> {
         let at = |i: u32| self.positions[i as usize].as_dvec3();
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));

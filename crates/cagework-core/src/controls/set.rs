@@ -21,7 +21,7 @@ use crate::weights::Weights;
 /// Users draw sheets slightly beyond the cage, to leave no gap between the sheet and the cage.
 const MAX_PROTRUSION: f64 = 0.02;
 
-/// Owned [`Controls`] of a subdivided cage or with inner controls.
+/// Owned form of [`Controls`], with optional subdivision and inner controls.
 #[derive(Clone, Debug)]
 pub struct ControlSet {
     cage: Cage,
@@ -47,7 +47,7 @@ impl<'a> From<&'a ControlSet> for Controls<'a> {
 }
 
 impl ControlSet {
-    /// Controls of a plain cage.
+    /// Creates the controls of a plain cage.
     #[must_use]
     pub fn plain(cage: &Cage) -> Self {
         Self {
@@ -61,7 +61,8 @@ impl ControlSet {
         }
     }
 
-    /// Controls of a cage whose surface is subdivided `smooth` times (0 to 3), with optional inner controls.
+    /// Creates the controls of a cage whose surface is subdivided `smooth` times (0 to 3), with optional inner
+    /// controls.
     ///
     /// # Errors
     /// [`ControlError`]: too many subdivision steps, or inner controls that are outside, overlap, have invalid indices,
@@ -100,8 +101,8 @@ impl ControlSet {
         &self.inner
     }
 
-    /// Positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`, object units).
-    /// Balls and tubes are translated without rotation, so they keep their radius. `[n_surface]`
+    /// Computes the positions of the surface vertices for display, with the controls at `positions` (`[n_controls]`,
+    /// object units). Balls and tubes are translated without rotation, so they keep their radius. `[n_surface]`
     ///
     /// # Panics
     /// If there is not one position per control.
@@ -251,7 +252,7 @@ impl Walls {
         Ok(walls)
     }
 
-    /// Surface vertex at a corner of a sheet. All faces of the sheet share it.
+    /// Returns the surface vertex at a corner of a sheet, which all faces of the sheet share.
     fn corner(&mut self, control: u32, at: DVec3) -> u32 {
         *self.corners.entry(control).or_insert_with(|| {
             self.points.push((at, [(control, 1.0), (control, 0.0)]));
@@ -273,8 +274,8 @@ impl Walls {
         self.part_of.push(part);
     }
 
-    /// Pairs of unconnected elements whose meshes intersect. The list is incomplete if the search reaches a limit of
-    /// [`crate::contact`].
+    /// Finds the pairs of unconnected elements whose meshes intersect. The list is incomplete if the search reaches a
+    /// limit of [`crate::contact`].
     fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
         let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
         for (face, &element) in self.faces.iter().zip(&self.element_of) {
@@ -300,7 +301,7 @@ impl Walls {
     }
 }
 
-/// First element of the connected part of each element; elements are connected by shared vertices.
+/// Returns the first element of the connected part of each element; elements are connected by shared vertices.
 fn parts(inner: &InnerControls) -> Vec<u32> {
     let mut part_of_vertex = vec![u32::MAX; inner.positions.len()];
     let mut parts: Vec<u32> = (0..inner.elements.len() as u32).collect();

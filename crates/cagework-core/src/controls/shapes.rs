@@ -13,8 +13,9 @@ const RINGS: usize = 4;
 /// Number of faces of one tube segment with both of its ends.
 pub(super) const TUBE_FACES: usize = SIDES * (1 + 2 * (RINGS + 1));
 
-/// Subdivisions of a ball's icosahedron for a given number of balls. Weights beside a ball are off by 2e-3 after three
-/// subdivisions, 6e-3 after two and 2e-2 after one; fewer faces per ball allow more balls ([`crate::cage::MAX_FACES`]).
+/// Returns the number of subdivisions of a ball's icosahedron for a given number of balls. Weights beside a ball are
+/// off by 2e-3 after three subdivisions, 6e-3 after two and 2e-2 after one; fewer faces per ball allow more balls
+/// ([`crate::cage::MAX_FACES`]).
 pub(super) fn ball_steps(n_balls: usize) -> u32 {
     match n_balls {
         0..=16 => 3,
@@ -38,12 +39,12 @@ pub(super) enum Size {
 
 /// Mesh of a ball or of a segment of a tube.
 pub(super) struct Shape {
-    /// Position of each point, and the parameter of its foot along the segment, 0 to 1.
+    /// Position of each point, and the parameter, 0 to 1, of the closest point on the segment.
     pub(super) points: Vec<(DVec3, f64)>,
     pub(super) faces: Vec<Vec<u32>>,
 }
 
-/// A ball: an icosahedron with `steps` subdivisions.
+/// Builds a ball: an icosahedron with `steps` subdivisions.
 pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape {
     let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corner = |k: usize| {
@@ -94,7 +95,7 @@ pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape 
     Shape { points: points.into_iter().map(|p| (center + size * p, 0.0)).collect(), faces }
 }
 
-/// A tube from `a` to `b` with hemispherical ends.
+/// Builds a tube from `a` to `b` with hemispherical ends.
 pub(super) fn tube(a: DVec3, b: DVec3, radius: f64, size: Size) -> Shape {
     let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
     let larger = (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();

@@ -7,7 +7,7 @@ use crate::cage::Cage;
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
 
-/// Computes the vectors for the columns of the cage's triangles from posed vertices. `[n_triangles]`
+/// Function that computes the vectors for the columns of the cage's triangles from posed vertices. `[n_triangles]`
 type PoseTriangles = fn(&Cage, &[Vec3]) -> Vec<Vec3>;
 
 /// Formula of coordinates in a cage without inner controls.
@@ -77,7 +77,7 @@ pub enum ClosedFormError {
 /// Number of rows between two progress reports.
 const RUN: usize = 1 << 10;
 
-/// Rows of weights of all points, with all columns stored. Fails if they exceed `memory_limit` bytes.
+/// Computes the weights of all points. All columns are stored. Fails if they exceed `memory_limit` bytes.
 pub(super) fn dense(
     kind: &'static str,
     form: &ClosedForm,

@@ -32,7 +32,7 @@ pub(super) const FORM: ClosedForm = ClosedForm {
     }),
 };
 
-/// Scaled normals `s n` of the triangles with the cage's vertices at `at`. `[n_triangles]`
+/// Computes the scaled normals `s n` of the triangles with the cage's vertices at `at`. `[n_triangles]`
 fn stretched_normals(cage: &Cage, at: impl Fn(u32) -> DVec3) -> impl Iterator<Item = DVec3> {
     let sides = |[a, b, c]: [DVec3; 3]| [b - a, c - a];
     cage.triangles().iter().enumerate().map(move |(t, triangle)| {
@@ -46,7 +46,7 @@ fn stretched_normals(cage: &Cage, at: impl Fn(u32) -> DVec3) -> impl Iterator<It
     })
 }
 
-/// Coordinates at a point; returns whether it is inside. `row`: `[n_cage + n_triangles]`, zero on entry.
+/// Computes the coordinates at a point. Returns whether it is inside. `row`: `[n_cage + n_triangles]`, zero on entry.
 fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
     let near = PLANE_TOLERANCE * f64::from(cage.diagonal());
     let (of_vertices, of_triangles) = row.split_at_mut(cage.n_vertices());
@@ -76,8 +76,9 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
     of_vertices.iter().sum::<f64>() >= MIN_SUM
 }
 
-/// Integral over the triangle (`foot`, `a`, `b`) of the Green's function `-1 / (4 pi r)`, where r is the distance from
-/// the origin. `foot` must be the projection of the origin to the triangle's plane. The integral is at most 0.
+/// Computes the integral over the triangle (`foot`, `a`, `b`) of the Green's function `-1 / (4 pi r)`, where r is the
+/// distance from the origin. `foot` must be the projection of the origin to the triangle's plane. The integral is at
+/// most 0.
 fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (edge, to_a, to_b) = (b - a, foot - a, foot - b);
     let product = edge.cross(to_a).length();

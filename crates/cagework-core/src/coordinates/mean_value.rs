@@ -27,7 +27,7 @@ const FULL_TURN_TOLERANCE: f64 = 1e-7;
 /// Mean value coordinates, with one column for each cage vertex. They are defined inside and outside the cage.
 pub(super) const FORM: ClosedForm = ClosedForm { row: coordinates, triangles: None };
 
-/// Mean value coordinates at a point; returns whether they are defined. `row`: `[n_cage]`, zero on entry.
+/// Computes the mean value coordinates at a point. Returns whether they are defined. `row`: `[n_cage]`, zero on entry.
 fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
     let near = SURFACE_TOLERANCE * f64::from(cage.diagonal());
     for (t, triangle) in cage.triangles().iter().enumerate() {

@@ -57,13 +57,13 @@ impl<'a> Columns<'a> {
         columns
     }
 
-    /// Column of a point, clamped to the outermost ones.
+    /// Returns the column of a point, clamped to the outermost ones.
     fn column(&self, p: DVec2) -> [usize; 2] {
         let last = (self.side - 1) as f64;
         ((p - self.low) * self.per_unit).clamp(DVec2::ZERO, DVec2::splat(last)).to_array().map(|x| x as usize)
     }
 
-    /// Winding number of a point; `None` if rounding could matter.
+    /// Computes the winding number of a point; `None` if rounding could matter.
     pub(super) fn winding_number(&self, point: DVec3) -> Option<f64> {
         let p = point.truncate();
         let [x, y] = self.column(p);
