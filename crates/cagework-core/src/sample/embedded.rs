@@ -1,12 +1,12 @@
 //! Recursive axis interpolation: weights at a point from nearby centres and the cage.
 //!
 //! Rays from p in both directions of an axis end at the face of the cube between eight centres or at the cage,
-//! whichever is nearer, and the value at p is interpolated linearly between the two ends. An end on the cage takes
-//! the Dirichlet values there. An end on a cube face is interpolated along the second axis in the same way, then along
-//! the third, whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the result
-//! is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even if no
-//! centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the axes
-//! are averaged. Rays next to re-entrant edges are split, see `edges.rs`.
+//! whichever is nearer, and the value at p is interpolated linearly between the two ends. An end on the cage takes the
+//! Dirichlet values there. An end on a cube face is interpolated along the second axis in the same way, then along the
+//! third, whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the
+//! result is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even
+//! if no centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the
+//! axes are averaged. Rays next to re-entrant edges are split, see `edges.rs`.
 
 use std::sync::OnceLock;
 

@@ -74,8 +74,8 @@ impl<'a> OutsideSampler<'a> {
         let step = distance.min(0.5 * open);
         let (at, mut other) = (at + step * inwards, Stencil::default());
         if inside(at, &mut other) {
-            // If q (the point `at`) is close to another wall, w(q) consists of that wall's values: reduce t. With t = 0,
-            // the row is w(p), as beside a sharp edge.
+            // If q (the point `at`) is close to another wall, w(q) consists of that wall's values: reduce t. With
+            // t = 0, the row is w(p), as beside a sharp edge.
             let depth = self.closest.find(at).distance;
             let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
             for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
