@@ -265,7 +265,7 @@ impl Models {
         Ok(())
     }
 
-    /// Copies the visibility of models from another document; false if nothing changes.
+    /// Copies the visibility of each model from `other`. Returns false if nothing changes.
     pub(crate) fn show_as(&mut self, other: &Self) -> bool {
         let shown = |id: u32| other.get(id).ok().map(|member| member.options.shown);
         let differs = |member: &Member| shown(member.id).is_some_and(|shown| shown != member.options.shown);

@@ -27,7 +27,7 @@ pub struct DocumentView {
     pub animation_seconds: f32,
     /// Surface points that pulls keep in place.
     pub pins: Vec<SurfacePoint>,
-    /// Whether the pose differs from the cage at rest.
+    /// Whether the pose differs from the cage at rest; false while the cage is being reshaped.
     pub posed: bool,
     /// Whether the cage is being reshaped.
     pub editing_rest: bool,

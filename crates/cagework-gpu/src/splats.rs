@@ -165,11 +165,11 @@ pub(crate) struct SplatMover {
     core: Bounds,
     /// Bounds within which posed centres are sorted by depth: `core` extended by the bounds of the posed cage.
     posed: Bounds,
-    /// Three rows per splat.
+    /// Rows of [`splat_rows`], three entries per splat.
     pub(crate) splats: Table,
     /// Index and colour of each splat, in drawing order.
     pub(crate) order: Table,
-    /// Whether the pose changed since the table of splats was written.
+    /// Whether the pose or the floaters changed since the table of splats was written.
     is_moved: bool,
     way: Way,
 }

@@ -69,7 +69,8 @@ pub struct Gesture {
 }
 
 impl Gesture {
-    /// Starts a gesture at `pointer`. `start`: current positions, `[n_cage]`; `pivot`: centre of rotation and scaling.
+    /// Starts a gesture at `pointer`. `start`: current positions, `[n_controls]`; `pivot`: centre of rotation and
+    /// scaling.
     #[must_use]
     pub fn new(kind: GestureKind, start: Vec<Vec3>, pull: Pull, pivot: Vec3, pointer: Vec2) -> Self {
         let constraint = Constraint::Free;
@@ -82,7 +83,7 @@ impl Gesture {
         self.kind
     }
 
-    /// Positions of the cage's vertices at the start of the gesture. `[n_cage]`
+    /// Positions of the controls at the start of the gesture. `[n_controls]`
     #[must_use]
     pub fn start(&self) -> &[Vec3] {
         &self.start
@@ -120,7 +121,7 @@ impl Gesture {
         self.typed = amount.filter(|a| a.is_finite());
     }
 
-    /// Positions to which the gesture moves the cage's vertices. `[n_cage]`
+    /// Positions to which the gesture moves the controls. `[n_controls]`
     #[must_use]
     pub fn positions(&self, view: &dyn View) -> Vec<Vec3> {
         match self.kind {

@@ -1,7 +1,8 @@
-//! Picking, selecting and moving the vertices of a cage.
+//! Picking, selecting and moving the vertices of a cage and its interior controls.
 //!
-//! Functions take cage positions `[n_cage]` in object units and the faces of a [`cagework_core::Cage`]. Pixels are
-//! those of the [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
+//! Functions take the positions of the controls (the cage's vertices, then the interior controls), `[n_controls]`,
+//! object units, and the faces of a [`cagework_core::Cage`]. Pixels are those of the
+//! [`View`](cagework_core::view::View): origin in the top left corner, x right, y down.
 
 mod gesture;
 mod pick;

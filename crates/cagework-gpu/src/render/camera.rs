@@ -141,8 +141,8 @@ impl Camera {
     }
 
     /// Sets the size of the picture and the widths of its margins under overlays (left, top, right, bottom), pixels.
-    /// Changes the distance so that the free part shows what it showed after the last framing or movement. Returns
-    /// whether size or margins have changed.
+    /// Changes the distance so that the free part shows at least what it showed after the last framing or movement.
+    /// Returns whether size or margins have changed.
     pub fn set_free_part(&mut self, size: Vec2, covered: [f32; 4]) -> bool {
         if (self.viewport, self.covered) == (size.max(Vec2::ONE), covered) {
             return false;
@@ -319,7 +319,8 @@ impl Camera {
         self.keep_visible();
     }
 
-    /// Multiplies the distance by `factor`. The point at the target's depth under `cursor` stays in place.
+    /// Multiplies the distance by `factor`, within limits that depend on the size of the scene. The point at the
+    /// target's depth under `cursor` stays in place.
     pub fn zoom_at(&mut self, factor: f32, cursor: Vec2) {
         let fixed = self.on_target_plane(cursor);
         let limits = DISTANCE_RANGE.map(|d| d * self.scene_radius);

@@ -243,10 +243,10 @@ struct Slot {
     triangles: std::ops::Range<usize>,
 }
 
-/// The members of a [`GltfDocument`] to store: its JSON, and those that cannot be recomputed from it.
+/// Members of a [`GltfDocument`] that are stored: its JSON, and those that cannot be recomputed from the JSON.
 pub(crate) struct GltfParts {
     pub(crate) json: Value,
-    /// Instance, primitive, range of vertices and range of triangles of each slot: starts and counts.
+    /// For each slot: instance, primitive, first vertex, number of vertices, first triangle, number of triangles.
     pub(crate) slots: Vec<[u32; 6]>,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
