@@ -336,7 +336,7 @@ impl<'a> Sampler<'a> {
 
     /// Adds the value of a wall at which a ray up (`side` 1) or down (0) ends.
     fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
-        // A ray from inside hits the back of a face: on the way up, of a face that faces up.
+        // A ray that starts inside hits the back of a wall: an upward ray hits a face that faces up.
         if faces_up == (side == 1) {
             self.add_wall(facet, barycentric, weight, scratch);
         } else {

@@ -164,7 +164,7 @@ fn sum_of_roots(shares: &[ThreadBatches], sweep: usize, cells: std::ops::Range<u
 }
 
 impl ThreadBatches {
-    /// Batches `share`, `share + n_shares`, ...: a fixed assignment keeps sums reproducible.
+    /// Allocates the batches `share`, `share + n_shares`, ...: a fixed assignment keeps sums reproducible.
     fn new(hierarchy: &Hierarchy, share: usize, n_shares: usize) -> Self {
         let n_rows = hierarchy.levels[0].n_rows();
         let batches = (share..hierarchy.n_batches())

@@ -91,7 +91,7 @@ fn finish(
         return Err(RestEditError::InsideOut { operation });
     }
     if let Some([a, b]) = crossings(&cage).first().copied() {
-        // A cage that already intersects itself may be edited, since that is how it is repaired.
+        // A cage that already intersects itself may be edited, so that it can be repaired.
         let n_before = Cage::new(before).map_or(usize::MAX, |c| crossings(&c).len());
         if crossings(&cage).len() > n_before {
             let face = |t: u32| cage.face_of_triangle()[t as usize];

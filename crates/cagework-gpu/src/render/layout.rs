@@ -107,11 +107,11 @@ pub struct SliceView {
     pub corner: [f32; 3],
     /// Value of the last colour; 0 to colour by cell type.
     pub high: f32,
-    /// Edge of a cell along u, object units.
+    /// Edge vector of a cell along u, object units.
     pub u: [f32; 3],
     /// Number of cells along u.
     pub n_u: u32,
-    /// Edge of a cell along v, object units.
+    /// Edge vector of a cell along v, object units.
     pub v: [f32; 3],
     /// Number of cells along v.
     pub n_v: u32,

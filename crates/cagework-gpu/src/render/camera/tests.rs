@@ -243,7 +243,7 @@ fn resizing_keeps_what_is_visible() {
 fn axes_are_seen_from_the_eye() {
     let mut camera = Camera::default();
     camera.look_along(AxisView::Right);
-    // From +x, z is to the left and y up.
+    // Seen from +x, z points to the left and y points up.
     let seen = [Vec3::Z, Vec3::Y, -Vec3::X];
     assert!(camera.axes().iter().zip(seen).all(|(a, b)| a.abs_diff_eq(b, 1e-6)), "{:?}", camera.axes());
 }
