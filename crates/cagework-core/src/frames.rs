@@ -8,11 +8,11 @@
 //! of the vertex's rest vector `d = p - sum_i w_i c_i` at the rest position `p`.
 //!
 //! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of the *bones* (segments of the
-//! polyline) that end at it, or without a bone if there are none. Its matrix is `R F`. `F = sum_j c_j' grad w_j`, from
-//! the coordinates of the cage without inner controls, is the Jacobian of the cage's motion at the joint. `R` belongs
-//! to the bone. The cage and the previous bone of the polyline predict a direction of the bone; `R` is the smallest
-//! rotation from the predicted to the posed direction, so that the bone does not roll. If one affine map moves all
-//! controls, `F` is the matrix of that map and `R` the identity.
+//! polyline) that end at it, or the joint alone if no bone ends at it. Its matrix is `R F`. `F = sum_j c_j' grad w_j`,
+//! from the coordinates of the cage without inner controls, is the Jacobian of the cage's motion at the joint. `R`
+//! belongs to the bone. The cage and the previous bone of the polyline predict a direction of the bone; `R` is the
+//! smallest rotation from the predicted to the posed direction, so that the bone does not roll. If one affine map moves
+//! all controls, `F` is the matrix of that map and `R` the identity.
 
 use std::borrow::Cow;
 

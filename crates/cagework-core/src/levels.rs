@@ -30,7 +30,8 @@ pub trait Boundary: Sync {
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64;
 }
 
-/// Every second cell of a row along x: unknowns of one colour whose six neighbours are all unknowns.
+/// Consecutive cells of one colour in a row along x, that is, every second cell. They are unknowns whose six neighbours
+/// are all unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     /// Index of the run's first cell among the cells of its colour.

@@ -1,7 +1,8 @@
 //! Voxels that a triangle overlaps, as one run per row.
 //!
 //! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). Along a row only x varies,
-//! so each separating axis bounds x from both sides. The row's voxels form one run, which needs no test per voxel.
+//! so each separating axis bounds x from both sides. The row's voxels form one run, so that voxels need not be tested
+//! one by one.
 
 use glam::DVec3;
 

@@ -140,14 +140,14 @@ pub struct CageOptions {
     /// Mirror symmetry. Default auto.
     pub symmetry: Symmetry,
     /// Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
-    /// Otherwise thin bridges join them to one cage. Default false.
+    /// Otherwise thin bridges join them into one cage. Default false.
     pub per_component: bool,
     /// Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
     /// of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
     #[serde(alias = "margin")]
     pub clearance: f32,
     /// Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
-    /// voxels are closed, detail thinner than one is lost. Default 0.
+    /// voxels are closed, and details thinner than one voxel are lost. Default 0.
     pub voxels: u32,
     /// Subdivision steps after which the cage's surface must enclose the model, 0 to 3. Default 0.
     #[cfg_attr(feature = "typescript", ts(skip))]

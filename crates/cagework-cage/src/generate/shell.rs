@@ -33,8 +33,8 @@ const MAX_GAP_HALF: f64 = 0.12;
 /// Minimum clearance between the cage and the solid, in voxels. It applies if the options request less.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// Clearance of a hull dilated by one voxel, in voxels: one voxel minus the largest movement of a smoothed vertex and
-/// an allowance for rounding.
+/// Clearance of a hull dilated by one voxel, in voxels: one voxel, minus the largest movement of a smoothed vertex,
+/// minus an allowance for rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
 /// The hull around a vertex counts as a limb if its length along the longest chord, divided by its mean thickness
@@ -242,7 +242,7 @@ impl Shell {
         let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
         let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
         let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
-        // If only a few vertices are classified as plate, they are where wires cross: drop their limits.
+        // If only a few vertices are classified as plate, they lie where wires cross: drop their limits.
         if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
             spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
         }

@@ -11,8 +11,8 @@ use cagework_core::controls::{ControlSet, Controls, InnerControls};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::progress::Progress;
 
-/// Clearances that are tried in this order, as fractions of the diagonal of the model's box. The last ones are a
-/// reserve: 0.05 suffices for all test models.
+/// Clearances that are tried in this order, as fractions of the diagonal of the model's box. All test models need at
+/// most 0.05; the larger clearances are a reserve.
 const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
 
 /// Generates a cage whose surface encloses the model after `options.smooth` subdivision steps.

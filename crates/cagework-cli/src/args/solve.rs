@@ -55,8 +55,8 @@ pub(crate) struct SolveArgs {
     /// Norm of a cell's change in Eq. 2: Euclidean, or the formula as printed.
     #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
     delta: DeltaNorm,
-    /// Vertices outside the cage: `extend` lets them follow the cage fully up to 5 % of its diagonal away, fading to zero at 15 %, so
-    /// that a cage may enclose an arm alone; `stay` keeps them in place; `refuse` is an error.
+    /// Vertices outside the cage: `extend` lets them follow the cage fully up to a distance of 5 % of its diagonal, fading to zero at
+    /// 15 %, so that a cage may enclose only an arm; `stay` keeps them in place; `refuse` fails with an error.
     #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
     outside: OutsidePolicy,
     /// Processor or GPU. CAGEWORK_ADAPTER selects one of several GPUs by part of its name.

@@ -252,8 +252,8 @@ impl VertexRun<'_> {
             let (raw, stored) = if options.preserve_affine && !has_offset {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
-                // The offset compensates the row's error, so the row is not corrected. Dropping weights must not change
-                // the position that the row reproduces.
+                // The offset compensates the row's error, so the goal is not the vertex. Dropping weights must not
+                // change the position that the row reproduces.
                 let raw = columns.sums(&row, target);
                 let goal = columns.combined(&row).1;
                 self.restore_row(v, columns, options.threshold, &mut row, goal);
