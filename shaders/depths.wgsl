@@ -15,7 +15,7 @@ struct Depths {
     per_block: u32,
     /// Number of blocks.
     n_blocks: u32,
-    /// 1 if floaters (stray splats, marked in the fourth component of their centre) are hidden, otherwise 0.
+    /// 1 if floaters (splats outside the cage, marked in the fourth component of their centre) are hidden, otherwise 0.
     hides: u32,
     /// Degree of the spherical harmonics that are drawn, 0 to 3.
     degree: u32,

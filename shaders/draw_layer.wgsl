@@ -1,5 +1,5 @@
-// Draws the layer that draw_splats.wgsl has drawn into the picture. The layer's colours are in sRGB and multiplied by
-// alpha in sRGB. Draws one triangle.
+// Blends the layer of splats, which draw_splats.wgsl has drawn, over the picture. The layer's colours are in sRGB and
+// multiplied by alpha in sRGB. Draws one triangle.
 
 @group(1) @binding(0) var layer: texture_2d<f32>;
 

@@ -2,7 +2,7 @@
 // one quad. slice_buffers.wgsl or slice_textures.wgsl provides the cells.
 
 struct SliceView {
-    /// Corner of the first cell that is a corner of the whole layer, world space.
+    /// Corner of the layer at its first cell, world space.
     corner: vec3f,
     /// Weight that the last colour of the colour map stands for; 0 to colour by cell type.
     high: f32,

@@ -3,7 +3,7 @@
 // cagework_core::stencil::sample_weights.
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// First entry of each vertex in `nodes` and `hats`.
+/// Index of each vertex's first entry in `nodes` and in `hats`. `[n_vertices + 1]`
 @group(0) @binding(1) var<storage, read> starts: array<vec2u>;
 /// Field entries of the stencils: (row of the field, weight as bits).
 @group(0) @binding(2) var<storage, read> nodes: array<vec2u>;

@@ -12,12 +12,13 @@
 /// Index and colour of each splat, sorted by the digits up to the one that `work.mode` selects. The colour 0 hides a
 /// splat.
 @group(0) @binding(8) var<storage, read_write> order: array<vec2u>;
-/// Coefficients of red, green and blue, 16 bits each, band 0 first. An even number per splat. Not read for degree 0.
+/// Coefficients of red, green and blue, 16 bits each, band 0 first, padded to an even number per splat. Not read for
+/// degree 0.
 @group(0) @binding(6) var<storage, read> harmonics: array<u32>;
 /// Columns x and y of the rotation of each splat, in two rows; zeros at rest. Not read for degree 0.
 @group(0) @binding(7) var<storage, read> turns: array<vec4f>;
 
-/// Coefficient `k` of the splat whose first word is `first`.
+/// Coefficient `k` of the splat whose coefficients start at word `first`.
 fn coefficient(first: u32, k: u32) -> f32 {
     return unpack2x16snorm(harmonics[first + k / 2u])[k % 2u];
 }

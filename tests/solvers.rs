@@ -156,8 +156,8 @@ mod error_bounds {
     #[test]
     fn conjugate_gradient_error_is_below_tau() {
         let cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
-        // The limit is higher than for multigrid, each of whose V-cycles reduces the error tenfold, so that the last
-        // one ends further below tau.
+        // The limit is higher than for multigrid: a V-cycle reduces the error tenfold, so the last V-cycle usually ends
+        // further below tau.
         suite::raw::tau_bounds_the_solver_error(&cg, &[32], 1e-5);
         suite::raw::tau_bounds_the_solver_error(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
     }

@@ -1,4 +1,5 @@
-//! The page's tour makes claims about the rat and the clamp; see web/src/tour/stops.ts and web/src/words/en/tour.ts.
+//! Checks the claims that the page's tour makes about the rat and the clamp. See web/src/tour/stops.ts and
+//! web/src/words/en/tour.ts.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 

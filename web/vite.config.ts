@@ -55,7 +55,10 @@ const writeServiceWorker: Plugin = {
   },
 };
 
-/** Writes gallery.html, which is index.html with another title and description: its script depends on the address. */
+/**
+ * Writes gallery.html, which is index.html with another title and description. The script of both pages decides from
+ * the address whether to show the gallery.
+ */
 const writeGallery: Plugin = {
   name: "gallery",
   generateBundle: {

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-# Debian packages, as "command package...". Packages of existing commands are not installed.
+# Debian packages, as "command package...". They are installed only if the command is missing.
 debian_packages=(
   "cc gcc libc6-dev"
 )
@@ -19,7 +19,7 @@ if [[ " test page-test npm " == *" ${1:-} "* ]]; then
   command -v chromium >/dev/null || missing+=(chromium)
   compgen -G "/usr/lib/*/libEGL_mesa.so.0" >/dev/null || missing+=(libegl1 libgl1-mesa-dri)
 fi
-# Tests of the kernels need a Vulkan device, for example Mesa's software device. Firefox needs a screen.
+# Tests of the kernels need a Vulkan device, for example Mesa's software device. Tests in Firefox need a virtual screen.
 if [ "${1:-}" = test ]; then
   command -v firefox-esr >/dev/null || missing+=(firefox-esr)
   command -v Xvfb >/dev/null || missing+=(xvfb)
@@ -42,7 +42,7 @@ if ((${#missing[@]})); then
   DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
 
-# rustup installs cargo here, which only login shells have in their PATH.
+# rustup installs cargo in this folder, which only login shells have in their PATH.
 if ! command -v cargo >/dev/null && [ -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ]; then
   export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
 fi

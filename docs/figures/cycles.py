@@ -28,7 +28,7 @@ def around(u):
 
 
 def sweep(u, f, omega=(1.0, 1.0)):
-    """Red, then black cells."""
+    """Relaxes red cells, then black cells."""
     for colour, factor in zip(colours_of(u), omega):
         change = (around(u) + f) / 6 - u[INNER]
         u[INNER][colour] += factor * change[colour]

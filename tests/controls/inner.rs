@@ -334,7 +334,7 @@ fn many_small_balls_do_not_stall_the_solve() {
 }
 
 /// Largest jump of a weight on lines near the points `corners`: the change between points 1/250 of a cell apart, minus
-/// the larger one of the changes in the previous and in the next step. The lines keep a distance of at least 0.1 cells
+/// the larger of the changes in the previous and in the next step. The lines keep a distance of at least 0.1 cells
 /// from all `corners`.
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;

@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::support::{bound, samples, scattered};
 
-/// One step of Catmull-Clark subdivision of values at vertices, which shares no code with `cagework_core`. Returns the
-/// new values (of vertices, of edges sorted by their ends, of faces) and the new quads.
+/// Subdivides values at vertices by one Catmull-Clark step, without any code of `cagework_core`. Returns the new values
+/// (of vertices, of edges sorted by their ends, of faces) and the new quads.
 fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
@@ -73,13 +73,13 @@ fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) 
     (PolygonMesh { positions: rows.iter().map(place).collect(), faces }, rows)
 }
 
-/// Allowed difference between f32 weights of two binds that divide the columns into different batches. It is due to
-/// rounding.
+/// Allowed rounding difference between f32 weights of two binds that divide the columns into different batches.
 const ROUND_OFF: f64 = 1e-5;
 
-/// On quads that are not planar, boundary values reproduce rest positions with an error of up to 2 % of the distance from
-/// a plane. Each bind then corrects its rows: that of the smooth cage distributes the error among the controls, that of
-/// the subdivided cage among its vertices. Their weights differ by at most this multiple of the error.
+/// On quads that are not planar, boundary values reproduce rest positions with an error of up to 2 % of the corners'
+/// distance from a plane. Each bind then corrects its rows: the bind to the smooth cage distributes the error among the
+/// controls, the bind to the subdivided cage among the subdivided vertices. The weights of the two binds differ by at
+/// most this multiple of the error.
 const MAX_ERROR_RATIO: f64 = 2.0;
 
 #[test]

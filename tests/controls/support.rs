@@ -1,4 +1,4 @@
-//! Helpers of the tests of controls.
+//! Helpers for the tests of controls.
 
 use cagework_core::bind::Watch;
 use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};

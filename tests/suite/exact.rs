@@ -14,7 +14,7 @@ const CORNERS: [Vec3; 4] = [
     Vec3::new(0.4, 0.3, 1.2),
 ];
 
-/// Barycentric coordinates of a point in [`CORNERS`].
+/// Barycentric coordinates of a point in the tetrahedron with the corners [`CORNERS`].
 fn barycentric(p: Vec3) -> [f32; 4] {
     let [a, b, c, d] = CORNERS.map(Vec3::as_dvec3);
     let w = DMat3::from_cols(b - a, c - a, d - a).inverse() * (p.as_dvec3() - a);
@@ -47,7 +47,7 @@ pub(crate) fn tetrahedron_is_barycentric_within_a_cell(back_end: &BackEnd) {
     let points = points::inside(&cage, 300, 1);
     let expected: Vec<f32> = points.iter().flat_map(|&p| barycentric(p)).collect();
     let binding = back_end.bind_with(&points, &cage, |o| o.grid = 32);
-    // Slope of a coordinate, which decreases from 1 at its corner to 0 on the opposite face.
+    // Steepest slope of a coordinate. Each coordinate decreases from 1 at its corner to 0 on the opposite face.
     let steepest = (0..4)
         .map(|k| {
             let [a, b, c] = [1, 2, 3].map(|j| CORNERS[(k + j) % 4]);

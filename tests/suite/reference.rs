@@ -21,7 +21,7 @@ const LIMIT_AT_64: f64 = 1.05e-4;
 /// elements themselves is 1.3e-5.
 const LIMIT_AT_128: f64 = 3.6e-5;
 
-/// Little-endian words of a NumPy file in `tests/data/armadillo`.
+/// Array of a NumPy file in `tests/data/armadillo`, as little-endian 32-bit words.
 macro_rules! npy {
     ($name:literal) => {
         words(include_bytes!(concat!("../data/armadillo/", $name, ".npy")))

@@ -21,7 +21,7 @@ pub(crate) fn inside_out_cage_gives_the_same_weights(back_end: &BackEnd) {
 pub(crate) fn unused_cage_vertex_has_no_weight(back_end: &BackEnd) {
     let mesh = l_shape();
     let mut with_one_more = mesh.clone();
-    // The unused vertex is the first, so that all other columns are shifted by one, and far away, so that it would
+    // Insert the unused vertex first, so that all other columns are shifted by one. It is so far away that it would
     // enlarge the grid if it were used.
     with_one_more.positions.insert(0, Vec3::splat(50.0));
     for i in with_one_more.faces.iter_mut().flatten() {

@@ -1,4 +1,4 @@
-/** Binds run in the background: they draw frames, report progress and can be cancelled. */
+/** Binds run in the background: during a bind, the page draws frames, shows progress, and can cancel the bind. */
 
 import { BIND_DEFAULTS } from "../src/defaults";
 import { bound, dropBox, expect, open, shoot, test } from "./support";

@@ -31,7 +31,7 @@ export async function dressed(page: Page): Promise<readonly Dropped[]> {
   return files;
 }
 
-/** Bends the cage so that models change shape and place, except those whose options keep their shape or place. */
+/** Bends the cage, so that each model moves and changes its shape, unless its options prevent that. */
 export async function bend(page: Page): Promise<void> {
   await page.evaluate(() => {
     const engine = globalThis.cagework?.engine;

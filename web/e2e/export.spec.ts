@@ -15,7 +15,7 @@ test("every export is valid and opens again", async ({ page }) => {
     const cage = new TextDecoder().decode((await download(page, "cage")).bytes);
     expect(cage.match(/^v /gm)?.length).toBe((await cagePositions(page)).length / 3);
     const weights = await download(page, "weights");
-    // The first bytes of a zip archive, which an NPZ file is.
+    // An NPZ file is a zip archive, which starts with these bytes.
     expect(Array.from(weights.bytes.slice(0, 4))).toEqual([0x50, 0x4b, 3, 4]);
     await exportsAPicture(page);
   });

@@ -4,7 +4,7 @@ import { decodeShare } from "../src/share";
 import { complaintsOfAxe } from "./stories";
 import { bound, expect, largestMove, restPositions, shoot, test } from "./support";
 
-/** A PNG of a view in one colour is smaller, bytes. */
+/** Lower limit for the size of a picture of an example, bytes. A PNG of a view in a single colour is smaller. */
 const PNG_OF_NOTHING = 3000;
 
 test.use({ viewport: { width: 1440, height: 900 } });

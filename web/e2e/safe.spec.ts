@@ -61,7 +61,7 @@ test("after a panic, and without memory, the page restarts with the saved work b
   const posed = await savedPose(page, "model");
   await crash(page, "panic");
   await restarted(page, /model/, posed, "panicked at");
-  // The test may receive the console's message after the state of the restarted page.
+  // The message in the console may reach the test later than the state of the restarted page.
   await expect.poll(() => complaints.join(), "the console has the panic").toMatch(/panicked at/);
   await drag(page, -20, 10);
   await drop(page, [{ name: "huge.glb", bytes: new Uint8Array(100) }]);

@@ -86,7 +86,7 @@ test("poses of a capture are blended and kept by a project and a reload, and its
     await floaters.uncheck({ force: true });
     hidden = await squares(page);
     expect(difference(posed, hidden), "the floaters are hidden").toBeGreaterThan(40);
-    // The floaters are in the right part of the picture; the vase stays.
+    // The floaters are in the right part of the picture. The vase, in the left part, must look the same.
     const left = (all: number[]) => all.filter((_, k) => Math.floor(k / 4) % 16 < 9);
     expect(difference(left(posed), left(hidden))).toBeLessThan(4);
     await floaters.check({ force: true });

@@ -1,4 +1,4 @@
-/** Saved work: the browser stores one entry per model, and only one tab has an entry open. */
+/** Saved work: the browser stores one entry per model, and at most one tab at a time has an entry open. */
 
 import type { Page } from "@playwright/test";
 import { savedSince } from "./kept";

@@ -1,4 +1,4 @@
-/** Tests the notebook widget in JupyterLab: cells, a slider that moves the cage, and a drag that Python sees. */
+/** Tests the notebook widget in JupyterLab: cells, a slider that moves the cage, and a drag that Python receives. */
 
 import { existsSync, readFileSync, rmSync } from "node:fs";
 import { join } from "node:path";

@@ -30,10 +30,10 @@ interface Traits {
   readonly _sent: Payload;
   /** The gzip-compressed wasm file. */
   readonly _wasm: DataView;
-  /** `[n_cage, 3]`, float64, object units. */
+  /** Current positions of the cage's vertices, float64, object units. `[n_cage, 3]` */
   readonly pose: DataView;
   readonly theme: "auto" | "dark" | "light";
-  /** CSS pixels. */
+  /** Height of the element, CSS pixels. */
   readonly height: number;
 }
 

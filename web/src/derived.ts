@@ -78,7 +78,7 @@ export function isCageSparse(state: AppState): boolean {
   return isGenerated && cage.info.vertices < FEW * cageOptions.target;
 }
 
-/** Whether the page asks to pull the sample, because nothing has been changed yet. */
+/** Whether the page asks the user to pull the sample, because nothing has been changed yet. */
 export function asksToPull(state: AppState): boolean {
   const { step, grip, bound, posed, undo, gesture, playing, clip, tour, scene } = state;
   const isUntouched = grip !== null && bound && !posed && undo === null && step !== "cage";

@@ -29,13 +29,13 @@ function byId(id: string): HTMLElement {
   return element;
 }
 
-/** Reloads the page without the share link in its address, which may have caused the crash. */
+/** Reloads the page without the share link in its address, because the link may have caused the crash. */
 function restart(): void {
   window.history.replaceState(null, "", location.pathname + location.search);
   location.reload();
 }
 
-/** Shows the gallery, which is downloaded only here. */
+/** Downloads the code of the gallery and shows the gallery. */
 async function gallery(): Promise<void> {
   // Tell the service worker which build is in use. The gallery does not register it.
   keepOffline(() => undefined);

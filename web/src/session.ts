@@ -56,7 +56,10 @@ async function download(address: string, signal: AbortSignal | undefined): Promi
   return answer.blob();
 }
 
-/** Methods that work "in the worker" share one worker, which runs their jobs in sequence. */
+/**
+ * The engine and its workers. All methods documented as working "in the worker" share one worker, which runs their jobs
+ * in sequence.
+ */
 export type Session = Awaited<ReturnType<typeof start>>;
 
 /** A file that a worker has read successfully. */
@@ -110,7 +113,8 @@ async function start(opened: OpenedOn & Needs) {
   // If preparing the pipelines fails, the first frame tries again and reports the error.
   engine.warm().catch(() => undefined);
   /**
-   * Starts drawing once the first model is open. On a slow GPU, drawing an empty frame before would delay the model.
+   * Starts drawing once the first model is open. On a slow GPU, drawing an empty frame before that would delay the
+   * model.
    */
   const begin = once(() =>
     frames.start(
@@ -310,7 +314,7 @@ async function start(opened: OpenedOn & Needs) {
     },
     /**
      * Binds in the worker. A model that is not bound yet is first bound with the option `grid` set to 32, unless the
-     * requested grid is as coarse or the bind is very large (see `startBind`). Each result is adopted as soon as it is
+     * requested grid is not finer or the bind is very large (see `startBind`). Each result is adopted as soon as it is
      * ready, without a change of the pose. After `cancel()`, `done` rejects with name "Cancelled", and adopted results
      * remain in use.
      */

@@ -84,7 +84,10 @@ export async function isFresh(): Promise<boolean> {
   return location.hash.length <= 1 && !(await hasEntries());
 }
 
-/** Opens, in this order of preference, a link, the work of the last visit, or the first sample. */
+/**
+ * Opens, in this order of preference: what the address links to (a stop of the tour or a sample), the work of the last
+ * visit, or the first sample.
+ */
 async function open(app: App, crash: Crash | undefined): Promise<void> {
   const stop = stopOf(location.hash);
   const link: Link = stop === undefined ? await openShared(app) : { opened: true };

@@ -47,7 +47,7 @@ export interface Fake {
   readonly problems: (Explanation & { fix?: Fix["label"] })[];
   /** Kinds of closed-form coordinates that count as computed; tests add to the list. */
   readonly others: string[];
-  /** Names of the engine functions called that have no implementation in the fake. */
+  /** Names of the called engine functions that the fake does not implement. */
   readonly calls: string[];
   /** Commands passed to `engine.apply`, in order. */
   readonly commands: Command[];

@@ -4,7 +4,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 /** Time between two frames, ms. */
 const FRAME = 16;
 
-/** More than the delay after which an idle page draws a sharp frame, ms. */
+/** A time longer than the delay after which an idle page draws a sharp frame, ms. */
 const LONG = 2000;
 
 beforeEach(() => {

@@ -165,7 +165,8 @@ impl Loaded {
         flat(&self.model.positions)
     }
 
-    /// Vertices that a cage is checked against: of the model, or of the mesh that stands for splats. `[n_vertices, 3]`
+    /// Vertices that a cage must enclose: those of the model or, for splats, of the mesh that approximates them.
+    /// `[n_vertices, 3]`
     #[wasm_bindgen(getter, js_name = checkedPositions)]
     #[must_use]
     pub fn checked_positions(&self) -> Vec<f32> {
@@ -300,7 +301,8 @@ impl Loaded {
         }
     }
 
-    /// Sets the upper limit of the longer side of textures, and drops the bytes of images that are not admitted.
+    /// Sets the upper limit of the longer side of textures, and drops the bytes of images that are not decoded.
+    /// `admitted`: for each image, whether it is decoded.
     fn keep_images(&mut self, side: u32, admitted: &[bool]) {
         self.side = side;
         let images = self.look.images.iter_mut().zip(admitted);

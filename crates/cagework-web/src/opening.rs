@@ -48,7 +48,7 @@ pub(crate) struct PoseContents {
 }
 
 impl OpenContents {
-    /// Contents for the editor, and settings of the project. `first`: the first model.
+    /// Converts the contents for the editor. Also returns the settings of the project. `first`: the first model.
     pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
         let of_project = self.poses.is_empty();

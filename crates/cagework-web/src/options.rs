@@ -65,7 +65,7 @@ pub(crate) struct JsSceneOptions {
     /// Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
     pub(crate) compare: Vec<Coordinates>,
     pub(crate) problems: bool,
-    /// Treatment of joints by the next export, which the marks of joints show. Null hides the marks.
+    /// How the next export treats joints, which determines where the joints are marked. Null hides the marks.
     pub(crate) joints: Option<Joints>,
 }
 
@@ -87,7 +87,7 @@ impl Default for JsSceneOptions {
     }
 }
 
-/// Quantity that the colours of the model show.
+/// What the colours of the model show: its materials, plain clay, weights, or errors.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(Serialize, ts_rs::TS))]

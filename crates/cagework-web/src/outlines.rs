@@ -12,7 +12,7 @@ pub(crate) struct Outline {
     pub(crate) angle: f32,
 }
 
-/// Outline of the unit sphere's image under `by`. `right`, `up`: directions of the screen.
+/// Outline of the unit sphere's image under `by`. `right`, `up`: unit vectors to the right and up on the screen.
 pub(crate) fn outline(by: Mat3, right: Vec3, up: Vec3) -> Outline {
     let [x, y] = [right, up].map(|direction| by.transpose() * direction);
     // Eigenvalues and first eigenvector of [[a, b], [b, c]].

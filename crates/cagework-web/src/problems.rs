@@ -83,8 +83,8 @@ impl Check {
 }
 
 impl Check {
-    /// Places of the faults in the cage, or with `are_outside` those of model vertices outside the cage. Faults of
-    /// severity `Note` are left out.
+    /// Places of the cage's faults or, with `are_outside`, of the model vertices outside the cage. Omits faults of
+    /// severity `Note`.
     fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
         let shown =
             move |p: &&Problem| p.severity != Severity::Note && (p.code == Code::ModelOutside) == are_outside;

@@ -42,9 +42,9 @@ impl Puller {
         Ok(Self::of(&mesh, &set)?)
     }
 
-    /// Starts a drag in the pose `start`, `[n_cage, 3]`. The grips are the grabs, then the pins. `rows`: weights of the
-    /// grips, `[n_grips, n_cage]`; `seeds`: nearest model vertex of each grip, or 2^32 - 1 for a cage vertex. Returns
-    /// the positions of the grabs, `[n_grabs, 3]`.
+    /// Starts a drag in the pose `start`, `[n_controls, 3]`. The grips are the grabs, then the pins. `rows`: weights of
+    /// the grips, `[n_grips, n_controls]`; `seeds`: nearest model vertex of each grip, or 2^32 - 1 for a cage vertex.
+    /// Returns the positions of the grabs, `[n_grabs, 3]`.
     ///
     /// # Errors
     /// If a grip does not fit the model or the cage, there are too many grips, an option is invalid, or the pose is
@@ -75,7 +75,8 @@ impl Puller {
     }
 
     /// Advances the solve by one frame towards the targets `to` of the grabs, `[n_grabs, 3]`; the target of a grab's
-    /// mirror image may be omitted. Returns the cage's positions, `[n_cage, 3]`, or an empty array without a drag.
+    /// mirror image may be omitted. Returns the positions of the controls, `[n_controls, 3]`, or an empty array without
+    /// a drag.
     #[must_use]
     pub fn frame(&mut self, to: &[f32]) -> Vec<f32> {
         let Some(drag) = &mut self.drag else { return Vec::new() };

@@ -28,7 +28,7 @@ impl State {
         }
     }
 
-    /// The scene that the view shows. `weights`: those on the GPU.
+    /// The scene that the view shows. `weights`: the weights on the GPU.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
@@ -62,12 +62,14 @@ impl State {
         self.playing.as_ref().is_none_or(|playing| playing.is_paused || playing.field.is_some())
     }
 
-    /// Whether dragging pulls the model's surface. Cage vertices without a front face are then not picked.
+    /// Whether dragging pulls the model's surface. Cage vertices whose faces all face away from the camera cannot be
+    /// picked then.
     pub(crate) fn pulls(&self) -> bool {
         self.view.pull && self.bound.is_some() && !self.editor.is_editing_rest()
     }
 
-    /// Element type that a click selects: the chosen one, but a vertex in pull mode, unless the cage is being reshaped.
+    /// Element type that a click selects: vertices in pull mode, unless the cage is being reshaped; otherwise the type
+    /// that the user has chosen.
     pub(crate) fn element(&self) -> Element {
         let is_pull = self.view.pull && !self.editor.is_editing_rest();
         if is_pull { Element::Vertex } else { self.editor.tools().element }

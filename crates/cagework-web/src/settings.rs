@@ -55,8 +55,9 @@ pub(crate) struct Settings {
     notices: Vec<String>,
 }
 
-/// Reads the settings of a project, and replaces missing and invalid values by defaults. `text`: JSON of the settings.
-/// `memory_limit`: limit of binds, bytes. That of the file is ignored, because the right limit depends on the computer.
+/// Reads the settings of a project. Missing and invalid values of a group become defaults; a missing group stays
+/// undefined. `text`: JSON of the settings. `memory_limit`: limit of binds, bytes. The limit in the file is ignored,
+/// because the right limit depends on the computer.
 #[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
 #[must_use]
 pub fn read_settings(text: &str, memory_limit: f64) -> JsValue {
@@ -81,7 +82,7 @@ impl Settings {
         settings
     }
 
-    /// Options of one group. Each valid value replaces its default. `None` if the group is missing.
+    /// Reads the options of one group. Each valid value replaces its default. `None` if the group is missing.
     fn group<T: Default + Serialize + DeserializeOwned>(
         &mut self,
         given: Option<Value>,
@@ -103,7 +104,8 @@ impl Settings {
                 (_, Ok(read)) => match check(&read) {
                     Err(wrong) => format!("; it must be {}", wrong.allowed),
                     Ok(()) => {
-                        // The option may have a former name, so take all options that differ from their defaults.
+                        // `key` may be a former name of the option, so take all options of `read` that differ from
+                        // their defaults.
                         let read = fields(&read).into_iter();
                         taken.extend(read.filter(|(name, value)| defaults.get(name) != Some(value)));
                         continue;

@@ -122,12 +122,12 @@ pub(crate) struct GpuKeys {
     pub(crate) floaters: Option<u64>,
 }
 
-/// Grabs and pins, and the posed models for picking.
+/// Marks of grabs and of an interior control that is being placed, and the posed models for picking.
 #[derive(Default)]
 pub(crate) struct GrabState {
-    /// Surface points that are grabbed, pinned or hovered.
+    /// Surface points that are grabbed or hovered. Pins are stored in the document.
     pub(crate) points: Vec<SurfacePoint>,
-    /// Position of the pointer, if the grabbed point is not there.
+    /// Target of the first grabbed point, if the point has not reached it.
     pub(crate) target: Option<Vec3>,
     /// How much each vertex of the model stays in place during the drag, 0 to 1. `[n_vertices]`
     pub(crate) stays: Option<Arc<Vec<f32>>>,
@@ -346,7 +346,8 @@ impl State {
         self.next_upload().is_some()
     }
 
-    /// The next data to upload, in the order mesh, cage, weights, parts. An upload may drop data later in this order.
+    /// The next data to upload, in the order mesh, cage, weights, parts. An upload may invalidate data that comes later
+    /// in this order.
     pub(crate) fn next_upload(&self) -> Option<Upload> {
         if self.models().is_empty() {
             return None;
@@ -452,7 +453,7 @@ pub(crate) fn joined(draws: &[&Arc<DrawModel>]) -> Arc<DrawModel> {
     }
 }
 
-/// What one upload transfers to the GPU.
+/// Data that one upload transfers to the GPU.
 #[derive(Clone, Copy)]
 pub(crate) enum Upload {
     Mesh,

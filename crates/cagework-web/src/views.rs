@@ -89,8 +89,8 @@ pub(crate) struct ModelInfo {
     /// Whether a model is a VRM.
     vrm: bool,
     bounds: BoundsView,
-    /// Another up axis that the file probably has: z if the models seem to lie on their back, y down if captures in the
-    /// file's format have y down by convention.
+    /// Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
+    /// other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
     suggested_up: Option<UpAxis>,
     notices: Vec<String>,
     /// Properties of each model.
@@ -277,7 +277,7 @@ pub(crate) struct Problem {
     pub(crate) fix: Option<Mend>,
 }
 
-/// What the button of a fix does.
+/// Action of the button that fixes a fault.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[cfg_attr(test, derive(ts_rs::TS))]

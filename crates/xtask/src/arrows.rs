@@ -1,5 +1,5 @@
 //! Checks that dependencies of crates (`cargo tree`) follow [`RULES`], the arrows of the diagram in ARCHITECTURE.md,
-//! and that modules do not use each other in circles. Every crate of the workspace must have a rule.
+//! and that the modules of a crate have no circular dependencies. Every crate of the workspace must have a rule.
 
 mod modules;
 
@@ -98,7 +98,7 @@ pub(crate) fn check() -> Result<(), String> {
         return Err(format!("crate {stranger} has no rule in crates/xtask/src/arrows.rs: give it one"));
     }
     for rule in RULES {
-        // `--target all` would follow combinations of targets and features that no build has.
+        // `--target all` would follow combinations of targets and features that no build uses.
         let mut used = tree(&["--package", rule.name, "--all-features"])?;
         used.extend(tree(&["--package", rule.name, "--all-features", "--target", "wasm32-unknown-unknown"])?);
         for name in used.iter().filter(|name| **name != rule.name) {

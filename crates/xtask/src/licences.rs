@@ -1,4 +1,5 @@
-//! Lists the licences of everything compiled into the page, the command, the Python packages and the npm package.
+//! Lists the licences of everything compiled into the page, the `cagework` command, the Python packages and the npm
+//! package.
 //!
 //! `cargo tree` lists the crates, their sources in the registry contain the licence files, and Vite writes the licences
 //! of the npm packages that it bundles. No other tool and no network is needed.
@@ -32,7 +33,7 @@ struct Part {
     texts: Vec<String>,
 }
 
-/// Writes the notices of the page into its folder.
+/// Writes the notices of the page into `folder`, which contains the built page and Vite's lists.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -54,7 +55,7 @@ fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// Writes the notices of the command into its folder.
+/// Writes the notices of the `cagework` command into `folder`.
 ///
 /// # Errors
 /// Names the package whose licence is not known.
@@ -62,7 +63,7 @@ pub(crate) fn of_command(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-cli", &host()?, &[])?)
 }
 
-/// Writes the notices of the Python package into a folder that belongs to it.
+/// Writes the notices of the Python package into `folder`, which belongs to the package.
 ///
 /// # Errors
 /// Names the package whose licence is not known.

@@ -12,7 +12,7 @@ use crate::wasm::{self, target_folder};
 const PACKAGE: &str = "web/package";
 /// Folder for the licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
-/// Folders whose tests and pages are copied into the blank project.
+/// Folders whose files are copied into the blank project, each with the folder to copy to.
 const COPIED: [(&str, &str); 3] = [
     ("web/package/examples", ""),
     ("web/package/examples/stackblitz", "stackblitz"),

@@ -42,7 +42,7 @@ const BPY: &str = "bpy==4.5.*";
 pub(crate) fn test_blender() -> Result<(), String> {
     let wheel = only_file(&build(&environment()?, &["--release", "--auditwheel", "skip"])?)?;
     let python = blank("blender")?;
-    // The wheel's dependencies are not installed, because Blender has NumPy and no SciPy.
+    // Do not install the wheel's dependencies: Blender has NumPy, but no SciPy.
     run(&python, &[&INSTALL[..], &[BPY, "pytest"]].concat(), &[])?;
     run(&python, &[&INSTALL[..], &["--no-deps", &wheel]].concat(), &[])?;
     let out = target_folder()?.join("blender-extension");
@@ -58,7 +58,7 @@ const NOTEBOOK: &str = "crates/cagework-py/notebook";
 const FILES: &str = "crates/cagework-py/notebook/cagework_notebook/files";
 /// Example notebooks.
 const EXAMPLES: &str = "crates/cagework-py/notebooks";
-/// Packages of the notebooks and of their tests.
+/// Packages that the notebooks and their tests need.
 const LAB: [&str; 10] = [
     "jupyterlab==4.*",
     "nbclient",

@@ -6,21 +6,22 @@ use crate::command::{root, run};
 use crate::npm::{self, exec};
 use crate::{arrows, deny, licences, package, prose, python, site, wasm};
 
-/// Builds the release command and runs it on its built-in sample.
+/// Builds the `cagework` command in release mode and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
     let fixed = ["run", "--quiet", "--release", "--locked", "--package", "cagework-cli", "--", "demo"];
     run("cargo", &[&fixed[..], args].concat(), &[])
 }
 
-/// Builds the page, and the release command (`target/release/cagework`).
+/// Builds the page, and the `cagework` command in release mode (`target/release/cagework`).
 pub(crate) fn build() -> Result<(), String> {
     site::build()?;
     run("cargo", &["build", "--release", "--locked", "--package", "cagework-cli"], &[])?;
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
-/// Packages of all test builds. The list is always the same, so that builds share features and artifacts. Benches have
-/// no tests but need criterion, which takes half a minute to build; xtask has other features.
+/// Arguments of Cargo that select the packages of all test builds. They are always the same, so that builds share
+/// features and artifacts. Benches have no tests but need criterion, which takes half a minute to build; xtask has
+/// other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
 /// Runs all tests: of Rust, Python and TypeScript, and of the page in browsers.
@@ -42,8 +43,9 @@ fn build_tests() -> Result<(), String> {
     run("cargo", &[&["test", "--locked", "--no-run"], &TESTED[..]].concat(), &[])
 }
 
-/// Checks what [`check()`] checks, except the benches, while it builds the tests. `.ci/run` sets clippy as the compiler
-/// and makes warnings errors; clippy on its own would check all dependencies in addition to building them.
+/// Checks what [`check()`] checks, except benches, xtask and documentation, while it builds the tests. `.ci/run` sets
+/// clippy as the compiler and makes warnings errors; clippy on its own would check all dependencies in addition to
+/// building them. `.ci/rustdoc` checks the documentation when the tests run.
 pub(crate) fn check_and_build() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
@@ -141,7 +143,7 @@ fn validate_exports() -> Result<(), String> {
     run("node", &["crates/cagework-io/tests/three-splats.mjs", &format!("{folder}/captures")], &[])
 }
 
-/// Runs a task of this program in parallel with `work`. Shows the task's output when task and `work` have ended.
+/// Runs a task of this program in parallel with `work`. If `work` succeeds, shows the task's output when it has ended.
 ///
 /// # Errors
 /// Returns the error of `work`, which also stops the task. Otherwise fails if the task fails.

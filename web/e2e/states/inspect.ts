@@ -60,8 +60,8 @@ const overlap = (a: DOMRect, b: DOMRect) =>
   a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 
 /**
- * A message if text extends outside the box of an enclosing element or outside the window; otherwise none. In an element
- * that scrolls, text may extend above and below the visible part.
+ * Returns a message if text extends outside the box of an enclosing element or outside the window, otherwise an empty
+ * list. In an element that scrolls, text may extend above and below the visible part.
  */
 function cutOff(node: Node, parent: Element, text: string): string[] {
   const range = document.createRange();

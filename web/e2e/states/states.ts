@@ -434,7 +434,7 @@ async function start(): Promise<void> {
     offer(T.offline.ready, { label: T.offline.reload, run: () => {} });
     await look("offer");
 
-    // Show every sentence that no state has shown, as a message.
+    // Show as messages all sentences that no state has shown.
     for (const text of sentencesOf(T).filter((text) => !isSeen(seen, text))) {
       tell.say(text);
       await look("message");

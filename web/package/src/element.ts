@@ -43,7 +43,7 @@ export class CageDeformer extends Base {
   static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
 
   #view: Promise<View> | undefined;
-  /** The view that `#view` has resolved with; undefined while the view opens. */
+  /** The view that `#view` has resolved to; undefined while the view opens. */
   #shown: View | undefined;
   /** Number of calls of `#open` and `#close`. A result that belongs to an earlier call is ignored. */
   #asked = 0;

@@ -5,7 +5,7 @@ import type { BindReport } from "./contract/generated";
 import { named } from "./session/client";
 import type { BindCallOptions, Cage, CageCallOptions, Weights } from "./types";
 
-/** The part of three.js's attributes that is used. Interleaved and quantised attributes have it, too. */
+/** Members of three.js's `BufferAttribute` that are used here. Interleaved and quantised attributes have them too. */
 export interface Attribute {
   readonly count: number;
   getX(index: number): number;
@@ -15,7 +15,7 @@ export interface Attribute {
   set needsUpdate(value: boolean);
 }
 
-/** The part of three.js's `BufferGeometry` that is used. */
+/** Members of three.js's `BufferGeometry` that are used here. */
 export interface Geometry {
   getAttribute(name: "position" | "normal"): unknown;
   getIndex(): { readonly count: number; getX(index: number): number } | null;

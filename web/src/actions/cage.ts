@@ -133,8 +133,8 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     },
     cancel: () => ctx.queue.cancel("cage"),
     /**
-     * Draws the cage that the panel's settings would make as lines. Removes this preview if the current cage was made
-     * with these settings, or if they cannot be previewed.
+     * Draws, as lines, a preview of the cage that the panel's settings would make. Removes the preview if the current
+     * cage was made with these settings, or if they cannot be previewed.
      */
     async preview() {
       if (!toPreview()) {

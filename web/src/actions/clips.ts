@@ -104,7 +104,7 @@ export function createClips(ctx: Context, settle: () => void) {
     const { seconds } = store.get().clip;
     set({ clip, seconds: seconds >= length ? 0 : seconds, playing: true });
     last = performance.now();
-    // Two calls must not start two animation loops.
+    // A second call must not start a second animation loop.
     cancelAnimationFrame(frame);
     frame = requestAnimationFrame(step);
   };

@@ -1,4 +1,4 @@
-/** Updates the view and binds again after the rest cage has changed. */
+/** Follows changes of the cage: updates the view and previews, binds again, and prepares pulls and splats. */
 
 import { effect, untracked } from "@preact/signals";
 import { isCapture, optionsInUse } from "../derived";
@@ -42,7 +42,7 @@ export function followCage(ctx: Context, { bind, edit, view, pull }: Followers):
     soon = setTimeout(() => {
       const { cage } = store.get();
       const options = optionsInUse(store.get());
-      // During a gesture, try again after a pause. A gesture that changes nothing does not start a bind when it ends.
+      // During a gesture, try again after a pause. If the gesture changes nothing, its end does not call `bindSoon`.
       if (edit.active()) bindSoon(PAUSE_MS);
       else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
     }, pause);

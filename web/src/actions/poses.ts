@@ -23,7 +23,7 @@ export function snapshotCage(ctx: Context): CageSnapshot | undefined {
   return cage ? { cage: session.cageArrays(), poses: session.engine.carriable(), shares } : undefined;
 }
 
-/** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for dense screens. */
+/** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for high-density screens. */
 const PICTURE = [128, 96] as const;
 
 export function createPoses(ctx: Context, edit: Edit) {

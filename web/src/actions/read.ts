@@ -26,9 +26,9 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
 }
 
 /**
- * Reads models in sequence, each with its companion files. Shows an error for each model that cannot be read. Throws a
- * cancellation if none can be read. `another`: what the button of an error message does: open another file, or add one.
- * `used`: pixels of the textures of the open models, if these remain open.
+ * Reads models in sequence, each with its companion files. Shows an error for each model that cannot be read. Throws an
+ * error named Cancelled if none can be read. `another`: what the button of an error message offers: to open another
+ * file ("file") or to add one ("add"). `used`: pixels of the textures of the open models, if these remain open.
  */
 export async function readModels(
   ctx: Context,

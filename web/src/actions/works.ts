@@ -1,4 +1,4 @@
-/** Saves work in the browser. Each work has one entry and is open in at most one tab. */
+/** Saves the open work as an entry in the browser. At most one tab at a time has an entry open. */
 
 import type { NamedFile } from "../contract";
 import { isFatal } from "../crash";

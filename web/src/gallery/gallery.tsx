@@ -19,7 +19,10 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 /** Share of an example that must be in view before it is opened. */
 const IN_VIEW = 0.3;
 
-/** Opens examples one at a time: opening several at once would not be faster on few processor cores. */
+/**
+ * Settles when the examples requested so far are open. They are opened one at a time: opening several at once would not
+ * be faster on few processor cores.
+ */
 let last: Promise<unknown> = Promise.resolve();
 function inTurn(work: () => Promise<void>): void {
   last = last.then(work);

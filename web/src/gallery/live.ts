@@ -9,7 +9,7 @@ import type { ShareLink } from "../share";
 /** Duration of a movement, ms. Movements longer than five seconds would need a button that stops them (WCAG 2.2.2). */
 const MOVE_MS = 1800;
 const CLIP_MS = 4000;
-/** Maximum device pixel ratio: six views are drawn. */
+/** Maximum device pixel ratio. It is low, because the gallery draws six views. */
 const MOST_SHARP = 1.5;
 
 export type Live = Awaited<ReturnType<typeof openLive>>;

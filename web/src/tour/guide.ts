@@ -125,7 +125,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     if (mine !== turn) return;
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
-    // The cage of a capture is made, and the model bound, after the capture is opened.
+    // A capture is opened without a cage and weights: wait until the page has generated a cage and bound the capture.
     await files.prepared();
     // Splats follow the cage only after a job of kind "lattice" has bound the lattice. That job is queued when the
     // model is bound. An empty job of the same kind ends after it.
@@ -207,7 +207,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       if (!before || (sample !== null && sample === opening)) return;
       turn += 1;
       ctx.queue.cancel("bind");
-      // What the user did on the tour cannot be undone after it, and is not saved.
+      // Changes that the user made during the tour cannot be undone afterwards, and are not saved.
       ctx.engine().clearHistory();
       store.set({ tour: null });
       putBack(before);

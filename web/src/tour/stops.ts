@@ -36,8 +36,8 @@ export interface Stop {
 }
 
 /**
- * Numbers of cells along each side of the cage's bounding box, for the error table. All its binds together take about a
- * second.
+ * Numbers of cells along each side of the cage's bounding box, for the error table. All binds of the table together
+ * take about a second.
  */
 export const GRIDS = [16, 32] as const;
 /** Values of `tau`, the threshold at which the solver stops, in the error table. */

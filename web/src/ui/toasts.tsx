@@ -15,7 +15,10 @@ import { Icon } from "./icons";
 const SHOWN_MS = 5000;
 /** Time for which a message with a button is shown, ms. */
 const SHOWN_WITH_BUTTON_MS = 12_000;
-/** Time after which a touch beside a message closes it, ms. A touch that started earlier was not a reaction to it. */
+/**
+ * Time for which a message is shown before a touch beside it can close it, ms. An earlier touch is not a reaction to
+ * the message.
+ */
 const READ_MS = 1000;
 /** Maximum number of visible messages of a kind, so that they do not hide the model. */
 const MOST = 3;

@@ -43,7 +43,7 @@ export interface View {
   close(): Promise<void>;
 }
 
-/** Opens a view with WebGPU, or WebGL2. Calls `lost` if a lost device cannot be restored. */
+/** Opens a view with WebGPU, or with WebGL2 if there is no WebGPU. Calls `lost` if a lost device cannot be restored. */
 export function openView(canvases: Canvases, lost: (error: unknown) => void): Promise<View> {
   return openOn(canvases, async (opened) => {
     const { artifact, module, canvas } = opened;

@@ -16,7 +16,7 @@ export interface Artifact {
 /** Modules by URL. Several views on a page share a module. */
 const modules = new Map<string, Promise<WebAssembly.Module>>();
 
-/** Downloads and compiles a wasm module, unless an earlier call has. */
+/** Downloads and compiles a wasm module. Calls with the same URL share the module, unless the download failed. */
 export function compile(url: string): Promise<WebAssembly.Module> {
   const known = modules.get(url) ?? download(url);
   modules.set(url, known);

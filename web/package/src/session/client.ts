@@ -10,7 +10,7 @@ import { buffers, type FromWorker, type JobKind, type Jobs, type ToWorker } from
 const PATIENCE = 400;
 
 interface Waiting {
-  /** Sends the job, again if the worker is replaced. */
+  /** Sends the job to a worker. Called again if the worker is replaced. */
   readonly ask: (to: Worker) => void;
   readonly done: (output: never) => void;
   readonly failed: (error: Error) => void;

@@ -15,7 +15,7 @@ type RunApart = <K extends "read" | "readCage" | "check" | "repair">(
   hear?: Hear,
 ) => Job<Jobs[K]["output"]>;
 
-/** Runs one job at a time, each in a new worker that is closed afterwards. */
+/** Function that runs one job at a time, each in a new worker that is closed afterwards. */
 export type Apart = RunApart & {
   /**
    * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for

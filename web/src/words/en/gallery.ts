@@ -7,7 +7,7 @@ export const galleryWords = {
     "Live examples, computed in this page. Drag a view to turn it. Click a title to open and change the example.",
   play: "Play",
   playOf: (title: string) => `Play: ${title}`,
-  /** By the keys of gallery/links.json. */
+  /** Titles and texts of the examples, by their keys in gallery/links.json. */
   examples: {
     pull: { title: "Pull the model", text: "One point of the head is pulled, and the cage follows." },
     capture: { title: "Bend a capture", text: "10,000 Gaussian splats move, turn and stretch." },

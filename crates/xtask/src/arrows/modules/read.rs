@@ -161,7 +161,7 @@ impl Crate {
         length
     }
 
-    /// Records a path that begins at the crate's root or is relative to a module.
+    /// Records a path if it begins at the crate's root or is relative to a module.
     fn mention(&mut self, path: &Found, place: &Place) {
         let Some(first) = path.segments.first() else { return };
         let ups = path.segments.iter().take_while(|s| *s == "super").count();
