@@ -16,8 +16,8 @@ const WITH_TURNS = 1u;
 /// are for stronger deformations.
 const STEPS = 10u;
 
-/// The orthogonal matrix nearest to `f`, by Newton's method on R = (R + R^-T) / 2 (Higham 1986, "Computing the polar
-/// decomposition"). Returns the identity if `f` has no positive determinant. CPU: cagework_core::splats::turn_of.
+/// Finds the orthogonal matrix nearest to `f` by Newton's method on R = (R + R^-T) / 2 (Higham 1986, "Computing the
+/// polar decomposition"). Returns the identity if `f` has no positive determinant. CPU: cagework_core::splats::turn_of.
 fn turn_of(f: mat3x3f) -> mat3x3f {
     let size = determinant(f);
     if size <= 0.0 { return mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0); }

@@ -35,7 +35,7 @@ fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
     return cover * clamp(1.4 - 4.0 * slope, vec2f(0.0), vec2f(1.0));
 }
 
-/// Value of the shadow map at `at`, 0 to 1 across the map, interpolated by cubic B-splines from four linear samples.
+/// Interpolates the shadow map at `at`, 0 to 1 across the map, by cubic B-splines from four linear samples.
 fn shadow_at(at: vec2f) -> f32 {
     let size = vec2f(textureDimensions(shadow_map));
     let place = at * size - 0.5;

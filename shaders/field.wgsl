@@ -23,7 +23,8 @@ struct Place {
     share: vec3f,
 }
 
-/// The cell that contains a point, and the point's coordinates in it. A point outside the lattice is clamped to it.
+/// Finds the cell that contains a point, and the point's coordinates in it. A point outside the lattice is clamped to
+/// it.
 fn place_in_lattice(point: vec3f) -> Place {
     let at = (point - field.origin) / field.cell;
     let corner = clamp(floor(at), vec3f(0.0), vec3f(field.dims - 2u));

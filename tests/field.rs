@@ -11,7 +11,7 @@ use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
 use cagework_tests::random::Random;
 use glam::{Mat3, Vec3};
 
-/// A sample's vertices, its cage, and the field of the pose that `posed` gives the cage.
+/// Returns a sample's vertices, its cage, and the field of the pose that `posed` gives the cage.
 fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec3>, Cage, Field) {
     let sample = samples::build(id).unwrap();
     let cage = Cage::new(&sample.cage).unwrap();
@@ -20,7 +20,7 @@ fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec
     (sample.mesh.positions, cage, field)
 }
 
-/// Indices of vertices at a distance of at least `cells` lattice cells from the cage. Considers every seventh vertex.
+/// Finds vertices at a distance of at least `cells` lattice cells from the cage, among every seventh vertex.
 fn deep_vertices(positions: &[Vec3], cage: &Cage, field: &Field, cells: f32) -> Vec<usize> {
     let reach = f64::from(cells * field.lattice.cell);
     let is_deep = |&v: &usize| ClosestOnCage::new(cage).find(positions[v].as_dvec3()).distance >= reach;
@@ -92,8 +92,8 @@ fn a_cage_at_rest_moves_nothing() {
     assert_eq!(bent, positions);
 }
 
-/// The cage of a bar of 1 x 1 x 4, and a pose of the cage that bends the bar by 120 degrees about the y axis. Straight
-/// lines along z become arcs.
+/// Creates the cage of a bar of 1 x 1 x 4, and a pose of the cage that bends the bar by 120 degrees about the y axis.
+/// Straight lines along z become arcs.
 fn bent_bar() -> (Cage, Vec<Vec3>) {
     let bounds = Bounds { min: Vec3::new(-0.5, -0.5, 0.0), max: Vec3::new(0.5, 0.5, 4.0) };
     let cage = Cage::new(&subdivided_box(bounds, 0.05, [3, 3, 9])).unwrap();
@@ -152,7 +152,7 @@ fn norm(matrix: Mat3) -> f32 {
     matrix.to_cols_array().iter().map(|x| x * x).sum::<f32>().sqrt()
 }
 
-/// The median, and the value below which 99 % of the values are.
+/// Finds the median, and the value below which 99 % of the values are.
 fn quantiles(values: &mut [f32]) -> [f32; 2] {
     values.sort_by(f32::total_cmp);
     [values[values.len() / 2], values[values.len() * 99 / 100]]

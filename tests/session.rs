@@ -22,7 +22,7 @@ const WEIGHT_TOLERANCE: f32 = 1e-4;
 /// Largest allowed difference between GPU and CPU positions, as a fraction of the cage's diagonal.
 const POSITION_TOLERANCE: f32 = 1e-4;
 
-/// A GPU context. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
+/// Opens a GPU context. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
 fn context(options: &ContextOptions) -> GpuContext {
     match block_on(GpuContext::new(options)) {
         Ok(context) => context,
@@ -30,7 +30,7 @@ fn context(options: &ContextOptions) -> GpuContext {
     }
 }
 
-/// Every third vertex of the animal [`creature`], to save time, and the animal's cage.
+/// Returns every third vertex of the animal [`creature`], to save time, and the animal's cage.
 fn input() -> (Vec<Vec3>, Cage) {
     (creature().positions.into_iter().step_by(3).collect(), cage(&creature_cage()))
 }

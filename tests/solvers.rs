@@ -87,7 +87,7 @@ macro_rules! solver_suite {
     };
 }
 
-/// A back end on the processor.
+/// Creates a back end on the processor.
 fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
     BackEnd {
         bind: |positions, cage, options, progress| cagework_core::bind(positions, cage, options, progress),
@@ -95,7 +95,7 @@ fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
     }
 }
 
-/// A back end on the GPU. All tests share one device.
+/// Creates a back end on the GPU. All tests share one device.
 fn gpu(method: Method, solver: Solver) -> BackEnd {
     fn bind(
         positions: &[Vec3],
@@ -135,7 +135,7 @@ solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jac
 solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
 solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));
 
-/// Conjugate gradients with a V-cycle as preconditioner.
+/// Creates a back end that solves by conjugate gradients with a V-cycle as preconditioner.
 fn preconditioned_cg(method: Method) -> BackEnd {
     let mut back_end = cpu(method, Solver::ConjugateGradient, 0);
     back_end.options.preconditioner = Preconditioner::VCycle;

@@ -22,7 +22,7 @@ fn bound(sample: &Sample, cage: &Cage, options: BindOptions) -> Binding {
     bind(&sample.mesh.positions, cage, &options, &Silent).unwrap()
 }
 
-/// Options of the method in K. Smith's paper (docs/method.md, sources).
+/// Returns the options of the method in K. Smith's paper (docs/method.md, sources).
 fn paper(grid: u32, tau: f32) -> BindOptions {
     BindOptions { grid, tau, method: Method::Classic, solver: Solver::Jacobi, ..BindOptions::default() }
 }
@@ -134,7 +134,7 @@ fn smooth_cage_avoids_sharp_folds() {
     assert!(smooth < 0.7 * plain, "{smooth} {plain}");
 }
 
-/// The 99.9th percentile over all edges of the increase of the dihedral angle from rest, radians.
+/// Finds the 99.9th percentile over all edges of the increase of the dihedral angle from rest, radians.
 fn sharpest_fold(triangles: &[[u32; 3]], rest: &[Vec3], posed: &[Vec3]) -> f64 {
     let normal = |at: &[Vec3], [a, b, c]: [u32; 3]| -> DVec3 {
         let [a, b, c] = [a, b, c].map(|v| at[v as usize].as_dvec3());

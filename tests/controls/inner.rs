@@ -21,7 +21,7 @@ fn points_at(positions: &[Vec3], radius: f32) -> InnerControls {
     InnerControls { positions: positions.to_vec(), elements, radius: Some(radius) }
 }
 
-/// A ball of radius 1/4 in the centre of a sphere of radius 1.
+/// Creates a ball of radius 1/4 in the centre of a sphere of radius 1.
 fn ball_in_sphere() -> ControlSet {
     ControlSet::new(&cage(&icosphere(3)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap()
 }
@@ -165,7 +165,7 @@ fn weights_are_linear_along_a_tube() {
     }
 }
 
-/// A cage with a ball, a bent bone and a sheet inside.
+/// Creates a cage with a ball, a bent bone and a sheet inside.
 fn all_kinds() -> ControlSet {
     let inner = InnerControls {
         positions: [
@@ -189,7 +189,7 @@ fn all_kinds() -> ControlSet {
     ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap()
 }
 
-/// Points in the cage of [`all_kinds`], with extra points inside inner controls and next to them.
+/// Creates points in the cage of [`all_kinds`], with extra points inside inner controls and next to them.
 fn everywhere() -> Vec<Vec3> {
     let mut points = scattered(1500, Vec3::splat(-0.99), Vec3::splat(0.99));
     for center in [Vec3::new(-0.5, 0.5, 0.2), Vec3::new(0.0, -0.4, 0.1)] {
@@ -333,9 +333,9 @@ fn many_small_balls_do_not_stall_the_solve() {
     }
 }
 
-/// Largest jump of a weight on lines near the points `corners`: the change between points 1/250 of a cell apart, minus
-/// the larger of the changes in the previous and in the next step. The lines keep a distance of at least 0.1 cells
-/// from all `corners`.
+/// Finds the largest jump of a weight on lines near the points `corners`: the change between points 1/250 of a cell
+/// apart, minus the larger of the changes in the previous and in the next step. The lines keep a distance of at least
+/// 0.1 cells from all `corners`.
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;
     let mut random = Random::new(81);

@@ -52,8 +52,8 @@ fn refined(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     (new, quads)
 }
 
-/// A mesh subdivided `steps` times, and the subdivision matrix: for each new vertex, a row with the weights of the
-/// original vertices.
+/// Subdivides a mesh `steps` times. Returns the new mesh and the subdivision matrix: for each new vertex, a row with
+/// the weights of the original vertices.
 fn refined_mesh(mesh: &PolygonMesh, steps: u32) -> (PolygonMesh, Vec<Vec<f64>>) {
     let n = mesh.positions.len();
     let mut faces = Vec::new();

@@ -14,7 +14,7 @@ pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut Bi
     bind(points, set, &options, &Silent).expect("points inside are bound")
 }
 
-/// Sampled weights before each point's row is corrected to sum to 1 and to reproduce the point at rest.
+/// Samples weights before each point's row is corrected to sum to 1 and to reproduce the point at rest.
 /// `[n_controls][n_points]`; all points must be different and inside.
 pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOptions) -> Vec<Vec<f32>> {
     let watch = Watch::new(&Silent);
@@ -27,7 +27,7 @@ pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOpt
     lanes.take(controls.n_controls()).collect()
 }
 
-/// Evenly distributed points in a box, none of them in a plane of symmetry of the box.
+/// Creates evenly distributed points in a box, none of them in a plane of symmetry of the box.
 pub(crate) fn scattered(n: usize, low: Vec3, high: Vec3) -> Vec<Vec3> {
     // Inverse powers of 1.2207, the root of x^4 = x + 1: the R3 sequence (Roberts 2018).
     const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_4];

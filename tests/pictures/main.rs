@@ -51,7 +51,7 @@ fn posed_with_selection() {
     }
 }
 
-/// The cage vertex above the neck, which influences much of head and body.
+/// Finds the cage vertex above the neck, which influences much of head and body.
 fn near_the_head(session: &Session) -> u32 {
     let positions = session.cage().expect("there is one").positions();
     let distance = |p: &Vec3| p.distance(Vec3::new(5.0, 4.0, -1.0));

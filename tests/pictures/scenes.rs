@@ -19,7 +19,7 @@ pub(crate) fn everywhere() -> [ContextOptions; 2] {
     [false, true].map(|draws_only| ContextOptions { draws_only, ..ContextOptions::default() })
 }
 
-/// An empty session. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
+/// Creates an empty session. Without an adapter the tests fail; the software adapter of mesa-vulkan-drivers suffices.
 pub(crate) fn empty(options: &ContextOptions) -> Session {
     match block_on(GpuContext::new(options)) {
         Ok(context) => Session::new(context),
@@ -34,12 +34,12 @@ fn upright(p: Vec3) -> Vec3 {
     Vec3::new(p.x, p.z, -p.y)
 }
 
-/// A session with the animal of [`creature::creature`] in its cage of 112 vertices.
+/// Creates a session with the animal of [`creature::creature`] in its cage of 112 vertices.
 pub(crate) fn creature() -> Session {
     creature_on(&ContextOptions::default())
 }
 
-/// [`creature`] on a device with these options.
+/// Like [`creature`], on a device with these options.
 pub(crate) fn creature_on(options: &ContextOptions) -> Session {
     let mesh = creature::creature();
     let around: Cage = cage(&moved(&creature::creature_cage(), upright));
@@ -84,7 +84,7 @@ pub(crate) fn bow(session: &mut Session) {
     session.pose(&posed);
 }
 
-/// Four balls side by side: textured, with vertex colours, transparent, and with an alpha mask.
+/// Creates a session with four balls side by side: textured, with vertex colours, transparent, and with an alpha mask.
 pub(crate) fn textured(options: &ContextOptions) -> Session {
     let mut model = DrawModel::default();
     for k in 0..4u32 {
@@ -124,7 +124,7 @@ pub(crate) fn textured(options: &ContextOptions) -> Session {
     session
 }
 
-/// A ball of radius 1 with a texture seam.
+/// Adds a ball of radius 1 with a texture seam.
 fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
     const RINGS: u32 = 24;
     const AROUND: u32 = 48;

@@ -9,12 +9,12 @@ use glam::{DVec3, Quat, Vec3};
 use super::reference::armadillo_cage;
 use super::{BackEnd, combined, principles};
 
-/// Largest difference between two matrices of weights.
+/// Finds the largest difference between two matrices of weights.
 fn largest_change(a: &Weights, b: &Weights) -> f32 {
     dense(a).iter().zip(dense(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// A smooth pose: each point rotated about y by `0.5 * p.y / size` radians.
+/// Twists points smoothly: rotates each point about y by `0.5 * p.y / size` radians.
 fn twisted(points: &[Vec3], size: f32) -> Vec<Vec3> {
     points.iter().map(|&p| Quat::from_rotation_y(0.5 * p.y / size) * p).collect()
 }
@@ -78,9 +78,9 @@ pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
     }
 }
 
-/// Harmonic coordinates of the union of two boxes at a point, by Walk on Spheres (Muller 1956). Each step jumps to a
-/// random point of the largest sphere inside one of the boxes. A walk ends within 1e-4 of the union's boundary, with
-/// the trilinear coordinates of its last point in the box that contains this point.
+/// Estimates harmonic coordinates of the union of two boxes at a point by Walk on Spheres (Muller 1956). Each step
+/// jumps to a random point of the largest sphere inside one of the boxes. A walk ends within 1e-4 of the union's
+/// boundary, with the trilinear coordinates of its last point in the box that contains this point.
 fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &mut Random) -> [f64; 16] {
     let mut sums = [0.0; 16];
     for _ in 0..n_walks {
@@ -147,7 +147,8 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     }
 }
 
-/// Re-entrant edges of a cage. An edge counts as re-entrant if more than 60 % of random points near it are inside.
+/// Finds the re-entrant edges of a cage. An edge counts as re-entrant if more than 60 % of random points near it are
+/// inside.
 fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
     let mut random = Random::new(75);
     let sides = cage.faces().iter().flat_map(|f| (0..f.len()).map(|k| [f[k], f[(k + 1) % f.len()]]));
@@ -160,8 +161,8 @@ fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// Largest change of a weight between points 1/250 of a cell apart, on lines near re-entrant edges that keep a distance
-/// of at least 0.1 cells from them.
+/// Finds the largest change of a weight between points 1/250 of a cell apart, on lines near re-entrant edges that keep
+/// a distance of at least 0.1 cells from them.
 fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     let cell = cage.bounds().extent().max_element() / grid as f32;
     let edges = re_entrant_edges(cage, 0.1 * cell);

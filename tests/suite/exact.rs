@@ -14,14 +14,14 @@ const CORNERS: [Vec3; 4] = [
     Vec3::new(0.4, 0.3, 1.2),
 ];
 
-/// Barycentric coordinates of a point in the tetrahedron with the corners [`CORNERS`].
+/// Computes the barycentric coordinates of a point in the tetrahedron with the corners [`CORNERS`].
 fn barycentric(p: Vec3) -> [f32; 4] {
     let [a, b, c, d] = CORNERS.map(Vec3::as_dvec3);
     let w = DMat3::from_cols(b - a, c - a, d - a).inverse() * (p.as_dvec3() - a);
     [1.0 - w.element_sum(), w.x, w.y, w.z].map(|w| w as f32)
 }
 
-/// Trilinear coordinates in the box from 0 to `size`, in the vertex order of [`cuboid`].
+/// Computes trilinear coordinates in the box from 0 to `size`, in the vertex order of [`cuboid`].
 fn trilinear(p: DVec3, size: DVec3) -> [f32; 8] {
     let t = p / size;
     std::array::from_fn(|v| {

@@ -74,7 +74,7 @@ impl BackEnd {
     }
 }
 
-/// Positions that weights w and cage vertices c give the mesh vertices: `sum w c`, in f64. `[n_vertices]`
+/// Computes the positions that weights w and cage vertices c give the mesh vertices: `sum w c`, in f64. `[n_vertices]`
 pub(crate) fn combined(weights: &Weights, cage: &[Vec3]) -> Vec<DVec3> {
     weights
         .rows()

@@ -28,7 +28,7 @@ macro_rules! npy {
     };
 }
 
-/// Words after the header, whose length is in bytes 8 and 9.
+/// Splits the data after the header, whose length is in bytes 8 and 9, into words.
 fn words(npy: &[u8]) -> impl Iterator<Item = [u8; 4]> {
     let header = usize::from(u16::from_le_bytes([npy[8], npy[9]]));
     npy[10 + header..].chunks_exact(4).map(|word| word.try_into().expect("four bytes"))
@@ -39,7 +39,7 @@ fn points(words: impl Iterator<Item = [u8; 4]>) -> Vec<Vec3> {
     values.chunks_exact(3).map(Vec3::from_slice).collect()
 }
 
-/// Mean of |a - b|.
+/// Computes the mean of |a - b|.
 fn mean_difference(a: &[f32], b: impl Iterator<Item = [u8; 4]>) -> f64 {
     let b: Vec<f32> = b.map(f32::from_le_bytes).collect();
     assert_eq!(a.len(), b.len());
@@ -54,7 +54,7 @@ pub(crate) fn armadillo_is_exact_at_128(back_end: &BackEnd) {
     mean_error_is_below(LIMIT_AT_128, back_end, 128);
 }
 
-/// The cage of the Armadillo, from `tests/data/armadillo`.
+/// Reads the cage of the Armadillo from `tests/data/armadillo`.
 pub(crate) fn armadillo_cage() -> Cage {
     let corners: Vec<u32> = npy!("cage_triangles").map(u32::from_le_bytes).collect();
     let faces = corners.chunks_exact(3).map(<[u32]>::to_vec).collect();

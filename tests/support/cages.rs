@@ -14,14 +14,14 @@ pub fn cage(mesh: &PolygonMesh) -> Cage {
     Cage::new(mesh).expect("test cages are closed and not degenerate")
 }
 
-/// A tetrahedron. The orientation may be inward: [`Cage::new`] flips it if needed.
+/// Creates a tetrahedron. The orientation may be inward: [`Cage::new`] flips it if needed.
 #[must_use]
 pub fn tetrahedron(corners: [Vec3; 4]) -> PolygonMesh {
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(Vec::from).to_vec();
     PolygonMesh { positions: corners.to_vec(), faces }
 }
 
-/// A box of six quads. Bit k of a vertex index selects `min` or `max` on axis k.
+/// Creates a box of six quads. Bit k of a vertex index selects `min` or `max` on axis k.
 #[must_use]
 pub fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     let at = |v: u32, axis: usize| if v >> axis & 1 == 0 { min[axis] } else { max[axis] };
@@ -33,7 +33,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> PolygonMesh {
     }
 }
 
-/// The octahedron with vertices on the axes at distance 1 from the origin, in the order +x, -x, +y, -y, +z, -z.
+/// Creates the octahedron with vertices on the axes at distance 1 from the origin, in the order +x, -x, +y, -y, +z, -z.
 #[must_use]
 pub fn octahedron() -> PolygonMesh {
     let positions = Vec3::AXES.iter().flat_map(|&a| [a, -a]).collect();
@@ -45,7 +45,7 @@ pub fn octahedron() -> PolygonMesh {
     PolygonMesh { positions, faces: faces.collect() }
 }
 
-/// The regular icosahedron with vertices at distance 1 from the origin.
+/// Creates the regular icosahedron with vertices at distance 1 from the origin.
 #[must_use]
 pub fn icosahedron() -> PolygonMesh {
     let golden = f32::midpoint(1.0, 5.0_f32.sqrt());
@@ -69,15 +69,15 @@ pub fn icosahedron() -> PolygonMesh {
     PolygonMesh { positions: positions.into_iter().map(Vec3::normalize).collect(), faces }
 }
 
-/// An octahedron, subdivided `times` times (each face into four) and projected onto the unit sphere: 6, 18, 66, 258,
+/// Subdivides an octahedron `times` times (each face into four) and projects it onto the unit sphere: 6, 18, 66, 258,
 /// 1,026 vertices for 0 to 4.
 #[must_use]
 pub fn sphere(times: u32) -> PolygonMesh {
     rounded(octahedron(), times)
 }
 
-/// An icosahedron, subdivided `times` times (each face into four) and projected onto the unit sphere: 12, 42, 162, 642,
-/// 2,562 vertices for 0 to 4.
+/// Subdivides an icosahedron `times` times (each face into four) and projects it onto the unit sphere: 12, 42, 162,
+/// 642, 2,562 vertices for 0 to 4.
 #[must_use]
 pub fn icosphere(times: u32) -> PolygonMesh {
     rounded(icosahedron(), times)
@@ -104,7 +104,8 @@ fn rounded(mut mesh: PolygonMesh, times: u32) -> PolygonMesh {
     mesh
 }
 
-/// The prism over a counter-clockwise outline in x and y, from z = 0 to `height`: two polygons, and a quad per side.
+/// Creates the prism over a counter-clockwise outline in x and y, from z = 0 to `height`: two polygons, and a quad per
+/// side.
 #[must_use]
 pub fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     let n = outline.len() as u32;
@@ -114,7 +115,7 @@ pub fn prism(outline: &[[f32; 2]], height: f32) -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(height)).collect(), faces }
 }
 
-/// The prism over a regular pentagon of radius 1, from z = 0 to 1.5.
+/// Creates the prism over a regular pentagon of radius 1, from z = 0 to 1.5.
 #[must_use]
 pub fn pentagonal_prism() -> PolygonMesh {
     let outline: Vec<[f32; 2]> = (0..5)
@@ -124,8 +125,8 @@ pub fn pentagonal_prism() -> PolygonMesh {
     prism(&outline, 1.5)
 }
 
-/// The surface of a union of unit cubes with these minimum corners: a quad per exposed side, with shared vertices.
-/// No two cubes may touch only along an edge or at a corner.
+/// Creates the surface of a union of unit cubes with these minimum corners: a quad per exposed side, with shared
+/// vertices. No two cubes may touch only along an edge or at a corner.
 #[must_use]
 pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     let filled: BTreeSet<[i32; 3]> = cubes.iter().copied().collect();
@@ -163,20 +164,21 @@ pub fn blocks(cubes: &[[i32; 3]]) -> PolygonMesh {
     mesh
 }
 
-/// An L of three unit cubes: two arms of length 1 along x and y.
+/// Creates an L of three unit cubes: two arms of length 1 along x and y.
 #[must_use]
 pub fn l_shape() -> PolygonMesh {
     blocks(&[[0, 0, 0], [1, 0, 0], [0, 1, 0]])
 }
 
-/// A C of unit cubes: arms `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]` on a back `[0, 1] x [0, 3]`, from z = 0 to 1.
+/// Creates a C of unit cubes: arms `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]` on a back `[0, 1] x [0, 3]`, from z = 0 to
+/// 1.
 #[must_use]
 pub fn c_shape() -> PolygonMesh {
     let arms = (1..4).flat_map(|x| [[x, 0, 0], [x, 2, 0]]);
     blocks(&arms.chain((0..3).map(|y| [0, y, 0])).collect::<Vec<_>>())
 }
 
-/// The shape of [`c_shape`] with one concave polygon for each of its two caps; 16 vertices.
+/// Creates the shape of [`c_shape`] with one concave polygon for each of its two caps; 16 vertices.
 #[must_use]
 pub fn c_prism() -> PolygonMesh {
     const OUTLINE: [[f32; 2]; 8] =
@@ -188,7 +190,7 @@ pub fn c_prism() -> PolygonMesh {
     PolygonMesh { positions: level(0.0).chain(level(1.0)).collect(), faces }
 }
 
-/// A bar of length 4 with a square cross-section of side `thickness`, not aligned with an axis.
+/// Creates a bar of length 4 with a square cross-section of side `thickness`, not aligned with an axis.
 #[must_use]
 pub fn thin_bar(thickness: f32) -> PolygonMesh {
     let long = blocks(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]);
@@ -196,13 +198,13 @@ pub fn thin_bar(thickness: f32) -> PolygonMesh {
     moved(&long, |p| turn * (p * Vec3::new(1.0, thickness, thickness)))
 }
 
-/// The mesh with every vertex mapped by `to`.
+/// Maps every vertex of a mesh by `to`.
 #[must_use]
 pub fn moved(mesh: &PolygonMesh, to: impl Fn(Vec3) -> Vec3) -> PolygonMesh {
     PolygonMesh { positions: mesh.positions.iter().map(|&p| to(p)).collect(), faces: mesh.faces.clone() }
 }
 
-/// The disjoint union of two meshes; the vertices of `a` come first.
+/// Creates the disjoint union of two meshes; the vertices of `a` come first.
 #[must_use]
 pub fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     let n = a.positions.len() as u32;
@@ -212,7 +214,7 @@ pub fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     both
 }
 
-/// The mesh with all faces reversed.
+/// Reverses all faces of a mesh.
 #[must_use]
 pub fn inside_out(mesh: &PolygonMesh) -> PolygonMesh {
     let mut turned = mesh.clone();
@@ -222,7 +224,7 @@ pub fn inside_out(mesh: &PolygonMesh) -> PolygonMesh {
     turned
 }
 
-/// The mesh with every polygon split into a fan of triangles at its first vertex.
+/// Splits every polygon of a mesh into a fan of triangles at its first vertex.
 #[must_use]
 pub fn triangulated(mesh: &PolygonMesh) -> PolygonMesh {
     let faces = mesh.faces.iter().flat_map(|f| (2..f.len()).map(move |k| vec![f[0], f[k - 1], f[k]]));

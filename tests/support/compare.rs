@@ -2,7 +2,8 @@
 
 use cagework_core::Weights;
 
-/// Index, both values and distance of the two numbers that differ most. A NaN counts as an infinite difference.
+/// Finds the two numbers that differ most: their index, both values, and their distance. A NaN counts as an infinite
+/// difference.
 ///
 /// # Panics
 /// If the slices differ in length.
@@ -25,7 +26,7 @@ pub fn assert_close(a: &[f32], b: &[f32], tolerance: f32) {
     assert!(distance <= tolerance, "at {index}: {x} and {y} differ by {distance:e}, more than {tolerance:e}");
 }
 
-/// The weights as a dense matrix in row-major order. `[n_rows * n_columns]`
+/// Converts weights to a dense matrix in row-major order. `[n_rows * n_columns]`
 #[must_use]
 pub fn dense(weights: &Weights) -> Vec<f32> {
     let mut all = vec![0.0; weights.n_rows() * weights.n_columns()];

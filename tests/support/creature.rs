@@ -28,7 +28,7 @@ const PARTS: [(Vec3, Vec3, f32); 8] = [
 const RINGS: u32 = 42;
 const AROUND: u32 = 44;
 
-/// The animal: 8 capsules of 1,850 vertices, 14,800 in all.
+/// Creates the animal: 8 capsules of 1,850 vertices, 14,800 in all.
 #[must_use]
 pub fn creature() -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -41,8 +41,8 @@ pub fn creature() -> TriMesh {
     mesh
 }
 
-/// The animal's cage: a body of 5 x 3 x 2 blocks, four legs of two blocks, tail, neck and head; 112 vertices, all faces
-/// are quads.
+/// Creates the animal's cage: a body of 5 x 3 x 2 blocks, four legs of two blocks, tail, neck and head; 112 vertices,
+/// all faces are quads.
 #[must_use]
 pub fn creature_cage() -> PolygonMesh {
     let body = (0..30).map(|k| [k % 5, k / 5 % 3, 2 + k / 15]);

@@ -13,7 +13,7 @@ pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
     winding_number(point.as_dvec3(), facets) > 0.5
 }
 
-/// `n` uniformly distributed points inside a cage.
+/// Draws `n` uniformly distributed random points inside a cage.
 #[must_use]
 pub fn inside(cage: &Cage, n: usize, seed: u64) -> Vec<Vec3> {
     let mut random = Random::new(seed);

@@ -11,13 +11,13 @@ pub struct Random {
 }
 
 impl Random {
-    /// A generator with this seed.
+    /// Creates a generator with this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// The next 64 bits.
+    /// Returns the next 64 bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.state;
@@ -26,24 +26,24 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number that is uniformly distributed in `[0, 1)`.
+    /// Returns a number that is uniformly distributed in `[0, 1)`.
     pub fn unit(&mut self) -> f32 {
         // 24 bits, so that the value is exact in f32.
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// A number that is uniformly distributed in `[low, high)`.
+    /// Returns a number that is uniformly distributed in `[low, high)`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// A point that is uniformly distributed in the box from `min` to `max`.
+    /// Returns a point that is uniformly distributed in the box from `min` to `max`.
     pub fn point(&mut self, min: Vec3, max: Vec3) -> Vec3 {
         let t = Vec3::new(self.unit(), self.unit(), self.unit());
         min + t * (max - min)
     }
 
-    /// A rotation by a random angle about a random axis.
+    /// Returns a rotation by a random angle about a random axis.
     pub fn rotation(&mut self) -> Quat {
         let axis = loop {
             let p = self.point(Vec3::splat(-1.0), Vec3::ONE);

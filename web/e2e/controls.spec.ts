@@ -19,7 +19,7 @@ import {
   test,
 } from "./support";
 
-/** A box centred at (0.15, 1, 0), as OBJ. The smooth surface of the box encloses the worm too. */
+/** Writes a box centred at (0.15, 1, 0) as OBJ. The smooth surface of the box encloses the worm too. */
 function cage(): Uint8Array {
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) =>
     [k & 1, (k >> 1) & 1, k >> 2].map((bit) => 6 * bit - 3),
@@ -48,7 +48,7 @@ async function click(page: Page, place: [number, number, number]): Promise<void>
   await page.mouse.click((box?.x ?? 0) + x, (box?.y ?? 0) + y);
 }
 
-/** The point of the worm's axis at height y. */
+/** Returns the point of the worm's axis at height y. */
 const axis = (y: number): [number, number, number] => [0.3 * Math.sin(1.5 * y), y, 0];
 
 test("a smooth cage and interior controls are bound, posed, undone and saved", async ({ page }) => {

@@ -110,7 +110,7 @@ function file(
   return all.file(`${name}.glb`);
 }
 
-/** The files of dummy, dress and belt. */
+/** Writes the files of dummy, dress and belt. */
 export const dressed = (): Promise<Dropped[]> =>
   Promise.all([
     file("dummy", [0.72, 0.62, 0.5], turned(rings(DUMMY, 4))),

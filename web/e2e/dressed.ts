@@ -50,7 +50,7 @@ export function apart(all: readonly number[]) {
   return { body: all.slice(0, shirt), shirt: all.slice(shirt, buckle), buckle: all.slice(buckle) };
 }
 
-/** The `n` files that one click downloads. */
+/** Clicks the export button of the given kind; returns the `n` files that it downloads. */
 export async function downloads(page: Page, kind: string, n: number): Promise<Dropped[]> {
   await step(page, "Export");
   const heard: Download[] = [];
@@ -85,9 +85,9 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
 }
 
 /**
- * The fraction of vertices that are at rest, for the body's upper half (skin) and its lower half (trousers). A vertex
- * is at rest if each coordinate differs from `rest` by at most `within`. The tolerance must be larger for positions
- * that are read from the GPU than for exported ones.
+ * Computes the fraction of vertices that are at rest, for the body's upper half (skin) and its lower half (trousers). A
+ * vertex is at rest if each coordinate differs from `rest` by at most `within`. The tolerance must be larger for
+ * positions that are read from the GPU than for exported ones.
  */
 export function still(
   points: readonly number[],
@@ -102,7 +102,9 @@ export function still(
   return [share(kept.slice(0, half)), share(kept.slice(half))];
 }
 
-/** A point of the window at which the brush hits model `id`, away from handles. The trial strokes are reverted. */
+/**
+ * Finds a point of the window at which the brush hits model `id`, away from handles. The trial strokes are reverted.
+ */
 export async function paintable(page: Page, id: number): Promise<{ x: number; y: number }> {
   const look = (id: number) => {
     const engine = globalThis.cagework?.engine;

@@ -12,7 +12,7 @@ import { longestTask } from "./tasks";
 
 const SIZES = [30_000, 200_000, 650_000];
 
-/** Peak resident memory of the renderer process, MB. */
+/** Reads the peak resident memory of the renderer process, MB. */
 async function memoryOf(browser: Browser): Promise<number> {
   const client = await browser.newBrowserCDPSession();
   const { processInfo } = await client.send("SystemInfo.getProcessInfo");

@@ -55,7 +55,7 @@ async function pull(page: Page, wanted: GizmoPart, by: (grip: Grip) => readonly 
   return { before, after: await cagePositions(page) };
 }
 
-/** Displacement of each cage vertex along one axis. */
+/** Returns the displacement of each cage vertex along one axis. */
 function along(axis: number, { before, after }: { before: number[]; after: number[] }): number[] {
   return after.map((value, k) => value - (before[k] ?? 0)).filter((_, k) => k % 3 === axis);
 }
@@ -67,7 +67,7 @@ const across = ({ away: [x, y] }: Grip) => [-36 * y, 36 * x] as const;
 
 const point = (list: readonly number[], i: number) => [0, 1, 2].map((axis) => list[3 * i + axis] ?? 0);
 
-/** Centroid of the points. */
+/** Computes the centroid of points. */
 function middle(list: readonly number[]): number[] {
   const n = list.length / 3;
   return [0, 1, 2].map((axis) => list.reduce((sum, value, k) => sum + (k % 3 === axis ? value / n : 0), 0));

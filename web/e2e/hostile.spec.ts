@@ -41,7 +41,7 @@ const DROPS: readonly (readonly string[])[] = [
 const LONGEST_S = 30;
 const MOST_BYTES = 1e9;
 
-/** Contents of a file in the /proc folder of each process; empty for processes that have ended. */
+/** Reads a file in the /proc folder of each process; empty for processes that have ended. */
 const statusOf = (processes: readonly number[], file: "stat" | "status"): string[] =>
   processes.map((id) => {
     try {
@@ -51,13 +51,13 @@ const statusOf = (processes: readonly number[], file: "stat" | "status"): string
     }
   });
 
-/** Resident memory of the largest of the processes, bytes. */
+/** Finds the resident memory of the largest process, bytes. */
 const largestOf = (processes: readonly number[]): number =>
   Math.max(
     ...statusOf(processes, "status").map((text) => 1024 * Number(/VmRSS:\s+(\d+)/.exec(text)?.[1] ?? 0)),
   );
 
-/** User and system time of the processes since their start, seconds. Linux counts in hundredths of a second. */
+/** Sums user and system time of the processes since their start, seconds. Linux counts in hundredths of a second. */
 const processorTimeOf = (processes: readonly number[]): number =>
   statusOf(processes, "stat").reduce((sum, text) => {
     const [user = 0, system = 0] = text.replace(/.*\) /, "").split(" ").slice(11, 13).map(Number);

@@ -12,7 +12,7 @@ import draco3d from "draco3dgltf";
 import validator from "gltf-validator";
 import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
 
-/** A PNG of 8 x 8 pixels, alternately orange and teal. */
+/** Writes a PNG of 8 x 8 pixels, alternately orange and teal. */
 function png(): Uint8Array {
   const SIDE = 8;
   const rows = Array.from({ length: SIDE }, (_, j) => [
@@ -33,7 +33,7 @@ function png(): Uint8Array {
   return new Uint8Array(Buffer.concat(parts));
 }
 
-/** A bent tube along y, 2 high, of radius up to 0.4, with texture coordinates. */
+/** Creates a bent tube along y, 2 high, of radius up to 0.4, with texture coordinates. */
 function tube(rings = 40, around = 32): { positions: Float32Array; uvs: Float32Array; indices: Uint32Array } {
   const positions: number[] = [];
   const uvs: number[] = [];
@@ -78,19 +78,19 @@ function document(): { document: Document; node: Node } {
   return { document, node };
 }
 
-/** The textured tube as GLB. */
+/** Writes the textured tube as GLB. */
 export async function glb(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document().document);
 }
 
-/** The textured tube as .gltf, with files for its buffer and texture. */
+/** Writes the textured tube as .gltf, with files for its buffer and texture. */
 export async function gltfFiles(): Promise<{ name: string; bytes: Uint8Array }[]> {
   const { json, resources } = await new NodeIO().writeJSON(document().document, { basename: "worm" });
   const files = Object.entries(resources).map(([name, bytes]) => ({ name, bytes }));
   return [{ name: "worm.gltf", bytes: new TextEncoder().encode(JSON.stringify(json)) }, ...files];
 }
 
-/** A torus of about `vertices` vertices, radii 1 and 0.35, as GLB. */
+/** Writes a torus of about `vertices` vertices, radii 1 and 0.35, as GLB. */
 export async function torus(vertices: number): Promise<Uint8Array> {
   const around = Math.round(Math.sqrt(vertices / 3));
   const rings = Math.round(vertices / around);
@@ -139,7 +139,7 @@ export async function meshoptGlb(): Promise<Uint8Array> {
   return io.writeBinary(made);
 }
 
-/** A tetrahedron as OBJ. If `open`, it lacks a face. */
+/** Writes a tetrahedron as OBJ. If `open`, it lacks a face. */
 export function obj(scale: number, open = false): Uint8Array {
   const corners = [
     [1, 1, 1],
@@ -158,7 +158,9 @@ export interface Mesh {
   readonly faces: readonly (readonly number[])[];
 }
 
-/** A box around the origin, given half its side lengths. Its six quads are counter-clockwise seen from outside. */
+/**
+ * Creates a box around the origin, given half its side lengths. Its six quads are counter-clockwise seen from outside.
+ */
 export function boxFaces(half: number | readonly [number, number, number]): Mesh {
   const sides = typeof half === "number" ? [half, half, half] : half;
   const signs = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 1, k & 2, k & 4].map((bit) => (bit ? 1 : -1)));
@@ -175,7 +177,7 @@ export function boxFaces(half: number | readonly [number, number, number]): Mesh
   };
 }
 
-/** A mesh as OBJ. */
+/** Writes a mesh as OBJ. */
 export function objOf({ positions, faces }: Mesh): Uint8Array {
   const lines = [
     ...positions.map((p) => `v ${p.join(" ")}`),
@@ -184,12 +186,12 @@ export function objOf({ positions, faces }: Mesh): Uint8Array {
   return new TextEncoder().encode(`${lines.join("\n")}\n`);
 }
 
-/** A box as OBJ. */
+/** Writes a box as OBJ. */
 export function box(half: number | readonly [number, number, number]): Uint8Array {
   return objOf(boxFaces(half));
 }
 
-/** Errors that the Khronos glTF validator finds in a GLB. */
+/** Returns the errors that the Khronos glTF validator finds in a GLB. */
 export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
   const report = await validator.validateBytes(new Uint8Array(bytes));
   const ERROR = 0;
@@ -199,8 +201,8 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
 }
 
 /**
- * A body and a hat skinned to two joints, and a rigid buckle. The body has two morph targets with default weights 0
- * and 1. A clip animates both joints and the morph targets.
+ * Writes a GLB of a body and a hat skinned to two joints, and a rigid buckle. The body has two morph targets with
+ * default weights 0 and 1. A clip animates both joints and the morph targets.
  */
 export async function dancer(): Promise<Uint8Array> {
   const document = new Document();
@@ -301,14 +303,14 @@ export async function dancer(): Promise<Uint8Array> {
   return new NodeIO().writeBinary(document);
 }
 
-/** Positions of the first primitive of the mesh `name` in a GLB. */
+/** Reads the positions of the first primitive of the mesh `name` in a GLB. */
 export async function positionsOf(bytes: Uint8Array, name: string): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const mesh = root.listMeshes().find((mesh) => mesh.getName() === name);
   return [...(mesh?.listPrimitives()[0]?.getAttribute("POSITION")?.getArray() ?? [])];
 }
 
-/** Vertex positions of a GLB's first primitive at the keyframe `seconds` of its morph target animation. */
+/** Reads the vertex positions of a GLB's first primitive at the keyframe `seconds` of its morph target animation. */
 export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const [primitive] = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());
@@ -328,8 +330,8 @@ export async function shownAt(bytes: Uint8Array, seconds: number): Promise<numbe
 }
 
 /**
- * A `.splat` file: splats on a vase, 2 high, with stripes. `floaters`: number of larger splats on its right, 1.2 from
- * its axis.
+ * Writes a `.splat` file: splats on a vase, 2 high, with stripes. `floaters`: number of larger splats on its right, 1.2
+ * from its axis.
  */
 export function splats(n = 1000, floaters = 0): Uint8Array {
   const bytes = Buffer.alloc(32 * (n + floaters));

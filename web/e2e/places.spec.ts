@@ -15,7 +15,7 @@ const overlap = (a: Box, b: Box) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
 /**
- * Number of cage vertices that are outside the view or under panels and toolbars. Vertices under the picture of the
+ * Counts the cage vertices that are outside the view or under panels and toolbars. Vertices under the picture of the
  * axes, which covers only a corner of the view, do not count.
  */
 const hiddenHandles = (page: Page) =>

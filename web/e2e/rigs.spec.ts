@@ -27,7 +27,7 @@ import {
 
 const TIMES = [0, 0.6, 1.3];
 
-/** Vertex positions while the first clip is at each of the given times, seconds. */
+/** Returns the vertex positions while the first clip is at each of the given times, seconds. */
 async function played(page: Page, at: readonly number[] = TIMES, rig = RIG_DEFAULTS): Promise<number[][]> {
   return page.evaluate(
     async ({ times, rig }) => {
@@ -45,7 +45,7 @@ async function played(page: Page, at: readonly number[] = TIMES, rig = RIG_DEFAU
   );
 }
 
-/** Vertex positions of the frame that is shown. */
+/** Returns the vertex positions of the frame that is shown. */
 const shownFrame = (page: Page) =>
   page.evaluate(() => [...(globalThis.cagework?.engine.clipPositions() ?? [])]);
 
@@ -204,7 +204,7 @@ test("a model with several meshes, morph targets and a clip is the same after po
     expect(largestMove(positions, again[k] ?? []), `time ${k}`).toBeLessThan(2e-5);
 });
 
-/** Lowest height of the model during the first clip. */
+/** Finds the lowest height of the model during the first clip. */
 async function lowest(page: Page, rig = RIG_DEFAULTS): Promise<number> {
   return page.evaluate(async (rig) => {
     const engine = globalThis.cagework?.engine;
@@ -220,7 +220,7 @@ async function lowest(page: Page, rig = RIG_DEFAULTS): Promise<number> {
   }, rig);
 }
 
-/** A GLB with the nodes and clips of another one, without its meshes. */
+/** Writes a GLB with the nodes and clips of another one, without its meshes. */
 async function clipsOf(bytes: Uint8Array): Promise<Buffer> {
   const document = await new NodeIO().readBinary(bytes);
   const root = document.getRoot();
@@ -228,7 +228,7 @@ async function clipsOf(bytes: Uint8Array): Promise<Buffer> {
   return Buffer.from(await new NodeIO().writeBinary(document));
 }
 
-/** Translations of the named nodes of a GLB. */
+/** Reads the translations of the named nodes of a GLB. */
 async function placesOf(bytes: Uint8Array): Promise<Record<string, readonly number[]>> {
   const nodes = (await new NodeIO().readBinary(bytes)).getRoot().listNodes();
   return Object.fromEntries(nodes.map((node) => [node.getName(), node.getTranslation()]));

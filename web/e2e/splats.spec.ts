@@ -5,7 +5,10 @@ import { savedSince } from "./kept";
 import { splats } from "./models";
 import { bound, download, drop, expect, grip, openWith, pull, rested, shoot, test } from "./support";
 
-/** Mean colour of the model alone in 16 x 16 squares, from the front. Splats are drawn without cage and floor. */
+/**
+ * Computes the mean colours of 16 x 16 squares of a picture of the model alone, from the front. Splats are drawn
+ * without cage and floor.
+ */
 async function squares(page: Page): Promise<number[]> {
   return page.evaluate(async () => {
     const session = globalThis.cagework;

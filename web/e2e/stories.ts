@@ -23,7 +23,7 @@ import {
   shoot,
 } from "./support";
 
-/** Accessibility faults that axe finds in the page, each with its elements. */
+/** Lists the accessibility faults that axe finds in the page, each with its elements. */
 export async function complaintsOfAxe(page: Page): Promise<string[]> {
   const { violations } = await new AxeBuilder({ page }).setLegacyMode().analyze();
   return violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);

@@ -73,7 +73,7 @@ export async function bound(page: Page): Promise<void> {
   });
 }
 
-/** Position of a cage vertex in window pixels. */
+/** Returns the position of a cage vertex in window pixels. */
 export async function handle(page: Page, vertex: number): Promise<{ x: number; y: number }> {
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
@@ -86,8 +86,8 @@ export async function handle(page: Page, vertex: number): Promise<{ x: number; y
 }
 
 /**
- * Index of a cage vertex that a click selects; -1 if there is none. The distance of the vertex from each side of the
- * cage's bounding box is at least the fraction `within` of the box's extent.
+ * Finds the index of a cage vertex that a click selects; -1 if there is none. The distance of the vertex from each side
+ * of the cage's bounding box is at least the fraction `within` of the box's extent.
  */
 export async function reachable(page: Page, within = 0): Promise<number> {
   return page.evaluate((within) => {
@@ -115,7 +115,10 @@ export async function reachable(page: Page, within = 0): Promise<number> {
   }, within);
 }
 
-/** Centre, in window pixels, of an edge (`corners` 2) or face (more) that a click selects, and the corners' indices. */
+/**
+ * Finds the centre, in window pixels, of an edge (`corners` 2) or face (more) that a click selects. Also returns the
+ * indices of its corners.
+ */
 export async function spot(
   page: Page,
   corners: number,
@@ -198,7 +201,7 @@ export async function grip(
   return found;
 }
 
-/** Where a point of the model appears, window pixels. */
+/** Returns the position of a point of the model in window pixels. */
 export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: number; y: number }> {
   return page.evaluate((point) => {
     const engine = globalThis.cagework?.engine;
@@ -231,17 +234,17 @@ export function cagePositions(page: Page): Promise<number[]> {
   return page.evaluate(() => Array.from(globalThis.cagework?.engine.cagePositions() ?? []));
 }
 
-/** Positions of the cage's vertices at rest. */
+/** Returns the positions of the cage's vertices at rest. */
 export function restPositions(page: Page): Promise<number[]> {
   return page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
 }
 
-/** Vertex positions of the model, read back from the GPU. */
+/** Reads the vertex positions of the model back from the GPU. */
 export function modelPositions(page: Page): Promise<number[]> {
   return page.evaluate(async () => Array.from((await globalThis.cagework?.readPositions()) ?? []));
 }
 
-/** Largest distance between points of the same index in two lists of coordinates. */
+/** Finds the largest distance between points of the same index in two lists of coordinates. */
 export function largestMove(a: readonly number[], b: readonly number[]): number {
   let largest = 0;
   for (let k = 0; k + 2 < a.length; k += 3) {
@@ -307,8 +310,8 @@ export async function drawn(page: Page): Promise<void> {
 }
 
 /**
- * Screenshot of the canvas alone, to be compared with another one. Toasts and other elements above the canvas are
- * hidden, because they change by themselves.
+ * Takes a screenshot of the canvas alone, to be compared with another one. Toasts and other elements above the canvas
+ * are hidden, because they change by themselves.
  */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);

@@ -21,7 +21,7 @@ async function visit(page: Page, stop: number): Promise<void> {
   await arrived(page, stop);
 }
 
-/** All matches of a pattern in the tour's card: the first group of each, as a number. */
+/** Finds all matches of a pattern in the tour's card. Returns the first group of each as a number. */
 async function numbers(page: Page, what: RegExp): Promise<number[]> {
   const text = (await card(page).textContent()) ?? "";
   return [...text.matchAll(what)].map((found) => Number(found[1]));

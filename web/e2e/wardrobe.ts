@@ -11,7 +11,7 @@ const AROUND = 24;
 const RADIUS = 0.35;
 const radiusAt = (y: number) => RADIUS * Math.sqrt(Math.max(0, Math.sin((Math.PI * y) / 2)));
 
-/** A surface of revolution about y, made of `rings` circles between the heights `from` and `to`. */
+/** Creates a surface of revolution about y, made of `rings` circles between the heights `from` and `to`. */
 function sleeve(from: number, to: number, rings: number, radius: (y: number) => number) {
   const positions: number[] = [];
   const indices: number[] = [];
@@ -84,7 +84,7 @@ function body(): Promise<Dropped> {
   return all.file("body.glb");
 }
 
-/** A sleeve around the upper body, skinned to two joints that a clip animates. */
+/** Writes a sleeve around the upper body, skinned to two joints that a clip animates. */
 function shirt(): Promise<Dropped> {
   const all = new Builder();
   const { document } = all;
@@ -128,7 +128,7 @@ function shirt(): Promise<Dropped> {
   return all.file("shirt.glb");
 }
 
-/** A box in front of the body. */
+/** Writes a box in front of the body. */
 function buckle(): Promise<Dropped> {
   const all = new Builder();
   const positions = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((k) => [
@@ -152,14 +152,14 @@ function buckle(): Promise<Dropped> {
 
 export const wardrobe = (): Promise<Dropped[]> => Promise.all([body(), shirt(), buckle()]);
 
-/** Positions of all vertices of a GLB: its meshes in order, and their primitives in order. */
+/** Reads the positions of all vertices of a GLB: its meshes in order, and their primitives in order. */
 export async function pointsOf({ bytes }: Pick<Dropped, "bytes">): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const primitives = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());
   return primitives.flatMap((primitive) => [...(primitive.getAttribute("POSITION")?.getArray() ?? [])]);
 }
 
-/** Distances between all pairs of points. */
+/** Computes the distances between all pairs of points. */
 export function distances(points: readonly number[]): number[] {
   const all = Array.from({ length: points.length / 3 }, (_, k) => points.slice(3 * k, 3 * k + 3));
   return all.flatMap((a, k) =>

@@ -14,11 +14,14 @@ const SHARP_MS = 1500;
 
 type Points = number[][];
 
-/** Rest pose and pose of the widget in Python, and the largest coordinate of the deformed model along each axis. */
+/**
+ * Reads the rest pose and the pose that the widget has in Python, and the largest coordinate of the deformed model
+ * along each axis.
+ */
 const written = (): { rest: Points; pose: Points; max: number[] } =>
   JSON.parse(readFileSync(WRITTEN, "utf8"));
 
-/** Largest difference between two lists of points. */
+/** Finds the largest difference between two lists of points. */
 const difference = (a: Points, b: Points) =>
   a.length === b.length ? Math.max(...a.flat().map((x, k) => Math.abs(x - (b.flat()[k] ?? 0)))) : Infinity;
 

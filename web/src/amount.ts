@@ -1,8 +1,8 @@
 /** The amount that is typed during a gesture, such as "-0.5". */
 
 /**
- * The typed text after a key press: digits append, one decimal point is allowed, minus toggles the sign, Backspace
- * deletes. Undefined for other keys.
+ * Returns the typed text after a key press: digits append, one decimal point is allowed, minus toggles the sign,
+ * Backspace deletes. Undefined for other keys.
  */
 export function nextAmount(typed: string, key: string): string | undefined {
   if (/^\d$/.test(key)) return typed + key;

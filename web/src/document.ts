@@ -116,7 +116,10 @@ export type DocumentMirror = ReturnType<typeof followDocument>;
 
 const keyOf = (view: View | undefined) => `${view?.mesh ?? 0} ${view?.cage ?? 0}`;
 
-/** The values of `next` that differ from those of `old`. Panels that show only equal values are not rendered again. */
+/**
+ * Returns the values of `next` that differ from those of `old`. Panels that show only equal values are not rendered
+ * again.
+ */
 function changed<T extends object>(old: T, next: T): Partial<T> {
   const isOther = (key: string) =>
     JSON.stringify(old[key as keyof T]) !== JSON.stringify(next[key as keyof T]);

@@ -104,14 +104,16 @@ export function coordinate(value: number, size = 0): string {
   return rounded.find((text) => text.length <= FIELD) ?? scientific(value);
 }
 
-/** The name of a file without its extension. The extension of a project, `.cagework.glb`, is removed as a whole. */
+/**
+ * Returns the name of a file without its extension. The extension of a project, `.cagework.glb`, is removed as a whole.
+ */
 export function stem(name: string): string {
   const base = (name.split(/[\\/]/).at(-1) ?? name).replace(/\.cagework(\.glb)?$/i, "");
   const dot = base.lastIndexOf(".");
   return dot > 0 ? base.slice(0, dot) : base;
 }
 
-/** The stem of exported files: without the endings of earlier exports, which would otherwise accumulate. */
+/** Returns the stem of exported files: without the endings of earlier exports, which would otherwise accumulate. */
 export function exportStem(name: string): string {
   return stem(name).replace(/(?<=.)(-pose[ds])+$/i, "");
 }

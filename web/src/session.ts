@@ -279,7 +279,7 @@ async function start(opened: OpenedOn & Needs) {
       };
       return reading("readCage", input, hear);
     },
-    /** A box around the model, with faces of about equal size: `divisions` of them along its longest side. */
+    /** Creates a box around the model, with faces of about equal size: `divisions` of them along its longest side. */
     boxCage: (divisions: number): CageArrays => polygons(engine.boxCage(divisions)),
     /** Checks the cage at rest, in a worker of its own. */
     checkCage: (): Job<Check> => ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })),
@@ -321,8 +321,8 @@ async function start(opened: OpenedOn & Needs) {
     bind: (options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> =>
       startBind({ client, engine, adapter, options, listener, cage }),
     /**
-     * Number of bytes that a bind with these options needs. Throws the error that the bind would end with. Fast enough
-     * to be called on every change.
+     * Estimates the number of bytes that a bind with these options needs. Throws the error that the bind would end
+     * with. Fast enough to be called on every change.
      */
     estimateMemory: (options: BindOptions) => engine.estimateMemory(options),
     /**
@@ -372,7 +372,7 @@ async function start(opened: OpenedOn & Needs) {
     pullGrab: (grab: GrabInput): Job<GrabResult> => ofNow(pulling().run("pullGrab", grab)),
     /** Solves one frame of the pull, in the worker for pulls. `to`: targets of the grabbed points, `[n_grabs, 3]`. */
     pullFrame: (to: Float32Array): Job<PullFrame> => ofNow(pulling().run("pullFrame", { to })),
-    /** A zip archive of files with distinct names. */
+    /** Creates a zip archive of files with distinct names. */
     zip: (files: readonly { readonly name: string; readonly bytes: Uint8Array }[]) =>
       pkg.Engine.zipFiles(
         files.map(({ name }) => name),
@@ -385,14 +385,14 @@ async function start(opened: OpenedOn & Needs) {
      * function that removes the listener.
      */
     onFrame: frames.listen,
-    /** PNG of the scene, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
+    /** Draws the scene as a PNG, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
     async picture(width: number, height: number, alone = false) {
       const pixels = new Uint8ClampedArray(await engine.picture(width, height, alone));
       const canvas = new OffscreenCanvas(width, height);
       canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
       return canvas.convertToBlob({ type: "image/png" });
     },
-    /** Posed positions as drawn, by default with harmonic coordinates. For tests. */
+    /** For tests: reads the posed positions as drawn, by default with harmonic coordinates. */
     readPositions: (kind: Coordinates = "harmonic") => engine.readPositions(kind),
     /**
      * Calls `listener` when the GPU device is lost, after which the page calls `recover()`. Returns a function that

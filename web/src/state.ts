@@ -181,8 +181,8 @@ export const INITIAL = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
 export type AppState = typeof INITIAL;
 
 /**
- * Values of the `MODEL_STATE` keys when another model is opened. Keeps the backend and the memory limit, which depend
- * on the computer.
+ * Returns the values of the `MODEL_STATE` keys when another model is opened. Keeps the backend and the memory limit,
+ * which depend on the computer.
  */
 export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): typeof MODEL_STATE {
   return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };

@@ -18,7 +18,7 @@ export function keepCrash(crash: Crash): boolean {
   }
 }
 
-/** The crash that this tab stored before it restarted the page. */
+/** Reads the crash that this tab stored before it restarted the page. */
 export function lastCrash(): Crash | undefined {
   try {
     const { during, report } = JSON.parse(sessionStorage.getItem(CRASH) ?? "{}");
@@ -38,7 +38,7 @@ export function forgetCrash(): void {
 
 export type Theme = "auto" | "light" | "dark";
 
-/** The theme that the user chose last; "auto" if none is stored. */
+/** Reads the theme that the user chose last; "auto" if none is stored. */
 export function loadTheme(): Theme {
   const theme = readItem(THEME);
   return theme === "light" || theme === "dark" ? theme : "auto";
@@ -57,7 +57,7 @@ export function markSeen(notice: string): void {
   writeItem(SEEN + notice, "yes");
 }
 
-/** The stop at which the user left the tour, from 0. */
+/** Reads the stop at which the user left the tour, from 0. */
 export function loadStop(): number {
   return Number(readItem(TOUR)) || 0;
 }

@@ -11,7 +11,7 @@ export const textOf = (message: Message) => (typeof message === "string" ? messa
 /** An error whose message is in the page's language. */
 export class PageError extends Error {}
 
-/** The message of an error, or of anything else that was thrown. */
+/** Returns the message of an error, or of anything else that was thrown. */
 export function messageOf(error: unknown): Message {
   if (error instanceof PageError) return error.message;
   if (error instanceof Error && error.name === "Unloaded") return T.offline.unloaded;
@@ -51,7 +51,7 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullab
   Unloaded: "reload",
 };
 
-/** Headline (`title`), message and remedy for an error. The error's name determines the remedy. */
+/** Finds headline (`title`), message and remedy for an error. The error's name determines the remedy. */
 export function explain(error: unknown, title: string): Explanation {
   const name = error instanceof Error ? error.name : "";
   const message = messageOf(error);

@@ -11,7 +11,10 @@ afterEach(() => {
 
 const MODULE = {} as WebAssembly.Module;
 
-/** A client with simulated workers that record their jobs. `answer`, `stop` and `miss` simulate events of a worker. */
+/**
+ * Creates a client with simulated workers that record their jobs. `answer`, `stop` and `miss` simulate events of a
+ * worker.
+ */
 function workers() {
   const all: { target: EventTarget; jobs: number[]; isOver: boolean }[] = [];
   const moved: ArrayBuffer[] = [];

@@ -11,7 +11,10 @@ interface Json {
   extensionsRequired?: string[];
 }
 
-/** A meshopt .gltf with two buffers: compressed data in worm.bin, and a fallback for programs without the decoder. */
+/**
+ * Writes a meshopt .gltf with two buffers: compressed data in worm.bin, and a fallback for programs without the
+ * decoder.
+ */
 async function twoBuffers(change: (json: Json) => void) {
   const bytes = await meshoptGlb();
   const start = GLB_HEADER + CHUNK_HEADER;

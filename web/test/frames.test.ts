@@ -17,7 +17,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A frame loop on a simulated GPU. `drawn`: for each draw call, whether it requests full resolution. */
+/** Creates a frame loop on a simulated GPU. `drawn`: for each draw call, whether it requests full resolution. */
 function slow(answer: (sharp: boolean) => boolean | undefined, calm = () => true) {
   const drawn: boolean[] = [];
   const frames = createFrames();

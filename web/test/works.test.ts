@@ -16,7 +16,7 @@ const DAY = 86_400_000;
 const entry = (id: string, when: number): Entry => ({ id, name: `${id}.obj`, when, size: 100 });
 const work = (id: string, where: Work["where"] = "nowhere"): Work => ({ ...entry(id, 0), where });
 
-/** The 12-byte header of a GLB (magic, version 2, file length), padded with zeros to `length` bytes. */
+/** Writes the 12-byte header of a GLB (magic, version 2, file length), padded with zeros to `length` bytes. */
 function glb(length: number): Uint8Array {
   const bytes = new Uint8Array(length);
   const view = new DataView(bytes.buffer);

@@ -12,7 +12,8 @@ pub(crate) struct Outline {
     pub(crate) angle: f32,
 }
 
-/// Outline of the unit sphere's image under `by`. `right`, `up`: unit vectors to the right and up on the screen.
+/// Computes the outline of the unit sphere's image under `by`. `right`, `up`: unit vectors to the right and up on the
+/// screen.
 pub(crate) fn outline(by: Mat3, right: Vec3, up: Vec3) -> Outline {
     let [x, y] = [right, up].map(|direction| by.transpose() * direction);
     // Eigenvalues and first eigenvector of [[a, b], [b, c]].
@@ -23,8 +24,8 @@ pub(crate) fn outline(by: Mat3, right: Vec3, up: Vec3) -> Outline {
     Outline { half_axes, angle: 0.5 * b.atan2(half) }
 }
 
-/// Outlines of the splat nearest to a place at rest, of the unit sphere's image under the deformation gradient at this
-/// splat, and of the splat in the pose; `None` without splats.
+/// Computes the outlines of the splat nearest to a place at rest, of the unit sphere's image under the deformation
+/// gradient at this splat, and of the splat in the pose; `None` without splats.
 pub(crate) fn outlines(
     splats: &Splats,
     field: Option<&Field>,

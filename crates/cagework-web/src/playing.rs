@@ -26,7 +26,7 @@ pub(crate) struct SharedClip {
 }
 
 impl SharedClip {
-    /// The clips of all models, grouped by name, in the order of the models.
+    /// Collects the clips of all models, grouped by name, in the order of the models.
     pub(crate) fn all(models: &Models) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for member in models.iter() {
@@ -199,7 +199,7 @@ impl Playback {
         self.posed[place].origins.get(node as usize).map(|&p| self.up.transform_point3(p))
     }
 
-    /// Current vertices, computed on the CPU. `[n_vertices]`
+    /// Computes the current vertices on the CPU. `[n_vertices]`
     pub(crate) fn positions(&self) -> Vec<Vec3> {
         let mut positions = skin_vertices(&self.skin, &self.palette(), &self.targets);
         if let Some(field) = &self.field {
@@ -209,7 +209,7 @@ impl Playback {
     }
 }
 
-/// Joint matrices and target weights of one model at a time of one of its clips.
+/// Computes joint matrices and target weights of one model at a time of one of its clips.
 fn posed(part: &ModelMotion, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
     match part {
         ModelMotion::Player(player) => player.at(clip, seconds, targets),

@@ -101,7 +101,7 @@ pub(crate) struct Faults {
 }
 
 impl Faults {
-    /// Marks of the faults. If the cage is a draft, the edges of all its faces are marked.
+    /// Creates the marks of the faults. If the cage is a draft, the edges of all its faces are marked.
     pub(crate) fn marks(&self, mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
         let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
         let Places { vertices, edges, faces, points } = &self.in_cage;

@@ -24,8 +24,8 @@ impl Loaded {
         self.model.triangles.as_flattened().to_vec()
     }
 
-    /// Geometry that a cage should enclose: positions and triangles of the model at rest, with each morph target, and
-    /// in the frames of `clip` if it is given. `[n, 3]` each
+    /// Returns the geometry that a cage should enclose: positions and triangles of the model at rest, with each morph
+    /// target, and in the frames of `clip` if it is given. `[n, 3]` each
     ///
     /// # Errors
     /// If the model has no clip with this name.
@@ -87,7 +87,8 @@ impl Binder {
     }
 }
 
-/// Export options of a model. Splits the names of rigid parts into attachments of the skeleton and other parts.
+/// Prepares the export options of a model. Splits the names of rigid parts into attachments of the skeleton and other
+/// parts.
 fn of_model(model: &Model, rig: &JsRigOptions) -> Answer<ReshapeOptions> {
     let options = rig.reshape.clone();
     let props = if rig.plain { Vec::new() } else { model.props()? };
@@ -127,7 +128,7 @@ impl Deformer {
         Ok(Self { n_controls, weights, frames })
     }
 
-    /// Positions of the points, `[n_points, 3]`, in a pose of the controls, `[n_controls, 3]`.
+    /// Computes the positions of the points, `[n_points, 3]`, in a pose of the controls, `[n_controls, 3]`.
     ///
     /// # Errors
     /// If the pose does not have `n_controls` points, or moves a point beyond the range of 32-bit floats.

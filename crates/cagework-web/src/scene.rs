@@ -28,7 +28,7 @@ impl State {
         }
     }
 
-    /// The scene that the view shows. `weights`: the weights on the GPU.
+    /// Creates the scene that the view shows. `weights`: the weights on the GPU.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
@@ -82,7 +82,7 @@ impl State {
             && self.editor.gesture().is_none()
     }
 
-    /// The scene of an exported picture. `alone`: only the model, on a transparent background.
+    /// Creates the scene of an exported picture. `alone`: only the model, on a transparent background.
     pub(crate) fn picture_scene(&self, alone: bool, weights: Option<&Weights>) -> SceneOptions {
         if !alone {
             return self.scene(weights);
@@ -125,7 +125,7 @@ impl State {
         shown
     }
 
-    /// The gizmo, placed at the centre of rotation and scaling.
+    /// Creates the gizmo, placed at the centre of rotation and scaling.
     pub(crate) fn gizmo(&self) -> Option<Gizmo> {
         let mode = self.view.gizmo?;
         let center =
@@ -139,7 +139,7 @@ impl State {
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 
-    /// Marks of the cage's faults; none if the view hides faults.
+    /// Creates the marks of the cage's faults; none if the view hides faults.
     fn marks(&self) -> Marks {
         if !self.view.problems {
             return Marks::default();
@@ -147,7 +147,7 @@ impl State {
         self.faults.marks(self.rest(), self.pose(), self.set().is_none())
     }
 
-    /// Marks of joints: dots for those inside the cage, rings for those outside; empty before a bind.
+    /// Creates the marks of joints: dots for those inside the cage, rings for those outside; empty before a bind.
     fn joint_marks(&self) -> Marks {
         let dots = self.bound.as_ref().and_then(|bound| bound.joints.as_ref());
         let (Some(mode), Some(dots)) = (self.view.joints, dots) else { return Marks::default() };

@@ -254,7 +254,7 @@ impl State {
         self.size.x / self.shown().len() as f32
     }
 
-    /// Pointer position relative to the picture under it, CSS pixels.
+    /// Converts a pointer position to a position in the picture under it, CSS pixels.
     pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
         self.pointers().at(x, y)
     }
@@ -264,7 +264,7 @@ impl State {
         Pointers { width: self.part_width(), last: self.shown().len() as f32 - 1.0 }
     }
 
-    /// A camera that frames these positions, and the picture's size in pixels.
+    /// Creates a camera that frames these positions. Also returns the picture's size in pixels.
     pub(crate) fn view_of(&self, positions: &[Vec3]) -> (Camera, [u32; 2]) {
         let size = (self.size * self.scale).max(Vec2::ONE);
         let mut camera = Camera::default();
@@ -297,7 +297,7 @@ impl State {
         self.is_changed = true;
     }
 
-    /// Properties of the cage, for panels; `None` without a cage.
+    /// Collects the properties of the cage, for panels; `None` without a cage.
     pub(crate) fn cage_state(&self) -> Option<CageState> {
         (!self.rest().faces.is_empty()).then(|| CageState {
             usable: self.set().is_some(),
@@ -307,7 +307,7 @@ impl State {
         })
     }
 
-    /// Document and bind state for the page's panels.
+    /// Collects document and bind state for the page's panels.
     pub(crate) fn document_view(&self) -> View {
         View {
             document: self.editor.view(),
@@ -324,7 +324,7 @@ impl State {
         (self.is_moved, self.is_changed) = (true, true);
     }
 
-    /// Draw data of all models, joined into one.
+    /// Joins the draw data of all models.
     pub(crate) fn draw_model(&self) -> Arc<DrawModel> {
         joined(&self.models().iter().filter_map(|member| self.draws.get(&member.id)).collect::<Vec<_>>())
     }
@@ -346,8 +346,8 @@ impl State {
         self.next_upload().is_some()
     }
 
-    /// The next data to upload, in the order mesh, cage, weights, parts. An upload may invalidate data that comes later
-    /// in this order.
+    /// Returns the next data to upload, in the order mesh, cage, weights, parts. An upload may invalidate data that
+    /// comes later in this order.
     pub(crate) fn next_upload(&self) -> Option<Upload> {
         if self.models().is_empty() {
             return None;
@@ -424,7 +424,7 @@ impl State {
         main.set_field(if self.view.original { None } else { self.field() }, self.pose());
     }
 
-    /// The field that deforms the splats of a capture; `None` at rest and without a lattice.
+    /// Computes the field that deforms the splats of a capture; `None` at rest and without a lattice.
     pub(crate) fn field(&self) -> Option<Field> {
         let is_posed = !self.editor.is_editing_rest() && self.editor.document().is_posed();
         let lattice = self.lattice.as_ref().filter(|_| is_posed)?;
@@ -439,7 +439,7 @@ pub(crate) struct Pointers {
 }
 
 impl Pointers {
-    /// Pointer position relative to the picture under it, CSS pixels.
+    /// Converts a pointer position to a position in the picture under it, CSS pixels.
     pub(crate) fn at(&self, x: f32, y: f32) -> Vec2 {
         Vec2::new(x - self.width * (x / self.width).floor().clamp(0.0, self.last), y)
     }
@@ -474,7 +474,7 @@ mod tests {
     use crate::playing::ModelMotion;
     use crate::puller::ON_CAGE;
 
-    /// A state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
+    /// Creates a state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
     fn uploaded() -> State {
         let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
         let model = Model::read("a.obj", text, &mut |_| None).unwrap();

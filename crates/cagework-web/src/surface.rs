@@ -210,7 +210,7 @@ impl Surface {
         }
     }
 
-    /// A small texture to draw into, and its format.
+    /// Creates a small texture to draw into; also returns its format.
     pub(crate) fn small_target(&self, context: &GpuContext) -> (wgpu::Texture, wgpu::TextureFormat) {
         (self.make_part(context, [SMALL_SIDE; 2]), self.format)
     }

@@ -114,7 +114,7 @@ pub(crate) fn check() -> Result<(), String> {
     modules::check()
 }
 
-/// Names of the packages in a dependency tree, without development and build dependencies.
+/// Lists the names of the packages in a dependency tree, without development and build dependencies.
 fn tree(args: &[&str]) -> Result<BTreeSet<String>, String> {
     let fixed = ["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let text = output("cargo", &[&fixed[..], args].concat())?;

@@ -46,7 +46,7 @@ fn faults(rules: &str, metadata: &Value) -> Result<Vec<String>, String> {
     Ok(faults)
 }
 
-/// Strings of a list: the quoted texts between its brackets.
+/// Reads the strings of a list: the quoted texts between its brackets.
 fn list(rules: &str, key: &str) -> Result<Vec<String>, String> {
     let start = format!("{key} = [");
     let rest =

@@ -41,8 +41,8 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     write(folder, of_web(folder, &OF_NPM)?)
 }
 
-/// Packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`. Deletes the
-/// lists.
+/// Lists the packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`.
+/// Deletes the lists.
 fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
@@ -108,7 +108,7 @@ fn write(folder: &Path, parts: Vec<Part>) -> Result<(), String> {
     save(STANDARD_LIBRARY, &read(&Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html"))?)
 }
 
-/// Third-party packages compiled into one of our packages for a target.
+/// Lists the third-party packages compiled into one of our packages for a target.
 fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>, String> {
     let fixed =
         ["tree", "--locked", "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"];
@@ -139,7 +139,7 @@ fn of_crates(package: &str, target: &str, features: &[&str]) -> Result<Vec<Part>
     Ok(parts)
 }
 
-/// Texts of the licence files in a package's folder.
+/// Reads the licence files in a package's folder.
 fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
     let entries = folder.read_dir().map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
     let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -192,7 +192,8 @@ fn notices(parts: Vec<Part>) -> Result<String, String> {
     Ok(format!("{HEAD}{list}{texts}"))
 }
 
-/// Licence text for a package without a licence file. Apache 2.0 has a fixed text; MIT has a line for the authors.
+/// Returns a licence text for a package without a licence file. Apache 2.0 has a fixed text; MIT has a line for the
+/// authors.
 fn standard_text(part: &Part) -> Result<String, String> {
     let Part { name, licence, authors, .. } = part;
     if licence.contains("Apache-2.0") {

@@ -47,7 +47,7 @@ pub(crate) fn check() -> Result<(), String> {
     }
 }
 
-/// The part of a line that is prose: all of it in Markdown, otherwise the comment.
+/// Returns the part of a line that is prose: all of it in Markdown, otherwise the comment.
 fn prose<'a>(line: &'a str, extension: &str) -> &'a str {
     let text = line.trim_start();
     let marks: &[&str] = if extension == "py" { &["#", "\"\"\""] } else { &["//", "/*", "*"] };

@@ -163,7 +163,7 @@ fn empty(folder: &Path) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))
 }
 
-/// Path of the only file in a folder.
+/// Finds the only file in a folder.
 fn only_file(folder: &str) -> Result<String, String> {
     let fault = || format!("there is no file in {folder}");
     let entry = std::fs::read_dir(folder).map_err(|e| format!("{folder}: {e}"))?.next().ok_or_else(fault)?;

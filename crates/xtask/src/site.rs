@@ -126,7 +126,7 @@ fn check_sizes() -> Result<(), String> {
     Ok(())
 }
 
-/// Size after gzip, bytes.
+/// Computes the size after gzip compression, bytes.
 fn compressed(bytes: &[u8]) -> Result<usize, String> {
     use std::io::Write as _;
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());

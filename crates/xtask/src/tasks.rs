@@ -55,7 +55,7 @@ pub(crate) fn check_and_build() -> Result<(), String> {
     })
 }
 
-/// The part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
+/// Runs the part of [`test()`] that runs in parallel with the Rust tests, after these have been built.
 pub(crate) fn test_beside() -> Result<(), String> {
     python::test()?;
     site::test_scripts()?;

@@ -90,7 +90,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
     path.metadata().and_then(|m| m.modified()).ok()
 }
 
-/// Modification time of a file, or of the newest file in a folder.
+/// Finds the modification time of a file, or of the newest file in a folder.
 fn newest(path: &Path) -> Option<SystemTime> {
     let Ok(entries) = path.read_dir() else { return modified(path) };
     entries.flatten().filter_map(|entry| newest(&entry.path())).max()
@@ -136,7 +136,7 @@ fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), Str
         .map_err(|e| format!("cannot write in {}: {e}", package.display()))
 }
 
-/// Absolute path of Cargo's target folder.
+/// Asks Cargo for the absolute path of its target folder.
 pub(crate) fn target_folder() -> Result<std::path::PathBuf, String> {
     let metadata = output("cargo", &["metadata", "--format-version", "1", "--no-deps", "--locked"])?;
     let key = "\"target_directory\":\"";

@@ -465,7 +465,7 @@ const isSeen = (seen: ReadonlySet<string>, text: string) => {
   return false;
 };
 
-/** All sentences of a catalogue that take no values. */
+/** Lists all sentences of a catalogue that take no values. */
 const sentencesOf = (words: unknown): string[] => {
   if (typeof words === "string") return words === "" ? [] : [words];
   return typeof words === "object" && words !== null ? Object.values(words).flatMap(sentencesOf) : [];

@@ -101,7 +101,7 @@ function mentions(bytes: Uint8Array, word: string): boolean {
   return new TextDecoder().decode(bytes.subarray(...head)).includes(word);
 }
 
-/** Byte range of the JSON in a GLB or glTF file. */
+/** Finds the byte range of the JSON in a GLB or glTF file. */
 function jsonRange(bytes: Uint8Array): [number, number] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const isGlb =

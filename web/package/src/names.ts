@@ -2,7 +2,7 @@
 
 import { MODEL_ENDINGS } from "./contract/generated";
 
-/** Lower-case extension of a file name without the dot; "" if the name has none. */
+/** Returns the lower-case extension of a file name without the dot; "" if the name has none. */
 export function extension(name: string): string {
   const base = name.split("/").at(-1) ?? name;
   const dot = base.lastIndexOf(".");
@@ -10,7 +10,8 @@ export function extension(name: string): string {
 }
 
 /**
- * Rank of a file's model format, 0 for the format that can store the most information; -1 if the file is not a model.
+ * Returns the rank of a file's model format: 0 for the format that can store the most information; -1 if the file is
+ * not a model.
  */
 export function rankOf(name: string): number {
   return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));

@@ -152,8 +152,8 @@ const SAME_POSITION = 1e-6;
 const SAME_NORMAL = 1e-2;
 
 /**
- * For each vertex, the number of the first vertex with the same position and normal, for example on the other side of a
- * texture seam.
+ * Finds, for each vertex, the number of the first vertex with the same position and normal, for example on the other
+ * side of a texture seam.
  */
 function groupsOf(position: Attribute, normal: Attribute | undefined, first: number): Uint32Array {
   let size = 0;
@@ -172,8 +172,8 @@ function groupsOf(position: Attribute, normal: Attribute | undefined, first: num
 }
 
 /**
- * Unit normals of points. All vertices of a group have the same normal: the sum of the normals of their triangles,
- * weighted by area.
+ * Computes unit normals of points. All vertices of a group have the same normal: the sum of the normals of their
+ * triangles, weighted by area.
  */
 function normalsOf(points: Float32Array, triangles: Uint32Array, parts: readonly Part[]): Float32Array {
   const groups = new Uint32Array(points.length / 3);

@@ -261,7 +261,7 @@ test("an element opens compressed files, reports unreadable ones and frees its m
   }
 });
 
-/** Positions of the single primitive of a GLB. */
+/** Reads the positions of the single primitive of a GLB. */
 function positionsOf(glb: Uint8Array): Float32Array {
   const view = new DataView(glb.buffer, glb.byteOffset);
   const length = view.getUint32(12, true);

@@ -307,7 +307,7 @@ test("errors name the argument, its value and the expected one", async () => {
 
 const QUARTER = new Matrix4().makeRotationZ(Math.PI / 2);
 
-/** Largest distance between vectors of the same index in two attributes of three.js. */
+/** Finds the largest distance between vectors of the same index in two attributes of three.js. */
 function apart(a, b) {
   let most = 0;
   for (let v = 0; v < a.count; v++) {

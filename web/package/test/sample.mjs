@@ -5,7 +5,7 @@ import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 
-/** The GLB, cage and first pose of a sample. `project` is the folder in which the package is installed. */
+/** Builds the GLB, cage and first pose of a sample. `project` is the folder in which the package is installed. */
 export async function sample(project, id) {
   const folder = dirname(createRequire(join(project, "package.json")).resolve("@cagework/core/package.json"));
   const pkg = await import(pathToFileURL(join(folder, "dist/pkg/cagework.js")).href);

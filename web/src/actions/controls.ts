@@ -94,7 +94,7 @@ export function createControls(
       actions.arm(null);
       if (drawn.length > 1) actions.add("line", drawn);
     },
-    /** Smoothing and interior controls for a link; undefined if the cage has neither. */
+    /** Returns smoothing and interior controls for a link; undefined if the cage has neither. */
     shared(): SharedControls | undefined {
       const controls = engine().cageControls();
       if (controls.smooth === 0 && controls.inner === 0) return undefined;

@@ -141,7 +141,7 @@ export function createEdit(ctx: Context) {
 
 export type Edit = ReturnType<typeof createEdit>;
 
-/** The status line of a gesture, such as "Move 0.25 along X". */
+/** Formats the status line of a gesture, such as "Move 0.25 along X". */
 export function sayGesture({ kind, amounts, axis, plane }: GestureView): string {
   const by = amounts.map(decimals).join(", ");
   const what = T.gesture[kind](amounts.length > 1 ? `(${by})` : by);

@@ -200,7 +200,7 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape" | "clips">, string>
   picture: ".png",
 };
 
-/** A file in memory, with the media type of its format. */
+/** Creates a blob with the media type of the file's format. */
 function blobOf(name: string, bytes: Uint8Array<ArrayBuffer>): Blob {
   const type = EXPORT_TYPES[extension(name)] ?? (name.endsWith(".zip") ? "application/zip" : OCTETS);
   return new Blob([bytes], { type });

@@ -204,7 +204,8 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
 export type Files = ReturnType<typeof createFiles>;
 
 /**
- * The sample that a project was made from. The page shows the sample's name in place of the name in the project file.
+ * Finds the sample that a project was made from. The page shows the sample's name in place of the name in the project
+ * file.
  */
 function sampleOf({ settings }: OpenedFile): string | undefined {
   try {

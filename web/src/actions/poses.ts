@@ -16,7 +16,7 @@ export interface CageSnapshot {
   readonly shares: readonly number[];
 }
 
-/** The current cage and its poses; undefined without a cage. */
+/** Copies the current cage and its poses; undefined without a cage. */
 export function snapshotCage(ctx: Context): CageSnapshot | undefined {
   const { cage, shares } = ctx.store.get();
   const session = ctx.session();
@@ -162,7 +162,8 @@ export function createPoses(ctx: Context, edit: Edit) {
 export type PoseActions = ReturnType<typeof createPoses>;
 
 /**
- * The default name of a new pose: "Pose" and the smallest number above the number of poses that makes an unused name.
+ * Returns the default name of a new pose: "Pose" and the smallest number above the number of poses that makes an unused
+ * name.
  */
 export function freshName(poses: readonly Pick<PoseView, "name">[]): string {
   const taken = new Set(poses.map((pose) => pose.name));

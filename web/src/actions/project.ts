@@ -27,7 +27,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]) {
     /** Returns the bytes of a project file with the open work. */
     write,
     fileName: (): string => `${exportStem(store.get().model?.name ?? "model")}.cagework.glb`,
-    /** The link to copy; undefined if a link cannot contain the open work. */
+    /** Creates a link to the open work; undefined if a link cannot contain it. */
     async link(): Promise<string | undefined> {
       const { sample, sampleCage, posed, scene, model, clip: shown } = store.get();
       const engine = ctx.engine();

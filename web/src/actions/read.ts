@@ -15,8 +15,8 @@ export interface ReadResult {
 }
 
 /**
- * The models among dropped files, each followed by its possible companion files, which are all files that are neither
- * models nor the cage (`plan.second`).
+ * Lists the models among dropped files, each followed by its possible companion files, which are all files that are
+ * neither models nor the cage (`plan.second`).
  */
 export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly NamedFile[])[] {
   const models = [plan.main, ...(plan.more ?? [])].flatMap((k) => files[k ?? -1] ?? []);

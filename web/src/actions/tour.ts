@@ -23,7 +23,7 @@ export function createTour(ctx: Context, needs: GuideNeeds) {
   };
 }
 
-/** The stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
+/** Returns the stop of the tour that the fragment of an address names, counted from 0; undefined if it names none. */
 export function stopOf(fragment: string): number | undefined {
   const said = new URLSearchParams(fragment.slice(1)).get("tour");
   return said === null ? undefined : Math.max(0, (Number.parseInt(said, 10) || 1) - 1);

@@ -307,7 +307,7 @@ export function attachPointer(stage: Stage, app: App): void {
   app.pointer = () => pointer;
 }
 
-/** The rectangle with these opposite corners. */
+/** Returns the rectangle with these opposite corners. */
 export function rectangle(a: { x: number; y: number }, b: { x: number; y: number }) {
   return {
     x: Math.min(a.x, b.x),

@@ -122,7 +122,10 @@ export interface KeyPress {
   readonly shiftKey: boolean;
 }
 
-/** A key press in the form of the table. With Alt, letters come from the physical key: Alt+A types "å" on a Mac. */
+/**
+ * Converts a key press to the form of the table. With Alt, letters come from the physical key: Alt+A types "å" on a
+ * Mac.
+ */
 export function keyOf(event: KeyPress): string {
   const place = /^(?:Key|Digit)(.)$/.exec(event.code)?.[1];
   const mod = event.ctrlKey || event.metaKey;
@@ -135,8 +138,8 @@ export function keyOf(event: KeyPress): string {
 }
 
 /**
- * The command of a key press. During a gesture, only commands with the scope "gesture" apply, and those that cancel the
- * gesture, start another one or toggle proportional editing.
+ * Finds the command of a key press. During a gesture, only commands with the scope "gesture" apply, and those that
+ * cancel the gesture, start another one or toggle proportional editing.
  */
 export function commandOf(
   event: KeyPress,

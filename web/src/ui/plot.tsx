@@ -41,8 +41,8 @@ export interface Scale {
 }
 
 /**
- * Ranges of the axes. The vertical axis extends between powers of ten that enclose all deltas and the threshold, the
- * horizontal axis to the last iteration.
+ * Computes the ranges of the axes. The vertical axis extends between powers of ten that enclose all deltas and the
+ * threshold, the horizontal axis to the last iteration.
  */
 export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   const deltas = curves
@@ -65,8 +65,8 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
 export type Place = readonly [x: number, y: number];
 
 /**
- * Position of the label of the threshold, the left end of its baseline. Tries positions below and above the threshold's
- * line, which is at height `at`, and returns the first that no curve crosses, or else the first of all.
+ * Finds a position for the label of the threshold: the left end of its baseline. Tries positions below and above the
+ * threshold's line, which is at height `at`, and returns the first that no curve crosses, or else the first of all.
  */
 export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
   const right = WIDTH - RIGHT - 4 - width;
@@ -81,7 +81,7 @@ export function placeLabel(lines: readonly (readonly Place[])[], at: number, wid
   return places.find(isFree) ?? places[0] ?? { x: LEFT + 4, y: at - 4 };
 }
 
-/** Heights of a polyline between two horizontal positions: at its corners and at both positions. */
+/** Finds the heights of a polyline between two horizontal positions: at its corners and at both positions. */
 function heightsBetween(line: readonly Place[], from: number, to: number): number[] {
   const heights = line.filter(([x]) => x >= from && x <= to).map(([, y]) => y);
   for (const at of [from, to]) {

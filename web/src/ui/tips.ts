@@ -12,7 +12,10 @@ interface Size {
   readonly height: number;
 }
 
-/** Upper left corner of a tip: below its element, above it if there is no room, or beside it in a vertical toolbar. */
+/**
+ * Finds the upper left corner of a tip: below its element, above it if there is no room, or beside it in a vertical
+ * toolbar.
+ */
 export function placeTip(box: DOMRectReadOnly, tip: Size, isInColumn: boolean, window: Size) {
   const inside = (at: number, size: number, limit: number) => Math.min(Math.max(GAP, at), limit - size - GAP);
   if (isInColumn) {

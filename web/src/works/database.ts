@@ -7,7 +7,7 @@ const VERSION = 2;
 const ENTRIES = "entries";
 const FILES = "projects";
 
-/** A new id. `randomUUID` does not exist on pages served over plain HTTP. */
+/** Creates an id. `randomUUID` does not exist on pages served over plain HTTP. */
 export function newId(): string {
   return crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4))).join("-");
 }
@@ -48,7 +48,7 @@ export async function hasEntries(): Promise<boolean> {
   return (await run("readonly", (entries) => entries.count()).catch(() => 0)) > 0;
 }
 
-/** All valid entries. Invalid ones are deleted; `damaged` counts them. */
+/** Reads all valid entries. Invalid ones are deleted; `damaged` counts them. */
 export async function readEntries(): Promise<{ entries: Entry[]; damaged: number }> {
   let names: IDBRequest<IDBValidKey[]> | undefined;
   const values: unknown[] = await run("readonly", (entries) => {
@@ -62,7 +62,7 @@ export async function readEntries(): Promise<{ entries: Entry[]; damaged: number
   return { entries: values.filter(isGood), damaged: damaged.length };
 }
 
-/** The project file of an entry; undefined if it is missing or incomplete. */
+/** Reads the project file of an entry; undefined if it is missing or incomplete. */
 export async function readFile(id: string): Promise<Blob | undefined> {
   const file: unknown = await run("readonly", (_, files) => files.get(id));
   return file instanceof Blob && (await isWhole(file)) ? file : undefined;

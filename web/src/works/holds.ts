@@ -20,7 +20,7 @@ export function hold(id: string): Promise<(() => void) | undefined> {
   });
 }
 
-/** Ids of the work that any tab has open. */
+/** Lists the ids of the work that any tab has open. */
 export async function heldIds(): Promise<ReadonlySet<string>> {
   const held = (await navigator.locks?.query())?.held ?? [];
   const names = held.flatMap(({ name }) => (name?.startsWith(PREFIX) ? [name.slice(PREFIX.length)] : []));
@@ -37,7 +37,7 @@ export function rememberOwn(id: string | null): void {
   }
 }
 
-/** The id stored by `rememberOwn`. */
+/** Reads the id stored by `rememberOwn`. */
 export function ownId(): string | null {
   try {
     return sessionStorage.getItem(OWN);

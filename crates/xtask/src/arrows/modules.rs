@@ -36,8 +36,8 @@ pub(super) fn check() -> Result<(), String> {
     Ok(())
 }
 
-/// Root files of all crates, each with whether its code under `#[cfg(test)]` is checked. This is false for the `lib.rs`
-/// and `main.rs` of `crates/*/src`, and true for the targets of the packages of tests and benches.
+/// Lists the root files of all crates, each with whether its code under `#[cfg(test)]` is checked. This is false for
+/// the `lib.rs` and `main.rs` of `crates/*/src`, and true for the targets of the packages of tests and benches.
 fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     let mut roots = Vec::new();
     for folder in files_in(&root().join("crates"))? {
@@ -53,7 +53,7 @@ fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
     Ok(roots)
 }
 
-/// Entries of a folder, sorted by name.
+/// Lists the entries of a folder, sorted by name.
 fn files_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let cannot = |e| format!("cannot read {}: {e}", folder.display());
     let entries = std::fs::read_dir(folder).map_err(cannot)?;
@@ -62,7 +62,7 @@ fn files_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(paths)
 }
 
-/// Edges between the top-level modules of a crate, including its root if modules use items defined there.
+/// Collects the edges between the top-level modules of a crate, including its root if modules use items defined there.
 fn edges(source: &Crate) -> Edges {
     let mut edges = Edges::new();
     for path in &source.paths {
@@ -75,7 +75,7 @@ fn edges(source: &Crate) -> Edges {
     edges
 }
 
-/// For each module, the edges between its child modules, named by their full paths.
+/// Collects, for each module, the edges between its child modules, named by their full paths.
 fn edges_of_folders(source: &Crate) -> impl Iterator<Item = Edges> {
     source.modules.iter().map(|folder| {
         let mut edges = Edges::new();
@@ -94,7 +94,7 @@ fn edges_of_folders(source: &Crate) -> impl Iterator<Item = Edges> {
     })
 }
 
-/// The circle with the fewest modules. Its first module is repeated at the end.
+/// Finds the circle with the fewest modules. Its first module is repeated at the end.
 fn shortest_circle(edges: &Edges) -> Option<Vec<String>> {
     let circles = edges.keys().filter_map(|(from, to)| {
         let mut way = way(edges, to, from)?;
@@ -104,7 +104,7 @@ fn shortest_circle(edges: &Edges) -> Option<Vec<String>> {
     circles.min_by_key(Vec::len)
 }
 
-/// Shortest path along edges, both ends included, by breadth-first search.
+/// Finds the shortest path along edges, both ends included, by breadth-first search.
 fn way(edges: &Edges, from: &str, to: &str) -> Option<Vec<String>> {
     let mut before = BTreeMap::from([(from, None)]);
     let mut queue = VecDeque::from([from]);

@@ -30,7 +30,7 @@ export interface Ready {
   readonly report: BindReport;
 }
 
-/** Called with the current stage and the fraction of it that is done. */
+/** Callback for the current stage and the finished fraction of the stage, 0 to 1. */
 export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: number) => void;
 
 export interface View {
@@ -173,7 +173,7 @@ function arraysOf({ positions, corners, controls, origin }: Cage, to: ArrayLike<
   };
 }
 
-/** Scene options of the element. Drags move vertices of the cage and do not pull the model. */
+/** Returns the scene options of the element. Drags move vertices of the cage and do not pull the model. */
 export function sceneOf(theme: string | null): SceneOptions {
   return { ...SCENE_DEFAULTS, theme: theme === "light" ? "light" : "dark", pull: false };
 }

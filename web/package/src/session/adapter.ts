@@ -3,7 +3,10 @@
 import type { Lack } from "../contract";
 import { named } from "./client";
 
-/** Name of the GPU that the browser would use; empty if the browser hides it. Throws an error if there is no GPU. */
+/**
+ * Returns the name of the GPU that the browser would use; empty if the browser hides it. Throws an error if there is no
+ * GPU.
+ */
 export async function findAdapter(): Promise<string> {
   const { gpu } = navigator;
   if (!gpu) throw named("NoWebGPU", "this browser has no WebGPU");

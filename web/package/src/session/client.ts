@@ -42,8 +42,8 @@ export function named(name: string, message: string): Error {
 }
 
 /**
- * An error named Unloaded, for a file of the program that could not be downloaded: there is no connection, or the
- * server has a newer version.
+ * Creates an error named Unloaded, for a file of the program that could not be downloaded: there is no connection, or
+ * the server has a newer version.
  */
 export function unloaded(reason: string): Error {
   return named("Unloaded", `part of the program could not be loaded (${reason}): check the connection`);

@@ -43,7 +43,7 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   return { name: main.name, content: main.file, siblings };
 }
 
-/** The error for the first file above the size limit; undefined if there is none. */
+/** Creates an error for the first file above the size limit; undefined if there is none. */
 export function tooLarge(files: readonly NamedFile[]): Error | undefined {
   const large = files.find(({ file }) => file.size > LARGEST);
   const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);

@@ -186,7 +186,7 @@ export type FromWorker =
   | { readonly kind: "done"; readonly id: number; readonly output: unknown }
   | { readonly kind: "failed"; readonly id: number; readonly name: string; readonly message: string };
 
-/** Buffers of all typed arrays in a message, without duplicates, to be transferred instead of copied. */
+/** Collects the buffers of all typed arrays in a message, without duplicates, to be transferred instead of copied. */
 export function buffers(value: unknown): ArrayBuffer[] {
   const found = new Set<ArrayBuffer>();
   const look = (value: unknown): void => {

@@ -53,8 +53,8 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
 export type Touch = ReturnType<typeof createTouch>;
 
 /**
- * Change between two positions of two fingers: translation of their midpoint, its new position, and zoom factor.
- * Undefined with fewer fingers.
+ * Computes the change between two positions of two fingers: translation of their midpoint, its new position, and zoom
+ * factor. Undefined with fewer fingers.
  */
 export function pinch(
   before: readonly Spot[],

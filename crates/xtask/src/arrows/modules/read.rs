@@ -63,7 +63,7 @@ impl Crate {
         Ok(source)
     }
 
-    /// Top-level module of a path's target: [`ROOT`] for the root's own items, `None` outside the crate.
+    /// Finds the top-level module of a path's target: [`ROOT`] for the root's own items, `None` outside the crate.
     pub(super) fn module_of(&self, segments: &[String]) -> Option<String> {
         let first = segments.first()?;
         if self.is_at_root(first) {
@@ -264,7 +264,7 @@ fn is_for_tests(tokens: &[TokenTree]) -> bool {
         if p.as_char() == '#' && g.stream().to_string().replace(' ', "") == "cfg(test)")
 }
 
-/// Number of tokens of an item, up to and including its semicolon or braces.
+/// Counts the tokens of an item, up to and including its semicolon or braces.
 fn item_length(tokens: &[TokenTree]) -> usize {
     let is_end = |token: &TokenTree| match token {
         TokenTree::Punct(p) => p.as_char() == ';',

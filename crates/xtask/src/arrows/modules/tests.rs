@@ -7,7 +7,7 @@ fn edges_of(root: &str, with_tests: bool) -> Edges {
     edges(&Crate::of_text(root, with_tests).expect("the text is Rust"))
 }
 
-/// The shortest circle as `a -> b -> a`, or an empty string.
+/// Returns the shortest circle as `a -> b -> a`, or an empty string.
 fn circle(root: &str) -> String {
     shortest_circle(&edges_of(root, false)).map_or_else(String::new, |circle| circle.join(" -> "))
 }
