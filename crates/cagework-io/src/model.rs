@@ -294,8 +294,8 @@ impl Model {
         self.capture.as_ref().map(|capture| &capture.splats)
     }
 
-    /// Returns the splats that show a file without faces: those of a capture, or one per point. `None` for a file with
-    /// faces.
+    /// Returns the splats that show a file without faces: the splats of a capture, or one splat per point. `None` for a
+    /// file with faces.
     #[must_use]
     pub fn drawn_splats(&self) -> Option<Cow<'_, Splats>> {
         match &self.capture {

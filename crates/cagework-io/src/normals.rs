@@ -19,7 +19,7 @@ const MAX_CLUSTERS_AT_ONE_PLACE: usize = 64;
 pub(crate) struct Shading {
     /// Model vertex of each shading vertex.
     pub(crate) vertex: Vec<u32>,
-    /// Unit normal of each shading vertex; area-weighted if the model has none.
+    /// Unit normal of each shading vertex; area-weighted if the model has no normals.
     pub(crate) normal: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     cluster: Vec<u32>,
@@ -35,8 +35,8 @@ impl Shading {
     /// Groups shading vertices into smooth surfaces.
     ///
     /// `positions`: model vertices at rest. `vertex`: model vertex of each shading vertex. `normal`: original unit
-    /// normal of each shading vertex, zero if there is none. `surface`: smooth surface of a shading vertex without
-    /// normal; may be empty. `triangles`: indices of shading vertices.
+    /// normal of each shading vertex, zero if the vertex has no normal. `surface`: smooth surface of a shading vertex
+    /// without normal; may be empty. `triangles`: indices of shading vertices.
     pub(crate) fn new(
         positions: &[Vec3],
         vertex: Vec<u32>,

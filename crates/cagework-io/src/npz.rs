@@ -70,16 +70,16 @@ impl From<ZipError> for NpzError {
 pub struct SavedWeights {
     /// One row per model vertex, then one per extra point.
     pub weights: Weights,
-    /// Frames of the last columns of the weights, after those of the cage and the inner controls. These columns carry
-    /// the part of each position that the weights of the controls do not reproduce.
+    /// Frames of the last columns of the weights, after the columns of the cage and the inner controls. These columns
+    /// carry the part of each position that the weights of the controls do not reproduce.
     pub frames: Frames,
     /// Points outside the cage, by row of the weights.
     pub outside: Vec<OutsideVertex>,
     /// Points of the rig that were bound with the model ([`Model::extra_points`](crate::Model::extra_points)), object
     /// units.
     pub extra_points: Vec<Vec3>,
-    /// Rest positions of the controls inside the cage, object units. Their columns follow those of the
-    /// cage's vertices.
+    /// Rest positions of the controls inside the cage, object units. Their columns follow the columns of the cage's
+    /// vertices.
     pub inner_controls: Vec<Vec3>,
 }
 
@@ -103,8 +103,8 @@ impl SavedWeights {
     }
 }
 
-/// Writes weights as an `.npz` file. The last rows belong to `extra_points`. The columns of `inner_controls` follow
-/// those of the cage and precede those of `frames`.
+/// Writes weights as an `.npz` file. The last rows belong to `extra_points`. The columns of `inner_controls` follow the
+/// columns of the cage and precede the columns of `frames`.
 #[must_use]
 pub fn write_weights_npz(
     weights: &Weights,

@@ -1,4 +1,4 @@
-//! Models far from the world origin, such as in map coordinates, where f32 at 4,500,000 has steps of 0.5.
+//! Models far from the world origin, for example in map coordinates, where f32 at 4,500,000 has steps of 0.5.
 //!
 //! Readers parse in f64 and subtract an origin near the model; writers add it. Models near the world origin
 //! have origin zero.
@@ -49,7 +49,7 @@ pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
     })
 }
 
-/// Text of a coordinate: with the digits of f32 if the origin is zero, otherwise with those of f64.
+/// Text of a coordinate: with the digits of f32 if the origin is zero, otherwise with the digits of f64.
 pub(crate) struct Coordinate {
     origin: f64,
     from_origin: f32,

@@ -1,6 +1,6 @@
 //! Kinds of the parts of a model that are selected by name.
 
-/// What the name of a part of a model refers to.
+/// Kind of part that a name refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PartKind {
     /// A material: the vertices of the faces that use it.

@@ -54,12 +54,12 @@ pub enum PolygonsError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The build of a 3MF shows more objects, vertices or triangles than the limit.
+    /// The build of a 3MF contains more objects, vertices or triangles than the limit.
     #[error("its build shows {count} {what}, more than the limit of {limit}: split the model")]
     TooMany {
         /// Number in the build. An object counts once per placement.
         count: u64,
-        /// What is counted, such as "vertices".
+        /// Kind of the counted elements, such as "vertices".
         what: &'static str,
         /// Largest number that is accepted.
         limit: u64,
@@ -93,11 +93,11 @@ pub(crate) struct Polygons {
     pub(crate) face_starts: Vec<u32>,
     /// Number of faces with fewer than three corners, which are ignored.
     pub(crate) n_left_out: usize,
-    /// Vertex colours, sRGB from 0 to 1; empty if the file has none.
+    /// Vertex colours, sRGB from 0 to 1; empty if the file has no colours.
     pub(crate) colors: Vec<[f32; 3]>,
     /// Named ranges of faces, such as STL solids.
     pub(crate) groups: Vec<Group>,
-    /// Material of each face, an index into `materials`, or [`NONE`]; empty if no face has one.
+    /// Material of each face, an index into `materials`, or [`NONE`]; empty if no face has a material.
     pub(crate) face_materials: Vec<u32>,
     /// Names and looks of the materials.
     pub(crate) materials: Vec<String>,

@@ -15,7 +15,7 @@ pub enum PoseCodeError {
     /// The length is wrong.
     #[error("the pose is cut off or damaged: it has {given} bytes instead of {expected}")]
     Length {
-        /// Number of bytes that were given.
+        /// Number of bytes of the encoded pose.
         given: usize,
         /// Expected number of bytes.
         expected: usize,

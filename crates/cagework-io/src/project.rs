@@ -3,7 +3,7 @@
 //! Viewers show the model at rest, its document unchanged, and the cage as lines. All other data is in the document
 //! extension [`EXTENSION`]: the up axis, and buffer views with cage positions, cage faces (for each face the number of
 //! corners, then the corners) and poses, all little-endian and in the model's axes. A model that is not a glTF is
-//! stored as its original file, and the visible mesh is built from this file. Further models of the same cage are
+//! stored as its original file, and the visible mesh is built from this file. Additional models of the same cage are
 //! stored as files and are not visible. Weights are not stored; they are recomputed from the settings.
 
 use std::borrow::Cow;

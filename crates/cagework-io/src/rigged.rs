@@ -49,7 +49,7 @@ impl Clip {
         found.ok_or_else(|| UnknownClip { asked: name.to_owned(), names })
     }
 
-    /// Name of the clip; "clip `number`" if it has none.
+    /// Name of the clip; "clip `number`" if it is unnamed.
     #[must_use]
     pub fn label(&self, number: usize) -> String {
         self.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("clip {number}"))
@@ -141,12 +141,12 @@ impl Model {
         }
     }
 
-    /// Exports a rigged model in its deformed shape, with skeleton, morph targets and animations fitted to
-    /// it. Each of the `poses` becomes an additional morph target; give zeros for `by` with poses, so that the shape
-    /// stays at rest.
+    /// Exports a rigged model in its deformed shape, with skeleton, morph targets and animations fitted to it. Each of
+    /// the `poses` becomes an additional morph target; with poses, pass zeros for `by`, so that the shape stays at
+    /// rest.
     ///
-    /// `by`: displacements of the vertices, then of [`Self::extra_points`]. `outside`: indices of those
-    /// points that are outside the cage.
+    /// `by`: displacements of the vertices, then of [`Self::extra_points`]. `outside`: indices of the points that are
+    /// outside the cage.
     ///
     /// # Errors
     /// [`WriteError`] unless there is one finite displacement per point, or if the document cannot be written.

@@ -58,12 +58,12 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Model {
-    /// Deforms the vertices of a model that is written without its rig: with the parts of `options` held in place or
+    /// Deforms the vertices of a model that is written without its rig: with the parts of `options` kept in place or
     /// rigid, then lifted by [`Self::stand`]. If `posed` equals `rest`, starts from [`Self::positions`] instead of the
     /// weighted sums, which would add rounding.
     ///
-    /// `weights`, `frames`: those of the model's vertices. `rest`, `posed`: `[n_controls]`, object units. Returns
-    /// `[n_vertices]`, object units.
+    /// `weights`, `frames`: results of binding the model's vertices. `rest`, `posed`: `[n_controls]`, object units.
+    /// Returns `[n_vertices]`, object units.
     ///
     /// # Panics
     /// As [`deform_bound`].

@@ -2,7 +2,7 @@
 
 use serde_json::error::Category;
 
-/// Number of bytes before a JSON error that the message shows.
+/// Number of bytes that a message shows before the position of a JSON error.
 const MAX_CONTEXT_BYTES: usize = 40;
 
 /// Limit on a text in a message, characters.

@@ -3,7 +3,7 @@
 //!
 //! Reading creates the vertices of an object once for each placement of the object in the build. An export replaces
 //! changed coordinates in the text of the model parts. If placements of one object have different shapes, it writes a
-//! copy of the object for each further shape. All other files of the archive are copied byte for byte.
+//! copy of the object for each additional shape. All other files of the archive are copied byte for byte.
 
 mod package;
 mod part;

@@ -1,5 +1,5 @@
-//! Timelines: when a clip shows each pose of a model, and what it shows in between. Exports and the preview of the web
-//! page use the same timeline.
+//! Timelines: when a clip shows each pose of a model, and how it interpolates in between. Exports and the preview of
+//! the web page use the same timeline.
 
 use cagework_core::choice;
 use thiserror::Error;
@@ -14,15 +14,15 @@ pub const MIN_GAP: f32 = 1e-3;
 pub const SECONDS_PER_POSE: f32 = 1.0;
 
 choice! {
-    /// What a clip shows between two keys, as in glTF 2.0, appendix C.
+    /// Interpolation between two keys, as in glTF 2.0, appendix C.
     Interpolation {
         /// The earlier shape.
         Step = "step",
-        /// The straight line between both shapes.
+        /// Linear interpolation between the two shapes.
         #[default]
         Linear = "linear",
-        /// A cubic spline. Its slope at a key is that of the line between the neighbouring keys, and zero at the first
-        /// and the last key.
+        /// A cubic spline. Its slope at a key is the slope of the line between the neighbouring keys, and zero at the
+        /// first and the last key.
         Cubic = "cubic",
     }
 }
@@ -70,10 +70,10 @@ pub enum TimelineError {
     },
 }
 
-/// When a clip shows each pose, and what it shows in between.
+/// Times at which a clip shows each pose, and the interpolation in between.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    /// What the clip shows between two keys.
+    /// Interpolation between two keys.
     pub interpolation: Interpolation,
     /// Time of each key in seconds, and the pose that it shows; `None` is the shape at rest. Times are ascending.
     keys: Vec<(f32, Option<usize>)>,

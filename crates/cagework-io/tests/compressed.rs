@@ -91,7 +91,7 @@ fn meshopt(extension: &str) -> Builder {
     b
 }
 
-/// A GLB with a missing fallback buffer for programs without decoder.
+/// A GLB with a missing fallback buffer for programs without a decoder.
 fn with_fallback(b: &Builder) -> Vec<u8> {
     let mut json = b.json.clone();
     json["buffers"] = json!([{ "byteLength": b.bin.len() }, { "byteLength": 1000, "uri": "fallback.bin" }]);

@@ -446,7 +446,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     let negative = read("a.splat", &negative).unwrap();
     assert_eq!(negative.splats().unwrap().scales[0].x, 2.0);
     assert_eq!(negative.notices[0], "1 splat has a negative scale: its absolute value is used");
-    // A .splat has no header, so its first bytes can equal those of a glTF or of a UTF-16 text.
+    // A .splat has no header, so its first bytes can equal the first bytes of a glTF or of a UTF-16 text.
     let braces = [&b"{\0\0\0"[..], &[0; 28]].concat();
     assert_eq!(read("a.splat", &braces).unwrap().format(), ModelFormat::Splat);
 

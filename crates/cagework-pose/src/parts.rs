@@ -13,8 +13,8 @@ use cagework_core::rotation::nearest_rotation;
 
 pub use bound::{BoundParts, PieceMotion, hold_parts};
 
-/// Multiple of the identity that is added to a piece's covariance, as a fraction of the covariance's trace. It
-/// determines the rotation where the points do not: a line of points does not rotate about itself.
+/// Multiple of the identity that is added to a piece's covariance, as a fraction of the covariance's trace. It fixes
+/// rotations that the points do not determine: a line of points does not rotate about itself.
 const IDENTITY_WEIGHT: f64 = 1e-9;
 
 /// Vertices that the cage does not move freely: vertices that stay in place, wholly or in part, and rigid pieces.

@@ -17,7 +17,7 @@ const MIRROR_TOLERANCE: f32 = 0.02;
 /// Maximum distance between a pin and the pointer that removes it, CSS pixels.
 const PIN_PX: f32 = 14.0;
 
-/// What a pull grabs.
+/// A point of the model or a vertex of the cage that a pull grabs.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Grab {

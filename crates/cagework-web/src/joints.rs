@@ -24,8 +24,8 @@ pub(crate) struct JointDots {
 }
 
 impl JointDots {
-    /// Finds the joints of all models. `weights` and `frames` are those of all points of the rigs. `outside`: indices
-    /// of points outside the cage, ascending.
+    /// Finds the joints of all models. `weights`, `frames`: results of binding all points of the rigs. `outside`:
+    /// indices of points outside the cage, ascending.
     ///
     /// # Errors
     /// If a rig cannot be read.

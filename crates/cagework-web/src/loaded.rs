@@ -136,8 +136,7 @@ impl Loaded {
 
     /// Rebuilds a model from the arrays of [`Self::store`].
     ///
-    /// # Errors
-    /// If the arrays are not those of [`Self::store`].
+    /// # Errors If the arrays are not from [`Self::store`].
     pub fn restore(arrays: Vec<Uint8Array>) -> Result<Loaded, JsValue> {
         let mut arrays = arrays.into_iter();
         let mut next = || arrays.next().map(|array| array.to_vec());

@@ -188,7 +188,7 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
     }
 }
 
-/// Name of an object, or its kind and index if it has none.
+/// Name of an object, or its kind and index if it is unnamed.
 pub(crate) fn name_of(json: &Value, list: &str, index: u32, kind: &str) -> String {
     stored_name(json, list, index).map_or_else(|| format!("{kind} {index}"), str::to_owned)
 }

@@ -236,8 +236,8 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
     Ok(size)
 }
 
-/// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes, and that
-/// of implicit zeros.
+/// Checks that all attributes and morph targets have one value per vertex. Returns the number of attributes, and the
+/// number of implicit zeros.
 fn check_counts(
     document: &GltfDocument,
     primitive: &Primitive,

@@ -22,7 +22,7 @@ pub struct FormatFacts {
     pub endings: &'static [&'static str],
     /// Extensions among `endings` that are supported for reading only.
     read_only: &'static [&'static str],
-    /// MIME types, for file choosers that support MIME types better than extensions; the first one is that of exported
+    /// MIME types, for file choosers that support MIME types better than extensions. The first one is used for exported
     /// files.
     pub mime_types: &'static [&'static str],
     /// Extensions of files that refer to other files: buffers, textures, materials.
@@ -43,7 +43,7 @@ pub struct FormatFacts {
     /// Approximate memory for writing a model, bytes. The second argument is the part of it that depends only
     /// on the numbers of vertices and triangles.
     pub(super) bytes_to_write: fn(&Model, u64) -> u64,
-    /// What a file in this format keeps of a model that was read from another format.
+    /// Properties that a file in this format keeps of a model that was read from another format.
     keeps: &'static [ModelProperty],
     /// Whether a file is recognised by its extension alone, whatever its bytes look like.
     is_unmarked: bool,
@@ -250,9 +250,9 @@ formats! {
 pub struct FormatError {
     /// Name given by the caller.
     pub name: String,
-    /// What the content seems to be.
+    /// Description of the content, such as "an FBX file".
     pub found: &'static str,
-    /// What the user can do.
+    /// Advice to the user.
     pub hint: String,
 }
 
@@ -295,7 +295,7 @@ impl ModelFormat {
         self.keeps(ModelProperty::Splats)
     }
 
-    /// Extensions of the formats that can be written and keep `what`, as text: "OBJ, PLY, OFF or 3MF".
+    /// Extensions of the formats that can be written and keep the property `what`, as text: "OBJ, PLY, OFF or 3MF".
     pub(crate) fn listed(what: ModelProperty) -> String {
         let all = Self::ALL.into_iter().filter(|format| format.keeps(what));
         let names: Vec<String> = all.map(|format| format.export_extension().to_uppercase()).collect();

@@ -25,7 +25,7 @@ use crate::up::UpAxis;
 /// Why a stored model cannot be restored.
 #[derive(Debug, Error)]
 pub enum RestoreError {
-    /// An array is missing, or is not what [`Model::store`] has written.
+    /// An array is missing, or was not written by [`Model::store`].
     #[error("the model that was read is damaged: open the file again")]
     Damaged,
     /// The file of a capture, which is read again, has an error.
@@ -126,8 +126,7 @@ impl StoredArrays<'_> {
 
     /// Takes the next array as numbers.
     ///
-    /// # Errors
-    /// [`RestoreError::Damaged`] if there is no further array.
+    /// # Errors [`RestoreError::Damaged`] if there are no more arrays.
     pub fn numbers<T: Pod>(&mut self) -> Result<Vec<T>, RestoreError> {
         let bytes = self.bytes()?;
         let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
@@ -138,8 +137,7 @@ impl StoredArrays<'_> {
 
     /// Takes the next array as JSON.
     ///
-    /// # Errors
-    /// [`RestoreError::Damaged`] if there is no further array, or it is not the JSON of a `T`.
+    /// # Errors [`RestoreError::Damaged`] if there are no more arrays, or it is not the JSON of a `T`.
     pub fn json<T: DeserializeOwned>(&mut self) -> Result<T, RestoreError> {
         serde_json::from_slice(&self.bytes()?).map_err(|_| RestoreError::Damaged)
     }
@@ -150,7 +148,7 @@ impl StoredArrays<'_> {
 }
 
 impl Model {
-    /// Appends the model to `store`. The file of a capture is stored as it is.
+    /// Appends the model to `store`. The file of a capture is stored unchanged.
     pub fn store(self, store: &mut Store) {
         let Self { name, positions, triangles, counts, notices, up, origin, bytes, format, .. } = self;
         let Self { encoding, has_normals, document, capture, .. } = self;

@@ -21,8 +21,7 @@ use crate::up::UpAxis;
 impl Model {
     /// Exports the model with new positions as `format`.
     ///
-    /// # Errors
-    /// Those of the writer for `format`, such as [`Self::write_glb`].
+    /// # Errors The errors of the writer for `format`, such as [`Self::write_glb`].
     pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         match &self.capture {
             Some(capture) if format.holds_splats() => {

@@ -261,7 +261,7 @@ impl NpyArray {
         Err(self.fault(&problem))
     }
 
-    /// Reads the values of an integer array. Negative values and those above 32 bits are errors.
+    /// Reads the values of an integer array. Negative values and values above 32 bits are errors.
     pub(super) fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
         let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
         match self.dtype.as_str() {

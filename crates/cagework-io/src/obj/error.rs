@@ -32,7 +32,7 @@ pub enum ObjError {
         line: usize,
         /// Index as written.
         index: i64,
-        /// Number of vertices; for a relative index, of those before the line.
+        /// Number of vertices; for a relative index, only the vertices before the line.
         vertices: usize,
     },
     /// The file has no `v` lines.

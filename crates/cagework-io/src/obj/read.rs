@@ -82,7 +82,7 @@ impl ObjDocument {
         self.face_starts.windows(2).map(|ends| corners(ends).iter().map(|c| c.v).collect()).collect()
     }
 
-    /// Normal of a corner; zero if it has none.
+    /// Normal of a corner; zero if the corner has no normal.
     pub(crate) fn normal(&self, corner: &Corner) -> Vec3 {
         self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)
     }
@@ -461,7 +461,7 @@ impl<'a> Reader<'a> {
             "lines, points, curves or faces with fewer than three corners",
             "not deformed: kept unchanged in OBJ exports",
         );
-        // Subtract what is freed after reading: the caller's copy of the file, and the weld table.
+        // Subtract the memory that is freed after reading: the caller's copy of the file, and the weld table.
         let freed = self.file_memory - self.bytes.len() as u64;
         let bytes = reading - freed - WELD_BYTES * vertices as u64;
         Ok(ObjModel {
@@ -498,8 +498,8 @@ fn smoothing_group(word: &[u8]) -> Option<u32> {
     if word == b"off" { Some(0) } else { u32::try_from(integer(word)?).ok() }
 }
 
-/// Converts an index as written to one from 0. Positive indices count from 1, negative ones backwards from
-/// the `count` elements read so far.
+/// Converts an index in the file to an index from 0. Positive indices count from 1, negative ones backwards from the
+/// `count` elements read so far.
 pub(super) fn resolve(index: i64, count: usize) -> Option<u32> {
     let from_zero = if index < 0 { i64::try_from(count).ok()?.checked_add(index)? } else { index - 1 };
     u32::try_from(from_zero).ok().filter(|&i| i != NONE)

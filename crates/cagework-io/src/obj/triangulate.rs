@@ -26,7 +26,7 @@ impl Triangulator {
     /// Appends the n - 2 triangles of `polygon` as `base` + corner numbers. `polygon`: corner positions in order.
     ///
     /// The triangles form a fan if all triangles of the fan face along the polygon's normal; otherwise ears are clipped
-    /// in the mean plane. Degenerate and self-intersecting polygons, and those beyond the work limit, are split into
+    /// in the mean plane. Degenerate and self-intersecting polygons, and polygons beyond the work limit, are split into
     /// fans.
     pub(crate) fn triangulate(&mut self, polygon: &[Vec3], base: u32, out: &mut Vec<[u32; 3]>) {
         let n = polygon.len() as u32;
@@ -47,7 +47,7 @@ impl Triangulator {
         out.extend((2..n).map(|k| [base, base + k - 1, base + k]));
     }
 
-    /// Reserves the work of clipping a polygon of `n` corners. Returns false if less work than that is left.
+    /// Reserves the work of clipping a polygon of `n` corners. Returns false if less work is left.
     fn may_clip(&mut self, n: u64) -> bool {
         let left = self.left.checked_sub(n * n);
         self.fans += usize::from(left.is_none());

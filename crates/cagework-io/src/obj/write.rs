@@ -11,7 +11,7 @@ use super::read::{MIN_CORNERS, NONE, ObjDocument};
 use crate::normals::Shading;
 use crate::origin::Coordinate;
 
-/// Distinct pairs (vertex, normal) at the corners of a file; without normal, (vertex, smooth surface).
+/// Distinct pairs (vertex, normal) at the corners of a file; at corners without normal, pairs (vertex, smooth surface).
 pub(crate) struct Pairs {
     /// The pairs as shading vertices, whose normals rotate with the surface.
     pub(crate) shading: Shading,
@@ -133,7 +133,7 @@ impl PatchedNormals {
         }
     }
 
-    /// Writes the replacement of a `vn` line. Returns false if the line has no replacement and stays as it is.
+    /// Writes the replacement of a `vn` line. Returns false if the line has no replacement and stays unchanged.
     fn write_line(&self, vn: usize, end: &[u8], out: &mut Vec<u8>) -> bool {
         for n in &self.lines[vn] {
             out.extend_from_slice(format!("vn {} {} {}", n.x, n.y, n.z).as_bytes());

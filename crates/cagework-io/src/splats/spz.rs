@@ -18,7 +18,7 @@ use crate::memory::{MemoryError, check_unpacked};
 
 const MAGIC: [u8; 4] = *b"NGSP";
 const HEADER: usize = 16;
-/// Size of the header of version 4, whose first 15 bytes are those of the other versions.
+/// Size of the header of version 4, whose first 15 bytes are the same as in the other versions.
 const HEADER_4: usize = 32;
 /// Offset of the byte of flags in the header, and the flag of files with extension records.
 const FLAGS: usize = 14;
@@ -228,7 +228,7 @@ fn read_streams<'a>(
     Ok(&bytes[HEADER_4..start])
 }
 
-/// Returns a sentence for the user if an extension record says that the file has other axes than those of the format.
+/// Returns a sentence for the user if an extension record says that the file has other axes than the format prescribes.
 fn axes_notice(mut records: &[u8]) -> Option<String> {
     while let Some((head, rest)) = records.split_at_checked(8) {
         let (payload, after) = rest.split_at_checked(word(head, 4) as usize)?;

@@ -44,7 +44,7 @@ pub(super) struct Object {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Property of the first corner of each triangle; empty if no triangle has one.
     pub(super) properties: Vec<Option<Property>>,
-    /// Property of the triangles that have none of their own.
+    /// Default property, for triangles without a property.
     pub(super) property: Option<Property>,
     pub(super) components: Vec<Placement>,
 }
@@ -205,7 +205,8 @@ impl PartReader<'_> {
                 }
             }
             (name, None) => {
-                // Other resources. Ignore identifiers that are not numbers: they cannot equal that of an object.
+                // Other resources. Ignore identifiers that are not numbers: they cannot equal the identifier of an
+                // object.
                 let _ = self.part.id_of(tag);
                 if ["texture2dgroup", "compositematerials", "multiproperties"].contains(&name) {
                     self.part.add_unseen("textures and mixed materials");

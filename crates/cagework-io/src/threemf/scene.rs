@@ -38,7 +38,7 @@ pub(super) struct Instance {
     pub(super) object: Key,
     /// Name of the object or of the nearest object that contains it and has a name.
     pub(super) name: String,
-    /// From the object's space to that of the build.
+    /// Transform from the object's space to the space of the build.
     pub(super) transform: DAffine3,
     pub(super) first_vertex: u32,
 }
@@ -186,7 +186,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Counts the instances, vertices and triangles of an object and its components, and how deep they are nested.
+    /// Counts the instances, vertices and triangles of an object and its components, and the depth of their nesting.
     fn measure(
         &self,
         key: Key,

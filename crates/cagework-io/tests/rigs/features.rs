@@ -300,7 +300,7 @@ fn skin_that_scales_beyond_f32_is_rejected() {
     assert!(refused.contains("exceed the range of f32"), "{refused}");
 }
 
-/// Colliders of VRM 1 without offset are at their node; radii and tails scale.
+/// Colliders of VRM 1 without an offset are at their node; radii and tails scale.
 #[test]
 fn colliders_without_offset_are_scaled() {
     let mut rig = rigged();

@@ -20,7 +20,7 @@ const CYCLES: f32 = 2.0;
 fn ankle(side: usize, t: f32) -> (bool, Vec3) {
     let phase = t / CYCLE + 0.5 * side as f32;
     let (step, u) = (phase.floor(), phase.fract());
-    // Planted in the first half of its cycle, at the place where the hips are in the middle of that half.
+    // The foot is planted in the first half of its cycle, at the x coordinate of the hips in the middle of that half.
     let from = STRIDE * (step + 0.25 - 0.5 * side as f32);
     let swing = (2.0 * u - 1.0).max(0.0);
     let smooth = swing * swing * (3.0 - 2.0 * swing);

@@ -18,7 +18,7 @@ pub(super) const CAGE_WEIGHT: f64 = 0.1;
 /// Weight of the cage's edges while a cage vertex is dragged. With a lower weight, the vertex's neighbours move against
 /// the drag.
 const GRABBED_CAGE_WEIGHT: f64 = 3.0;
-/// Weight of samples beyond the reach, which stay in place. Results are nearly equal from 100 to 300.
+/// Weight that keeps samples beyond the reach in place. Results are nearly equal from 100 to 300.
 const STAY_WEIGHT: f64 = 200.0;
 /// Share of the reach within which samples move freely. From there to the full reach, the weight that keeps a sample in
 /// place rises from 0 to [`STAY_WEIGHT`].

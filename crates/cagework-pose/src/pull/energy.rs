@@ -29,8 +29,8 @@ pub struct Pull {
     gradients: DMatrix<f64>,
     /// Edges of the cage and of inner controls, in both directions.
     edges: Vec<[u32; 2]>,
-    /// Weight of each edge, such that the weighted sum of squared edge lengths at rest is 3, as it is for the samples'
-    /// gradients.
+    /// Weight of each edge, such that the weighted sum of squared edge lengths at rest is 3, the same as for the
+    /// samples' gradients.
     edge_weight: f64,
     /// The sum `sum_e w_e D_e^T D_e` over the model's rows, and the same sum over the cage's edges. `[n, n]`
     of_model: DMatrix<f64>,

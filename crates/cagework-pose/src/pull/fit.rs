@@ -46,7 +46,7 @@ pub struct FitOptions {
 pub struct Fit {
     /// Positions of the cage vertices and inner controls. `[n]`, object units
     pub cage: Vec<DVec3>,
-    /// Weight lambda of the energy in the fit: the given one, or its estimate.
+    /// Weight lambda of the energy in the fit: the value in the options, or its estimate.
     pub lambda: f64,
     /// Energy of the pose: mean squared distance of the model's gradients from rotations, plus 0.1 times that of the
     /// cage's edges.

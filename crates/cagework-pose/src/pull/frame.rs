@@ -21,7 +21,7 @@ const RELAX_LENGTH: f64 = 0.1;
 /// paths, grabs that make a half turn would meet in one point.
 const MIN_ARC_ANGLE: f64 = 0.5;
 /// Multiple of the identity that is added to the grabs' covariance, as a fraction of the covariance's trace. It
-/// prevents rotations that the grabs do not determine, such as that of two grabs about the line between them.
+/// prevents rotations that the grabs do not determine, such as the rotation of two grabs about the line between them.
 const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {

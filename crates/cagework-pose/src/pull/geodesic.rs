@@ -12,7 +12,7 @@ use cagework_core::mesh::weld;
 const MIN_BRIDGE_LENGTH: f32 = 1e-9;
 
 /// Graph of the model's edges. Vertices at equal positions are one node. A bridge joins each component to the largest
-/// one, between the nearest nodes of both.
+/// one, between their nearest nodes.
 pub(super) struct Geodesic {
     /// Node at the position of each vertex. `[n_vertices]`
     unique_of: Vec<u32>,

@@ -4,8 +4,8 @@ use super::samples::dense;
 use super::{Pull, PullError};
 use cagework_core::weights::Weights;
 
-/// Barycentric coordinates come from pointers and files, so each may be this far below 0, and their sum this far from
-/// 1.
+/// Tolerance of barycentric coordinates, which come from pointers and files: each may be at most this far below 0, and
+/// their sum at most this far from 1.
 const BARYCENTRIC_TOLERANCE: f64 = 1e-3;
 
 /// A point that can be grabbed or pinned.
@@ -37,7 +37,7 @@ impl Grip {
         Self { row, seed, is_cage: false }
     }
 
-    /// Creates the grip of a handle. `triangles` and `weights`: those of the model.
+    /// Creates the grip of a handle. `triangles` and `weights`: triangles and weights of the model.
     ///
     /// # Errors
     /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another

@@ -17,8 +17,8 @@ const STEPS_PER_EXTENT: f32 = 64.0;
 /// Number of probe points per sample, including the sample.
 const PROBES_PER_SAMPLE: usize = 7;
 
-/// A sample is used if no entry of its Jacobian differs by more than this from that of the identity. A probe far
-/// outside the cage does not move with the cage, which makes the Jacobian wrong.
+/// A sample is used if no entry of its Jacobian differs by more than this from the identity. A probe far outside the
+/// cage does not move with the cage, which makes the Jacobian wrong.
 const MAX_JACOBIAN_ERROR: f64 = 0.5;
 
 /// Samples of a model with probe points for central differences.

@@ -18,7 +18,7 @@ use cagework_editor::CageControls;
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Offsets {
     /// Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
-    /// In the weights, their columns follow those of the controls.
+    /// In the weights, their columns follow the columns of the controls.
     pub(crate) frames: Frames,
     /// Points outside the cage.
     pub(crate) outside: Vec<OutsideVertex>,
@@ -123,7 +123,7 @@ impl Bound {
     }
 
     /// Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce,
-    /// and the points outside the cage. In the weights, the columns of the frames follow those of the controls.
+    /// and the points outside the cage. In the weights, the columns of the frames follow the columns of the controls.
     #[wasm_bindgen(getter, unchecked_return_type = "Offsets")]
     #[must_use]
     pub fn offsets(&self) -> JsValue {
@@ -235,8 +235,8 @@ mod tests {
             let offsets = Offsets { frames, outside: Vec::new() };
             offsets.bound(3, vec![0, 1], vec![column], vec![1.0])
         };
-        // The frames add 9 columns to those of the 3 controls: 3 for the coordinate axes, 3 for the motion of the whole
-        // cage, and 3 for the joint.
+        // The frames add 9 columns to the 3 columns of the controls: 3 for the coordinate axes, 3 for the motion of the
+        // whole cage, and 3 for the joint.
         assert!(bound(vec![2], 11).is_ok());
         assert!(bound(vec![2], 12).is_err(), "a column");
         assert!(bound(vec![3], 2).is_err(), "a joint");

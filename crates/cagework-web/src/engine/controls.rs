@@ -23,7 +23,7 @@ impl Engine {
         self.read(|state| object(&state.cage().controls))
     }
 
-    /// Replaces the interior controls by those of an OBJ file, and adds a step to the history.
+    /// Replaces the interior controls by the controls in an OBJ file, and adds a step to the history.
     ///
     /// # Errors
     /// If the file cannot be read, or a control does not fit into the cage. The document is then unchanged.

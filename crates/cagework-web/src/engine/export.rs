@@ -538,7 +538,7 @@ impl MovedModel {
 struct ModelRows {
     weights: Weights,
     frames: Frames,
-    /// Points outside the cage. Indices of the rig's points follow those of the vertices.
+    /// Points outside the cage. Indices of the rig's points follow the indices of the vertices.
     outside: Vec<OutsideVertex>,
     rig: Weights,
 }

@@ -78,8 +78,8 @@ impl Engine {
         drop(self.gpu.lock().await);
     }
 
-    /// Renders the scene, or with `alone` only the model on a transparent background. RGBA pixels, rows from the top.
-    /// `[height, width, 4]`
+    /// Renders the scene, or, if `alone` is set, only the model on a transparent background. RGBA pixels, rows from the
+    /// top. `[height, width, 4]`
     ///
     /// # Errors
     /// If the GPU device is lost, or the picture is too large.

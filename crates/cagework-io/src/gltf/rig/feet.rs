@@ -34,7 +34,7 @@ const MAX_GAP: f64 = 0.04;
 /// Time in which a correction fades before and after a contact, seconds.
 const FADE: f64 = 0.15;
 /// Samples per second at equal time steps, in addition to samples at the keys of the clip. A clip has at most
-/// [`MAX_SAMPLES`] samples of either kind.
+/// [`MAX_SAMPLES`] samples of each kind.
 const RATE: f64 = 60.0;
 const MAX_SAMPLES: usize = 20_000;
 /// Largest number of legs whose feet are locked.
@@ -267,7 +267,7 @@ pub(super) fn lock(
 }
 
 /// Computes the times of samples, seconds, ascending: equally spaced times and the keys of the clip, at most
-/// [`MAX_SAMPLES`] of either kind. Within this limit, there are at least [`RATE`] equally spaced times per second.
+/// [`MAX_SAMPLES`] of each kind. Within this limit, there are at least [`RATE`] equally spaced times per second.
 pub(super) fn times(clip: &Clip) -> Vec<f64> {
     let seconds = f64::from(clip.seconds);
     let n = ((seconds * RATE).ceil() as usize).clamp(2, MAX_SAMPLES);

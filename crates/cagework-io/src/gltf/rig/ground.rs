@@ -17,8 +17,8 @@ pub struct Ground {
 pub(super) struct ClipGround {
     pub(super) name: String,
     pub(super) seconds: f32,
-    /// Heights before and after the deformation. The height after it contains neither the lift of the rest shape nor
-    /// `lift`.
+    /// Heights before and after the deformation. The height after the deformation includes neither the lift of the rest
+    /// shape nor `lift`.
     pub(super) lows: [f64; 2],
     /// Vertical offset of the clip.
     pub(super) lift: f64,

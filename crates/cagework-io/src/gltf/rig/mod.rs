@@ -85,10 +85,10 @@ pub(crate) struct Rig<'a> {
     origin: DVec3,
     /// Diagonal of the bounding box of the model in all its morph states, object units.
     diagonal: f64,
-    /// World positions of the further points that are bound: ends of morph targets, points of nodes and VRM points.
+    /// World positions of the additional points to bind: ends of morph targets, points of nodes and VRM points.
     extras: Vec<DVec3>,
     n_ends: usize,
-    /// Lattice whose nodes are bound instead of the ends of morph targets, if there are many of these.
+    /// Lattice whose nodes are bound instead of the ends of morph targets; `None` if the ends are few.
     lattice: Option<Lattice>,
 }
 
@@ -138,8 +138,8 @@ impl RigPrimitive {
 impl<'a> Rig<'a> {
     /// Reads the rig of a document. `rest`: vertices of the model, relative to `origin`.
     ///
-    /// # Errors
-    /// If a primitive cannot be read. Those of visible meshes were validated when the file was read.
+    /// # Errors If a primitive cannot be read. Primitives of visible meshes are readable, because they were validated
+    /// when the file was read.
     pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3], origin: DVec3) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut rig = Self {
@@ -204,7 +204,7 @@ impl<'a> Rig<'a> {
         Self::has_skin_or_targets(document) || !instances().any(|i| is_flat(i.world)) && follow()
     }
 
-    /// Whether the document has skins or morph targets, which a plain export removes.
+    /// Whether the document has skins or morph targets, which an export without reshaping removes.
     pub(crate) fn has_skin_or_targets(document: &GltfDocument) -> bool {
         let morphs = |mesh: u32| {
             let primitives = &document.root.meshes[mesh as usize].primitives;
@@ -221,8 +221,8 @@ impl<'a> Rig<'a> {
         ends.map(|&end| relative(end, self.origin))
     }
 
-    /// Returns the displacements of all points, with `parts` held in place or kept rigid. `by`: displacements by the
-    /// cage alone. `rest`: `[n_vertices]`.
+    /// Returns the displacements of all points, with `parts` kept in place or rigid. `by`: displacements without regard
+    /// to `parts`. `rest`: `[n_vertices]`.
     pub(crate) fn held(&self, parts: &HeldParts, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
             return by;

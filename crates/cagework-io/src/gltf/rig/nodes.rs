@@ -310,7 +310,7 @@ impl Rig<'_> {
         if moved.n_moved > 0 {
             let mut root = root.clone();
             root.nodes = std::mem::take(&mut moved.nodes);
-            // The hierarchy is that of the original document, which was checked, so this cannot fail.
+            // This cannot fail: the hierarchy of the original document was checked and has not changed.
             if let Ok(worlds) = Worlds::new(&root) {
                 moved.world = worlds.world;
             }

@@ -92,7 +92,7 @@ impl Player {
             document.slots.iter().filter_map(|slot| Some((place(document, slot)?, slot))).collect();
         for (number, wanted) in like.slots.iter().enumerate() {
             // Slots are matched by node and primitive number, which exports preserve. Slots without a match, such as
-            // those of meshes without nodes, are matched by their order in the file.
+            // the slots of meshes without nodes, are matched by their order in the file.
             let same = place(like, wanted).and_then(|place| places.get(&place).copied());
             let Some(slot) = same.or_else(|| document.slots.get(number)) else { continue };
             let (instance, primitive) = document.primitive(slot);

@@ -42,8 +42,8 @@ pub(super) struct SurfaceGradients<'a> {
 }
 
 impl<'a> SurfaceGradients<'a> {
-    /// Stores the input; gradients are computed when first needed. `triangles`: those of the model. `by`: displacements
-    /// of all points.
+    /// Stores the input; gradients are computed when first needed. `triangles`: triangles of the model. `by`:
+    /// displacements of all points.
     pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
         Self { triangles, by, gradients: OnceCell::new() }
     }

@@ -27,7 +27,7 @@ pub struct Skeleton {
     /// For each joint of the body, the file whose deformation all files share: world position at rest, displacement,
     /// and scale factor of clip translations.
     moves: BTreeMap<String, (DVec3, DVec3, f64)>,
-    /// Lowest points of the body or of all files, which determine by how much every file is lifted. Displacements in
+    /// Lowest points of the body or of all files, which determine how far every file is lifted. Displacements in
     /// `moves` include this lift.
     pub(super) ground: Option<Ground>,
 }
@@ -39,7 +39,7 @@ impl Skeleton {
         !self.moves.is_empty()
     }
 
-    /// Lowest points that determine by how much every file is lifted.
+    /// Lowest points that determine how far every file is lifted.
     #[must_use]
     pub fn ground(&self) -> Option<&Ground> {
         self.ground.as_ref()

@@ -36,7 +36,7 @@ const DIRECTIONS: usize = 128;
 pub(super) struct StandInput<'a> {
     /// Moves of joints by their names.
     pub(super) named: Option<&'a NamedMoves>,
-    /// Heights of a shared skeleton, which replace those of the file.
+    /// Heights of a shared skeleton, which replace the heights of the file.
     pub(super) shared: Option<&'a Ground>,
     /// Lift of the rest shape.
     pub(super) lift: f64,

@@ -178,7 +178,7 @@ pub(super) fn rescale(
     }
 }
 
-/// Applies `to + linear (v - from)` to values v, and `linear` alone to tangents.
+/// Applies `to + linear (v - from)` to values v, and only `linear` to tangents.
 fn moved(values: &[[f32; 3]], change: &NodeChange, linear: DMat3, output: &Output) -> Vec<[f32; 3]> {
     let value = |(k, &v): (usize, &[f32; 3])| {
         let v = Vec3::from_array(v).as_dvec3();

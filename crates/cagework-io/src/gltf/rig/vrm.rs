@@ -40,7 +40,7 @@ pub(super) fn points(document: &GltfDocument, worlds: &Worlds, diagonal: f64) ->
             return;
         };
         let at = world.transform_point3(offset);
-        // Ignore offsets longer than the model: such colliders stand for planes.
+        // Ignore offsets longer than the model: such colliders represent planes.
         let is_near = at.distance(world.w_axis.truncate()) <= diagonal;
         if is_near {
             points.push(VrmPoint { node, at, bound_index: 0, what });
