@@ -47,9 +47,9 @@ pub struct LookGroup {
     pub base_color: [f32; 4],
     /// Base colour texture, an index into [`Look::images`].
     pub image: Option<u32>,
-    /// How alpha is used: not at all, to discard fragments, or to blend.
+    /// Wrap mode along u and v.
     pub wrap: [LookWrap; 2],
-    /// How alpha is used: ignored, for discarding fragments, or for blending.
+    /// How alpha is used: not at all, to discard fragments, or to blend.
     pub alpha: LookAlpha,
     /// Whether back faces are drawn.
     pub double_sided: bool,

@@ -21,8 +21,8 @@ pub fn shown(text: &str) -> String {
     format!("{}…{}", escaped(&head.collect::<String>()), escaped(&tail))
 }
 
-/// Escapes control characters in text of a file, and characters that change the reading direction, such as `\n` or
-/// `\u{1b}`.
+/// Escapes control characters, and characters that change the reading direction, in text of a file: a line feed becomes
+/// `\n`, an escape `\u{1b}`.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

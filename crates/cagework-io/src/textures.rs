@@ -15,7 +15,8 @@ const MAX_TOTAL_PIXELS: u64 = 1 << 29;
 /// Limit on all drawn textures together, pixels: 256 MiB, and a third more on the GPU for mipmaps.
 const MAX_DRAWN_PIXELS: u64 = 1 << 26;
 
-/// If fewer pixels of [`MAX_DRAWN_PIXELS`] remain, the textures of an additional model are not decoded.
+/// Smallest remaining part of the budget [`MAX_DRAWN_PIXELS`], pixels. With less, the textures of an additional model
+/// are not decoded.
 const MIN_DRAWN_PIXELS: u64 = 1 << 18;
 
 /// Why an image is not decoded.

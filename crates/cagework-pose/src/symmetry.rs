@@ -48,7 +48,8 @@ impl Symmetry {
         self.plane
     }
 
-    /// The vertex at the mirror image of a vertex; `None` if there is none. A vertex on the plane is its own partner.
+    /// The vertex at the mirror image of a vertex; `None` if no vertex is there. A vertex on the plane is its own
+    /// partner.
     #[must_use]
     pub fn partner(&self, vertex: u32) -> Option<u32> {
         self.partner.get(vertex as usize).copied().flatten()

@@ -208,7 +208,7 @@ class Job:
 
 
 def card(report):
-    """The report of a bind in a few lines."""
+    """Formats the report of a bind in a few lines."""
     points, outside = report["vertices"], report["outside_vertices"]
     lines = [
         f"{points:,} points, {report['cage_vertices']:,} cage vertices, grid {report['grid']}",
@@ -220,7 +220,7 @@ def card(report):
 
 
 def live_key(obj):
-    """The shape key that follows the cage; makes it if it is missing."""
+    """Returns the shape key that follows the cage, and makes it if it is missing."""
     keys = obj.data.shape_keys
     if not keys:
         obj.shape_key_add(name="Basis", from_mix=False)
@@ -235,7 +235,7 @@ def live_key(obj):
 
 
 def posed_cage(obj, depsgraph):
-    """Positions of the posed cage in the bind space of an object's mesh."""
+    """Returns the positions of the posed cage in the bind space of an object's mesh."""
     world, _ = cage_mesh(obj.data.cagework.cage, depsgraph)
     matrix = loaded(obj.data).to_bind @ np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
     return transform(world, matrix)

@@ -303,7 +303,7 @@ class Pull(OnBound, bpy.types.Operator):
 
 
 def copy_key(obj, name):
-    """A new shape key with the current shape of the key that follows the cage."""
+    """Adds a shape key with the current shape of the key that follows the cage."""
     active = obj.active_shape_key_index
     key = obj.shape_key_add(name=name, from_mix=False)
     key.value = 0.0  # Blender 5.0 adds keys with the value 1.

@@ -23,9 +23,9 @@ pub(super) type Key = (usize, usize);
 pub(super) struct Scene {
     /// Name and content of each part; the first one has the build.
     pub(super) parts: Vec<(String, ModelPart)>,
-    /// Instances in the order of the components and items in the file, with children before the object's own triangles.
+    /// Index of each part by [`part_name`].
     part_of: HashMap<Vec<u8>, usize>,
-    /// In the order in which components and items are written, children before the object's own triangles.
+    /// Instances in the order of the components and items in the file, with children before the object's own triangles.
     pub(super) instances: Vec<Instance>,
     pub(super) n_vertices: usize,
     pub(super) notices: Vec<String>,

@@ -86,9 +86,8 @@ impl Pull {
     /// `weights`: rows of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight `m_k` of each point,
     /// scaled to sum to 1; a point with the share 0 is ignored. `to`: targets, object units.
     ///
-    /// # Errors
-    /// [`PullError`]: the weights are of another cage, lengths differ, no point has a target, or numbers are out of
-    /// range.
+    /// # Errors [`PullError`]: the weights belong to another cage, lengths differ, no point has a target, or numbers
+    /// are out of range.
     pub fn fit(
         &self,
         weights: &Weights,

@@ -160,7 +160,8 @@ fn grabs_that_move_rigidly_move_all_rigidly() {
     assert!(b.apart(&drag.cage(), &expected) < 1e-3, "{}", b.apart(&drag.cage(), &expected));
 }
 
-/// A half turn in few frames. On straight paths, all grabs would meet in the middle, and the model would collapse.
+/// The grabs make a half turn in few frames. On straight paths, all grabs would meet in the middle, and the model would
+/// collapse.
 #[test]
 fn grabs_that_make_a_half_turn_turn_the_model() {
     let b = humanoid();

@@ -70,9 +70,9 @@ pub(super) struct Deformation<'a> {
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,
-    /// Moves of nodes given by a skeleton that is shared with other files.
+    /// Motions of nodes whose meshes stay rigid.
     pub(super) rigid: &'a HashMap<u32, Motion>,
-    /// Moves that a skeleton shared with other files determines.
+    /// Moves of nodes given by a skeleton that is shared with other files.
     pub(super) named: Option<&'a NamedMoves>,
     /// Up axis of the file.
     pub(super) up: DVec3,

@@ -33,9 +33,9 @@ pub struct ReshapeReport {
     pub max_condition: f64,
     /// Number of vertices whose skinning matrix is singular; they follow their neighbours.
     pub singular_vertices: usize,
-    /// Additional lift of each clip, object units; empty unless the model is kept on its ground.
+    /// Distance by which the model was lifted so that its lowest point keeps its height, object units.
     pub lift: f64,
-    /// Further lift of each clip, object units; empty unless the model is kept on its ground.
+    /// Additional lift of each clip, object units; empty unless the model is kept on its ground.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub clip_lifts: Vec<f64>,
     /// Lowest points, if the model is kept on its ground.
