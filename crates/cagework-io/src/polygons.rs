@@ -99,7 +99,7 @@ pub(crate) struct Polygons {
     pub(crate) groups: Vec<Group>,
     /// Material of each face, an index into `materials`, or [`NONE`]; empty if no face has a material.
     pub(crate) face_materials: Vec<u32>,
-    /// Names and looks of the materials.
+    /// Names of the materials, and their appearance by name.
     pub(crate) materials: Vec<String>,
     pub(crate) looks: HashMap<String, Material>,
     /// Memory of a file that the document keeps, bytes.

@@ -90,8 +90,7 @@ impl Timeline {
     }
 
     /// Creates a timeline that shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at
-    /// 0 s, and ends with the last pose or, with `seconds_back`, this number of seconds later with the shape that it
-    /// started with.
+    /// 0 s, and ends with the last pose or, with `seconds_back`, this number of seconds later with its first shape.
     ///
     /// # Errors
     /// If a time is outside the limits, or not later than the previous time.

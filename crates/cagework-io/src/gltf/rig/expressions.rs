@@ -64,7 +64,7 @@ pub struct Vrm {
     pub colliders: usize,
 }
 
-/// A morph target that shows a pose on one mesh.
+/// The morph target of one mesh that stores a pose.
 pub(super) struct PoseTarget {
     pub(super) node: usize,
     pub(super) mesh: usize,
