@@ -41,8 +41,9 @@ fn shadow_at(at: vec2f) -> f32 {
     let place = at * size - 0.5;
     let f = fract(place);
     let g = 1.0 - f;
-    // Weights of the four pixels along each axis. One linear sample between the first two pixels, at `low`, gives their
-    // weighted mean; another one, at `high`, that of the last two.
+    // Weights of the four pixels along each axis. A linear sample between the first two pixels, at `low`, gives the
+    // weighted mean of these two; a linear sample between the last two, at `high`, gives the weighted mean of the last
+    // two.
     let w0 = g * g * g / 6.0;
     let w1 = (4.0 - 6.0 * f * f + 3.0 * f * f * f) / 6.0;
     let w3 = f * f * f / 6.0;

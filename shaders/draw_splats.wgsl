@@ -9,7 +9,7 @@ const MIN_ALPHA = 1.0 / 255.0;
 /// Limit on the standard deviation of a splat on the screen, pixels. Longer axes of a splat are shortened to it.
 const MAX_REACH = 1024.0;
 /// Limit of the normalised device coordinates at which the projection of a covariance is linearised. It prevents huge
-/// ellipses of splats far beside the picture.
+/// ellipses of splats far outside the picture.
 const MAX_OFF_CENTER = 1.3;
 
 struct Varying {

@@ -123,8 +123,8 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
 }
 
 /// Before weights are corrected to reproduce the rest positions, the weights of a smooth cage and those of the
-/// subdivided cage times the subdivision matrix are the same linear combinations of the same fields. They agree to 1e-5
-/// even if quads are bent.
+/// subdivided cage times the subdivision matrix are the same linear combinations of the same fields. The weights agree
+/// to 1e-5 even if quads are bent.
 #[test]
 fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() {
     for (mesh, steps) in

@@ -215,7 +215,7 @@ fn orthographic_from_above() {
 #[test]
 fn formats_without_srgb_look_the_same() {
     let mut session = creature();
-    // Blended elements would differ, because such formats blend sRGB values: draw opaque elements only.
+    // Blended elements would differ, because these formats blend sRGB values: draw opaque elements only.
     let view = ViewOptions { floor: false, ..ViewOptions::default() };
     let bare = SceneOptions { view, cage_lines: false, handles: false, ..SceneOptions::default() };
     session.set_scene(bare);
@@ -223,7 +223,7 @@ fn formats_without_srgb_look_the_same() {
     let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);
     let n = expected.len();
     let sum: f64 = expected.iter().zip(&actual).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
-    // Edges are slightly darker, because multisampling in such formats averages sRGB values.
+    // Edges are slightly darker, because multisampling in these formats averages sRGB values.
     assert!(sum / (n as f64) < 1.0, "{}", sum / n as f64);
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn sparsify_changes_weights_and_poses_little(back_end: &BackEnd) {
     assert!(n_dropped > 1000, "{n_dropped} weights were dropped");
 }
 
-/// Asserts that the weights of two closed parts in one cage equal those of each part alone.
+/// Asserts that the weights of two closed parts in one cage equal the weights of each part as a cage of its own.
 fn assert_independent(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, tolerance: f32) {
     let both = cage(&together(a, b));
     let n = a.positions.len();

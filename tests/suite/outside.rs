@@ -16,7 +16,7 @@ const AFFINE_TOLERANCE: f32 = 5e-5;
 
 /// Creates three groups of points: inside the C-shaped cage; outside, but within 5 % of the cage's diagonal of 5.1,
 /// some of them in the gap of the C; and corners of a box, farther away than 15 % of the diagonal. Returns all points,
-/// the indices of the second group, and those of the third.
+/// the indices of the second group, and the indices of the third.
 fn some_outside(n_inside: usize) -> (Vec<Vec3>, Vec<u32>, Vec<u32>) {
     let mut vertices = points::inside(&cage(&c_shape()), n_inside, 40);
     let near = [[-0.2, 1.5, 0.5], [2.0, -0.1, 0.4], [2.5, 1.2, 0.5], [3.0, 1.9, 0.7], [1.5, 0.3, 1.2]]

@@ -14,7 +14,7 @@ use super::BackEnd;
 const N_WALKED: usize = 100;
 
 /// Largest allowed mean error of a weight at g = 64, 1.5 times the measured 6.9e-5. With the weights of the nearest
-/// cell centre instead of interpolated ones, the mean error is 3.3e-4.
+/// cell centre instead of interpolated weights, the mean error is 3.3e-4.
 const LIMIT_AT_64: f64 = 1.05e-4;
 
 /// Largest allowed mean error of a weight at g = 128, 1.6 times the measured 2.3e-5. The mean error of the finite

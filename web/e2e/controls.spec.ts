@@ -38,7 +38,7 @@ async function boundTo(page: Page, smooth: number, inner: number): Promise<void>
   await bound(page);
 }
 
-/** Clicks where the point `place`, in object space, appears. */
+/** Clicks at the window position of the point `place`, object space. */
 async function click(page: Page, place: [number, number, number]): Promise<void> {
   const box = await page.locator("canvas").first().boundingBox();
   const [x = 0, y = 0] = await page.evaluate(

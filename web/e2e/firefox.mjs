@@ -58,7 +58,7 @@ async function visit(name, display, preferences) {
     });
     console.log(`${name}: ${adapter}${lack ? ` (${lack})` : ""}`);
 
-    // The place of a cage vertex that a click selects.
+    // Find the position of a cage vertex that a click selects.
     const place = await page.evaluate(() => {
       const { engine } = globalThis.cagework;
       const canvas = document.querySelector("canvas");

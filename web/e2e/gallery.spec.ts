@@ -1,4 +1,4 @@
-/** The gallery: its examples are live and then idle, and a title opens the page in the example's pose. */
+/** The gallery: its examples move and then stop drawing, and a title opens the page in the example's pose. */
 
 import { decodeShare } from "../src/share";
 import { complaintsOfAxe } from "./stories";

@@ -8,15 +8,15 @@ import { bound, cagePositions, drawn, expect, handle, openWith, reachable, shoot
 /** Tolerance for coordinates that a drag must not change, object units. The cage is two units long. */
 const ALIKE = 1e-4;
 
-/** A place at which the pointer hits a handle of the gizmo, in window pixels. */
+/** A position at which the pointer hits a handle of the gizmo, in window pixels. */
 interface Grip {
   readonly x: number;
   readonly y: number;
-  /** Unit vector from the centre of the gizmo to this place, in screen space. */
+  /** Unit vector from the centre of the gizmo to this position, in screen space. */
   readonly away: readonly [number, number];
 }
 
-/** Finds a place at which the pointer hits the handle `wanted` of the gizmo. */
+/** Finds a position at which the pointer hits the handle `wanted` of the gizmo. */
 async function grip(page: Page, wanted: GizmoPart): Promise<Grip> {
   const found = await page.evaluate((wanted) => {
     const engine = globalThis.cagework?.engine;
@@ -177,8 +177,8 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.evaluate(() => {
       const session = globalThis.cagework;
       const positions = session?.engine.restPositions();
-      // Move only one corner. Both kinds of coordinates reproduce affine maps of the whole cage, so a pose that is such
-      // a map would show no difference.
+      // Move only one corner. Both kinds of coordinates reproduce affine maps of the whole cage, so an
+      // affine pose would show no difference.
       session?.engine.setCagePositions(
         positions?.map((value, k) => (k >= 21 ? 3 * value : value)) ?? new Float32Array(),
       );

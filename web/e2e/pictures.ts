@@ -39,7 +39,7 @@ const EXAMPLES: Readonly<Record<string, Example>> = {
   pull: { sample: "rat", pose: 1, camera: [0.9, 0.2, 1.1] },
   capture: {
     sample: "spot",
-    // Turns each height about the vertical axis, by 0 at the bottom to 0.9 at the top.
+    // Twists the model about the vertical axis, from 0 radians at the bottom to 0.9 radians at the top.
     pose: ([x, y, z]) => {
       const angle = 0.45 * (y + 1);
       const [sine, cosine] = [Math.sin(angle), Math.cos(angle)];

@@ -139,8 +139,8 @@ async function comparesAll(page: Page): Promise<void> {
 }
 
 /**
- * Drops a model called `name` and waits until it is bound. The name must differ from that of the open model, because
- * the window's title tells when the new model is open.
+ * Drops a model called `name` and waits until it is bound. The name must differ from the open model's name,
+ * because the window's title shows when the new model is open.
  */
 async function dropsAWorm(page: Page, name: string): Promise<void> {
   await drop(page, [{ name: `${name}.glb`, bytes: await glb() }]);

@@ -46,7 +46,7 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     const width = await page.evaluate(() => document.documentElement.scrollWidth);
     expect(width).toBeLessThanOrEqual(390);
     await page.touchscreen.tap(200, 200);
-    // The status line would cover the model: it becomes transparent, but screen readers still read it.
+    // The status line would cover the model, so it becomes transparent. Screen readers still read it.
     await expect(page.locator("#status span")).toHaveText(/selected|Ready/);
     await expect(page.locator("#status span")).toHaveCSS("opacity", "0");
     await shoot(page, "phone-read");

@@ -56,7 +56,7 @@ test("a cell draws the widget, and its pose is one array in the notebook and in 
   const longer = written().rest.map(([x = 0, y = 0, z = 0]) => [x, y, 2 * z]);
   await expect.poll(async () => difference(await poseOf(), longer)).toBeLessThan(ROUNDING);
   // The capsule ends at z = 1 at rest, hence at z = 2 when the slider doubles its length. The error of the grid is
-  // below 0.1 % of that.
+  // below 0.1 % of this length.
   expect(written().max[2]).toBeCloseTo(2, 2);
   // Zoom out until the longer model fits, and wait for the frame at full resolution.
   await element.hover();
@@ -64,7 +64,7 @@ test("a cell draws the widget, and its pose is one array in the notebook and in 
   await page.waitForTimeout(SHARP_MS);
   await page.screenshot({ path: join(TARGET, "screens/notebook-slider.png") });
 
-  // Drag a vertex of the cage: the first place where the cursor is a pointer.
+  // Drag a vertex of the cage, at the first position where the cursor is a pointer.
   const held = await element.evaluate((element) => {
     const { left, top, right, bottom } = element.getBoundingClientRect();
     for (let y = top + 4; y < bottom; y += 8) {

@@ -1,6 +1,6 @@
 /**
- * The notebook widget: shows `<cage-deformer>` in a cell's output, and keeps its pose equal to that of the widget in
- * Python.
+ * The notebook widget: shows `<cage-deformer>` in a cell's output, and keeps its pose equal to the pose of the widget
+ * in Python.
  */
 
 import type { BindReport, Offsets } from "../package/src/contract/generated";

@@ -96,8 +96,8 @@ export function elementInUse({ tools, scene, editingRest }: AppState): CageEleme
 }
 
 /**
- * Options of automatic binds and saved projects: those of the last bind, or without one, the chosen options. Options
- * that were chosen after a bind take effect when the user binds again.
+ * Options of automatic binds and saved projects: the options of the last bind or, before the first bind, the chosen
+ * options. Options that were chosen after a bind take effect when the user binds again.
  */
 export function optionsInUse({ appliedOptions, bindOptions }: AppState): BindOptions {
   return appliedOptions ?? bindOptions;

@@ -32,7 +32,7 @@ export function followDocument(ctx: Context) {
   const startCheck = () =>
     attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) => {
-        // Wait for the current task to end: an opened cage may come with its check, and `know` then cancels this job.
+        // Wait for the current task to end: an opened cage may already have a check, and `know` then cancels this job.
         await new Promise((resolve) => setTimeout(resolve));
         if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
       }),
@@ -41,7 +41,7 @@ export function followDocument(ctx: Context) {
   const modelPatch = (): Partial<AppState> => {
     const { model, cageClip } = store.get();
     const info = engine().modelInfo();
-    // The name of a single model may be that of its sample or file. Keep it.
+    // A single model may have the name of its sample or file. Keep this name.
     const isAlone = info.members.length === 1 && model?.members.length === 1;
     const notices = [...new Set([...(model?.notices ?? []), ...info.notices])];
     return {

@@ -209,8 +209,8 @@ async function start(opened: OpenedOn & Needs) {
      */
     shareReader: reading.share,
     /**
-     * Opens a file that was read; a project brings its cage and poses. Call it once for each file. `sample`: identifier
-     * of the sample, if the file is one.
+     * Opens a file that was read; for a project, also its cage and poses. Call it once for each file. `sample`:
+     * identifier of the sample, if the file is one.
      */
     open: (read: ReadFile, sample: string | null = null) =>
       openRead(read as ReadModel, sample).finally(begin),

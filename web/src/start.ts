@@ -17,7 +17,7 @@ import type { Stage } from "./ui/viewport";
 import { T } from "./words";
 import { hasEntries } from "./works/database";
 
-/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a hardly visible difference. */
+/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a barely visible difference. */
 const MOST_SHARP = 2;
 
 export interface Start {

@@ -1,4 +1,4 @@
-//! Outlines of a splat and of the deformation at a place, as ellipses on the screen, for the page's tour.
+//! Outlines of a splat and of the deformation at a point, as ellipses on the screen, for the page's tour.
 
 use cagework_core::field::Field;
 use cagework_core::splats::Splats;
@@ -24,8 +24,8 @@ pub(crate) fn outline(by: Mat3, right: Vec3, up: Vec3) -> Outline {
     Outline { half_axes, angle: 0.5 * b.atan2(half) }
 }
 
-/// Computes the outlines of the splat nearest to a place at rest, of the unit sphere's image under the deformation
-/// gradient at this splat, and of the splat in the pose; `None` without splats.
+/// Computes the outlines of the splat nearest to the point `place` at rest, of the unit sphere's image under the
+/// deformation gradient at this splat, and of the splat in the pose; `None` without splats.
 pub(crate) fn outlines(
     splats: &Splats,
     field: Option<&Field>,

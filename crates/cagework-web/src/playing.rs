@@ -92,7 +92,7 @@ pub(crate) struct Playback {
     clips: Vec<SharedClip>,
     /// Vertices of all models with their joints and morph targets.
     pub(crate) skin: Skin,
-    /// Rotation from the axes of the files to those of the scene.
+    /// Rotation from the axes of the files to the axes of the scene.
     up: Mat4,
     /// Current joint matrices and target weights of each model.
     posed: Vec<RigPose>,

@@ -83,7 +83,7 @@ impl Check {
 }
 
 impl Check {
-    /// Places of the cage's faults or, with `are_outside`, of the model vertices outside the cage. Omits faults of
+    /// Locations of the cage's faults or, with `are_outside`, of the model vertices outside the cage. Omits faults of
     /// severity `Note`.
     fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
         let shown =
@@ -92,7 +92,7 @@ impl Check {
     }
 }
 
-/// Places of the faults that a [`Check`] found, to be marked in the scene.
+/// Locations of the faults that a [`Check`] found, to be marked in the scene.
 #[derive(Default)]
 pub(crate) struct Faults {
     pub(crate) in_cage: Places,

@@ -89,7 +89,7 @@ impl Puller {
         flat(&drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>())
     }
 
-    /// Whether the last frame hardly moved the cage, so that no further frame is needed. True without a drag.
+    /// Whether the last frame barely moved the cage, so that no further frame is needed. True without a drag.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn settled(&self) -> bool {

@@ -13,7 +13,8 @@ use crate::options::{Colour, SliceShown};
 use crate::state::State;
 
 impl State {
-    /// Style of the mesh. Colours of weights and errors need a bind; those of weights also need a selected vertex.
+    /// Style of the mesh. Colours of weights and errors need a bind; colours of weights also need a
+    /// selected vertex.
     pub(crate) fn mesh_style(&self) -> MeshStyle {
         match self.view.colour {
             _ if !self.view.model => MeshStyle::Hidden,

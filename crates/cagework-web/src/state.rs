@@ -62,7 +62,7 @@ pub(crate) struct State {
     pub(crate) draft: Vec<[Vec3; 2]>,
     pub(crate) view: JsSceneOptions,
     pub(crate) camera: Camera,
-    /// Place of the camera after `frame_all`. If the camera is still there when the view is resized,
+    /// Placement of the camera after `frame_all`. If the camera is still there when the view is resized,
     /// `frame_all` is called again.
     framed: Option<CameraPlace>,
     /// Size of the viewport, CSS pixels.
@@ -96,7 +96,8 @@ pub(crate) struct BoundModels {
     pub(crate) frames: Arc<Frames>,
     /// Weights of the points of the models' rigs.
     pub(crate) rig: Option<Weights>,
-    /// Vertices outside the cage, then points of rigs outside it. Indices of the latter start after the last vertex.
+    /// Vertices outside the cage, then points of rigs outside the cage. The indices of rig points start after the last
+    /// vertex.
     pub(crate) outside: Vec<OutsideVertex>,
     /// Joints of the rigs; `None` if a rig cannot be read.
     pub(crate) joints: Option<JointDots>,

@@ -32,12 +32,12 @@ pub(crate) const SMALL_SIDE: u32 = 16;
 pub(crate) struct Surface {
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
-    /// Render format: that of the canvas, with sRGB encoding.
+    /// Render format: the canvas's format with sRGB encoding.
     format: wgpu::TextureFormat,
     /// Textures that sessions draw into: one of the whole picture, or several side by side.
     ///
     /// An sRGB view of the canvas would avoid the copy, but SwiftShader does not encode when multisampling resolves
-    /// into such a view: a clear of 0.2 gives 51 instead of 124.
+    /// into an sRGB view: a clear of 0.2 gives 51 instead of 124.
     parts: Vec<wgpu::Texture>,
     /// Draws `parts` into a canvas that does not support copies.
     painter: Option<PartPainter>,

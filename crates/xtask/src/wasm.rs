@@ -35,8 +35,8 @@ struct Artifact {
     name: &'static str,
 }
 
-/// Both builds, in build order. Cargo keeps only the artifact of the last build, and must link the other one again. The
-/// build for browsers with WebGPU comes last, because developers repeat it most often.
+/// Both builds, in build order. Cargo keeps only the artifact of the last build, and must link the other build again.
+/// The build for browsers with WebGPU comes last, because developers repeat it most often.
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],

@@ -164,7 +164,7 @@ const full = (): Record<AppState["step"], Patch> => ({
   },
 });
 
-/** States of each step other than those of `full`. */
+/** States of each step that `full` does not contain. */
 const states = (): Record<AppState["step"], readonly Patch[]> => ({
   model: [
     { model: null, cage: null, bound: false },

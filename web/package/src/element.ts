@@ -10,7 +10,7 @@ import { openView, type Ready, sceneOf, type View } from "./element/view";
 import { named } from "./session/client";
 import type { Bound, Cage, File, NameOption } from "./types";
 
-/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a hardly visible difference. */
+/** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a barely visible difference. */
 const MOST_SHARP = 2;
 /** Default number of cells along the cage's longest side. */
 const GRID = 64;

@@ -1,4 +1,4 @@
-/** Geometries of three.js that follow a cage. Works with any version of three.js, which is not imported. */
+/** Deforms geometries of three.js by a cage. Does not import three.js, so any version of it can be used. */
 
 import { bind, deform, generateCage } from "@cagework/core";
 import type { BindReport } from "./contract/generated";

@@ -147,7 +147,7 @@ for (const [how, address] of [
   test(`the element can be dragged, posed and exported with ${how}`, async ({ visit }) => {
     const page = await visit(how, address);
     await ready(page);
-    // Find a handle: the first place where the cursor is a pointer.
+    // Find a handle: the first position where the cursor is a pointer.
     const found = await page.evaluate(() => {
       const element = document.querySelector("cage-deformer");
       const events: Float32Array[] = [];

@@ -158,7 +158,7 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
 
 /**
  * Whether two binds had the same method, solver, preconditioner, grid and backend. The report of the newer bind then
- * replaces the other.
+ * replaces the report of the older bind.
  */
 export function sameWay(a: BindReport, b: BindReport): boolean {
   return (

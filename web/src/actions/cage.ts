@@ -68,7 +68,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     ctx.store.set({ cagePreview: cage ? cage.positions.length / 3 : null });
   };
 
-  /** The settings to preview; undefined if they are those of the cage, or cannot be previewed. */
+  /** Returns the settings to preview; undefined if the cage was made with them, or if they cannot be previewed. */
   const toPreview = (): CageSettings | undefined => {
     const state = ctx.store.get();
     const { step, model, cageSource, cageProgress, editingRest } = state;

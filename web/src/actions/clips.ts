@@ -17,7 +17,7 @@ export async function loadClipLattice(ctx: Context): Promise<void> {
   if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
   ctx.tell.say(T.clips.preparing);
   const { grid } = ctx.store.get().bindOptions;
-  // Playback and export use the same lattice: neither may cancel the computation of the other.
+  // Playback and export use the same lattice: neither may cancel the computation that the other has started.
   await ctx.queue.add("lattice", async (signal) => {
     if (!engine.hasLattice) await follow(signal, ctx.session().loadLattice(grid));
   });

@@ -66,7 +66,7 @@ export function createControls(
     },
     /**
      * Handles a click while a kind of control is chosen: adds a point or sheet there, or extends the bone by a point. A
-     * second click at the same place ends the bone.
+     * second click at the same position ends the bone.
      */
     place(x: number, y: number) {
       const { placing } = store.get();

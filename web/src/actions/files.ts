@@ -35,7 +35,7 @@ export interface FileNeeds {
 
 /**
  * Limit on the estimated work of the automatic bind of a project, in updates of one value at a grid node. This many
- * take about 10 s on one processor core; the options of a project file could ask for hours.
+ * take about 10 s on one processor core; the options of a project file could request hours of work.
  */
 const MOST_UPDATES = 1e10;
 

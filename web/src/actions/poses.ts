@@ -49,8 +49,8 @@ export function createPoses(ctx: Context, edit: Edit) {
         const carried = await follow(signal, ctx.session().carryPoses(cage, poses));
         stop();
         if (label) edit.setEditingRest(false);
-        // `carried` starts with the current pose. If this is not an undo step of its own, keep the new cage's current
-        // pose if the old cage was at rest or the cage is being reshaped.
+        // `carried` starts with the current pose. If the conversion is not an undo step of its own, keep the new cage's
+        // current pose if the old cage was at rest or the cage is being reshaped.
         if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
         const positions = triples(carried);
         engine().apply({ do: "carry_poses", from: n / 3, positions, shares: [...shares] }, label);
@@ -133,8 +133,8 @@ export function createPoses(ctx: Context, edit: Edit) {
       if (done) engine().commit(T.did.blend);
     },
     /**
-     * Converts the poses of the previous cage to poses of the current cage. With a label, this is an undo step of its
-     * own, otherwise a part of the last step.
+     * Converts the poses of the previous cage to poses of the current cage. With a label, the conversion is an undo
+     * step of its own, otherwise a part of the last step.
      */
     carry,
     reset() {

@@ -26,7 +26,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const { store } = ctx;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let saving: Promise<void> | undefined;
-  /** Whether saving the open work has failed. The user has been told, and the work is not saved again. */
+  /** Whether saving the open work has failed. The user has been notified, and the work is not saved again. */
   let hasFailed = false;
   /** Whether the entry of the open work was deleted, and the work has not changed since. */
   let isUnwanted = false;

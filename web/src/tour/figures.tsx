@@ -231,7 +231,7 @@ function Ellipses({ app }: Figure) {
     };
   }, [app]);
   // The splats at rest and in the pose share one scale. The ellipse of the gradient has its own scale, and is drawn
-  // over the unit circle, of which it is the image.
+  // over the unit circle, whose image it is.
   const longest = (first: number) => Math.max(outlines[first] ?? 0, outlines[first + 6] ?? 0);
   const scales = [24 / longest(0), 24 / Math.max(outlines[3] ?? 0, 1.5), 24 / longest(0)];
   return outlines.length === 0 ? (

@@ -88,7 +88,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     return { ...BIND_DEFAULTS, backend, memory_limit, ...way };
   };
 
-  /** Runs binds in order and adds their reports to those of the stop. Ends early if a bind fails or `turn` changes. */
+  /** Runs binds in order and adds their reports to `tour.reports`. Ends early if a bind fails or `turn` changes. */
   const run = async (binds: readonly Partial<BindOptions>[], mine: number) => {
     for (const [k, way] of binds.entries()) {
       set({ doing: [k + 1, binds.length] });
@@ -166,7 +166,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       await visit(stopsOf(gpu)[name], mine);
       if (mine === turn) set({ doing: null });
     },
-    /** Runs other binds, whose measurements replace those of this stop. */
+    /** Runs other binds, whose reports replace the reports of this stop. */
     async measure(binds: readonly Partial<BindOptions>[]) {
       turn += 1;
       const mine = turn;
@@ -174,7 +174,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       await run(binds, mine);
       if (mine === turn) set({ doing: null });
     },
-    /** Runs one more bind to show its result, and adds its measurements to those of this stop. */
+    /** Runs one more bind to show its result, and adds its report to the reports of this stop. */
     async show(way: Partial<BindOptions>) {
       turn += 1;
       const mine = turn;

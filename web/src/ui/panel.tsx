@@ -1,4 +1,4 @@
-/** The panel of the current step, with the next action at its foot. On narrow screens it is a bottom sheet. */
+/** The panel of the current step, with the next action at the bottom. On narrow screens it is a bottom sheet. */
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";

@@ -237,7 +237,7 @@ function Cue({ app }: { app: App }) {
   );
 }
 
-/** Progress of opening a file, with a button to cancel. For a large model, also asks whether to go on. */
+/** Progress of opening a file, with a button to cancel. For a large model, also asks whether to continue. */
 function Busy({ app }: { app: App }) {
   const { busy, busyStep, cancelBusy, goOn } = app.store.get();
   return (

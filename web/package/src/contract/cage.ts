@@ -9,7 +9,7 @@ import type { CageControls, Problem } from "./generated";
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
-  /** Undefined for a new cage. The document then keeps those of its inner controls that fit into the cage. */
+  /** Undefined for a new cage. The document then keeps its inner controls, as far as they fit into the new cage. */
   readonly controls?: CageControls | undefined;
 }
 

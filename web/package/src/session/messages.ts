@@ -42,7 +42,7 @@ export interface ReadModel {
   readonly vertices: number;
 }
 
-/** Weights as compressed sparse rows. `offsets` describes the columns after those of the controls. */
+/** Weights as compressed sparse rows. `offsets` describes the columns after the columns of the controls. */
 export interface BoundArrays {
   readonly indptr: Uint32Array;
   readonly indices: Uint32Array;

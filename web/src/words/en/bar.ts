@@ -1,4 +1,4 @@
-/** Text of the step bar, and of the buttons at the foot of each panel. */
+/** Text of the step bar, and of the buttons at the bottom of each panel. */
 
 export const bar = {
   steps: "Steps",
