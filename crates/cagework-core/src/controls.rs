@@ -82,6 +82,12 @@ impl<'a> Controls<'a> {
         self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
     }
 
+    /// Radius of balls and tubes, object units; `None` without inner controls.
+    #[must_use]
+    pub fn inner_radius(&self) -> Option<f32> {
+        self.inner().map(|inner| inner.radius_in(self.surface.bounds().extent().max_element()))
+    }
+
     /// Returns the edges of the inner controls, and three edges from each inner control to the nearest cage triangle,
     /// so that all controls are connected.
     #[must_use]

@@ -132,8 +132,7 @@ impl<'a> JointPoints<'a> {
     pub(super) fn new(controls: Controls<'a>) -> Option<Self> {
         let inner = controls.inner().filter(|inner| inner.has_radius())?;
         let joints = (0..inner.positions.len()).filter(|&i| inner.is_rounded(i)).map(|i| i as u32).collect();
-        let radius = inner.radius_in(controls.surface().bounds().extent().max_element());
-        Some(Self { inner, joints, radius })
+        Some(Self { inner, joints, radius: controls.inner_radius()? })
     }
 
     /// Returns each joint, followed by the six points around it, at the distance of the radius, for central

@@ -349,10 +349,9 @@ fn outside_of(
 /// Returns notices about inner controls: a radius that is too small for a grid of `cells` cells along the longest side,
 /// and vertices that no element uses.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
-    let Some(inner) = controls.inner() else { return Vec::new() };
+    let (Some(inner), Some(radius)) = (controls.inner(), controls.inner_radius()) else { return Vec::new() };
     let mut notices = Vec::new();
-    let (radius, cell) =
-        (inner.radius_in(controls.surface().bounds().extent().max_element()), grid.cell.max_element() as f32);
+    let cell = grid.cell.max_element() as f32;
     if inner.has_radius() && radius < cell {
         let finer = (f64::from(cells) * f64::from(cell / radius)).ceil();
         notices.push(format!(

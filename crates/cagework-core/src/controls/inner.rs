@@ -157,6 +157,14 @@ impl InnerControls {
         self.radius.unwrap_or(DEFAULT_RADIUS * longest)
     }
 
+    /// Controls that are balls.
+    pub(crate) fn balls(&self) -> impl Iterator<Item = u32> {
+        self.elements.iter().filter_map(|element| match element {
+            InnerElement::Point(control) => Some(*control),
+            InnerElement::Line(_) | InnerElement::Face(_) => None,
+        })
+    }
+
     /// Whether any element is a ball or tube.
     #[must_use]
     pub fn has_radius(&self) -> bool {

@@ -189,7 +189,7 @@ impl ControlSet {
 }
 
 fn steps_of(inner: &InnerControls) -> u32 {
-    shapes::ball_steps(inner.elements.iter().filter(|e| matches!(e, InnerElement::Point(_))).count())
+    shapes::ball_steps(inner.balls().count())
 }
 
 /// Number of faces of an element's mesh. Balls are subdivided `steps` times; sheets have triangles on both sides.

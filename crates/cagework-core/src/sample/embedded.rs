@@ -20,6 +20,7 @@ use crate::levels::Level;
 use crate::options::OutsidePolicy;
 use crate::voxelize::lines::Overlaps;
 
+use super::balls::{Balls, NearBall};
 use super::edges::{EDGE_TOLERANCE, EdgeLists, Passage};
 use super::outside::OutsideSampler;
 use super::triangles::TriangleLists;
@@ -49,6 +50,7 @@ pub struct Sampler<'a> {
     level: &'a Level,
     lists: TriangleLists,
     edges: EdgeLists,
+    balls: Balls<'a>,
     overlaps: &'a Overlaps,
     /// Sampler for points outside the cage, created for the first such point.
     beyond: OnceLock<OutsideSampler<'a>>,
@@ -66,6 +68,8 @@ struct Scratch {
     /// Facets in a second cube: the cube of the point one cell from the edge or, for an edge beyond the cube of the
     /// ray, the cube of the ray's point beside the edge.
     other: Vec<u32>,
+    /// Balls near the point.
+    balls: Vec<NearBall>,
     stencil: Stencil,
     /// Total weight of ray ends that lie outside the cage.
     outside: f64,
@@ -114,7 +118,8 @@ impl<'a> Sampler<'a> {
         let lists = TriangleLists::new(surface, grid);
         let edges = EdgeLists::new(surface, grid, &lists);
         let same = CAGE_TOLERANCE * f64::from(surface.diagonal()) / grid.cell.max_element();
-        Self { controls, level, lists, edges, overlaps, beyond: OnceLock::new(), policy, same }
+        let balls = Balls::new(controls, grid);
+        Self { controls, level, lists, edges, balls, overlaps, beyond: OnceLock::new(), policy, same }
     }
 
     /// Stencils of points (object units). Lists points outside the cage in `outside`.
@@ -159,6 +164,7 @@ impl<'a> Sampler<'a> {
         let low = p.floor().to_array().map(|x| x as u32);
         self.lists.in_cube(low, &mut scratch.near);
         self.edges.in_cube(low, &mut scratch.edges);
+        self.balls.near(low, &mut scratch.balls);
         if scratch.near.is_empty() && scratch.edges.is_empty() {
             self.trilinear(low, p, scratch);
         } else if let Some((triangle, barycentric)) = self.touching(p, &scratch.near) {
@@ -171,6 +177,9 @@ impl<'a> Sampler<'a> {
                 let weight = 1.0 / ORDERS.len() as f64;
                 self.descend(Query { low, p, order: &order, weight, splits: true }, scratch);
             }
+        }
+        if scratch.outside == 0.0 {
+            self.balls.correct(&scratch.balls, p, &mut scratch.stencil);
         }
         let doubtful = scratch.outside > MAX_OUTSIDE_WEIGHT && scratch.outside < 1.0 - MAX_OUTSIDE_WEIGHT;
         let inside = if doubtful { self.winds_around(point) } else { scratch.outside < 0.5 };
@@ -214,9 +223,13 @@ impl<'a> Sampler<'a> {
 
     fn add_centre(&self, low: [u32; 3], bits: [u32; 3], weight: f64, scratch: &mut Scratch) {
         let grid: &Grid = &self.level.grid;
-        match self.level.row_of[grid.index([low[0] + bits[0], low[1] + bits[1], low[2] + bits[2]])] {
+        let cell = [low[0] + bits[0], low[1] + bits[1], low[2] + bits[2]];
+        match self.level.row_of[grid.index(cell)] {
             NO_CELL => scratch.outside += weight,
-            row => scratch.stencil.add_node(row, weight),
+            row => {
+                scratch.stencil.add_node(row, weight);
+                self.balls.add(&mut scratch.balls, DVec3::from_array(cell.map(f64::from)), weight, true);
+            }
         }
     }
 
@@ -369,6 +382,14 @@ impl<'a> Sampler<'a> {
         let stencil = &mut scratch.stencil;
         self.controls
             .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
+        if !scratch.balls.is_empty() {
+            self.balls.add(&mut scratch.balls, self.place(facet, barycentric), weight, false);
+        }
+    }
+
+    /// Point of a facet, cell coordinates.
+    fn place(&self, facet: u32, barycentric: [f64; 3]) -> DVec3 {
+        self.lists.triangle(facet).corners.iter().zip(barycentric).map(|(&corner, b)| b * corner).sum()
     }
 
     /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If two faces
@@ -402,7 +423,7 @@ impl<'a> Sampler<'a> {
             return false;
         }
         let corners = self.lists.triangle(facet).corners;
-        let place: DVec3 = corners.iter().zip(barycentric).map(|(&c, b)| b * c).sum();
+        let place = self.place(facet, barycentric);
         if (place + 1.0).cmplt(*low).any() || (place - 1.0).cmpgt(*high).any() {
             return false;
         }

@@ -3,6 +3,7 @@
 //! A vertex's *stencil* (weights of field rows, called nodes, and of Dirichlet values, called hats) depends only on
 //! geometry. It is computed once per bind and applied to every batch of columns.
 
+mod balls;
 pub mod classic;
 mod closest;
 mod edges;

@@ -92,7 +92,7 @@ fn surface_follows_its_controls() {
     }
     // The vertices of a ball stay on a sphere around its control, whose radius is 1/32 of the smooth cage's longest
     // side.
-    let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
+    let radius = controls.inner_radius().unwrap();
     assert!(posed[posed.len() - 642..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }
 
