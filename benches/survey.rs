@@ -131,7 +131,7 @@ fn each(n: u32, add: impl Fn(Patches, f32) -> Patches) -> Patches {
     (0..n).fold(Patches::default(), |parts, k| add(parts, k as f32))
 }
 
-/// Joins `n` parts that `add` makes from random numbers.
+/// Calls `add` `n` times, each time with the patches so far and the same sequence of random numbers.
 fn random(n: u32, add: impl Fn(Patches, &mut Random) -> Patches) -> Patches {
     let mut random = Random::new(38);
     (0..n).fold(Patches::default(), |parts, _| add(parts, &mut random))

@@ -7,7 +7,7 @@
 @group(0) @binding(3) var<storage, read> colors: array<u32>;
 /// Index and colour of each splat, sorted by the lower digit. Not read while sorting by the lower digit.
 @group(0) @binding(4) var<storage, read> source: array<vec2u>;
-/// Position of the next splat of each block and bin. `[n_blocks, BINS]`
+/// Index in `order` of the next splat of each block and bin. `[n_blocks, BINS]`
 @group(0) @binding(5) var<storage, read_write> counts: array<u32>;
 /// Index and colour of each splat, sorted by the digits up to the one that `work.mode` selects. The colour 0 hides a
 /// splat.

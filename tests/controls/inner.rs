@@ -45,24 +45,22 @@ fn weight_of_a_ball_in_a_sphere_matches_the_formula() {
     }
 }
 
-/// Next to the ball, weights match the formula (1/r - 1) / 3 in each direction, not only on average. Linear
-/// interpolation in a cell of width h has an error of at most `h^2 / 8` times the sum of the absolute second
-/// derivatives, here `(2 + 1 + 1) / (3 r^3)`. The cage is an icosphere of four subdivisions, whose deviation from a
+/// Next to the ball, weights match the formula (1/r - 1) / 3 within 5e-3 in each direction, not only on average. Linear
+/// interpolation alone misses by up to 6.3e-3. The cage is an icosphere of four subdivisions, whose deviation from a
 /// sphere is negligible.
 #[test]
 fn weights_next_to_a_ball_match_the_formula_in_every_direction() {
     let set = ControlSet::new(&cage(&icosphere(4)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap();
     let ball = set.cage().n_vertices();
     let options = BindOptions { grid: 64, tau: 1e-7, ..BindOptions::default() };
-    for r in [0.27_f32, 0.3, 0.4] {
-        let points: Vec<Vec3> =
-            scattered(60, Vec3::NEG_ONE, Vec3::ONE).iter().map(|d| r * d.normalize_or(Vec3::X)).collect();
-        let weights = &samples(&points, Controls::from(&set), &options)[ball];
-        let r = f64::from(r);
-        let (expected, most) = ((1.0 / r - 1.0) / 3.0, 4.0 / (3.0 * r.powi(3)) / 32.0_f64.powi(2) / 8.0);
-        for (p, w) in points.iter().zip(weights) {
-            assert!((f64::from(*w) - expected).abs() < most, "{p}: {w}, not {expected}");
-        }
+    let directions = scattered(60, Vec3::NEG_ONE, Vec3::ONE);
+    let radii = [0.26_f32, 0.27, 0.3, 0.35, 0.4];
+    let points: Vec<Vec3> =
+        radii.iter().flat_map(|r| directions.iter().map(move |d| r * d.normalize_or(Vec3::X))).collect();
+    let weights = &samples(&points, Controls::from(&set), &options)[ball];
+    for (p, w) in points.iter().zip(weights) {
+        let expected = (1.0 / f64::from(p.length()) - 1.0) / 3.0;
+        assert!((f64::from(*w) - expected).abs() < 5e-3, "{p}: {w}, not {expected}");
     }
 }
 

@@ -63,7 +63,7 @@ export async function openWith(page: Page, files: readonly Dropped[]): Promise<v
   await drop(page, files);
 }
 
-/** Waits until a model is bound and no job is running. */
+/** Waits until a model is bound and the status reports no job. "Reshaping the cage" names a mode, not a job. */
 export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,

@@ -40,7 +40,7 @@ pub struct Project {
     pub settings: String,
 }
 
-/// Error of reading a project.
+/// Why a project cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ProjectError {
     /// The model in the project cannot be read.

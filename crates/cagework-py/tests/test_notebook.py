@@ -15,7 +15,7 @@ def widget(model, cage, bound):
 def test_widget_sends_the_model_its_cage_and_all_weights(widget, model, cage, bound):
     sent = widget._sent
     vertices, triangles = cw.read_model(sent["file"])
-    # float32 has 24 significant bits.
+    # The file contains float32: coordinates below 4 are rounded by at most 2**-23.
     np.testing.assert_allclose(vertices, model.vertices, atol=2.0**-23)
     np.testing.assert_array_equal(triangles, model.faces)
     np.testing.assert_array_equal(np.frombuffer(sent["positions"]).reshape(-1, 3), cage.vertices)

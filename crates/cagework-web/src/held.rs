@@ -14,7 +14,7 @@ use crate::state::State;
 /// Maximum distance of a vertex from the mirror image of a surface point, as a fraction of the diagonal of model and
 /// cage. Points nearer than this to their image count as lying on the mirror plane.
 const MIRROR_TOLERANCE: f32 = 0.02;
-/// Maximum distance between a pin and the pointer that removes it, CSS pixels.
+/// A click removes a pin within this distance of the pointer, CSS pixels.
 const PIN_PX: f32 = 14.0;
 
 /// A point of the model or a vertex of the cage that a pull grabs.

@@ -56,8 +56,8 @@ pub(crate) struct Settings {
 }
 
 /// Reads the settings of a project. Missing and invalid values of a group become defaults; a missing group stays
-/// undefined. `text`: JSON of the settings. `memory_limit`: limit of binds, bytes. The limit in the file is ignored,
-/// because the right limit depends on the computer.
+/// undefined. `text`: JSON of the settings. `memory_limit`: the most memory that a bind may use, bytes. The limit in the
+/// file is ignored, because the right limit depends on the computer.
 #[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
 #[must_use]
 pub fn read_settings(text: &str, memory_limit: f64) -> JsValue {

@@ -24,7 +24,7 @@ pub(crate) fn build() -> Result<(), String> {
 /// other features.
 const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
-/// Runs all tests: of Rust, Python and TypeScript, and of the page in browsers.
+/// Runs the Rust, Python and TypeScript tests, and the tests of the page in browsers.
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
     build_tests()?;

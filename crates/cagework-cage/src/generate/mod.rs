@@ -60,8 +60,8 @@ const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), Non
 /// order until the target is met.
 const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 
-/// Number of [`BAND_LAYERS`], from the first, in which edges are first collapsed only within the allowed distance from
-/// the hull ([`CageOptions::detail`]).
+/// Number of the first passes, which collapse edges only within the allowed distance from the hull
+/// ([`CageOptions::detail`]): one pass for each of the first [`BAND_LAYERS`].
 const N_NARROW_BANDS: usize = 3;
 
 /// For models in several pieces, and on lattices refined for gaps: a coarser lattice is tried without further passes if

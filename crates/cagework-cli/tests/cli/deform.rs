@@ -196,7 +196,8 @@ fn files_with_z_up_keep_their_axes() {
 #[test]
 fn pose_with_another_vertex_order_is_rejected() {
     let sandbox = bound();
-    // The posed cage is the same box, but with the indices of two diagonally opposite corners of a face swapped.
+    // The posed cage is the affine image of the box, but two diagonally opposite corners of a face have swapped their
+    // indices.
     let [a, b] = [
         0,
         CORNERS

@@ -115,7 +115,7 @@ pub enum CageError {
         "cage component {component} (with face {face}) encloses no volume: it is flat or folded onto itself"
     )]
     Flat {
-        /// Index of the component, in the order of their first faces.
+        /// Index of the component. Components are numbered in the order of their first faces.
         component: u32,
         /// Index of the component's first face.
         face: u32,
@@ -157,7 +157,7 @@ pub enum CageNotice {
     },
     /// Inverted faces were flipped.
     Flipped {
-        /// Index of the component, in the order of their first faces.
+        /// Index of the component. Components are numbered in the order of their first faces.
         component: u32,
         /// Number of flipped faces.
         faces: usize,
@@ -166,7 +166,7 @@ pub enum CageNotice {
     },
     /// A component lies inside another one.
     Cavity {
-        /// Index of the component, in the order of their first faces.
+        /// Index of the component. Components are numbered in the order of their first faces.
         component: u32,
     },
     /// Vertices without faces: their weights are zero.

@@ -23,7 +23,8 @@ const OUTLINE_TOLERANCE: f64 = 1e-15;
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Computes the Wachspress coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`,
-/// non-negative, sum 1; `areas`: `[n]`, scratch. A point that is outside by rounding is treated as on the side.
+/// non-negative, sum 1; `areas`: `[n]`, scratch. If rounding puts the point outside, it is treated as a point of the
+/// side that it crossed.
 pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], areas: &mut [f64]) {
     let n = outline.len();
     let before = |k: usize| if k == 0 { n - 1 } else { k - 1 };

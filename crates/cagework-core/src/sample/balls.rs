@@ -1,10 +1,10 @@
 //! Correction of interpolation beside balls, the points inside a cage.
 //!
-//! Beside a ball of radius R, a harmonic function is `a + b/r` plus terms that vary less, with the distance r from the
-//! ball's centre. Interpolation along axes is exact for `a` and misses `1/r` by a known amount δ: its value at the vertex
-//! minus its interpolated value. `b` follows from two values of the function, that of the ball and the mean of the
-//! stencil's nodes: `b = (u_ball - u_nodes) / (1/R - (1/r)_nodes)`. Adding `b δ` moves the share `δ / (1/R - (1/r)_nodes)`
-//! of the stencil from its nodes to the ball.
+//! Beside a ball of radius R, a harmonic function is `a + b/r` plus terms that vary less, where r is the distance from
+//! the ball's centre. Interpolation along axes is exact for `a`. Its error for `1/r` is known: `δ` is the value of `1/r`
+//! at the vertex minus its interpolated value. `b` follows from two values of the function, that of the ball and the
+//! mean of the stencil's nodes: `b = (u_ball - u_nodes) / (1/R - (1/r)_nodes)`. To add `b δ`, the part
+//! `δ / (1/R - (1/r)_nodes)` of the stencil's weight moves from its nodes to the ball.
 
 use glam::DVec3;
 

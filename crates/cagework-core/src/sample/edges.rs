@@ -15,9 +15,9 @@ use crate::grid::Grid;
 /// Distance, in cells, up to which an edge splits a passing ray.
 pub(super) const REACH: f64 = 0.25;
 
-/// Squared distance from the centre of a cube, in cells, within which an edge can split rays in or beyond the cube. The
-/// distance is half the cube's diagonal plus the diagonal of a square of side [`REACH`]; its square, 1.49, is rounded
-/// up.
+/// Squared distance, in cells, from the centre of a cube between eight centres. An edge further away cannot split a ray
+/// that leaves a point of the cube. The distance is half the cube's diagonal plus the diagonal of a square of side
+/// [`REACH`]; its square, 1.49, is rounded up.
 const MAX_SQUARED_DISTANCE: f64 = 1.5;
 
 /// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge. At flatter edges, sampled weights

@@ -6,7 +6,8 @@
 //! third, whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the
 //! result is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even
 //! if no centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the
-//! axes are averaged. Rays next to re-entrant edges are split, see `edges.rs`.
+//! axes are averaged. Rays next to re-entrant edges are split, see `edges.rs`; stencils beside balls are corrected, see
+//! `balls.rs`.
 
 use std::sync::OnceLock;
 

@@ -86,7 +86,7 @@ fn rows_of_a_tetrahedron_are_simple_fractions() {
     let rows = subdivide(&tetrahedron(), 1).rows;
     let expected = [
         (0, [12.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0]),
-        // Row 4 is the first edge point, on the edge of vertices 0 and 1.
+        // Row 4 is the first edge point, that of the edge between vertices 0 and 1.
         (4, [5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0, 1.0 / 12.0]),
         // Row 10 is the first face point; its face does not contain vertex 3.
         (10, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0]),

@@ -31,7 +31,7 @@ impl Session {
     /// repeated if the new device is out of memory.
     ///
     /// # Errors
-    /// As the calls that set model, cage, weights and parts.
+    /// The errors of the calls that set model, cage, weights and parts.
     pub async fn recover(&self, context: GpuContext) -> Result<Self, GpuError> {
         let mut session = Self::new(context);
         session.camera = self.camera;

@@ -236,9 +236,8 @@ fn clips_keep_the_height_of_their_lowest_point() {
         // The export takes the lowest point from 60 samples per second, `lowest` from 240. The tolerance covers the
         // difference.
         assert!((with - before).abs() < 2e-3, "{what}");
-        // In a walk on the spot (`sink` < 0) the hips' track is constant, so its offset from the rest position scales
-        // with the length of the hips' translation. The lift changes this length, so the two lifts do not add up
-        // exactly.
+        // In a walk on the spot (`sink` < 0) the track of the hips is scaled by the length of their translation at
+        // rest. Lifting the skeleton changes this length, so the lifts of skeleton and clip do not add up exactly.
         if sink >= 0.0 {
             assert!((f64::from(with - without) - report.lift - report.clip_lifts[0]).abs() < 1e-5, "{what}");
         }

@@ -98,10 +98,11 @@ pub struct Drag {
     pub(super) hold: DMatrix<f64>,
     /// Part of the right-hand side that does not depend on rotations. `[n, 3]`
     pub(super) constant: DMatrix<f64>,
-    /// Moments (see [`Pull::moments`]) of the start pose, the moments that full relaxation adds, and their current
-    /// blend.
+    /// Moments of the start pose, see [`Pull::moments`].
     pub(super) posed: Vec<f64>,
+    /// Change of the moments by full relaxation.
     pub(super) relaxing: Vec<f64>,
+    /// Current moments: `posed` and a share of `relaxing`.
     pub(super) moments: Vec<f64>,
     /// Distance along the surface to the nearest grab, object units. `[n_vertices]`
     walks: Vec<f32>,
