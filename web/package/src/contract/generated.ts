@@ -70,7 +70,7 @@ tau: number,
  */
 max_iterations: number,
 /**
- * Total of the smallest weights that are dropped from each row, after which the row's sum and rest position are
+ * Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
  * restored. 0 drops none. Default 0.
  */
 sparsify: number,
@@ -135,7 +135,7 @@ share: number, };
 export type Offsets = {
 /**
  * Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
- * In the weights, their columns follow those of the controls.
+ * In the weights, their columns follow the columns of the controls.
  */
 frames: Frames,
 /**
@@ -297,8 +297,8 @@ export type CellCounts = {
  */
 interior: number,
 /**
- * Classic method: cells that the cage's surface intersects. Embedded method: cells with their centre inside the
- * cage and less than a cell from it along an axis.
+ * Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
+ * and less than a cell from its surface along an axis.
  */
 boundary: number,
 /**
@@ -447,7 +447,7 @@ shape: Shape,
 symmetry: Symmetry,
 /**
  * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
- * Otherwise thin bridges join them to one cage. Default false.
+ * Otherwise thin bridges join them into one cage. Default false.
  */
 per_component: boolean,
 /**
@@ -457,7 +457,7 @@ per_component: boolean,
 clearance: number,
 /**
  * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
- * voxels are closed, detail thinner than one is lost. Default 0.
+ * voxels are closed, and details thinner than one voxel are lost. Default 0.
  */
 voxels: number, };
 /**
@@ -521,7 +521,7 @@ export type Severity = "error" | "warning" | "note";
  */
 export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
 /**
- * What the button of a fix does.
+ * Action of the button that fixes a fault.
  */
 export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
 /**
@@ -606,8 +606,8 @@ rigged: boolean,
  */
 vrm: boolean, bounds: Bounds,
 /**
- * Another up axis that the file probably has: z if the models seem to lie on their back, y down if captures in the
- * file's format have y down by convention.
+ * Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
+ * other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
  */
 suggestedUp: UpAxis | null, notices: Array<string>,
 /**
@@ -615,7 +615,7 @@ suggestedUp: UpAxis | null, notices: Array<string>,
  */
 members: Array<MemberInfo>, };
 /**
- * What a clip shows between two keys, as in glTF 2.0, appendix C.
+ * Interpolation between two keys, as in glTF 2.0, appendix C.
  */
 export type Interpolation = "step" | "linear" | "cubic";
 /**
@@ -679,7 +679,7 @@ name: string, } | { "do": "move_pose",
  */
 index: number,
 /**
- * Index in this list to which the pose moves.
+ * New index of the pose in the list.
  */
 to: number, } | { "do": "set_pose_time",
 /**
@@ -895,7 +895,7 @@ animationSeconds: number,
  */
 pins: Array<SurfacePoint>,
 /**
- * Whether the pose differs from the cage at rest.
+ * Whether the pose differs from the cage at rest; false while the cage is being reshaped.
  */
 posed: boolean,
 /**
@@ -919,7 +919,7 @@ selected: SelectionView,
  */
 tools: Tools,
 /**
- * Number of vertices without a mirror image, in symmetric editing; otherwise 0.
+ * Number of vertices without a mirror image; 0 unless gestures also move mirror images.
  */
 unmatched: number,
 /**
@@ -987,7 +987,7 @@ notices: Array<string>, };
  */
 export type Theme = "dark" | "light";
 /**
- * Quantity that the colours of the model show.
+ * What the colours of the model show: its materials, plain clay, weights, or errors.
  */
 export type Colour = "material" | "clay" | "weight" | "error";
 /**
@@ -1019,7 +1019,7 @@ pull: boolean,
  */
 compare: Array<Coordinates>, problems: boolean,
 /**
- * Treatment of joints by the next export, which the marks of joints show. Null hides the marks.
+ * How the next export treats joints, which determines where the joints are marked. Null hides the marks.
  */
 joints: Joints | null,
 /**
@@ -1188,11 +1188,11 @@ export type Pivot = "middle" | "border" | "last";
  */
 export type SelectMode = "replace" | "add" | "remove" | "toggle";
 /**
- * What a gesture does with the selection.
+ * Transformation that a gesture applies to the selection.
  */
 export type Gesture = "grab" | "rotate" | "scale";
 /**
- * How far a gesture has moved, for a status line.
+ * Kind, amount and constraint of a gesture, for a status line.
  */
 export type GestureView = {
 /**
