@@ -92,9 +92,7 @@ test("a clip is chosen, paused, bent by the cage and exported", async ({ page })
   });
 
   await test.step("Space shows the original, and its release the frame", async () => {
-    // The first key shows the focus ring. It is pressed once before the pictures, so that all of them contain the ring.
     await page.getByRole("application").focus();
-    await page.keyboard.press(" ");
     const frame = await drawing(page);
     await page.keyboard.down(" ");
     await expect.poll(async () => frame.equals(await drawing(page))).toBe(false);

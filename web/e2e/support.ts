@@ -311,7 +311,7 @@ export async function drawn(page: Page): Promise<void> {
 
 /**
  * Takes a screenshot of the canvas alone, to be compared with another one. Toasts and other elements above the canvas
- * are hidden, because they change by themselves.
+ * are hidden, because they change by themselves, and so is the focus ring, whose colours vary by rounding.
  */
 export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
@@ -323,7 +323,8 @@ export async function drawing(page: Page): Promise<Buffer> {
   const sheet = await page.evaluateHandle(() => {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(
-      "body :not(canvas, :has(canvas)) { opacity: 0 !important; transition: none !important }",
+      `body :not(canvas, :has(canvas)) { opacity: 0 !important; transition: none !important }
+      .viewport { outline: none !important }`,
     );
     document.adoptedStyleSheets.push(sheet);
     return sheet;
