@@ -53,10 +53,12 @@ export function list(names: readonly string[]): string {
   return format.list.format(names);
 }
 
-/** Formats a number of bytes with one to three digits before the point: 1536 -> "1.5 kB". */
+/** Formats a number of bytes in the largest unit that leaves at least 1: 1536 -> "1.5 kB". */
 export function bytes(value: number): string {
   const units = ["byte", "kilobyte", "megabyte", "gigabyte", "terabyte"] as const;
-  const power = Math.min(units.length - 1, Math.max(0, Math.floor(Math.log10(Math.max(1, value)) / 3)));
+  // Round before the unit is chosen, so that 999,600 bytes are not "1000 kB".
+  const rounded = Math.max(1, Number(value.toPrecision(3)));
+  const power = Math.min(units.length - 1, Math.floor(Math.log10(rounded) / 3));
   const scaled = value / 1000 ** power;
   return inUnit(scaled, units[power] ?? "byte", power === 0 || scaled >= 100 ? 0 : 1);
 }

@@ -84,7 +84,7 @@ export function openSession(canvases: Canvases, needs: Needs): Promise<Session> 
 }
 
 interface Needs {
-  /** Whether the first model to be opened is the first sample. */
+  /** Resolves to true if the session opens the first sample, because there is no link and no saved work. */
   readonly fresh: Promise<boolean>;
   /** Called after each change of the document. */
   changed(view: View): void;

@@ -20,6 +20,7 @@ describe("formats", () => {
   it("choose the unit of bytes", () => {
     expect(bytes(999)).toBe("999 byte");
     expect(bytes(1500)).toBe("1.5 kB");
+    expect(bytes(999_600)).toBe("1 MB");
     expect(bytes(2_147_483_648)).toBe("2.1 GB");
   });
   it("choose the unit of a duration after rounding", () => {

@@ -29,8 +29,8 @@ pub struct Allocator<'a> {
 
 impl<'a> Allocator<'a> {
     /// Begins an allocation. `what`: name of the object in error messages. Callers must not await anything before
-    /// [`Self::settle`]: error scopes are a stack of the device, on which other tasks would meanwhile push and pop
-    /// scopes of their own.
+    /// [`Self::settle`]: error scopes form a stack, of the device in browsers and of the thread elsewhere, on which other
+    /// tasks could push and pop scopes of their own during the wait.
     pub fn new(context: &'a GpuContext, what: &'static str) -> Self {
         let refused = context.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = context.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);

@@ -224,7 +224,8 @@ impl Session {
         self.bound.as_ref().map(|b| b.frames.as_ref())
     }
 
-    /// Sets the positions of the controls for the next frame. Only these positions are uploaded.
+    /// Sets the positions of the controls for the next frame. Uploads only them and, after a bind, the columns computed
+    /// from them.
     ///
     /// # Panics
     /// If the number of positions differs from the number of controls.

@@ -1,4 +1,4 @@
-"""Generated models, and the `cagework` command, whose results the package must equal."""
+"""Generated models, and the `cagework` command, whose results those of the package must equal."""
 
 import json
 import os

@@ -41,7 +41,7 @@ pub(crate) struct CageArgs {
     /// Triangles only; no quads.
     #[arg(long)]
     pub(crate) triangles: bool,
-    /// Make the cage symmetric: if the model is symmetric (auto), never (none), or always across one axis.
+    /// Make the cage symmetric: if the model is symmetric (auto), never (none), or always in the plane perpendicular to an axis (x, y, z).
     #[arg(long, default_value_t, value_parser = super::words::<Symmetry>())]
     pub(crate) symmetry: Symmetry,
     /// One closed part per connected component of the model, without bridges between them.

@@ -121,7 +121,8 @@ mod tests {
             assert_eq!(convergence.stalls(), stalls);
             let left = 1e-2 * f64::powi(contraction, 4) / (1.0 - contraction);
             let delta = convergence.latest().1;
-            // The estimate is the sum of the remaining corrections, times 1 - 0.12 = 0.88 (`CONTRACTION`).
+            // `delta` is 1 - `CONTRACTION` = 0.88 times `left`, the sum of the remaining corrections. If the cycles
+            // diverge, that sum is infinite.
             assert!(contraction > 1.0 || (0.88 * left - delta).abs() < 1e-9, "{delta}, not {left}");
         }
     }
