@@ -28,7 +28,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   check-scripts  the part of `check` that is about TypeScript
   test-beside    the part of `test` that runs beside the Rust tests: TypeScript, Firefox, the packages, the page's build
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
-  python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
+  python         the Python package only, built with the Rust tests and tested against the command
   blender        the Blender extension: built, and tested in Blender as a Python package (needs Python 3.11)
   notebooks      the notebook widget in JupyterLab, and the example notebooks (600 MB to download)
   notebook-wheel the notebook widget's wheel, into target/notebook
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
         ["check-and-build"] => tasks::check_and_build(),
         ["test-beside"] => tasks::test_beside(),
         ["check-scripts"] => tasks::check_scripts(),
-        ["python"] => python::test(),
+        ["python"] => tasks::build_tests().and_then(|()| python::test()),
         ["blender"] => python::test_blender(),
         ["notebooks"] => python::test_notebooks(),
         ["notebook-wheel"] => python::notebook_wheel().map(|wheel| println!("{wheel}")),

@@ -39,8 +39,13 @@ pub(crate) fn test() -> Result<(), String> {
     site::test_built_page(&[])
 }
 
-fn build_tests() -> Result<(), String> {
-    run("cargo", &[&["test", "--locked", "--no-run"], &TESTED[..]].concat(), &[])
+/// Builds the Rust tests, what they run, and the native module of the Python package.
+pub(crate) fn build_tests() -> Result<(), String> {
+    run("cargo", &[&["test", "--locked", "--no-run"], &TESTED[..]].concat(), &[])?;
+    // `cargo test` omits the native module, which has no Rust tests. The example needs the features of the tests, which
+    // therefore apply to the whole build.
+    let native = ["--lib", "--example", "export_samples"];
+    run("cargo", &[&["build", "--quiet", "--locked"], &TESTED[..], &native].concat(), &[])
 }
 
 /// Checks what [`check()`] checks, except benches, xtask and documentation, while it builds the tests. `.ci/run` sets
@@ -130,12 +135,6 @@ fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
-    // Built with the features of `cargo test`. `cargo run` would build dependencies again for this package alone.
-    run(
-        "cargo",
-        &[&["build", "--quiet", "--locked"], &TESTED[..], &["--example", "export_samples"]].concat(),
-        &[],
-    )?;
     let export = wasm::target_folder()?.join("debug/examples/export_samples");
     run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
     run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])?;
