@@ -18,6 +18,7 @@ pub mod fill;
 pub mod frames;
 pub mod geometry;
 pub mod grid;
+pub mod inpaint;
 pub mod levels;
 pub mod mesh;
 pub mod options;

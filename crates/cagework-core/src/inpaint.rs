@@ -1,0 +1,278 @@
+//! Copies values of one surface, such as joint weights of a body, to another one near it, such as clothes.
+//!
+//! A vertex takes the values of the closest point if that point is near and faces the same way. The values of all other
+//! vertices minimise the squared graph Laplacian, so that they continue those of their neighbours smoothly.
+//!
+//! Source: Abdrashitov, Raichstat, Monsen and Hill 2023, "Robust Skin Weights Transfer via Weight Inpainting". Two
+//! things differ. An edge has the weight 1/length instead of cotangents, so degenerate triangles and edges of three
+//! faces need no treatment. The inner side of a thick cloth, which faces the body, takes the values of the outer side.
+
+mod tree;
+
+use glam::Vec3;
+
+use crate::deform::vertex_normals;
+use crate::mesh::{Bounds, TriMesh, Weld, weld};
+use crate::team::map_indices;
+use tree::TriangleTree;
+
+/// Largest distance between a vertex and the point whose values it takes, as a fraction of the source's diagonal.
+pub const REACH: f32 = 0.025;
+/// Cosine of the largest angle between their normals: 30 degrees, as in the paper.
+const MIN_COSINE: f32 = 0.866;
+/// Largest thickness of a cloth, as a fraction of the source's diagonal.
+const MAX_THICKNESS: f32 = 0.015;
+/// Largest cosine between the normals of the two sides of a cloth.
+const MAX_SIDES_COSINE: f32 = -0.5;
+/// Largest cosine between the normal of the inner side and the direction to the outer side.
+const MAX_BEHIND_COSINE: f32 = -0.7;
+/// Shortest edge length in the Laplacian, as a fraction of the mean edge length.
+const MIN_RELATIVE_LENGTH: f64 = 1e-3;
+/// Conjugate gradients stop when the preconditioned residual has fallen by this factor, or after this many steps.
+const TOLERANCE: f64 = 1e-4;
+const MAX_STEPS: usize = 300;
+/// Number of free vertices up to which they need no start from a coarser graph.
+const COARSEST: usize = 50;
+
+/// Values of each vertex of the target, and how they were found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inpainted {
+    /// Values, non-negative. `[n_vertices][n_columns]`
+    pub values: Vec<f32>,
+    /// Number of distinct positions with the values of the closest point, or of the outer side.
+    pub matched: usize,
+    /// Number of positions whose values continue those of their neighbours.
+    pub inpainted: usize,
+    /// Number of positions in parts without any match, such as buttons. They have the values of the closest point.
+    pub copied: usize,
+}
+
+/// Copies non-negative `values`, `[n_vertices][n_columns]`, from the vertices of `source` to those of `target`.
+#[must_use]
+pub fn inpaint(source: &TriMesh, values: &[f32], n_columns: usize, target: &TriMesh) -> Inpainted {
+    let (source_seams, _, source_normals) = welded(source);
+    let (seams, cloth, normals) = welded(target);
+    let TriMesh { positions, triangles } = &cloth;
+    let size = Bounds::of(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
+    let cosine = |a: Vec3, b: Vec3| a.normalize_or_zero().dot(b);
+
+    let tree = TriangleTree::new(source);
+    let found = map_indices(positions.len(), |v| {
+        let Some(hit) = tree.closest(positions[v]) else { return (false, vec![0.0; n_columns]) };
+        let normal = hit.blend(|v| source_normals[source_seams.unique_of[v] as usize]);
+        let is_match = hit.distance as f32 <= REACH * size && cosine(normal, normals[v]) >= MIN_COSINE;
+        (is_match, (0..n_columns).map(|c| hit.blend(|v| values[v * n_columns + c])).collect())
+    });
+    let mut known: Vec<bool> = found.iter().map(|&(is_match, _)| is_match).collect();
+    let mut all: Vec<f32> = found.into_iter().flat_map(|(_, row)| row).collect();
+
+    let mut outer = cloth.clone();
+    outer.triangles.retain(|corners| corners.iter().all(|&v| known[v as usize]));
+    let tree = TriangleTree::new(&outer);
+    let behind = map_indices(positions.len(), |v| {
+        let hit = tree.closest(positions[v]).filter(|_| !known[v])?;
+        let way = hit.blend(|v| positions[v]) - positions[v];
+        let is_inner = hit.distance as f32 <= MAX_THICKNESS * size
+            && cosine(hit.blend(|v| normals[v]), normals[v]) <= MAX_SIDES_COSINE
+            && cosine(way, normals[v]) <= MAX_BEHIND_COSINE;
+        is_inner.then_some(hit)
+    });
+    for (v, hit) in behind.into_iter().enumerate().filter_map(|(v, hit)| Some((v, hit?))) {
+        known[v] = true;
+        (0..n_columns).for_each(|c| all[v * n_columns + c] = hit.blend(|v| all[v * n_columns + c]));
+    }
+
+    let graph = Graph::new(positions, triangles);
+    let reached = graph.reached(&known);
+    let is_free: Vec<bool> = reached.iter().zip(&known).map(|(&reached, &known)| reached && !known).collect();
+    graph.fill(&is_free, &mut all, n_columns);
+    let row = |&v: &u32| &all[v as usize * n_columns..][..n_columns];
+    Inpainted {
+        values: seams.unique_of.iter().flat_map(row).map(|value| value.max(0.0)).collect(),
+        matched: known.iter().filter(|&&known| known).count(),
+        inpainted: is_free.iter().filter(|&&free| free).count(),
+        copied: reached.iter().filter(|&&reached| !reached).count(),
+    }
+}
+
+/// The mesh with seams closed, and its vertex normals.
+fn welded(mesh: &TriMesh) -> (Weld, TriMesh, Vec<Vec3>) {
+    let seams = weld(&mesh.positions);
+    let positions: Vec<Vec3> = seams.first.iter().map(|&v| mesh.positions[v as usize]).collect();
+    let joined = |corners: &[u32; 3]| corners.map(|v| seams.unique_of[v as usize]);
+    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(joined).collect();
+    let normals = vertex_normals(&positions, &triangles);
+    (seams, TriMesh { positions, triangles }, normals)
+}
+
+/// Edges of a mesh with the weight 1/length.
+struct Graph {
+    /// First entry of each vertex in `edges`. `[n_vertices + 1]`
+    starts: Vec<u32>,
+    /// Neighbour and weight.
+    edges: Vec<(u32, f64)>,
+    /// Sum of the weights of a vertex. `[n_vertices]`
+    degrees: Vec<f64>,
+}
+
+impl Graph {
+    fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, a], [b, c], [c, b], [c, a], [a, c]]);
+        let mut pairs: Vec<[u32; 2]> = sides.filter(|[a, b]| a != b).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let length = |[a, b]: [u32; 2]| f64::from(positions[a as usize].distance(positions[b as usize]));
+        let mean = pairs.iter().map(|&pair| length(pair)).sum::<f64>() / pairs.len().max(1) as f64;
+        let shortest = (MIN_RELATIVE_LENGTH * mean).max(f64::MIN_POSITIVE);
+        let edges = pairs.iter().map(|&pair| (pair, mean / length(pair).max(shortest)));
+        Self::of_edges(positions.len(), edges.collect())
+    }
+
+    /// A graph of edges in both directions. Weights of equal edges are added.
+    fn of_edges(n: usize, mut all: Vec<([u32; 2], f64)>) -> Self {
+        all.sort_by_key(|&(pair, _)| pair);
+        let (mut starts, mut degrees, mut edges) = (vec![0; n + 1], vec![0.0; n], Vec::new());
+        for same in all.chunk_by(|a, b| a.0 == b.0) {
+            let ([from, to], weight) = (same[0].0, same.iter().map(|&(_, weight)| weight).sum::<f64>());
+            starts[from as usize + 1] += 1;
+            degrees[from as usize] += weight;
+            edges.push((to, weight));
+        }
+        (0..n).for_each(|v| starts[v + 1] += starts[v]);
+        Self { starts, edges, degrees }
+    }
+
+    fn of(&self, v: usize) -> &[(u32, f64)] {
+        &self.edges[self.starts[v] as usize..self.starts[v + 1] as usize]
+    }
+
+    /// Which vertices are connected to a marked one.
+    fn reached(&self, marked: &[bool]) -> Vec<bool> {
+        let mut reached = marked.to_vec();
+        let mut stack: Vec<u32> = (0..marked.len() as u32).filter(|&v| marked[v as usize]).collect();
+        while let Some(v) = stack.pop() {
+            for &(next, _) in self.of(v as usize) {
+                if !std::mem::replace(&mut reached[next as usize], true) {
+                    stack.push(next);
+                }
+            }
+        }
+        reached
+    }
+
+    /// Sets the values `x` of the free vertices to those that minimise `x^T L D^-1 L x`, with the Laplacian `L` of the
+    /// graph and its diagonal `D`. They start from the solution of a coarser graph.
+    fn fill(&self, is_free: &[bool], values: &mut [f32], n_columns: usize) {
+        let free: Vec<u32> = (0..is_free.len() as u32).filter(|&v| is_free[v as usize]).collect();
+        if free.len() > COARSEST {
+            self.start(is_free, values, n_columns);
+        }
+        let mut near: Vec<u32> = free.clone();
+        near.extend(free.iter().flat_map(|&v| self.of(v as usize)).map(|&(next, _)| next));
+        near.sort_unstable();
+        near.dedup();
+        let solved = map_indices(n_columns, |c| {
+            let mut x: Vec<f64> = values.iter().skip(c).step_by(n_columns).map(|&x| x.into()).collect();
+            self.solve((&free, &near), &mut x);
+            free.iter().map(|&v| x[v as usize] as f32).collect::<Vec<f32>>()
+        });
+        for (c, column) in solved.iter().enumerate() {
+            for (&v, &value) in free.iter().zip(column) {
+                values[v as usize * n_columns + c] = value;
+            }
+        }
+    }
+
+    /// Joins pairs of vertices that are both free or both known, fills that graph, and sets both free vertices to its value.
+    fn start(&self, is_free: &[bool], values: &mut [f32], n_columns: usize) {
+        let mut pair_of = vec![u32::MAX; is_free.len()];
+        let mut members: Vec<[u32; 2]> = Vec::new();
+        for v in 0..is_free.len() {
+            if pair_of[v] != u32::MAX {
+                continue;
+            }
+            let others = self.of(v).iter().filter(|&&(next, _)| {
+                pair_of[next as usize] == u32::MAX && is_free[next as usize] == is_free[v]
+            });
+            let other = others.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(v as u32, |&(next, _)| next);
+            pair_of[v] = members.len() as u32;
+            pair_of[other as usize] = members.len() as u32;
+            members.push([v as u32, other]);
+        }
+        let edges = (0..is_free.len()).flat_map(|v| {
+            let edge = |&(next, weight): &(u32, f64)| ([pair_of[v], pair_of[next as usize]], weight);
+            self.of(v).iter().map(edge).collect::<Vec<_>>()
+        });
+        let coarse = Self::of_edges(members.len(), edges.filter(|([a, b], _)| a != b).collect());
+        let is_coarse_free: Vec<bool> = members.iter().map(|&[v, _]| is_free[v as usize]).collect();
+        let at = |v: u32, c: usize| values[v as usize * n_columns + c];
+        let mean = |&[a, b]: &[u32; 2]| (0..n_columns).map(move |c| (at(a, c) + at(b, c)) / 2.0);
+        let mut coarse_values: Vec<f32> = members.iter().flat_map(mean).collect();
+        // Graphs without edges between free vertices do not become smaller.
+        if 10 * members.len() < 9 * is_free.len() {
+            coarse.fill(&is_coarse_free, &mut coarse_values, n_columns);
+            for v in (0..is_free.len()).filter(|&v| is_free[v]) {
+                let pair = pair_of[v] as usize;
+                values[v * n_columns..][..n_columns]
+                    .copy_from_slice(&coarse_values[pair * n_columns..][..n_columns]);
+            }
+        }
+    }
+
+    /// `L x` at a vertex.
+    fn laplacian(&self, x: &[f64], v: usize) -> f64 {
+        self.of(v).iter().fold(self.degrees[v] * x[v], |sum, &(next, weight)| sum - weight * x[next as usize])
+    }
+
+    /// Solves for one column by conjugate gradients with a diagonal preconditioner. `near`: the vertices `free` and their
+    /// neighbours.
+    fn solve(&self, (free, near): (&[u32], &[u32]), x: &mut [f64]) {
+        let n = x.len();
+        let mut inverse = vec![0.0; n];
+        for v in free.iter().map(|&v| v as usize) {
+            let of_edge = |&(next, weight): &(u32, f64)| weight * weight / self.degrees[next as usize];
+            inverse[v] = 1.0 / (self.degrees[v] + self.of(v).iter().map(of_edge).sum::<f64>());
+        }
+        let mut work = vec![0.0; n];
+        // y = L D^-1 L x at the free vertices.
+        let mut apply = |x: &[f64], y: &mut [f64]| {
+            near.iter()
+                .for_each(|&v| work[v as usize] = self.laplacian(x, v as usize) / self.degrees[v as usize]);
+            free.iter().for_each(|&v| y[v as usize] = self.laplacian(&work, v as usize));
+        };
+        let dot = |a: &[f64], b: &[f64]| free.iter().map(|&v| a[v as usize] * b[v as usize]).sum::<f64>();
+        let preconditioned = |r: &[f64]| -> Vec<f64> { r.iter().zip(&inverse).map(|(r, d)| r * d).collect() };
+        // The right-hand side belongs to the known values alone.
+        let (mut known, mut y) = (x.to_vec(), vec![0.0; n]);
+        free.iter().for_each(|&v| known[v as usize] = 0.0);
+        apply(&known, &mut y);
+        let limit = TOLERANCE * TOLERANCE * dot(&y, &preconditioned(&y));
+        if limit == 0.0 {
+            x.copy_from_slice(&known);
+            return;
+        }
+        apply(x, &mut y);
+        let mut residual: Vec<f64> = y.iter().map(|y| -y).collect();
+        let mut step = preconditioned(&residual);
+        let mut norm = dot(&residual, &step);
+        for _ in 0..MAX_STEPS {
+            if norm <= limit {
+                break;
+            }
+            apply(&step, &mut y);
+            let length = norm / dot(&step, &y);
+            for v in free.iter().map(|&v| v as usize) {
+                x[v] += length * step[v];
+                residual[v] -= length * y[v];
+            }
+            let last = norm;
+            norm = free.iter().map(|&v| inverse[v as usize] * residual[v as usize].powi(2)).sum();
+            for v in free.iter().map(|&v| v as usize) {
+                step[v] = inverse[v] * residual[v] + norm / last * step[v];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
