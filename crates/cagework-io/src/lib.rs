@@ -37,6 +37,7 @@ mod stl;
 mod textures;
 mod threemf;
 mod timeline;
+mod transfer;
 mod up;
 
 pub use blender::write_field_blender;
@@ -70,6 +71,7 @@ pub use textures::TexturePlan;
 pub use timeline::{
     Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline, TimelineError, check_times,
 };
+pub use transfer::TransferError;
 pub use up::{UpAxis, lies_on_back};
 
 /// Compiles the README's example.

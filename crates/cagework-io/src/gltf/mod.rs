@@ -26,6 +26,7 @@ mod select;
 mod size;
 mod skin;
 mod splats;
+mod transfer;
 
 use std::sync::Arc;
 
@@ -61,6 +62,7 @@ pub use rig::{
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm};
 pub(crate) use size::{MAX_PRIMITIVES, MAX_TRIANGLES};
 pub(crate) use splats::write as write_splats;
+pub(crate) use transfer::write_skinned;
 
 /// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
 fn size_of_total(found: u64, declared: u64) -> String {

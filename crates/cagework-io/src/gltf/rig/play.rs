@@ -150,6 +150,11 @@ impl Player {
         Ok(player)
     }
 
+    /// Node of each entry of the palette; `None` for a mesh without a node.
+    pub(crate) fn palette_nodes(&self) -> Vec<Option<u32>> {
+        self.palette.iter().map(|&(node, _)| node).collect()
+    }
+
     /// Animation clips of the file.
     #[must_use]
     pub fn clips(&self) -> &[Clip] {
