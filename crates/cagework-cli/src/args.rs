@@ -10,6 +10,7 @@ mod render;
 mod rig;
 mod size;
 mod solve;
+mod transfer;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -32,6 +33,7 @@ pub(crate) use render::{RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
 pub(crate) use size::SizeArgs;
 pub(crate) use solve::{MemoryArgs, SolveArgs};
+pub(crate) use transfer::TransferArgs;
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
 #[derive(Debug, Parser)]
@@ -64,6 +66,8 @@ pub(crate) enum Command {
     Map(MapArgs),
     /// Deform many models with one cage and one pose. The cage is solved once; each model gets its own output file.
     Refit(RefitArgs),
+    /// Give clothes the skeleton and the joint weights of a body.
+    Transfer(TransferArgs),
     /// Move points of the model to given positions by solving for the pose of the cage.
     Pull(PullArgs),
     /// Find the cage pose that deforms a model into a target: another model with the same vertices, or landmarks.
@@ -368,6 +372,10 @@ fn npz_output(text: &str) -> Result<PathBuf, String> {
 
 fn lattice_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["npz", "py"])
+}
+
+fn glb_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["glb"])
 }
 
 fn obj_output(text: &str) -> Result<PathBuf, String> {

@@ -29,6 +29,7 @@ mod refit;
 mod render;
 mod rig;
 mod signals;
+mod transfer;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,7 @@ fn main() -> ExitCode {
         Command::Deform(args) => deform::run(args, cli.json),
         Command::Map(args) => field::run(args, cli.json),
         Command::Refit(args) => refit::run(args, cli.json),
+        Command::Transfer(args) => transfer::run(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
         Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),

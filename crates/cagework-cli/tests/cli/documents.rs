@@ -14,7 +14,7 @@ fn files() -> Sandbox {
     let positions = &sample.mesh.positions;
     assert!(positions.len() > 1680, "rear.json grabs vertex 1680");
     let horse = write_mesh_glb("horse", &sample.mesh, &sample.colours, None).unwrap();
-    for name in ["horse", "shirt", "body", "jacket", "trousers", "boots"] {
+    for name in ["horse", "shirt", "body", "jacket", "trousers", "boots", "saddle"] {
         sandbox.write(&format!("{name}.glb"), &horse);
     }
     sandbox

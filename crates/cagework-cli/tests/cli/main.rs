@@ -22,4 +22,5 @@ mod rigs;
 mod siblings;
 mod splats;
 mod support;
+mod transfer;
 mod usage;

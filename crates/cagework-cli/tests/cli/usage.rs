@@ -7,7 +7,7 @@ use crate::support::Sandbox;
 fn version_and_help_succeed() {
     let sandbox = Sandbox::new();
     sandbox.run("--version").success().stdout(contains(env!("CARGO_PKG_VERSION")));
-    for command in ["", "info", "bind", "deform", "refit", "cage", "bench", "demo"] {
+    for command in ["", "info", "bind", "deform", "refit", "transfer", "cage", "bench", "demo"] {
         sandbox
             .run(&format!("{command} --help"))
             .success()
