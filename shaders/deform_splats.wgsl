@@ -2,15 +2,15 @@
 // du/dx. Both u and F are interpolated trilinearly between the nodes of the lattice. F at a node comes from differences
 // of u, as in Field::node_gradients. One invocation per splat. CPU: cagework_core::splats::deform_splats.
 //
-// A splat has three rows: its centre; the entries xx, xy, xz, yy of its covariance; and the entries yz, zz.
+// A splat has three rows: its centre and 0, or FLOATER for a floater; the entries xx, xy, xz, yy of its covariance; and
+// the entries yz, zz. A posed splat also has a turn, a vector: its x and y follow zz, and its z is added to the fourth
+// entry of the centre. The turn is 0 at rest, and without spherical harmonics, which need it.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(2) var<storage, read> rest: array<vec4f>;
-/// Columns x and y of the rotation of each splat, in two rows. Not written unless the mode is WITH_TURNS.
-@group(0) @binding(3) var<storage, read_write> turns: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> splats: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> splats: array<vec4f>;
 
-/// Value of `Work::mode`: also compute the rotations, which spherical harmonics need.
+/// Value of `Work::mode`: also compute the turns.
 const WITH_TURNS = 1u;
 /// Number of Newton steps. Five suffice if the singular values are within a factor of 10 of each other; the other five
 /// are for stronger deformations.
@@ -27,6 +27,27 @@ fn turn_of(f: mat3x3f) -> mat3x3f {
         r = 0.5 * (r + (1.0 / determinant(r)) * cofactors);
     }
     return r;
+}
+
+/// A rotation as a vector: its axis times tan(angle / 4), at most of length 1. The quaternion is the normalised longest
+/// row of 4 q q^T, whose entries are sums of entries of `r`.
+fn turn_vector(r: mat3x3f) -> vec3f {
+    let trace = r[0].x + r[1].y + r[2].z;
+    let by_w = vec3f(r[1].z - r[2].y, r[2].x - r[0].z, r[0].y - r[1].x);
+    let squares = 1.0 + 2.0 * vec3f(r[0].x, r[1].y, r[2].z) - trace;
+    let products = vec3f(r[1].z + r[2].y, r[2].x + r[0].z, r[0].y + r[1].x);
+    var q = vec4f(by_w, 1.0 + trace);
+    if trace < 0.0 {
+        if squares.x >= max(squares.y, squares.z) {
+            q = vec4f(squares.x, products.z, products.y, by_w.x);
+        } else if squares.y >= squares.z {
+            q = vec4f(products.z, squares.y, products.x, by_w.y);
+        } else {
+            q = vec4f(products.y, products.x, squares.z, by_w.z);
+        }
+    }
+    q = normalize(select(q, -q, q.w < 0.0));
+    return q.xyz / (1.0 + q.w);
 }
 
 /// Derivative of u at node `k` along an axis, by central differences. A neighbour beyond the end of the lattice is
@@ -72,12 +93,9 @@ fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
     }
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
     let bent = f * covariance * transpose(f);
-    if work.mode == WITH_TURNS {
-        let r = turn_of(f);
-        turns[2u * splat] = vec4f(r[0], r[1].x);
-        turns[2u * splat + 1u] = vec4f(r[1].yz, 0.0, 0.0);
-    }
-    splats[3u * splat] = vec4f(center.xyz + by, center.w);
+    var turn = vec3f(0.0);
+    if work.mode == WITH_TURNS { turn = turn_vector(turn_of(f)); }
+    splats[3u * splat] = vec4f(center.xyz + by, center.w + turn.z);
     splats[3u * splat + 1u] = vec4f(bent[0], bent[1].y);
-    splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, 0.0, 0.0);
+    splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, turn.xy);
 }

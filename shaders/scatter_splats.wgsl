@@ -11,31 +11,34 @@
 @group(0) @binding(5) var<storage, read_write> counts: array<u32>;
 /// Index and colour of each splat, sorted by the digits up to the one that `work.mode` selects. The colour 0 hides a
 /// splat.
-@group(0) @binding(8) var<storage, read_write> order: array<vec2u>;
+@group(0) @binding(7) var<storage, read_write> order: array<vec2u>;
 /// Coefficients of red, green and blue, 16 bits each, band 0 first, padded to an even number per splat. Not read for
 /// degree 0.
 @group(0) @binding(6) var<storage, read> harmonics: array<u32>;
-/// Columns x and y of the rotation of each splat, in two rows; zeros at rest. Not read for degree 0.
-@group(0) @binding(7) var<storage, read> turns: array<vec4f>;
+
+/// Fourth entry of a floater's centre; turns add a number between -1 and 1, see deform_splats.wgsl.
+const FLOATER: f32 = 4.0;
 
 /// Coefficient `k` of the splat whose coefficients start at word `first`.
 fn coefficient(first: u32, k: u32) -> f32 {
     return unpack2x16snorm(harmonics[first + k / 2u])[k % 2u];
 }
 
+fn is_floater(splat: u32) -> bool { return splats[3u * splat].w > 0.5 * FLOATER; }
+
 /// Colour and opacity of a splat, seen from the eye. The harmonics do not rotate with the splat. Instead, the direction
 /// of view is rotated by the inverse of the splat's rotation.
 fn color_of(splat: u32) -> u32 {
     if depths.degree == 0u { return colors[splat]; }
-    var direction = normalize(depths.viewer.w * splats[3u * splat].xyz - depths.viewer.xyz);
-    let low = turns[2u * splat];
-    let high = turns[2u * splat + 1u];
-    let x = low.xyz;
-    if any(x != vec3f(0.0)) {
-        let y = vec3f(low.w, high.xy);
-        direction = vec3f(dot(x, direction), dot(y, direction), dot(cross(x, y), direction));
-    }
-    var basis = harmonic_basis(direction);
+    let center = splats[3u * splat];
+    let direction = normalize(depths.viewer.w * center.xyz - depths.viewer.xyz);
+    let turn_z = center.w - select(0.0, FLOATER, is_floater(splat));
+    let turn = vec3f(splats[3u * splat + 2u].zw, turn_z);
+    // The inverse of the rotation whose axis times tan(angle / 4) is `turn`.
+    let size = dot(turn, turn);
+    let across = cross(turn, direction);
+    let back = (8.0 * cross(turn, across) - 4.0 * (1.0 - size) * across) / ((1.0 + size) * (1.0 + size));
+    var basis = harmonic_basis(direction + back);
     let n = (depths.degree + 1u) * (depths.degree + 1u);
     let first = splat * ((3u * n + 1u) / 2u);
     var color = vec3f(0.0);
@@ -56,7 +59,7 @@ fn scatter_splats(@builtin(global_invocation_id) id: vec3u) {
     for (var at = block * depths.per_block; at < end; at += 1u) {
         var entry = vec2u(at, 0u);
         if work.mode == LOWER_DIGIT {
-            let is_hidden = depths.hides == 1u && splats[3u * at].w > 0.0;
+            let is_hidden = depths.hides == 1u && is_floater(at);
             if !is_hidden { entry.y = color_of(at); }
         } else {
             entry = source[at];

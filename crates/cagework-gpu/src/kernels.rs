@@ -80,13 +80,13 @@ kernels! {
     /// Adds the cage's displacement field to skinned positions.
     BEND_VERTICES = "bend_vertices" + ["work", "field"], 64, 12, &[Uniform, Read, ReadWrite];
     /// Deforms splats.
-    DEFORM_SPLATS = "deform_splats" + ["work", "field"], 64, 80, &[Uniform, Read, Read, ReadWrite, ReadWrite];
+    DEFORM_SPLATS = "deform_splats" + ["work", "field"], 64, 80, &[Uniform, Read, Read, ReadWrite];
     /// Counts the splats of each block by the value of a digit of their depth.
     COUNT_SPLATS = "count_splats" + ["work", "depths"], 64, 8192, &[Uniform, Read, Read, Read, ReadWrite];
     /// Computes where the splats of each block and bin start in the sorted order.
     SCAN_SPLATS = "scan_splats" + ["work", "depths"], 128, 8192, &[Uniform, Read, ReadWrite];
     /// Writes splats in the order of their bins, with their colours as seen by the eye.
-    SCATTER_SPLATS = "scatter_splats" + ["work", "depths", "harmonics"], 64, 8192, &[Uniform, Read, Read, Read, Read, ReadWrite, Read, Read, ReadWrite];
+    SCATTER_SPLATS = "scatter_splats" + ["work", "depths", "harmonics"], 64, 8192, &[Uniform, Read, Read, Read, Read, ReadWrite, Read, ReadWrite];
     /// Computes normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];
 }

@@ -112,8 +112,11 @@ pub fn sort_splats(centers: &[Vec3], depths: &Depths) -> Vec<u32> {
     source
 }
 
-/// Splats as rows for kernels: position, floater (0 or 1), covariance (xx, xy, xz, yy, yz, zz), padding. `floaters`: 1
-/// for floaters; may be empty. `[n_splats, 12]`
+/// Fourth entry of the first row of a floater. Kernels add a number between -1 and 1.
+pub const FLOATER: f32 = 4.0;
+
+/// Splats as rows for kernels: position, 0 or [`FLOATER`], covariance (xx, xy, xz, yy, yz, zz), padding. `floaters`: the
+/// fourth entry of each splat; may be empty. `[n_splats, 12]`
 #[must_use]
 pub fn splat_rows(pose: &SplatPose, floaters: &[f32]) -> Vec<[f32; 12]> {
     let row = |(k, (&Vec3 { x, y, z }, &[xx, xy, xz, yy, yz, zz])): (usize, (&Vec3, &[f32; 6]))| {
@@ -197,14 +200,14 @@ struct Processor {
     at: SplatPose,
 }
 
+/// Buffers and kernels of splats. Beside the file's data (48 bytes at rest, colours and harmonics), they take 80 bytes per
+/// splat: 48 posed, 16 for the orders by one and both digits, and 16 for counters, which are 4 for a million splats.
 #[derive(Debug)]
 struct SplatKernels {
     rest: wgpu::Buffer,
     depths: wgpu::Buffer,
     works: wgpu::Buffer,
     splats: wgpu::Buffer,
-    /// Rotations of the splats, which turn their harmonics.
-    turns: wgpu::Buffer,
     degree: u32,
     unit: f32,
     /// The field's table and the kernel that reads it; `None` at rest.
@@ -252,7 +255,7 @@ impl SplatMover {
     pub(crate) fn set_floaters(&mut self, context: &GpuContext, floaters: &[u32]) {
         self.floaters = vec![0.0; self.len()];
         for &splat in floaters {
-            self.floaters[splat as usize] = 1.0;
+            self.floaters[splat as usize] = FLOATER;
         }
         self.write_rest(context);
         self.is_moved = true;
@@ -383,7 +386,6 @@ impl SplatKernels {
         let degree = (1..=of.degree).rev().find(fits).unwrap_or_default();
         let (words, unit) = if degree > 0 { splat_harmonics(of, degree) } else { (vec![0; 4], 0.0) };
         let harmonics = allocator.table("spherical harmonics of splats", &words)?;
-        let turns = allocator.storage("rotations of splats", if degree > 0 { 32 * n as u64 } else { 16 })?;
         let Depths { n_blocks, .. } =
             Depths::new(n, Bounds { min: Vec3::ZERO, max: Vec3::ONE }, Vec3::X, false);
         let rest = allocator.storage("splats at rest", 48 * n as u64)?;
@@ -402,7 +404,7 @@ impl SplatKernels {
                 launch(&kernels::SCAN_SPLATS, &[&depths, &counts]),
                 launch(
                     &kernels::SCATTER_SPLATS,
-                    &[&depths, splats, &colors, source, &counts, &harmonics, &turns, target],
+                    &[&depths, splats, &colors, source, &counts, &harmonics, target],
                 ),
             ]
         });
@@ -412,7 +414,7 @@ impl SplatKernels {
             context.queue.write_buffer(&works, k * WORK_STRIDE, bytemuck::bytes_of(&of_blocks));
         }
         let (splats, degree) = (splats.clone(), u32::from(degree));
-        Ok(Self { rest, depths, works, splats, turns, degree, unit, deform: None, sort })
+        Ok(Self { rest, depths, works, splats, degree, unit, deform: None, sort })
     }
 
     fn set_field(&mut self, context: &GpuContext, field: Option<&Field>) {
@@ -429,7 +431,7 @@ impl SplatKernels {
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             });
-            let buffers = [&buffer, &self.rest, &self.turns, &self.splats];
+            let buffers = [&buffer, &self.rest, &self.splats];
             let launch =
                 context.pipelines.launch(&context.device, &kernels::DEFORM_SPLATS, &self.works, &buffers);
             self.deform = Some((buffer, launch));
@@ -449,7 +451,6 @@ impl SplatKernels {
         let depths = Depths { degree: self.degree, unit: self.unit, ..depths };
         context.queue.write_buffer(&self.depths, 0, bytemuck::bytes_of(&depths));
         if is_moved && self.deform.is_none() {
-            encoder.clear_buffer(&self.turns, 0, None);
             encoder.copy_buffer_to_buffer(&self.rest, 0, &self.splats, 0, 48 * u64::from(depths.n_splats));
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {

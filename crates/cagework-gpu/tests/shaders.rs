@@ -7,7 +7,7 @@ use cagework_core::stencil;
 use cagework_gpu::kernels::{self, ALL, Binding, Kernel};
 use cagework_gpu::layout::{Work, mode};
 use cagework_gpu::render::shaders::ALL as DRAWN;
-use cagework_gpu::splats::{BINS, Depths};
+use cagework_gpu::splats::{BINS, Depths, FLOATER};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
 
@@ -131,6 +131,7 @@ fn constants_equal_those_of_rust() {
     same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);
     same(&kernels::COUNT_SPLATS, "BINS", f64::from(BINS));
     same(&kernels::DEFORM_SPLATS, "WITH_TURNS", f64::from(mode::WITH_TURNS));
+    same(&kernels::SCATTER_SPLATS, "FLOATER", f64::from(FLOATER));
     same(&kernels::COUNT_SPLATS, "LOWER_DIGIT", f64::from(mode::LOWER_DIGIT));
     let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);
     same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_CENTRE", centre);
