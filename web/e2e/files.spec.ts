@@ -153,8 +153,7 @@ test("choosing Z as the up axis turns model, cage and pose, but not exported fil
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   const choice = page.getByRole("group", { name: "Up axis" });
   await choice.getByRole("radio", { name: "Z" }).click();
-  // The model turns by -90 degrees about x. The tolerance allows for the rounding of saved poses, which have 16 bits
-  // per coordinate, relative to the largest displacement.
+  // The model turns by -90 degrees about x.
   const TOLERANCE = 1e-3;
   const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
   const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);

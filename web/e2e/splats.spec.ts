@@ -114,8 +114,8 @@ test("poses of a capture are blended and kept by a project and a reload, and its
     if (!(await floaters.isVisible())) await page.keyboard.press("n");
     await floaters.check({ force: true });
     shown = await squares(page);
-    // The project stores the pose in 16 bits per number, so positions differ by up to 1.6e-5. Colours then differ
-    // most at the soft edges of splats, where alpha is 2 to 40 of 255, because colours are divided by alpha.
+    // Colours differ most at the soft edges of splats, where alpha is 2 to 40 of 255, because colours are divided by
+    // alpha.
     expect(difference(posed, shown), "with floaters").toBeLessThan(10);
   });
   await test.step("a reload restores the kept work", async () => {

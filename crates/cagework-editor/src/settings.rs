@@ -5,7 +5,7 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
-use cagework_io::{MAX_SECONDS, SECONDS_PER_POSE, decode_pose, encode_pose};
+use cagework_io::{MAX_SECONDS, SECONDS_PER_POSE, decode_pose, position_bytes, positions_of};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -25,7 +25,8 @@ pub struct DocumentSettings {
     /// Subdivision and interior controls. The last positions of the project's cage mesh are those of the controls.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controls: Option<CageControls>,
-    /// The pose in the axes of the model's file: [`cagework_io::encode_pose`] in URL-safe base 64. Null at rest.
+    /// The pose in the axes of the model's file: [`cagework_io::position_bytes`] in URL-safe base 64. In older projects
+    /// [`cagework_io::encode_pose`]. Null at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
     /// Surface points that pulls keep in place.
@@ -54,11 +55,8 @@ impl DocumentSettings {
     pub fn of(document: &Document) -> Self {
         let Document { cage, poses, shares, transition, pins, sample, has_sample_cage, models, .. } =
             document;
-        let up = models.up();
-        let in_file = |positions| up.turned_back(positions);
-        let pose = document.is_posed().then(|| {
-            URL_SAFE_NO_PAD.encode(encode_pose(&in_file(&cage.mesh.positions), &in_file(&document.pose)))
-        });
+        let in_file = models.up().turned_back(&document.pose);
+        let pose = document.is_posed().then(|| URL_SAFE_NO_PAD.encode(position_bytes(&in_file)));
         let has_pins = poses.iter().any(|pose| pose.pins.as_ref().is_some_and(|pins| !pins.is_empty()));
         let pins_of = |pose: &NamedPose| pose.pins.as_ref().map_or_else(Vec::new, |pins| pins.to_vec());
         let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
@@ -142,8 +140,9 @@ impl DocumentSettings {
         let damaged = "The pose in this project is damaged: the cage is at rest.";
         let bytes = URL_SAFE_NO_PAD.decode(text.trim_end_matches('=')).map_err(|_| damaged)?;
         let up = document.models.up();
-        let pose =
-            decode_pose(&up.turned_back(&document.cage.mesh.positions), &bytes).map_err(|_| damaged)?;
+        let rest = up.turned_back(&document.cage.mesh.positions);
+        let exact = positions_of(&bytes).filter(|pose| pose.len() == rest.len());
+        let pose = exact.map_or_else(|| decode_pose(&rest, &bytes), Ok).map_err(|_| damaged)?;
         Ok(Some(up.turned(&pose).into_owned()))
     }
 }
@@ -165,10 +164,28 @@ mod tests {
         }
     }
 
+    /// A document whose cage is one vertex at (1, 1, 1).
+    fn one_vertex() -> Document {
+        let mesh = PolygonMesh { positions: vec![Vec3::ONE], faces: Vec::new() };
+        let cage = Arc::new(RestCage { mesh, ..RestCage::default() });
+        Document { cage, ..Document::default() }
+    }
+
+    /// The bytes are a count, the largest offset 2, and the offsets 2, 1 and -2 in units of 2 / 32,767.
+    #[test]
+    fn poses_of_older_projects_are_read() {
+        let bytes = [1, 0, 0, 0, 0, 0, 0, 0x40, 0xff, 0x7f, 0, 0x40, 1, 0x80];
+        let old =
+            DocumentSettings { pose: Some(URL_SAFE_NO_PAD.encode(bytes)), ..DocumentSettings::default() };
+        let pose = old.pose_of(&one_vertex()).unwrap().unwrap();
+        assert!(pose[0].distance(Vec3::new(3.0, 2.0, -1.0)) < 2.0 / 32_767.0, "{pose:?}");
+    }
+
     #[test]
     fn damaged_poses_give_a_message() {
-        let document = Document::default();
-        for pose in ["!", "AAEC", ""] {
+        let document = one_vertex();
+        // The last pose has 12 bytes, but a coordinate is NaN.
+        for pose in ["!", "AAEC", "", "AAAAAAAAwH8AAAAA"] {
             let settings = DocumentSettings { pose: Some(pose.to_owned()), ..DocumentSettings::default() };
             assert!(settings.pose_of(&document).unwrap_err().contains("at rest"), "{pose}");
         }

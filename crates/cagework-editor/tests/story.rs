@@ -228,12 +228,7 @@ fn assert_survives_saving(editor: &Editor, k: usize) {
         assert_eq!((&a.name, &a.positions, a.lead), (&b.name, &b.positions, b.lead), "{k}");
     }
     assert_eq!(reopened.transition, document.transition, "{k}");
-    // Projects store each coordinate of a pose in 16 bits, relative to the pose's largest movement.
-    let movements = document.pose.iter().zip(&document.cage.mesh.positions).map(|(p, r)| p.distance(*r));
-    let largest = movements.fold(0.0, f32::max);
-    for (a, b) in reopened.pose.iter().zip(&*document.pose) {
-        assert!(a.distance(*b) <= 1e-4 * largest, "{k}: {a} {b}");
-    }
+    assert_eq!(reopened.pose, document.pose, "{k}");
     assert_eq!(document.is_posed(), reopened.is_posed(), "{k}");
     if document.is_posed() {
         assert_eq!(reopened.shares, document.shares, "{k}");

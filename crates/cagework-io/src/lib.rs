@@ -61,7 +61,7 @@ pub use part_kind::PartKind;
 pub use point_file::{PointFile, PointFileError};
 pub use polygons::PolygonsError;
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
-pub use project::{Project, ProjectError, read_project, write_project};
+pub use project::{Project, ProjectError, position_bytes, positions_of, read_project, write_project};
 pub use rigged::UnknownClip;
 pub use select::SelectError;
 pub use shown::{escaped, json_fault, shown, value_fault};

@@ -336,11 +336,15 @@ fn drop_cage(json: &mut Value, node: Option<u64>) {
     }
 }
 
-fn position_bytes(positions: &[Vec3]) -> Vec<u8> {
+/// Positions as projects store them: three little-endian f32 each.
+#[must_use]
+pub fn position_bytes(positions: &[Vec3]) -> Vec<u8> {
     positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect()
 }
 
-fn positions_of(bytes: &[u8]) -> Option<Vec<Vec3>> {
+/// Positions from [`position_bytes`]; `None` if bytes are missing or a number is not finite.
+#[must_use]
+pub fn positions_of(bytes: &[u8]) -> Option<Vec<Vec3>> {
     let numbers = |b: &[u8]| b.try_into().map_or(f32::NAN, f32::from_le_bytes);
     let vector = |b: &[u8]| Vec3::new(numbers(&b[..4]), numbers(&b[4..8]), numbers(&b[8..]));
     let positions: Vec<Vec3> = bytes.chunks_exact(12).map(vector).collect();
