@@ -156,6 +156,11 @@ impl RawSplats {
                 return wrong("the position", position.to_string(), FINITE);
             }
             let scale = &mut splats.scales[splat];
+            if let Some(axis) = (0..3).find(|&axis| scale[axis].is_nan()) {
+                let limits =
+                    ["scale_0 is not a number", "scale_1 is not a number", "scale_2 is not a number"];
+                return wrong("the scale", scale.to_string(), limits[axis]);
+            }
             if !scale.abs().cmple(Vec3::splat(MAX_SCALE)).all() {
                 return wrong("the scale", scale.to_string(), "the limit is 1e15");
             }
@@ -189,7 +194,8 @@ impl RawSplats {
                 .chain(harmonics)
                 .find(|c| !c.abs().cmple(Vec3::splat(MAX_COLOR)).all())
             {
-                return wrong("the colour", color.to_string(), "the limit is 1e15");
+                let limit = if color.is_nan() { FINITE } else { "the limit is 1e15" };
+                return wrong("the colour", color.to_string(), limit);
             }
         }
         let mut notices = Vec::new();

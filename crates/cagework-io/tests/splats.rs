@@ -419,8 +419,15 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         huge.contains("splat 2 has the scale") && huge.contains("the limit is 1e15: remove such splats"),
         "{huge}"
     );
-    for color in [f32::INFINITY, f32::NAN, 1e38] {
-        assert!(with(10, color).unwrap_err().contains("splat 2 has the colour"));
+    for (column, property) in [(19, "scale_0"), (20, "scale_1"), (21, "scale_2")] {
+        let fault = with(column, f32::NAN).unwrap_err();
+        let reason = format!("but {property} is not a number: remove such splats");
+        assert!(fault.contains("splat 2 has the scale [") && fault.contains(&reason), "{fault}");
+    }
+    for (color, limit) in [(f32::INFINITY, "1e15"), (f32::NAN, "all numbers must be finite"), (1e38, "1e15")]
+    {
+        let fault = with(10, color).unwrap_err();
+        assert!(fault.contains("splat 2 has the colour") && fault.contains(limit), "{fault}");
     }
     assert!(with(18, f32::NAN).unwrap_err().contains("the opacity NaN"));
     // Infinite odds are an opacity of 1, and a scale of exp(-200) is 0.

@@ -52,7 +52,7 @@ pub(crate) fn read(
             }
             if let Some(inner) = extension["extensions"].as_object().and_then(|all| all.keys().next()) {
                 let problem = format!(
-                    "its splats use {}, which is not supported: convert them with `splat-transform IN.glb OUT.ply`",
+                    "its splats use {}, which is not supported: export them as .ply or .spz instead",
                     crate::shown::shown(inner)
                 );
                 return Err(SplatError::Unsupported(problem).into());
