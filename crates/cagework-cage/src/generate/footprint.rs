@@ -14,17 +14,27 @@ const ROUNDING_MARGIN: f64 = 1e-6;
 /// A separating axis with a smaller x component does not bound x.
 const MIN_AXIS_X: f64 = 1e-12;
 
-/// Bounds on the centres of the voxels that a triangle overlaps, from its separating axes.
+/// The voxels that a triangle overlaps.
 #[derive(Debug)]
 pub(crate) struct Footprint {
+    triangle: [DVec3; 3],
+    /// Half the edge of the enlarged voxels.
+    half: f64,
+    min: DVec3,
+    max: DVec3,
+    /// Computed for the first run: most triangles of dense models need no run.
+    axes: Option<Axes>,
+}
+
+/// Bounds on the centres of the voxels that a triangle overlaps, from its separating axes.
+#[derive(Debug)]
+struct Axes {
     /// Bounds on x that depend on y and z; the first `n_slanted` are used.
     slanted: [RowBound; 10],
     n_slanted: usize,
     /// Bounds on combinations of y and z without x; the first `n_across` are used.
     across: [RowBound; 10],
     n_across: usize,
-    min: DVec3,
-    max: DVec3,
 }
 
 /// The bounds `low <= x + y_share y + z_share z <= high`, or the same without x. The fields `y` and `z` are these
@@ -42,26 +52,61 @@ impl Footprint {
     pub(crate) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
         let half = 0.5 + grow + ROUNDING_MARGIN;
         let [a, b, c] = triangle;
-        let mut footprint = Self {
+        let (min, max) = (a.min(b).min(c) - half, a.max(b).max(c) + half);
+        Self { triangle, half, min, max, axes: None }
+    }
+
+    pub(crate) fn n_rows(&self, dims: [usize; 3]) -> usize {
+        let [_, ys, zs] = rows(self.min, self.max, dims);
+        ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
+    }
+
+    /// Adds the run of every row to `voxels`. Skips rows whose part of the bounding box is already in the set.
+    pub(crate) fn add_to(mut self, voxels: &mut Voxels) {
+        let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
+        // Because of rounding, a run may begin one voxel before the bounding box.
+        let (from, end) = (ceil(self.min.x - 0.5 - ROUNDING_MARGIN), xs[1]);
+        if from >= end {
+            return;
+        }
+        for z in zs[0]..zs[1] {
+            for y in ys[0]..ys[1] {
+                if !voxels.has_whole_run(y, z, from, end - 1)
+                    && let Some((first, last)) = self.run(y, z, voxels.dims[0])
+                {
+                    voxels.add_run(y, z, first, last);
+                }
+            }
+        }
+    }
+
+    fn run(&mut self, y: usize, z: usize, n: usize) -> Option<(usize, usize)> {
+        let axes = self.axes.get_or_insert_with(|| Axes::new(self.triangle, self.half, [self.min, self.max]));
+        axes.run(y, z, n, [self.min.x, self.max.x])
+    }
+}
+
+impl Axes {
+    fn new(triangle: [DVec3; 3], half: f64, bounds: [DVec3; 2]) -> Self {
+        let mut axes = Self {
             slanted: [RowBound::default(); 10],
             n_slanted: 0,
             across: [RowBound::default(); 10],
             n_across: 0,
-            min: a.min(b).min(c) - half,
-            max: a.max(b).max(c) + half,
         };
+        let [a, b, c] = triangle;
         let edges = [b - a, c - b, a - c];
-        footprint.bound(edges[0].cross(edges[1]), triangle, half);
+        axes.bound(edges[0].cross(edges[1]), triangle, half, bounds);
         for e in edges {
-            footprint.bound(DVec3::new(0.0, -e.z, e.y), triangle, half);
-            footprint.bound(DVec3::new(e.z, 0.0, -e.x), triangle, half);
-            footprint.bound(DVec3::new(-e.y, e.x, 0.0), triangle, half);
+            axes.bound(DVec3::new(0.0, -e.z, e.y), triangle, half, bounds);
+            axes.bound(DVec3::new(e.z, 0.0, -e.x), triangle, half, bounds);
+            axes.bound(DVec3::new(-e.y, e.x, 0.0), triangle, half, bounds);
         }
-        footprint
+        axes
     }
 
     /// Adds the bounds that one separating axis sets.
-    fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64) {
+    fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64, [min, max]: [DVec3; 2]) {
         let [p, q, r] = triangle.map(|v| axis.dot(v));
         let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
         let (low, high) = (p.min(q).min(r) - reach, p.max(q).max(r) + reach);
@@ -73,35 +118,15 @@ impl Footprint {
             self.n_slanted += 1;
         } else {
             // The axis has no x component except by rounding: widen the bounds by the range of the x term.
-            let (one, other) = (axis.x * self.min.x, axis.x * self.max.x);
+            let (one, other) = (axis.x * min.x, axis.x * max.x);
             let (low, high) = (low - one.max(other), high - one.min(other));
             self.across[self.n_across] = RowBound { y: axis.y, z: axis.z, low, high };
             self.n_across += 1;
         }
     }
 
-    pub(crate) fn n_rows(&self, dims: [usize; 3]) -> usize {
-        let [_, ys, zs] = rows(self.min, self.max, dims);
-        ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
-    }
-
-    /// Adds the run of every row to `voxels`. Skips rows whose part of the bounding box is already in the set.
-    pub(crate) fn add_to(&self, voxels: &mut Voxels) {
-        let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
-        // Because of rounding, a run may extend one voxel beyond the bounding box at either end.
-        let (from, to) = (xs[0].saturating_sub(1), xs[1].min(voxels.dims[0] - 1));
-        for z in zs[0]..zs[1] {
-            for y in ys[0]..ys[1] {
-                if !voxels.has_whole_run(y, z, from, to)
-                    && let Some((first, last)) = self.run(y, z, voxels.dims[0])
-                {
-                    voxels.add_run(y, z, first, last);
-                }
-            }
-        }
-    }
-
-    fn run(&self, y: usize, z: usize, n: usize) -> Option<(usize, usize)> {
+    /// The run of a row. `xs`: bounds on x of the triangle's bounding box.
+    fn run(&self, y: usize, z: usize, n: usize, xs: [f64; 2]) -> Option<(usize, usize)> {
         let (y, z) = (y as f64 + 0.5, z as f64 + 0.5);
         for a in &self.across[..self.n_across] {
             let at = a.y * y + a.z * z;
@@ -109,7 +134,7 @@ impl Footprint {
                 return None;
             }
         }
-        let (mut low, mut high) = (self.min.x, self.max.x);
+        let [mut low, mut high] = xs;
         for s in &self.slanted[..self.n_slanted] {
             let at = s.y * y + s.z * z;
             low = low.max(s.low - at);
@@ -129,20 +154,17 @@ pub(super) fn any_run(
     dims: [usize; 3],
     each: impl Fn(usize, usize, usize, usize) -> bool,
 ) -> bool {
-    let half = 0.5 + grow + ROUNDING_MARGIN;
-    let [a, b, c] = triangle;
-    let [xs, ys, zs] = rows(a.min(b).min(c) - half, a.max(b).max(c) + half, dims);
+    let mut footprint = Footprint::new(triangle, grow);
+    let [xs, ys, zs] = rows(footprint.min, footprint.max, dims);
     if xs[0] >= xs[1] {
         return false;
     }
-    let mut footprint = None;
     for z in zs[0]..zs[1] {
         for y in ys[0]..ys[1] {
-            if each(y, z, xs[0], xs[1] - 1) {
-                let footprint = footprint.get_or_insert_with(|| Footprint::new(triangle, grow));
-                if footprint.run(y, z, dims[0]).is_some_and(|(first, last)| each(y, z, first, last)) {
-                    return true;
-                }
+            if each(y, z, xs[0], xs[1] - 1)
+                && footprint.run(y, z, dims[0]).is_some_and(|(first, last)| each(y, z, first, last))
+            {
+                return true;
             }
         }
     }

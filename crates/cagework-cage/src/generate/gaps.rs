@@ -7,7 +7,7 @@ use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::voxels::Voxels;
 use super::{CageOptions, MAX_VOXELS};
 use cagework_core::cage::Cage;
-use cagework_core::geometry::winding_number;
+use cagework_core::geometry::{winding_number, winding_number_of_mesh};
 use cagework_core::progress::Cancelled;
 
 /// Largest allowed cosine of the angle between the directions from a sheet to its two walls. Creases whose walls open
@@ -239,8 +239,8 @@ impl Gap {
     pub(super) fn is_hollow(&self, lattice: &Lattice, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
         let n = self.voxels.len();
         let is_inside = |k: usize| {
-            let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
-            winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
+            let point = center(lattice, self.voxels[k * n / 4]).as_dvec3();
+            winding_number_of_mesh(point, positions, triangles).abs() > 0.5
         };
         // Decide by the majority of three points of the sheet; the third is needed only if the first two differ.
         let [first, second] = [1, 2].map(is_inside);
