@@ -50,7 +50,7 @@ const FAULTS: readonly Fault[] = [
     name: "a face without area",
     cage: { ...cube, faces: [...cube.faces, [0, 1, 1]] },
     says: /no area/,
-    button: /Drop it/,
+    button: /Remove it/,
     broken: true,
     vertices: 8,
   },

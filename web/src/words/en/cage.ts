@@ -91,7 +91,7 @@ export const cage = {
   outside: "Vertices outside",
   encloses: "Encloses the model",
   partOutside: "Part of the model is outside.",
-  preview: (n: number) => `The view shows a preview of ${plural(n, "vertex", "vertices")}.`,
+  preview: (n: number) => `The view shows a preview with ${plural(n, "vertex", "vertices")}.`,
   vertices: (n: number) => plural(n, "vertex", "vertices"),
   edges: "Edges",
   faces: "Faces",
@@ -99,13 +99,13 @@ export const cage = {
   bridged: (parts: number, models: number) =>
     `${models > 1 ? "The models have" : "The model has"} ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>
-    `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices, move Closeness to the right.`,
+    `These vertices follow the shape within ${share} of its size. To use more of the ${wanted} vertices you asked for, move Closeness to the right.`,
   sparsest: (share: string) =>
     `These vertices follow the shape within ${share} of its size, the closest setting.`,
   fineEnough: "Fine enough",
   repairs: {
     weld: () => "Join them",
-    drop_degenerate: (n: number) => (n === 1 ? "Drop it" : `Drop all ${n}`),
+    drop_degenerate: (n: number) => (n === 1 ? "Remove it" : `Remove all ${n}`),
     mirror: () => "Mirror this half",
     fill_holes: () => "Fill the holes",
     flip: () => "Turn them outward",

@@ -22,7 +22,7 @@ export const clips = {
   jointsSentence: "A dot for a joint inside the cage, a ring for one outside.",
   rigid: (kept: number, all: number) => `Parts that keep their shape (${kept} of ${all})`,
   rigidSentence: "For buckles, eyes or weapons: each moves with its joint and does not bend.",
-  advanced: "More about joints",
+  advanced: "More joint options",
   turn: "Bones turn with the shape",
   turnSentence:
     "For a cage that poses the model, for example raises an arm: joints turn too, and rotations in clips are adapted.",

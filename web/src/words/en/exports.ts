@@ -44,7 +44,7 @@ export const exports = {
     ],
     smallest: [
       "Smallest",
-      "Also rounds positions to 16 bits and compresses by meshopt, for three.js and Babylon.js. Blender cannot open it.",
+      "Also rounds positions to 16 bits and compresses with meshopt, for three.js and Babylon.js. Blender cannot open it.",
     ],
   },
   expressions: "Expressions of the VRM",

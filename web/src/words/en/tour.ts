@@ -100,7 +100,7 @@ export const tourWords = {
     splat: {
       title: "What a splat is",
       claim: () =>
-        "This cow has no triangles: 10,000 splats, soft ellipsoids with a colour, show it. The cage deforms the space around each splat. Nearby, that is a stretch and a rotation, which turn a small sphere into an ellipsoid and a splat into another splat.",
+        "This cow has no triangles: 10,000 splats, soft ellipsoids with a colour, show it. The cage deforms the space around each splat. Close to the splat, that is a stretch and a rotation, which turn a small sphere into an ellipsoid and a splat into another splat.",
       task: "pull the head, then point at the neck or tap it.",
     },
   },

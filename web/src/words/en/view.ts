@@ -44,7 +44,7 @@ export const status = {
   rest: "the rest pose",
   broken: "The cage has faults; step Cage lists them",
   selected: (last: number) => `Cage vertex ${last} selected`,
-  innerSelected: (last: number) => `Control ${last} inside selected`,
+  innerSelected: (last: number) => `Inner control ${last} selected`,
   placing: {
     point: "Click the model to put a point there",
     line: "Click each corner of the bone, then Done",
