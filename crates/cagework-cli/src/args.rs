@@ -62,7 +62,7 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and deform the mesh with it.
     Deform(DeformArgs),
-    /// Map points by the deformation of a moved cage, or back.
+    /// Map points through the deformation of a moved cage, or back.
     Map(MapArgs),
     /// Deform many models with one cage and one pose. The cage is solved once; each model gets its own output file.
     Refit(RefitArgs),

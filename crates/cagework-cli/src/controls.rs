@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cagework_core::words::counted;
 use cagework_core::{Cage, ControlSet, InnerControls};
 use cagework_io::{SavedWeights, UpAxis, read_inner_controls};
 use glam::{DVec3, Vec3};
@@ -66,7 +67,11 @@ pub(crate) fn with_inner(
 ) -> Result<Vec<Vec<Vec3>>, CliError> {
     if !files.is_empty() && files.len() != poses.len() {
         return Err(CliError::Mismatch {
-            message: format!("{} --pose-controls were given for {} --pose", files.len(), poses.len()),
+            message: format!(
+                "--pose-controls: {} for {}",
+                counted(files.len(), "file", "files"),
+                counted(poses.len(), "pose", "poses")
+            ),
             hint: "give one for each --pose, in the same order, or none",
         });
     }
@@ -77,10 +82,10 @@ pub(crate) fn with_inner(
         }
         Err(CliError::Mismatch {
             message: format!(
-                "{}: has {} vertices, but {} inner controls were bound",
+                "{}: has {}, but {} bound",
                 shown_path(path),
-                positions.len(),
-                rest.len()
+                counted(positions.len(), "vertex", "vertices"),
+                counted(rest.len(), "inner control was", "inner controls were")
             ),
             hint: "the pose of inner controls is their file with moved vertices: same number, same order",
         })

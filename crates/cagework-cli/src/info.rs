@@ -109,7 +109,12 @@ impl std::fmt::Display for InnerInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { file, vertices, points, lines, faces, .. } = self;
         writeln!(f, "{} (OBJ), inner controls for `cagework bind --controls`", shown(file))?;
-        writeln!(f, "  vertices    {vertices}\n  elements    {points} points, {lines} lines, {faces} faces")
+        let elements = [
+            counted(*points, "point", "points"),
+            counted(*lines, "line", "lines"),
+            counted(*faces, "face", "faces"),
+        ];
+        writeln!(f, "  vertices    {vertices}\n  elements    {}", elements.join(", "))
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use cagework_core::Frames;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::progress::Silent;
+use cagework_core::words::counted;
 use cagework_core::{BindOptions, Controls, InnerControls, Weights, bind};
 use cagework_io::{Model, SavedWeights, write_inner_controls};
 use cagework_pose::pull::{Probes, Pull};
@@ -58,10 +59,10 @@ impl BoundModel {
         if inner_controls != inner {
             return Err(CliError::Mismatch {
                 message: format!(
-                    "{}: was bound with {} inner controls, but {} were given, or at other positions",
+                    "{}: was bound with {}, but {} given, or at other positions",
                     shown_path(&args.weights),
-                    inner_controls.len(),
-                    inner.len()
+                    counted(inner_controls.len(), "inner control", "inner controls"),
+                    counted(inner.len(), "was", "were")
                 ),
                 hint: "give the same --controls and --smooth as for `cagework bind`",
             });

@@ -228,7 +228,7 @@ pub const MAX_ITERATIONS: Number = Number {
     name: "max_iterations",
     help: "Stop after this many Jacobi sweeps or cg steps, and after at most 60 V-cycles",
     unit: "iterations",
-    allowed: "a whole number from 1 on",
+    allowed: "a whole number of at least 1",
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
     slider: Some(Slider { min: 1.0, max: 1e6, step: 1.0 }),
 };

@@ -72,7 +72,7 @@ pub struct RepairedMesh {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RepairError {
     /// [`Repair::Grow`] was requested without a model to enclose.
-    #[error("growing the cage needs the model that should be inside: give it")]
+    #[error("growing the cage needs a model: give the one that should be inside")]
     NoModel,
     /// [`Repair::Grow`] was requested for a mesh that is not a valid cage after the other repairs.
     #[error("the mesh must be a valid cage before it can grow: {0}")]

@@ -36,11 +36,11 @@ pub(crate) struct PoseArgs {
 
 /// Arguments of `cagework fit`.
 #[derive(Args, Debug)]
-#[command(after_help = "LANDMARKS is a list of pairs, such as\n\n  \
+#[command(after_help = "The file of --landmarks is a list, such as\n\n  \
     [{\"vertex\": 1204, \"to\": [0.4, 1.1, 0]},\n   {\"triangle\": 88, \"bary\": [0.2, 0.3, 0.5], \"to\": [0, 1, 0]},\n   \
     {\"point\": [0.1, 1.7, 0.1], \"to\": [0.1, 1.9, 0.2]}]\n\n\
     A landmark is a vertex of the model, a point of a triangle, or the model's closest point to a position. \
-    \"weight\" is its weight in the sum, 1 by default.\n\n\
+    An optional \"weight\" says how much it counts, 1 by default.\n\n\
     Examples:\n  cagework fit shirt.glb --cage cage.obj --weights shirt.npz --target shirt-large.glb -o large.obj\n  \
     cagework fit shirt.glb --cage cage.obj --weights shirt.npz --landmarks body.json -o body.obj")]
 #[command(group = clap::ArgGroup::new("to").required(true).args(["target", "landmarks"]))]

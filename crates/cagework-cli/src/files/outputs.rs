@@ -92,7 +92,7 @@ pub(crate) fn refuse_files_named(
             if let Some(output) = beside.iter().find(|output| output.is_same(&identity)) {
                 return Err(CliError::Mismatch {
                     message: format!(
-                        "{}: would be overwritten, but {} names it",
+                        "{}: would be overwritten, but {} uses it",
                         shown_path(&output.path),
                         shown_path(model)
                     ),

@@ -123,7 +123,7 @@ fn surface_point(bound: &BoundModel, landmark: &LandmarkJson) -> Result<SurfaceP
                 || (bary.iter().sum::<f64>() - 1.0).abs() > BARY_TOLERANCE
             {
                 return Err(format!(
-                    "has the barycentric coordinates {bary:?}; expected numbers from 0 on that sum to 1"
+                    "has the barycentric coordinates {bary:?}; expected non-negative numbers that sum to 1"
                 ));
             }
             Ok((model.triangles[t as usize], bary.map(|b| b.max(0.0))))

@@ -67,16 +67,16 @@ fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
         motion(-1.0)
     );
 
-    sandbox.run("info spine.obj").success().stdout(contains("1 points, 1 lines, 0 faces"));
+    sandbox.run("info spine.obj").success().stdout(contains("1 point, 1 line, 0 faces"));
     sandbox.write("few.obj", "v 0 0 0\np 1\n");
     sandbox
         .run(&format!("{deform} --pose-controls few.obj"))
         .failure()
-        .stderr(contains("has 1 vertices, but 4 inner controls were bound"));
+        .stderr(contains("has 1 vertex, but 4 inner controls were bound"));
     sandbox
         .run(&format!("{deform} --pose-controls moved.obj --pose-controls moved.obj"))
         .failure()
-        .stderr(contains("2 --pose-controls were given for 1 --pose"));
+        .stderr(contains("--pose-controls: 2 files for 1 pose"));
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn invalid_targets_are_rejected_and_nothing_is_written() {
     sandbox
         .run(&format!("{FIT} --target target.obj --lambda=-1"))
         .failure()
-        .stderr(contains("lambda is -1; it must be a number from 0 on"));
+        .stderr(contains("lambda is -1; it must be a number of at least 0"));
     for (landmarks, message) in [
         ("[]", "bad.json: has 0 landmarks; expected 1 to 10000"),
         ("{}", "bad.json: a value has the wrong type, at line 1, column 0"),
@@ -86,7 +86,7 @@ fn invalid_targets_are_rejected_and_nothing_is_written() {
         ("[{\"to\": [0, 0, 0]}]", "landmark 0 needs one of vertex, triangle (with bary) and point"),
         (
             "[{\"triangle\": 0, \"bary\": [1, 1, 1], \"to\": [0, 0, 0]}]",
-            "expected numbers from 0 on that sum to 1",
+            "expected non-negative numbers that sum to 1",
         ),
         ("[{\"vertex\": 1, \"to\": [0, 0, 1e39]}]", "landmark 0 has the coordinate inf"),
         (

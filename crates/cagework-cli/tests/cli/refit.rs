@@ -196,7 +196,7 @@ fn outputs_that_later_models_refer_to_are_rejected_before_anything_is_written() 
         sandbox.write(model, &content);
         let refit = format!("{} a.obj {model}", REFIT.replace("-o out", "-o kit/out"));
         sandbox.run(&refit).code(1).stdout("").stderr(contains(format!(
-            "error: kit/out/a.obj: would be overwritten, but {model} names it\nhint: "
+            "error: kit/out/a.obj: would be overwritten, but {model} uses it\nhint: "
         )));
         assert_eq!(sandbox.read("kit/out/a.obj"), named.as_bytes(), "{content}");
         std::fs::remove_file(sandbox.path(model)).unwrap();
@@ -210,7 +210,7 @@ fn outputs_that_later_models_refer_to_are_rejected_before_anything_is_written() 
     sandbox
         .run(&format!("{REFIT} a.obj kit/b.obj"))
         .code(1)
-        .stderr(contains("out/a.obj: would be overwritten, but kit/b.obj names it"));
+        .stderr(contains("out/a.obj: would be overwritten, but kit/b.obj uses it"));
 }
 
 #[test]

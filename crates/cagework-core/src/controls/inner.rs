@@ -87,7 +87,7 @@ pub enum ControlError {
         vertex: u32,
     },
     /// An element has the index of a vertex that does not exist.
-    #[error("{what} {element} inside the cage names vertex {vertex}, but there are only {n} (0 to {})", n - 1)]
+    #[error("{what} {element} inside the cage names vertex {vertex}; indices run from 0 to {}", n - 1)]
     Index {
         /// Kind of element.
         what: &'static str,

@@ -98,7 +98,7 @@ impl Pull {
         let goals = self.goals(weights, shares, to)?;
         let used = shares.iter().filter(|&&share| share > 0.0).count();
         let n = self.n_cage();
-        let value = |value| PullError::Value { what: "lambda", value, range: "a number from 0 on" };
+        let value = |value| PullError::Value { what: "lambda", value, range: "a number of at least 0" };
         if let Some(lambda) = options.lambda {
             if !(0.0..f64::MAX).contains(&lambda) {
                 return Err(value(lambda));

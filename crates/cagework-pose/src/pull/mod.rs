@@ -53,7 +53,7 @@ pub enum PullError {
     Empty,
     /// The weights belong to another model or cage.
     #[error(
-        "the weights are of {rows} model vertices and {columns} cage vertices, but the model has {vertices} and the cage {cage}: \
+        "the weights are for {rows} model vertices and {columns} cage vertices, but the model has {vertices} and the cage {cage}: \
      bind this model to this cage"
     )]
     Shape {
@@ -89,7 +89,7 @@ pub enum PullError {
     #[error("nothing is grabbed: give at least one grab")]
     NoGrab,
     /// There are too many grabs and pins.
-    #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}")]
+    #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}: remove some")]
     Handles(usize),
     /// A value is not finite, or it is out of range.
     #[error("{what} is {value}; it must be {range}")]
@@ -121,6 +121,8 @@ pub enum PullError {
         cage: usize,
     },
     /// The matrix is singular in f64.
-    #[error("the pull cannot be solved: is the cage flat, or the pose not finite?")]
+    #[error(
+        "the pull cannot be solved: check that the cage is not flat and that the pose has only finite numbers"
+    )]
     Singular,
 }

@@ -15,10 +15,7 @@ fn invalid_controls_are_errors_with_a_remedy() {
     let middle = [[0.5; 3]];
     let cases = [
         (inner(&middle, vec![]), "there is no control inside: give points (p)"),
-        (
-            inner(&middle, vec![Point(1)]),
-            "point 0 inside the cage names vertex 1, but there are only 1 (0 to 0)",
-        ),
+        (inner(&middle, vec![Point(1)]), "point 0 inside the cage names vertex 1; indices run from 0 to 0"),
         (
             inner(&[[f32::NAN; 3]], vec![Point(0)]),
             "control 0 inside the cage has a coordinate that is not a finite number",
