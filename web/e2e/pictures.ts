@@ -1,6 +1,6 @@
 /** Makes the pictures of the samples and of docs/ for `cargo xtask pictures`. */
 
-import { mkdirSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { SCENE_DEFAULTS } from "../src/defaults";
@@ -62,7 +62,12 @@ const EXAMPLES: Readonly<Record<string, Example>> = {
     camera: [0.4, 0.1, 1],
   },
   smooth: { sample: "clamp", pose: 0, camera: [0.2, 0.1, 1], smooth: 2 },
-  thin: { sample: "strider", pose: 1, camera: [0.6, 0.2, 1] },
+  compare: {
+    sample: "clamp",
+    pose: 0,
+    camera: [0.2, 0.1, 0.75],
+    scene: { compare: ["harmonic", "mean_value", "green"] },
+  },
 };
 
 /** Moves cage vertices by a map. `[n_cage, 3]` */
@@ -79,6 +84,8 @@ function moved(rest: readonly number[], map: (vertex: Point) => Point): number[]
   );
   return points.flatMap((point) => point.map((x, axis) => x * half + (middle[axis] ?? 0)));
 }
+
+const LINKS = join(import.meta.dirname, "../src/gallery/links.json");
 
 test("links of the gallery", async ({ page }) => {
   await page.setViewportSize({ width: 1440, height: 900 });
@@ -111,8 +118,30 @@ test("links of the gallery", async ({ page }) => {
       ...(clip === undefined ? {} : { clip }),
     });
   }
-  const path = join(import.meta.dirname, "../src/gallery/links.json");
-  writeFileSync(path, `${JSON.stringify(links, null, 2)}\n`);
+  writeFileSync(LINKS, `${JSON.stringify(links, null, 2)}\n`);
+});
+
+test("the picture that other sites show of links", async ({ page }) => {
+  const { pull } = JSON.parse(readFileSync(LINKS, "utf8"));
+  await open(page, `./${pull}`);
+  const data = await page.evaluate(
+    async ([width, height, scene]) => {
+      const session = globalThis.cagework;
+      if (!session) throw new Error("no session");
+      session.engine.setScene({ ...scene, theme: "light", pull: false });
+      // Reducing a larger picture smooths edges.
+      const picture = await createImageBitmap(await session.picture(2 * width, 2 * height));
+      const canvas = new OffscreenCanvas(width, height);
+      const context = canvas.getContext("2d");
+      if (!context) throw new Error("no canvas");
+      context.imageSmoothingQuality = "high";
+      context.drawImage(picture, 0, 0, width, height);
+      const file = await canvas.convertToBlob({ type: "image/jpeg", quality: 0.85 });
+      return Array.from(new Uint8Array(await file.arrayBuffer()));
+    },
+    [1200, 630, SCENE_DEFAULTS] as const,
+  );
+  writeFileSync(join(import.meta.dirname, "../preview.jpg"), Uint8Array.from(data));
 });
 
 /** Side length of a sample's picture, pixels: three times its size in the page, for high-density screens. */

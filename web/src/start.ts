@@ -4,8 +4,10 @@ import { isSoftware } from "@cagework/core/session/adapter";
 import { effect, untracked } from "@preact/signals";
 import { report } from "./actions/context";
 import { stopOf } from "./actions/tour";
+import { isComparison } from "./actions/view";
 import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
+import { COORDINATES } from "./defaults";
 import { percent } from "./format";
 import type { Offline } from "./offline/keep";
 import { decodeShare } from "./share";
@@ -141,11 +143,11 @@ async function openShared(app: App): Promise<Link> {
     if (pose) engine.decodePose(pose);
     engine.amend();
     if (seen) app.view.show(seen);
-    if (clip !== undefined) {
-      if (!app.store.get().model?.clips[clip]) throw new PageError(T.link.noClip(clip));
-      await app.files.prepared();
-      await app.clips.choose(clip);
-    }
+    const compared = COORDINATES.filter((kind) => seen?.scene.compare?.includes(kind));
+    if (clip !== undefined && !app.store.get().model?.clips[clip]) throw new PageError(T.link.noClip(clip));
+    if (clip !== undefined || isComparison(compared)) await app.files.prepared();
+    await app.view.compare(compared);
+    if (clip !== undefined) await app.clips.choose(clip);
     return { opened };
   } catch (damage) {
     return { opened, damage };

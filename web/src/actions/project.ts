@@ -50,13 +50,10 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]) {
 
 export type Project = ReturnType<typeof createProject>;
 
-/**
- * Scene options that a link contains: no preferences, such as the theme, and none that need a computation, such as
- * slices.
- */
+/** Scene options that a link contains: no preferences, such as the theme, and no slices. */
 export function ofLink(scene: SceneOptions): Partial<SceneOptions> {
-  const { model, cage, floor, base_wireframe, colour, weights_to_one, problems } = scene;
-  return { model, cage, floor, base_wireframe, colour, weights_to_one, problems };
+  const { model, cage, floor, base_wireframe, colour, weights_to_one, problems, compare } = scene;
+  return { model, cage, floor, base_wireframe, colour, weights_to_one, problems, compare };
 }
 
 /**

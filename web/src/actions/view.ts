@@ -75,9 +75,10 @@ export function createView(
 
   return {
     scene,
-    /** Applies scene options, camera and selection of a link. */
+    /** Applies scene options, camera and selection of a link, but compares no coordinates: that needs the bound model. */
     show(seen: SharedView) {
-      const next = { ...store.get().scene, ...ofLink({ ...SCENE_DEFAULTS, ...seen.scene }) };
+      const { compare: _, ...shared } = ofLink({ ...SCENE_DEFAULTS, ...seen.scene });
+      const next = { ...store.get().scene, ...shared };
       engine().setScene(next);
       engine().setCamera(seen.camera);
       engine().select(Uint32Array.from(seen.selected), "replace");

@@ -77,6 +77,9 @@ export async function openLive(
     await session.bind({ ...BIND_DEFAULTS, backend: "cpu" }, () => undefined).done;
     if (model.splats > 0) await session.loadLattice(BIND_DEFAULTS.grid).done;
     if (seen) engine.setCamera(seen.camera);
+    // Each kind makes the pictures narrower, and the engine moves the camera away accordingly.
+    for (const kind of seen?.scene.compare ?? [])
+      if (kind !== "harmonic") await session.bindByFormula(kind).done;
     if (pose) engine.decodePose(pose);
     // `blend` interpolates between the cage at rest and a saved pose.
     engine.apply({ do: "save_pose", name: sample }, sample);

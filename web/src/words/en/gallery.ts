@@ -17,6 +17,9 @@ export const galleryWords = {
       title: "Smooth the cage",
       text: "Catmull-Clark subdivision: faces bend, with the same handles.",
     },
-    thin: { title: "Move thin parts", text: "One leg is pulled. The others stay in place." },
+    compare: {
+      title: "Compare coordinates",
+      text: "A jaw opens by harmonic, mean value and Green coordinates, from left to right.",
+    },
   },
 };
