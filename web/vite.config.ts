@@ -57,7 +57,8 @@ const writeServiceWorker: Plugin = {
 
 /**
  * Writes gallery.html, which is index.html with another title and description. The script of both pages decides from
- * the address whether to show the gallery.
+ * the address whether to show the gallery. Adds OpenGraph tags to both, which other sites read to show a link. The
+ * service worker does not keep the picture of these tags.
  */
 const writeGallery: Plugin = {
   name: "gallery",
@@ -66,14 +67,37 @@ const writeGallery: Plugin = {
     handler(_, bundle) {
       const page = bundle["index.html"];
       if (page?.type !== "asset") throw new Error("the build has no index.html");
-      const source = String(page.source)
+      const gallery = String(page.source)
         .replace("<title>", "<title>Gallery - ")
         .replace(/(name="description"\s+content=")[^"]*/, `$1${DESCRIPTION}`);
+      page.source = withPreview(String(page.source), "");
+      const source = withPreview(gallery, "gallery.html");
       this.emitFile({ type: "asset", fileName: "gallery.html", source });
+      const picture = readFileSync(join(import.meta.dirname, PREVIEW));
+      this.emitFile({ type: "asset", fileName: PREVIEW, source: picture });
     },
   },
 };
 const DESCRIPTION = "Live examples of cage deformation by harmonic coordinates, computed in your browser.";
+const PREVIEW = "preview.jpg";
+
+/** Adds OpenGraph tags with the title and description of a page. `SITE` is the address of the built site, if known. */
+function withPreview(html: string, name: string): string {
+  const site = process.env.SITE?.replace(/\/?$/, "/") ?? "./";
+  const tags = {
+    "og:type": "website",
+    "og:title": /<title>(.*)<\/title>/.exec(html)?.[1],
+    "og:description": /name="description"\s+content="([^"]*)"/.exec(html)?.[1],
+    "og:url": site + name,
+    "og:image": site + PREVIEW,
+    "og:image:width": "1200",
+    "og:image:height": "630",
+    "og:image:alt": "A rat in its cage, whose vertices are handles.",
+    "twitter:card": "summary_large_image",
+  };
+  const lines = Object.entries(tags).map(([key, value]) => `<meta property="${key}" content="${value}">`);
+  return html.replace("</title>", `</title>\n    ${lines.join("\n    ")}`);
+}
 
 /** Configuration of the page's build. URLs are relative, so the page works under any path of any server. */
 export default defineConfig({

@@ -1,13 +1,48 @@
 /** The gallery: its examples move and then stop drawing, and a title opens the page in the example's pose. */
 
+import links from "../src/gallery/links.json" with { type: "json" };
 import { decodeShare } from "../src/share";
 import { complaintsOfAxe } from "./stories";
-import { bound, expect, largestMove, restPositions, shoot, test } from "./support";
+import { bound, expect, largestMove, open, restPositions, shoot, test } from "./support";
 
 /** Lower limit for the size of a picture of an example, bytes. A PNG of a view in a single colour is smaller. */
 const PNG_OF_NOTHING = 3000;
 
 test.use({ viewport: { width: 1440, height: 900 } });
+
+test("both pages name a picture for links to them", async ({ page }) => {
+  for (const [path, title] of [
+    ["./", "Cagework"],
+    ["./gallery.html", "Gallery - Cagework"],
+  ] as const) {
+    const html = await (await page.request.get(path)).text();
+    const tag = (key: string) => new RegExp(`property="${key}" content="([^"]+)"`).exec(html)?.[1] ?? "";
+    expect(tag("og:title")).toBe(title);
+    expect(tag("og:description")).toMatch(/in your browser/);
+    expect(tag("twitter:card")).toBe("summary_large_image");
+    const picture = await (await page.request.get(tag("og:image"))).body();
+    expect(picture.length).toBeLessThan(150_000);
+    // The first frame header of a JPEG: marker, length, precision, height, width.
+    const frame = picture.indexOf(Buffer.from([0xff, 0xc0]));
+    expect([picture.readUInt16BE(frame + 7), picture.readUInt16BE(frame + 5)].map(String)).toEqual([
+      tag("og:image:width"),
+      tag("og:image:height"),
+    ]);
+  }
+});
+
+test("a link shows coordinates side by side, and is copied with them", async ({ page, context }) => {
+  await context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  await open(page, `./${links.compare}`);
+  await expect(page.locator(".compare-labels")).toHaveText("HarmonicMean valueGreen");
+  await shoot(page, "link-compare");
+  await page.getByRole("button", { name: /link/i }).first().click();
+  const copied = async () =>
+    decodeShare(new URL(await page.evaluate(() => navigator.clipboard.readText())).hash);
+  await expect
+    .poll(async () => (await copied())?.seen?.scene.compare)
+    .toEqual(["harmonic", "mean_value", "green"]);
+});
 
 test("every example is drawn, and a title opens the page in its pose", async ({ page }) => {
   await page.goto("./gallery.html");
