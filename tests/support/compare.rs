@@ -2,8 +2,8 @@
 
 use cagework_core::Weights;
 
-/// Finds the two numbers that differ most: their index, both values, and their distance. A NaN counts as an infinite
-/// difference.
+/// Finds the two numbers that differ most: their index, both values, and their distance; zeros if all are equal. A
+/// difference that is NaN counts as infinite.
 ///
 /// # Panics
 /// If the slices differ in length.

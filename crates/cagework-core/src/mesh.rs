@@ -54,7 +54,7 @@ pub struct TriMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Polygon mesh with faces of any size: input of a cage.
+/// Polygon mesh whose faces may have any number of corners. [`crate::Cage`] is made from it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PolygonMesh {
     /// Vertex positions.

@@ -29,10 +29,10 @@ pub struct DocumentSettings {
     /// [`cagework_io::encode_pose`]. Null at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<String>,
-    /// Surface points that pulls keep in place.
+    /// Pinned surface points, which stay in place when the user pulls others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
-    /// For each saved pose, the surface points that pulls keep in place.
+    /// The pinned surface points of each saved pose.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_pins: Vec<Vec<SurfacePoint>>,
     /// Share of each saved pose in the current pose, 0 to 1.

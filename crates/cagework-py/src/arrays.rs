@@ -20,7 +20,7 @@ pub(crate) enum Points<'py> {
 }
 
 impl Points<'_> {
-    /// The points `[n]`, relative to the origin that was subtracted when they were read.
+    /// The points `[n]`. Converted points are relative to the origin that was subtracted from them.
     pub(crate) fn as_slice(&self) -> &[Vec3] {
         match self {
             Self::Borrowed(array) => {

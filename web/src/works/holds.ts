@@ -20,7 +20,7 @@ export function hold(id: string): Promise<(() => void) | undefined> {
   });
 }
 
-/** Lists the ids of the work that any tab has open. */
+/** Returns the ids of the works that are open in any tab. */
 export async function heldIds(): Promise<ReadonlySet<string>> {
   const held = (await navigator.locks?.query())?.held ?? [];
   const names = held.flatMap(({ name }) => (name?.startsWith(PREFIX) ? [name.slice(PREFIX.length)] : []));

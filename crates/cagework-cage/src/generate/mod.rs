@@ -121,7 +121,8 @@ fn generate_plain(
     let base = first_voxels(target);
     let most_gaps = target / VERTICES_PER_GAP;
     let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
-        // With subdivision, the clearance keeps the surface off the model. A finer lattice would reduce this clearance.
+        // The lattice is refined for gaps only without subdivision: a subdivided surface lies inside its cage, and the
+        // finer lattice would leave less space between the cage and the model.
         (Shape::Follow, 0) => {
             let clearance = options.distance(bounds);
             gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &|_| {

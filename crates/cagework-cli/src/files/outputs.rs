@@ -159,8 +159,8 @@ impl FileIdentity {
     }
 }
 
-/// Opens a device or pipe for appending. For a name such as `/dev/fd/3`, returns a duplicate of that descriptor:
-/// opening the name would truncate the file, or write from its beginning.
+/// Opens a device or pipe for appending. On Linux, a name such as `/dev/fd/3` gives a duplicate of that descriptor,
+/// which continues at its position: opening the name would start at the beginning of the file, or append to its end.
 fn open_for_append(path: &Path) -> io::Result<File> {
     #[cfg(target_os = "linux")]
     if let Some(number) = descriptor(path) {

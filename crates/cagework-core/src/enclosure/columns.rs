@@ -71,7 +71,7 @@ impl<'a> Columns<'a> {
         for &number in &self.over[y * self.side + x] {
             let corners = self.triangles[number as usize];
             let [a, b, c] = corners.map(|q| q.truncate() - p);
-            // Doubled areas of the triangles of the point and each side.
+            // Twice the signed areas of the triangles that the point forms with the sides.
             let areas = [b.perp_dot(c), c.perp_dot(a), a.perp_dot(b)];
             let near = TOLERANCE * self.extent * self.extent;
             if areas.iter().any(|&area| area > near) && areas.iter().any(|&area| area < -near) {

@@ -348,7 +348,8 @@ impl<'a> Sampler<'a> {
         p.floor().clamp(DVec3::ZERO, highest).to_array().map(|x| x as u32)
     }
 
-    /// Adds the value of a wall at which a ray up (`side` 1) or down (0) ends.
+    /// Adds the value of the wall at which an upward (`side` 1) or downward (0) ray ends. If the ray hits the wall from
+    /// outside the cage, adds the weight to `scratch.outside` instead.
     fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
         // A ray that starts inside hits the back of a wall: an upward ray hits a face that faces up.
         if faces_up == (side == 1) {

@@ -52,7 +52,7 @@ impl Session {
     /// Vertices deformed on the CPU, `[n_vertices]`, object units. `None` without weights.
     ///
     /// # Panics
-    /// If the number of positions differs from the number of controls.
+    /// If the length of `pose` differs from the number of controls.
     #[must_use]
     pub fn deformed(&self, pose: &[Vec3]) -> Option<Vec<Vec3>> {
         let bound = self.bound.as_ref()?;

@@ -232,7 +232,8 @@ impl Engine {
         if let Some(player) = self.read(|state| Answer::Ok(state.models().get(id)?.model.player()?))? {
             return Ok(ModelMotion::Player(Box::new(player)));
         }
-        // A model whose format has no clips moves only with the cage.
+        // A model whose format has no clips has one shape: that of the cage's pose or, for `dynamic`, the rest shape,
+        // which the caller deforms.
         let pose =
             self.read(|state| if request.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
