@@ -49,7 +49,7 @@ pub const CLEARANCE: Number = Number {
 /// Range of [`CageOptions::voxels`].
 pub const VOXELS: Number = Number {
     name: "voxels",
-    help: "Voxels along the model's longest side; gaps narrower than three voxels are closed",
+    help: "Voxels along the model's longest side, finer across narrow gaps; gaps below three voxels are closed",
     unit: "voxels",
     allowed: "0 (automatic) or a whole number from 8 to 128",
     is_allowed: |n| n == 0.0 || n.fract() == 0.0 && (MIN_VOXELS as f64..=MAX_VOXELS as f64).contains(&n),
