@@ -30,7 +30,7 @@ fn random_splats(rng: &mut Rng, n: usize, at: impl Fn(&mut Rng) -> Vec3) -> Spla
 fn lattice() -> Lattice {
     let TriMesh { positions, triangles } = egg(5, 6);
     let faces = triangles.iter().map(|t| t.to_vec()).collect();
-    Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap(), 24)
+    Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).expect("an egg is a valid cage"), 24)
 }
 
 #[test]
