@@ -106,7 +106,7 @@ export function createPoses(ctx: Context, edit: Edit) {
       void portray(index);
     },
     rename(index: number, text: string) {
-      const name = text.trim();
+      const name = text.trim().replace(/\s+/g, " ");
       if (name === "" || name === store.get().poses[index]?.name) return;
       edit.apply({ do: "rename_pose", index, name }, T.did.rename);
     },

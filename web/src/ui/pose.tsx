@@ -305,12 +305,18 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
         >
           <Icon name="grip" />
         </button>
-        <input
+        {/* Unlike an input, a textarea wraps a long name. */}
+        <textarea
           class="pose-name"
-          type="text"
+          rows={1}
           value={name}
           aria-label={T.pose.nameOf(name)}
           maxLength={60}
+          onKeyDown={(event) => {
+            if (event.key !== "Enter") return;
+            event.preventDefault();
+            event.currentTarget.blur();
+          }}
           onChange={(event) => app.poses.rename(index, event.currentTarget.value)}
         />
         <Button
