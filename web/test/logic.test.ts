@@ -75,12 +75,12 @@ describe("hints", () => {
   const hint = (patch: Partial<AppState>, scene: Partial<AppState["scene"]>, isTouch = false) =>
     hintOf({ ...INITIAL, cage, bound: true, ...patch, scene: { ...INITIAL.scene, ...scene } }, isTouch);
   it("name only what the tool can do with what is visible", () => {
-    expect(hint({}, {})).toMatch(/^Pull the model, or drag a handle/);
-    expect(hint({}, { cage: false })).toMatch(/^Pull the model ·/);
-    expect(hint({}, { pull: false })).toMatch(/^Drag a handle/);
+    expect(hint({}, {})).toMatch(/^Pull the model or a handle/);
+    expect(hint({}, { cage: false })).toMatch(/^Pull the model \(arrow keys too\) ·/);
+    expect(hint({}, { pull: false })).toMatch(/^Drag a handle ·/);
     expect(hint({}, { pull: false, cage: false })).not.toMatch(/Drag a handle|Pull the model/);
     const selected = { count: 1, last: 0, center: null };
-    expect(hint({ selected }, { pull: false, gizmo: "move" })).toMatch(/gizmo/);
+    expect(hint({ selected }, { pull: false, gizmo: "move" })).toMatch(/gizmo.*arrow keys/);
     expect(hint({ editingRest: true }, { cage: false })).not.toMatch(/Drag a handle/);
   });
   it("mention no wheel, mouse button or key on a phone", () => {

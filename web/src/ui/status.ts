@@ -42,10 +42,10 @@ export function hintOf(state: AppState, isTouch: boolean): string {
   if (!cage) return T.hints.noCage;
   if (clip.clip !== null) return T.hints[`clip${clip.playing ? "" : "Paused"}${isTouch ? "Touch" : ""}`];
   if (editingRest && !scene.cage) return T.hints.restHidden;
-  if (editingRest) return isTouch ? T.hints.restTouch : T.hints.rest;
+  if (editingRest) return T.hints.rest;
   if (!bound) return bindRun ? T.hints.binding : T.hints.unbound;
   const drag = T.hints.drags[dragOf(state)];
-  return isTouch ? T.hints.touch(drag) : T.hints.mouse(drag);
+  return isTouch ? T.hints.touch(drag) : T.hints.mouse(drag, scene.pull || state.selected.count > 0);
 }
 
 function dragOf({ scene, selected }: AppState): keyof typeof T.hints.drags {

@@ -34,7 +34,7 @@ export const pose = {
   },
   poses: "Poses",
   empty:
-    "No poses yet. Drag the cage, then save the pose. Saved poses can be blended, played and exported as morph targets.",
+    "No poses yet. Pull the model, then save the pose. Saved poses can be blended, played and exported as morph targets.",
   save: "Save this pose",
   blend: "Blend",
   blendOf: (name: string) => `Blend of ${name}`,

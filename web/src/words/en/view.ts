@@ -67,21 +67,21 @@ export const hints = {
   placing:
     "The control is placed under the pointer, halfway between the model's front and back. Drag to turn the view.",
   restHidden: "The cage is hidden: show it in the See panel, then drag its handles.",
-  restTouch: "Drag a handle to reshape the cage; the model stays still.",
-  rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",
+  rest: "Drag a handle to reshape the cage; the model stays still. Pose, at the top, returns to posing.",
   binding: "The model is being bound. You can pose it afterwards.",
   unbound: "Bind the model so that it follows its cage.",
   /** What a drag does. It depends on the tool and on whether the cage is visible. */
   drags: {
     pull: "Pull the model",
-    pullOrHandle: "Pull the model, or drag a handle",
+    pullOrHandle: "Pull the model or a handle",
     handle: "Drag a handle",
     gizmo: "Drag the gizmo or a handle",
     nothing: "The cage is hidden: show it in the See panel, or choose Pull",
   },
   touch: (drag: string) => `${drag}. On the background, one finger turns, two move and zoom.`,
-  mouse: (drag: string) =>
-    `${drag} · drag the background to turn · right-drag to move · scroll to zoom · ? for keys`,
+  /** `arrows`: whether the arrow keys move what a drag moves. */
+  mouse: (drag: string, arrows: boolean) =>
+    `${drag}${arrows ? " (arrow keys too)" : ""} · drag elsewhere to turn · right-drag to move · scroll to zoom · ? for keys`,
 };
 
 export const toast = { close: "Close message" };
