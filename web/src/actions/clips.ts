@@ -5,17 +5,19 @@
 
 import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
-import { drawn, rigOf } from "../derived";
+import { drawn, isCapture, rigOf } from "../derived";
 import { follow } from "../queue";
 import type { ClipState } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
-/** Computes the lattice by which the cage deforms a moving model, if the options need one and the engine has none. */
-export async function loadClipLattice(ctx: Context): Promise<void> {
+/** Computes the lattice by which the cage deforms a capture or a moving model, if one is needed and there is none. */
+export async function loadLattice(ctx: Context): Promise<void> {
   const engine = ctx.engine();
-  if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
-  ctx.tell.say(T.clips.preparing);
+  const { model, posed } = ctx.store.get();
+  const { dynamic } = rigOf(ctx.store.get());
+  if (engine.hasLattice || !(dynamic || (isCapture(model) && posed))) return;
+  if (dynamic) ctx.tell.say(T.clips.preparing);
   const { grid } = ctx.store.get().bindOptions;
   // Playback and export use the same lattice: neither may cancel the computation that the other has started.
   await ctx.queue.add("lattice", async (signal) => {
@@ -71,7 +73,7 @@ export function createClips(ctx: Context, settle: () => void) {
       return false;
     }
     return attempt(ctx, T.failed.clip, async () => {
-      await loadClipLattice(ctx);
+      await loadLattice(ctx);
       await engine().startClip(rigOf(store.get()));
     });
   };

@@ -3,11 +3,11 @@
 import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
 import { EXPORT_TYPES, SHAPE_FORMATS, type SPLAT_FORMATS } from "../defaults";
-import { rigOf } from "../derived";
+import { isCapture, rigOf } from "../derived";
 import { exportStem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { loadClipLattice } from "./clips";
+import { loadLattice } from "./clips";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 import type { Pulling } from "./pull";
@@ -68,7 +68,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
 
   /** Downloads one file for each model to export, or all of them in a zip archive. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
-    if (kind === "glb") await loadClipLattice(ctx);
+    if (kind === "glb" || isCapture(model)) await loadLattice(ctx);
     const { members } = model;
     const { exportOnly } = ctx.store.get();
     const chosen = members.filter(({ id }) => id === exportOnly);

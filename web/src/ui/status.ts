@@ -1,6 +1,6 @@
 /** Sentences of the status line. */
 
-import { cageBroken } from "../derived";
+import { cageBroken, isCapture } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 
@@ -21,6 +21,7 @@ export function underWay(state: AppState): string | null {
   if (state.boxArmed) return T.status.boxArmed;
   if (state.playing) return T.status.playing(state.playingPose ?? T.status.rest);
   if (cageBroken(state)) return T.status.broken;
+  if (isCapture(state.model) && state.bound && !state.lattice) return T.status.capture;
   return null;
 }
 

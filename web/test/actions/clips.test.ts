@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
-import { createClips, loadClipLattice } from "../../src/actions/clips";
+import { createClips, loadLattice } from "../../src/actions/clips";
 import { rigOf } from "../../src/derived";
 import { createFake, MODEL, settled } from "../fake";
 
@@ -165,7 +165,7 @@ it("with the option `dynamic`, a clip starts once the lattice is ready, which is
   const chosen = clips.choose(0);
   await settled();
   expect([starts(), said.at(-1)]).toEqual([0, "Computing how the cage bends the moving model"]);
-  const exported = loadClipLattice(ctx);
+  const exported = loadLattice(ctx);
   await settled();
   asked.at(-1)?.resolve(undefined);
   teach({ hasLattice: true });

@@ -42,6 +42,23 @@ function page() {
   return { ...fake, exports, project, pull };
 }
 
+it("a posed capture is exported once the lattice that deforms it is ready", async () => {
+  const { exports, ctx, store, asked, teach, showModel } = page();
+  showModel({ ...MODEL, splats: 10 });
+  store.set({ posed: true });
+  teach({ hasLattice: false, exportGlb: () => new Uint8Array(1), rigNotices: () => [] });
+  // The job that starts after each bind of a capture.
+  const followed = ctx.queue.replace("lattice", () => ctx.session().loadLattice(8).done);
+  const saved = exports.save("glb");
+  await settled();
+  expect(downloads).toEqual([]);
+  teach({ hasLattice: true });
+  asked.at(-1)?.resolve(undefined);
+  await Promise.all([followed, saved]);
+  expect(downloads).toEqual(["cube-posed.glb"]);
+  expect(asked.filter(({ kind }) => kind === "lattice")).toHaveLength(1);
+});
+
 it("an export waits until a released pull has ended", async () => {
   const { exports, pull, teach } = page();
   let isPulling = true;

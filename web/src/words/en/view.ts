@@ -43,6 +43,7 @@ export const status = {
   playing: (pose: string) => `Playing: ${pose}`,
   rest: "the rest pose",
   broken: "The cage has faults; step Cage lists them",
+  capture: "Preparing the capture to follow the cage",
   selected: (last: number) => `Cage vertex ${last} selected`,
   innerSelected: (last: number) => `Inner control ${last} selected`,
   placing: {
