@@ -183,3 +183,47 @@ test("two fingers move the view, one finger poses", async ({ page }) => {
     await shoot(page, "touch-pulled");
   });
 });
+
+test("the sheet and its panels at every height", async ({ page }) => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await open(page);
+  const sheet = page.getByRole("button", { name: "Resize the panel" });
+  const step = (name: string) => page.getByRole("button", { name, exact: false }).first();
+  const heightOf = (selector: string) => page.locator(selector).evaluate((element) => element.clientHeight);
+  await test.step("a long name of a pose is readable as a whole", async () => {
+    await step("Pose").tap();
+    const name = page.getByRole("textbox", { name: /^Name of/ }).first();
+    await name.fill("Stretching to the left with both arms above the head");
+    await name.press("Enter");
+    await expect(name).not.toBeFocused();
+    const hidden = await name.evaluate((area) => [
+      area.scrollWidth - area.clientWidth,
+      area.scrollHeight - area.clientHeight,
+    ]);
+    expect(hidden).toEqual([0, 0]);
+    expect(await heightOf(".pose-name >> nth=0"), "more than one line").toBeGreaterThan(40);
+    await shoot(page, "phone-long-name");
+    await name.fill(" ");
+    await name.press("Enter");
+    await expect(name).toHaveValue(/^Stretching/);
+  });
+  await test.step("under the highest sheet, the overlays of the view do not overlap", async () => {
+    await expect(page.locator(".tools")).toBeVisible();
+    await sheet.tap();
+    await expect(page.locator(".tools")).toBeHidden();
+    await expect(page.locator(".axes")).toBeHidden();
+    await expect(page.locator(".looks")).toBeVisible();
+    await shoot(page, "phone-sheet-high");
+  });
+  await test.step("at the lowest sheet, See and a chosen step are visible", async () => {
+    await sheet.tap();
+    await expect.poll(() => heightOf(".panel")).toBeLessThan(0.2 * 844);
+    await page.getByRole("button", { name: /^See/ }).first().tap();
+    expect(await heightOf(".see")).toBeGreaterThan(0.4 * 844);
+    await shoot(page, "phone-see");
+    await page.getByRole("button", { name: /^See/ }).first().tap();
+    await step("Export").tap();
+    await expect.poll(() => heightOf(".panel")).toBeGreaterThan(0.4 * 844);
+    await shoot(page, "phone-export");
+  });
+});

@@ -157,6 +157,10 @@ function attachSheet(panel: HTMLElement, handle: HTMLElement): void {
     delete panel.dataset.dragging;
     if (moved) settle(panel.offsetHeight / window.innerHeight);
   };
+  // A step that the user chooses must be visible.
+  document.querySelector("#bar")?.addEventListener("click", ({ target }) => {
+    if (rest === 0 && target instanceof Element && target.closest(".step")) settle(RESTS[1]);
+  });
   handle.addEventListener("pointerup", end);
   handle.addEventListener("pointercancel", end);
   handle.addEventListener("click", () => {

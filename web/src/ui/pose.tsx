@@ -317,7 +317,11 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
             event.preventDefault();
             event.currentTarget.blur();
           }}
-          onChange={(event) => app.poses.rename(index, event.currentTarget.value)}
+          onChange={(event) => {
+            app.poses.rename(index, event.currentTarget.value);
+            // An empty name is rejected.
+            event.currentTarget.value = app.store.get().poses[index]?.name ?? "";
+          }}
         />
         <Button
           label={T.pose.show}
