@@ -226,7 +226,9 @@ impl ModelGap {
         } else {
             format!("choose a smaller detail than {}", options.detail)
         };
-        let Vec3 { x, y, z } = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
+        let mean = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
+        // Adding zero to the rounded coordinates turns -0 into 0.
+        let Vec3 { x, y, z } = (mean * 1e3).round() / 1e3 + Vec3::ZERO;
         let width = self.width;
         Some(format!(
             "the cage closes the gap of about {width:.3} at ({x:.3}, {y:.3}, {z:.3}); to keep it open, {remedy}"
