@@ -59,7 +59,7 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
     let bytes = read(path)?;
     let name = path.display().to_string();
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_within(&name, &bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_within(&name, bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
     Ok(model)
 }
@@ -71,7 +71,7 @@ pub(crate) fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Mo
 pub(crate) fn load_with_clips(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_with_clips(&path.display().to_string(), &bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_with_clips(&path.display().to_string(), bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
     Ok(model)
 }

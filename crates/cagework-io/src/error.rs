@@ -67,6 +67,16 @@ pub enum WriteError {
         /// Size that the export would have.
         bytes: u64,
     },
+    /// A GLB of this many corners could not be read again.
+    #[error(
+        "a material has {corners} corners of triangles, more than the limit of {limit} for a GLB: export another format"
+    )]
+    Corners {
+        /// Number of corners.
+        corners: u64,
+        /// Largest number that is accepted.
+        limit: u64,
+    },
     /// The original document cannot be patched, for the reason given.
     #[error("the original document cannot be patched: {0}")]
     Document(String),

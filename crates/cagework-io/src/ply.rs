@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
-    Addable as _, ElementDef, Encoding as PlyEncoding, Header, Ply, Property, PropertyAccess,
+    Addable as _, ElementDef, Encoding as PlyEncoding, Header, Property, PropertyAccess,
     PropertyAccessResult, PropertyDef, PropertyType, ScalarType,
 };
 use ply_rs_bw::writer::Writer;
@@ -18,6 +18,8 @@ const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOR: [&str; 3] = ["red", "green", "blue"];
 /// Vertex index that ends a triangle strip. The reader also stores it for values that are not valid indices.
 const NO_VERTEX: u32 = u32::MAX;
+/// Number of elements that are parsed or written at a time, each with memory of its own.
+const ELEMENTS_AT_A_TIME: usize = 1 << 16;
 /// Names of the property that lists the vertices of a face. Files use either name.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
@@ -30,12 +32,35 @@ struct Element {
     corners: Vec<u32>,
 }
 
-/// A face or triangle strip as read, which takes less memory than an [`Element`].
+/// A face or triangle strip as read.
 #[derive(Default)]
 struct Face {
     corners: Vec<u32>,
     /// The first corner that is not a valid index, as written.
     odd: Option<f64>,
+}
+
+/// All faces or triangle strips of a file in two lists. A list per face would take four times the memory.
+#[derive(Default)]
+struct Faces {
+    corners: Vec<u32>,
+    /// End of each face in `corners`.
+    ends: Vec<usize>,
+    /// The first face with a corner that is not a valid index, and that corner as written.
+    odd: Option<(usize, f64)>,
+}
+
+impl Faces {
+    fn push(&mut self, face: &Face) {
+        self.odd = self.odd.or(face.odd.map(|odd| (self.ends.len(), odd)));
+        self.corners.extend(&face.corners);
+        self.ends.push(self.corners.len());
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.corners[start..end])
+    }
 }
 
 impl PropertyAccess for Face {
@@ -170,11 +195,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
             return Err(PolygonsError::Count { name, count: element.count as u64, bytes: n_bytes });
         }
     }
-    // All elements of one kind are in memory at the same time. A corner takes at least one byte.
-    let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
+    // All vertices are in memory at the same time. A corner takes at least one byte.
     let corners = if count("face") + count("tristrips") > 0 { n_bytes } else { 0 };
-    let elements = others * size_of::<Element>() as u64;
-    let held = n_bytes + bytes.len() as u64 + elements;
+    let held = n_bytes + bytes.len() as u64 + count("vertex") * size_of::<Element>() as u64;
     Polygons::check_memory(held, count("vertex"), corners / 2, memory_limit)?;
 
     let mut read = Polygons {
@@ -191,7 +214,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     }
     let mut left_out = Vec::new();
     // Faces may precede their vertices.
-    let (mut faces, mut strips) = (Vec::new(), Vec::new());
+    let (mut faces, mut strips) = (Faces::default(), Faces::default());
     for (name, element) in &header.elements {
         let has = |names: &[&str]| names.iter().all(|&n| element.properties.contains_key(n));
         let known: Vec<&str> = [&POSITION[..], &NORMAL, &COLOR].concat();
@@ -211,9 +234,13 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
                 left_out.extend(element.properties.keys().filter(|k| !known.contains(&k.as_str())).cloned());
             }
             kind => {
-                let all = Parser::<Face>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(wrong)?;
+                let (parser, mut all) = (Parser::<Face>::new(), Faces::default());
+                for start in (0..element.count).step_by(ELEMENTS_AT_A_TIME) {
+                    let count = ELEMENTS_AT_A_TIME.min(element.count - start);
+                    let part = ElementDef { count, ..element.clone() };
+                    let read = parser.read_payload_for_element(&mut reader, &part, &header);
+                    read.map_err(wrong)?.iter().for_each(|face| all.push(face));
+                }
                 match kind {
                     "face" => faces = all,
                     "tristrips" => strips = all,
@@ -227,16 +254,16 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
             }
         }
     }
-    let n_triangles: usize = strips.iter().map(|strip| unstrip(&strip.corners).count()).sum();
-    let n_corners = faces.iter().map(|face| face.corners.len()).sum::<usize>() + 3 * n_triangles;
+    let n_triangles: usize = strips.iter().map(|strip| unstrip(strip).count()).sum();
+    let n_corners = faces.corners.len() + 3 * n_triangles;
     Polygons::check_memory(held, count("vertex"), n_corners as u64, memory_limit)?;
     read.corners.reserve_exact(n_corners);
-    read.face_starts.reserve_exact(faces.len() + n_triangles);
-    for face in faces {
-        read.corners.extend(&face.corners);
-        read.end_face(face.odd)?;
+    read.face_starts.reserve_exact(faces.ends.len() + n_triangles);
+    for (k, corners) in faces.iter().enumerate() {
+        read.corners.extend(corners);
+        read.end_face(faces.odd.filter(|odd| odd.0 == k).map(|odd| odd.1))?;
     }
-    for triangle in strips.iter().flat_map(|strip| unstrip(&strip.corners)) {
+    for triangle in strips.iter().flat_map(unstrip) {
         read.corners.extend(triangle);
         read.end_face(None)?;
     }
@@ -249,15 +276,16 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
 
 /// Writes polygons, colours and normals of vertices in the encoding of the source, by default binary little-endian.
 pub(crate) fn write(shape: &Shape<'_>) -> Vec<u8> {
-    let (origin, faces, colors, normals) = (shape.origin, shape.faces(), shape.colors(), shape.normals());
+    let (origin, colors, normals) = (shape.origin, shape.colors(), shape.normals());
     let mut header = Header::new();
     header.encoding = match shape.encoding {
         Encoding::Text => PlyEncoding::Ascii,
         Encoding::LittleEndian => PlyEncoding::BinaryLittleEndian,
         Encoding::BigEndian => PlyEncoding::BinaryBigEndian,
     };
-    let mut element = |name: &str, properties: Vec<(&str, PropertyType)>| {
+    let mut element = |name: &str, count: usize, properties: Vec<(&str, PropertyType)>| {
         let mut element = ElementDef::new(name.into());
+        element.count = count;
         for (name, kind) in properties {
             element.properties.add(PropertyDef::new(name.into(), kind));
         }
@@ -274,25 +302,34 @@ pub(crate) fn write(shape: &Shape<'_>) -> Vec<u8> {
     if colors.is_some() {
         properties.extend(scalars(COLOR, ScalarType::UChar));
     }
-    element("vertex", properties);
+    element("vertex", shape.positions.len(), properties);
     // Many programs expect 8-bit corner counts, so use them if they suffice.
-    let is_small = faces.iter().all(|face| face.len() < 256);
+    let is_small = shape.faces().all(|face| face.len() < 256);
     let counter = if is_small { ScalarType::UChar } else { ScalarType::UInt };
-    element("face", vec![(CORNERS[0], PropertyType::List(counter, ScalarType::UInt))]);
+    element("face", shape.faces().len(), vec![(CORNERS[0], PropertyType::List(counter, ScalarType::UInt))]);
     let vertex = |(v, p): (usize, &Vec3)| Element {
         place: (origin + p.as_dvec3()).to_array(),
         normal: normals.get(v).map_or([0.0; 3], Vec3::to_array),
         color: color_bytes(colors.and_then(|colors| colors.get(&(v as u32)))),
         ..Element::default()
     };
-    let mut ply = Ply::<Element>::new();
-    ply.header = header;
-    ply.payload.insert("vertex".into(), shape.positions.iter().enumerate().map(vertex).collect());
-    let faces = faces.into_iter().map(|corners| Element { corners, ..Element::default() });
-    ply.payload.insert("face".into(), faces.collect());
-    let mut bytes = Vec::new();
-    Writer::new()
-        .write_ply(&mut bytes, &mut ply)
-        .expect("a Vec takes all bytes, and both lists are declared");
+    let face = |corners: Vec<u32>| Element { corners, ..Element::default() };
+    let (mut vertices, mut faces) = (shape.positions.iter().enumerate().map(vertex), shape.faces().map(face));
+    let payload: [(&str, &mut dyn Iterator<Item = Element>); 2] =
+        [("vertex", &mut vertices), ("face", &mut faces)];
+    let (mut bytes, writer) = (Vec::new(), Writer::new());
+    let mut is_written = writer.write_header(&mut bytes, &header);
+    for (name, elements) in payload {
+        loop {
+            let part: Vec<Element> = elements.take(ELEMENTS_AT_A_TIME).collect();
+            if part.is_empty() {
+                break;
+            }
+            let element = &header.elements[name];
+            is_written =
+                is_written.and_then(|_| writer.write_payload_of_element(&mut bytes, &part, element, &header));
+        }
+    }
+    is_written.expect("a Vec takes all bytes, and both lists are declared");
     bytes
 }

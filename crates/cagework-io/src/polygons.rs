@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
-use crate::obj::{Corner, Group, Line, Material, NONE, ObjDocument, shown_token};
+use crate::obj::{Corner, Group, Line, MAX_FACE_CORNERS, Material, NONE, ObjDocument, shown_token};
 use crate::origin::{origin_near, relative};
 
 /// Memory of the table for welding coincident vertices, bytes per vertex.
@@ -53,6 +53,14 @@ pub enum PolygonsError {
         index: String,
         /// Number of vertices.
         vertices: usize,
+    },
+    /// A face has too many corners.
+    #[error("face {face} has {corners} corners, more than the limit of {MAX_FACE_CORNERS}: split it")]
+    FaceCorners {
+        /// Face index, from 0.
+        face: usize,
+        /// Number of corners.
+        corners: usize,
     },
     /// The build of a 3MF contains more objects, vertices or triangles than the limit.
     #[error("its build shows {count} {what}, more than the limit of {limit}: split the model")]
@@ -147,7 +155,11 @@ impl Polygons {
             let index = odd.map_or_else(|| index.to_string(), |odd| odd.to_string());
             return Err(PolygonsError::Vertex { face, index, vertices });
         }
-        if self.corners.len() - start < 3 {
+        let corners = self.corners.len() - start;
+        if corners > MAX_FACE_CORNERS {
+            return Err(PolygonsError::FaceCorners { face, corners });
+        }
+        if corners < 3 {
             self.corners.truncate(start);
             self.n_left_out += 1;
             return Ok(());
@@ -207,8 +219,11 @@ pub(crate) struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    pub(crate) fn faces(&self) -> Vec<Vec<u32>> {
-        self.document.map_or_else(|| self.triangles.iter().map(Vec::from).collect(), ObjDocument::faces)
+    pub(crate) fn faces(&self) -> Box<dyn ExactSizeIterator<Item = Vec<u32>> + '_> {
+        match self.document {
+            Some(document) => Box::new(document.faces()),
+            None => Box::new(self.triangles.iter().map(Vec::from)),
+        }
     }
 
     /// Colours of vertices, sRGB from 0 to 1, if there are any.

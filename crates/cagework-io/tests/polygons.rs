@@ -388,3 +388,18 @@ fn ply_colours_can_have_any_numeric_type() {
         (expected, expected, expected)
     );
 }
+
+#[test]
+fn a_face_has_at_most_4_194_304_corners() {
+    // One more corner than 2^22 would be no multiple of three, so add two.
+    let n = (1 << 22) + 2;
+    let corners = |from: usize| (0..n).map(|k| format!(" {}", from + k % 3)).collect::<String>();
+    let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf{}\n", corners(1));
+    let off = format!("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{n}{}\n", corners(0));
+    for (name, text, message) in [
+        ("a.obj", obj, "a.obj: line 4: the face has more than 4194304 corners: split it"),
+        ("a.off", off, "a.off: face 0 has 4194306 corners, more than the limit of 4194304: split it"),
+    ] {
+        assert_eq!(fault(name, text.as_bytes()), message);
+    }
+}

@@ -9,6 +9,7 @@ use cagework_core::skin::Rig;
 use glam::{DVec3, Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
+use super::accessor::MAX_ELEMENTS;
 use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
 use crate::look::linear_from_srgb;
@@ -27,6 +28,11 @@ pub(crate) fn build_from_obj(
     rest: &[Vec3],
     origin: DVec3,
 ) -> Result<(Vec<u8>, Vec<u32>), WriteError> {
+    let by_material = document.by_material();
+    let corners = by_material.iter().map(|(_, triangles)| 3 * triangles.len() as u64).max().unwrap_or(0);
+    if corners > MAX_ELEMENTS {
+        return Err(WriteError::Corners { corners, limit: MAX_ELEMENTS });
+    }
     let pairs = document.pairs(rest);
     let mut json = json!({
         "asset": { "version": "2.0", "generator": "Cagework" },
@@ -42,7 +48,7 @@ pub(crate) fn build_from_obj(
     let mut pack = Pack::empty();
     let mut sources = Vec::new();
     let mut textures = HashMap::new();
-    for (material, triangles) in document.by_material() {
+    for (material, triangles) in by_material {
         let mut part = PrimitiveBuilder::default();
         for corner in triangles.into_iter().flatten() {
             let (pair, vt) = (pairs.of_corner[corner as usize], document.corners[corner as usize].vt);

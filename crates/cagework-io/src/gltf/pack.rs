@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use ::gltf::binary::{Glb, Header};
+use ::gltf::binary::Glb;
 use glam::Vec3;
 use serde_json::{Value, json};
 
@@ -151,10 +151,10 @@ impl<'a> Pack<'a> {
             let mut kept = kept.into_iter();
             self.views.retain(|_| kept.next().unwrap_or(true));
         }
-        let bin = self.lay_out(&mut json)?;
+        let (starts, length) = self.lay_out(&mut json)?;
         match &mut json {
-            Value::Object(object) if bin.is_empty() => drop(object.shift_remove("buffers")),
-            json => json["buffers"] = json!([{ "byteLength": bin.len() }]),
+            Value::Object(object) if length == 0 => drop(object.shift_remove("buffers")),
+            json => json["buffers"] = json!([{ "byteLength": length }]),
         }
         for key in ["accessors", "bufferViews"] {
             if json[key].as_array().is_none_or(Vec::is_empty)
@@ -163,27 +163,34 @@ impl<'a> Pack<'a> {
                 object.shift_remove(key);
             }
         }
-        write_glb(&json, &bin)
+        write_chunks(&text_of(&json)?, length, |out| {
+            let first = out.len();
+            for ((bytes, _), start) in self.views.iter().flatten().zip(starts) {
+                out.resize(first + start, 0);
+                out.extend_from_slice(bytes);
+            }
+        })
     }
 
-    fn lay_out(&self, json: &mut Value) -> Result<Vec<u8>, WriteError> {
+    /// Sets the offsets of all buffer views, and returns them with the length of the buffer.
+    fn lay_out(&self, json: &mut Value) -> Result<(Vec<usize>, usize), WriteError> {
         let bytes: u64 = self.views.iter().flatten().map(|(b, _)| b.len() as u64 + 2 * ALIGN as u64).sum();
         if bytes > u64::from(u32::MAX) {
             return Err(WriteError::TooLarge { bytes });
         }
-        let mut bin = Vec::with_capacity(bytes as usize);
+        let (mut starts, mut end) = (Vec::with_capacity(self.views.len()), 0_usize);
         for (number, view) in self.views.iter().enumerate() {
             let Some((bytes, phase)) = view else {
                 return Err(WriteError::Document(format!("buffer view {number} is longer than its buffer")));
             };
             // Alignment is relative to the buffer: keep the offset of the original view modulo 4.
-            bin.resize(bin.len().next_multiple_of(ALIGN) + phase, 0);
+            let start = end.next_multiple_of(ALIGN) + phase;
             json["bufferViews"][number]["buffer"] = 0.into();
-            json["bufferViews"][number]["byteOffset"] = bin.len().into();
-            bin.extend_from_slice(bytes);
+            json["bufferViews"][number]["byteOffset"] = start.into();
+            starts.push(start);
+            end = start + bytes.len();
         }
-        bin.resize(bin.len().next_multiple_of(ALIGN), 0);
-        Ok(bin)
+        Ok((starts, end.next_multiple_of(ALIGN)))
     }
 }
 
@@ -197,18 +204,33 @@ pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
 
 /// Writes a GLB of a document whose only buffer is `bin`.
 pub(super) fn write_glb(json: &Value, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
-    let text = serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))?;
-    write_chunks(&text, bin)
+    write_chunks(&text_of(json)?, bin.len(), |out| out.extend_from_slice(bin))
 }
 
-fn write_chunks(text: &[u8], bin: &[u8]) -> Result<Vec<u8>, WriteError> {
-    let bytes = 64 + text.len() as u64 + bin.len() as u64;
+fn text_of(json: &Value) -> Result<Vec<u8>, WriteError> {
+    serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))
+}
+
+/// Writes a GLB (glTF 2.0, section 4.4) without a second copy of its binary chunk, whose `length` bytes `fill` appends.
+fn write_chunks(text: &[u8], length: usize, fill: impl FnOnce(&mut Vec<u8>)) -> Result<Vec<u8>, WriteError> {
+    let [json, bin] = [text.len(), length].map(|length| (length as u64).next_multiple_of(ALIGN as u64));
+    let bytes = 20 + json + if bin > 0 { 8 + bin } else { 0 };
     if bytes > u64::from(u32::MAX) {
         return Err(WriteError::TooLarge { bytes });
     }
-    let header = Header { magic: *b"glTF", version: 2, length: 0 };
-    let glb = Glb { header, json: text.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
-    glb.to_vec().map_err(|e| WriteError::Document(e.to_string()))
+    let word = |number: u64| (number as u32).to_le_bytes();
+    let mut out = Vec::with_capacity(bytes as usize);
+    for part in [&b"glTF"[..], &word(2), &word(bytes), &word(json), b"JSON", text] {
+        out.extend_from_slice(part);
+    }
+    out.resize(20 + json as usize, b' ');
+    if bin > 0 {
+        out.extend(word(bin));
+        out.extend(b"BIN\0");
+        fill(&mut out);
+        out.resize(bytes as usize, 0);
+    }
+    Ok(out)
 }
 
 impl GltfDocument {
@@ -226,7 +248,8 @@ impl GltfDocument {
         if let Some(packed) = &self.packed {
             return Some(Ok(packed.clone()));
         }
-        Some(write_chunks(self.text.as_deref()?, self.buffers.first()?))
+        let bin = self.buffers.first()?;
+        Some(write_chunks(self.text.as_deref()?, bin.len(), |out| out.extend_from_slice(bin)))
     }
 }
 

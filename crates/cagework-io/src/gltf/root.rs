@@ -46,10 +46,11 @@ pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
     })
 }
 
-/// Copy of a value that the crate `gltf` can parse: without `null` members, and without `extensions` and `extras`,
-/// whose values can have any type.
+/// Copy of a value that the crate `gltf` can parse: without `null` members, without names, which can be long, and
+/// without `extensions` and `extras`, whose values can have any type.
 fn strict(value: &Value) -> Value {
-    let is_read = |key: &str, value: &Value| !matches!(key, "extras" | "extensions") && !value.is_null();
+    let is_read =
+        |key: &str, value: &Value| !matches!(key, "name" | "extras" | "extensions") && !value.is_null();
     match value {
         Value::Array(items) => items.iter().map(strict).collect(),
         Value::Object(object) => {

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use cagework_core::PolygonMesh;
 use cagework_core::mesh::weld;
+use cagework_core::words::decimals;
 use glam::Vec3;
 
 use super::format::ModelProperty;
@@ -34,7 +35,7 @@ impl Model {
     pub fn cage_mesh(&self) -> PolygonMesh {
         match &self.document {
             Document::Obj(document) => {
-                PolygonMesh { positions: self.positions.clone(), faces: document.faces() }
+                PolygonMesh { positions: self.positions.clone(), faces: document.faces().collect() }
             }
             Document::Gltf(_) => {
                 let welded = weld(&self.positions);
@@ -81,7 +82,8 @@ impl Model {
         MemoryError::check(needed, MAX_STATES_BYTES)
             .map_err(|e| faulty(WriteError::Document(e.to_string())))?;
         if !times.is_empty() {
-            return Ok(times.iter().map(|&at| state(format!("{at:.3} s"), Some(at), Some(0), &[])).collect());
+            let at_key = |&at: &f32| state(format!("{} s", decimals(at, 3)), Some(at), Some(0), &[]);
+            return Ok(times.iter().map(at_key).collect());
         }
         let alone = |k: usize| {
             let mut targets = vec![0.0; defaults.len()];
@@ -101,8 +103,8 @@ impl Model {
             let (pose, cage) = (pose.name.clone(), self.name.clone());
             return Err(PoseError::Count { pose, given, cage, expected: first.len() });
         }
-        let mut posed = match &pose.document {
-            Document::Obj(document) => document.faces(),
+        let mut posed: Vec<Vec<u32>> = match &pose.document {
+            Document::Obj(document) => document.faces().collect(),
             Document::Gltf(_) => pose.triangles.iter().map(|t| t.to_vec()).collect(),
         };
         if let Some(welded) = welded.filter(|_| is_unwelded) {

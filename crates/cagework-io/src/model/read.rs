@@ -147,10 +147,10 @@ impl Source<'_, '_> {
     ) -> Result<Model, ReadError> {
         let fault = |source| ReadError::Polygons { name: self.name.into(), source };
         let mut read = read(&self.bytes, self.memory_limit, self.near).map_err(fault)?;
+        // Only a 3MF is patched when it is exported.
+        let file = Some(self.bytes).filter(|_| format == ModelFormat::ThreeMf);
         let mut document = read.document().map_err(fault)?;
-        if format == ModelFormat::ThreeMf {
-            document.bytes = self.bytes.into_owned();
-        }
+        document.bytes = file.map_or_else(Vec::new, Cow::into_owned);
         let corner = |c: u32| document.corners[c as usize].v;
         let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);
         Ok(Model {

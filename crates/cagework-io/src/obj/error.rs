@@ -49,6 +49,14 @@ pub enum ObjError {
         /// Maximum number of materials.
         limit: usize,
     },
+    /// A face has too many corners.
+    #[error("line {line}: the face has more than {limit} corners: split it")]
+    FaceCorners {
+        /// Line number, from 1.
+        line: usize,
+        /// Maximum number of corners.
+        limit: usize,
+    },
     /// The file has more vertices or corners than 32-bit indices can number.
     #[error("line {line}: more than {limit} vertices or corners: simplify the model")]
     TooLarge {

@@ -156,6 +156,9 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
 /// `[n_corners]`
 fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
+    if document.normals.is_empty() && document.face_smoothing.is_empty() {
+        return vertices;
+    }
     let normals: Vec<Vec3> = document.corners.iter().map(|corner| document.normal(corner)).collect();
     let surfaces = document.surfaces();
     let says: Vec<bool> = normals.iter().zip(&surfaces).map(|(n, &s)| *n != Vec3::ZERO || s != 0).collect();

@@ -77,9 +77,9 @@ pub(crate) struct ObjDocument {
 
 impl ObjDocument {
     /// Vertices of each face.
-    pub(crate) fn faces(&self) -> Vec<Vec<u32>> {
+    pub(crate) fn faces(&self) -> impl ExactSizeIterator<Item = Vec<u32>> {
         let corners = |ends: &[u32]| &self.corners[ends[0] as usize..ends[1] as usize];
-        self.face_starts.windows(2).map(|ends| corners(ends).iter().map(|c| c.v).collect()).collect()
+        self.face_starts.windows(2).map(move |ends| corners(ends).iter().map(|c| c.v).collect())
     }
 
     /// Normal of a corner; zero if the corner has no normal.
@@ -185,6 +185,9 @@ pub(crate) const MAX_MATERIALS: usize = 1 << 14;
 
 /// Minimum number of corners of a face. Faces with fewer corners are ignored, as are lines and points.
 pub(super) const MIN_CORNERS: usize = 3;
+
+/// Limit on the corners of a face, each of which takes up to 100 bytes while a model is read and drawn.
+pub(crate) const MAX_FACE_CORNERS: usize = 1 << 22;
 
 /// Number of lines or corners after which the memory limit is checked again.
 const MEMORY_CHECK_INTERVAL: usize = 1 << 12;
@@ -310,6 +313,7 @@ impl<'a> Reader<'a> {
             (24, document.face_materials.len()),
             (80, document.colors.len()),
             (64, document.groups.len()),
+            (32, self.forward.len()),
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
@@ -322,6 +326,9 @@ impl<'a> Reader<'a> {
         for token in words {
             if self.document.corners.len().is_multiple_of(MEMORY_CHECK_INTERVAL) {
                 self.check_memory()?;
+            }
+            if self.document.corners.len() - start == MAX_FACE_CORNERS {
+                return Err(ObjError::FaceCorners { line, limit: MAX_FACE_CORNERS });
             }
             let token = &self.bytes[token];
             let bad = || ObjError::Corner { line, found: shown(token) };
