@@ -2,6 +2,7 @@
 
 use cagework_core::BindOptions;
 use cagework_core::field::{self, FieldWeights, Lattice, bend_vertices};
+use cagework_core::words::decimals;
 use cagework_io::{Clip, ModelFormat, shown};
 use serde::Serialize;
 
@@ -78,9 +79,9 @@ pub(crate) fn run(
         notices: model.notices.clone(),
     };
     let text = format!(
-        "bent {n} frames of clip {} ({:.2} s)\nwrote {}: its frames as morph targets and an animation, without skeleton\n",
+        "bent {n} frames of clip {} ({} s)\nwrote {}: its frames as morph targets and an animation, without skeleton\n",
         shown(clip),
-        summary.seconds,
+        decimals(summary.seconds, 2),
         shown(&summary.output)
     );
     print(&if as_json { json(&summary) } else { text })

@@ -248,7 +248,7 @@ fn text(info: &Info) -> String {
         row("parts", listed(&info.parts));
     }
     let [min, max] = [info.bounds.min, info.bounds.max];
-    row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));
+    row("bounds", format!("{min:?} to {max:?}, diagonal {:?}", info.bounds.diagonal));
     if let Some(SplatInfo { degree, median_opacity, median_size }) = info.splats {
         row("splats", format!("spherical harmonics of degree {degree}"));
         row("medians", format!("opacity {median_opacity:.2}, largest standard deviation {median_size:.2e}"));

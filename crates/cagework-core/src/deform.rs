@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::frames::Frames;
 use crate::weights::Weights;
-use crate::words::{counted, grouped};
+use crate::words::{counted, decimals, grouped};
 
 /// A mesh vertex outside the cage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,8 +44,9 @@ pub fn outside_in_words<'a>(
         n => format!("; {} of them stay where they are", grouped(n)),
     };
     Some(format!(
-        "{} {is} outside the cage, up to {most:.2} % of its diagonal{staying}.",
-        counted(n, "vertex", "vertices")
+        "{} {is} outside the cage, up to {} % of its diagonal{staying}.",
+        counted(n, "vertex", "vertices"),
+        decimals(most, 2)
     ))
 }
 
@@ -84,7 +85,8 @@ pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Ve
 /// Error of a pose that moves a point beyond the range of 32-bit floats.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
-    "the pose moves point {point} to {to}, but 32-bit floats end at {:e}: use smaller coordinates",
+    "the pose moves point {point} to {:?}, but 32-bit floats end at {:e}: use smaller coordinates",
+    .to.to_array(),
     f32::MAX
 )]
 pub struct NotFinite {

@@ -1,4 +1,4 @@
-//! Formatting of counts in messages.
+//! Formatting of numbers in messages.
 
 /// A count with thousands separators: `15,002`.
 pub fn grouped(n: usize) -> String {
@@ -16,4 +16,22 @@ pub fn grouped(n: usize) -> String {
 /// A count with its noun in the singular or plural: `1 edge`, `2 edges`.
 pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(n), if n == 1 { one } else { many })
+}
+
+/// A number with `n` decimals; from a million on, with an exponent: `12.35`, `3.00e30`.
+pub fn decimals(x: impl Into<f64>, n: usize) -> String {
+    let x = x.into();
+    if x.abs() < 1e6 { format!("{x:.n$}") } else { format!("{x:.n$e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimals;
+
+    #[test]
+    fn large_numbers_get_an_exponent() {
+        for (x, text) in [(0.0, "0.00"), (-999_999.0, "-999999.00"), (1e6, "1.00e6"), (3e38, "3.00e38")] {
+            assert_eq!(decimals(x, 2), text);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, shells_of_points};
+use cagework_core::words::decimals;
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
@@ -357,7 +358,7 @@ impl Model {
         let clip = name.as_deref().unwrap_or("clip");
         let step = seconds / (frames.len().max(2) - 1) as f32;
         let times: Vec<f32> = (0..frames.len()).map(|k| k as f32 * step).collect();
-        let named = |(at, shape): (&f32, _)| (format!("{at:.3} s"), shape);
+        let named = |(at, shape): (&f32, _)| (format!("{} s", decimals(*at, 3)), shape);
         let frames: Vec<(String, Vec<Vec3>)> = times.iter().zip(frames).map(named).collect();
         let timeline = &Timeline::at_keys(&times);
         self.glb(rest, &frames, PoseClip { name: clip, timeline, is_alone: true })

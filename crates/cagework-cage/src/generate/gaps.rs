@@ -9,6 +9,7 @@ use super::{CageOptions, MAX_VOXELS};
 use cagework_core::cage::Cage;
 use cagework_core::geometry::{winding_number, winding_number_of_mesh};
 use cagework_core::progress::Cancelled;
+use cagework_core::words::decimals;
 
 /// Largest allowed cosine of the angle between the directions from a sheet to its two walls. Creases whose walls open
 /// by more than 60 degrees are therefore not gaps.
@@ -226,12 +227,11 @@ impl ModelGap {
         } else {
             format!("choose a smaller detail than {}", options.detail)
         };
-        let mean = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
-        // Adding zero to the rounded coordinates turns -0 into 0.
-        let Vec3 { x, y, z } = (mean * 1e3).round() / 1e3 + Vec3::ZERO;
-        let width = self.width;
+        let middle = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
+        let [x, y, z] = middle.to_array().map(|x| decimals(x, 3));
+        let width = decimals(self.width, 3);
         Some(format!(
-            "the cage closes the gap of about {width:.3} at ({x:.3}, {y:.3}, {z:.3}); to keep it open, {remedy}"
+            "the cage closes the gap of about {width} at ({x}, {y}, {z}); to keep it open, {remedy}"
         ))
     }
 }

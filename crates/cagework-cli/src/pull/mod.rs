@@ -7,6 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::deform::{deform_bound, deform_finite};
+use cagework_core::{Bounds, words::decimals};
 use cagework_io::shown;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle};
 use glam::{DVec3, Vec3};
@@ -14,7 +15,7 @@ use serde::Serialize;
 
 use crate::args::PullArgs;
 use crate::error::CliError;
-use crate::files::{json, print};
+use crate::files::{json, print, shown_path};
 use crate::pose::{BoundModel, pull, write_pose};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
@@ -94,6 +95,7 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let at_stop = deformed(&pose(&drag));
     let settle_frames = drag.settle(&to);
     let cage_pose = pose(&drag);
+    check_precision(&cage_pose, &given.job)?;
     let after = deform_finite(&weights, &frames, &cage_pose).map_err(|e| CliError::file(&given.job, e))?;
     let drag_length = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
     let apart = |(a, b): (&Vec3, &Vec3)| a.as_dvec3().distance(b.as_dvec3());
@@ -117,6 +119,26 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary, output) })
 }
 
+/// Rejects a pose whose shape is lost because it is so far away that 32-bit floats round it coarsely.
+fn check_precision(pose: &[Vec3], job: &Path) -> Result<(), CliError> {
+    /// Largest step between coordinates, as a fraction of the pose's size.
+    const MAX_STEP: f32 = 0.01;
+    let far = pose.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+    let size = Bounds::of(pose).map_or(0.0, |bounds| bounds.extent().max_element());
+    let step = far.next_up() - far;
+    if step <= MAX_STEP * size {
+        return Ok(());
+    }
+    Err(CliError::Mismatch {
+        message: format!(
+            "{}: the pulled cage has coordinates up to {far:e}, where 32-bit floats have steps of {step:e}, more than \
+             {MAX_STEP} of its size {size:?}",
+            shown_path(job)
+        ),
+        hint: "give targets nearer to the model",
+    })
+}
+
 fn since(begun: Instant) -> f64 {
     begun.elapsed().as_secs_f64() * 1e3
 }
@@ -128,17 +150,17 @@ fn text(summary: &PullSummary, output: &Path) -> String {
     );
     let mut out = format!(
         "pulled by {} samples and {} cage vertices: {:.2} ms per frame, {:.1} ms per grab, {:.0} ms precomputation\n\
-         reach {reach}; grabs within {:.1e} of the model's size; edges stretched to at most {:.2} (99th percentile {:.2}, \
-         first percentile {:.2})\nwrote {}\n",
+         reach {reach}; grabs within {:.1e} of the model's size; edges stretched to at most {} (99th percentile {}, \
+         first percentile {})\nwrote {}\n",
         summary.samples,
         summary.cage,
         summary.frame_ms,
         summary.grab_ms,
         summary.precompute_ms,
         summary.error,
-        summary.stretches.stretch_max,
-        summary.stretches.stretch_99,
-        summary.stretches.stretch_1,
+        decimals(summary.stretches.stretch_max, 2),
+        decimals(summary.stretches.stretch_99, 2),
+        decimals(summary.stretches.stretch_1, 2),
         shown(&output.display().to_string()),
     );
     for notice in &summary.notices {

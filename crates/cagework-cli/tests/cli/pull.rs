@@ -55,6 +55,15 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
     sandbox.write("job.json", format!(r#"{{"grabs": [{{"vertex": {top}, "to": [0, 3e30, 0]}}]}}"#));
     let far = sandbox.json(&format!("{PULL} --json"));
     assert!(far["stretch_max"].as_f64().unwrap() > 1e25, "{far}");
+    sandbox.run(PULL).success().stdout(predicate::str::is_match("stretched to at most .\\...e").unwrap());
+
+    // 3e30 is between 2^101 and 2^102, where floats of 24 bits have steps of 2^78.
+    sandbox.write(
+        "job.json",
+        format!(r#"{{"grabs": [{{"vertex": {top}, "to": [0, 3e30, 0]}}], "reach": "all"}}"#),
+    );
+    let sentence = format!("coordinates up to 3e30, where 32-bit floats have steps of {:e}", 78_f32.exp2());
+    sandbox.run(PULL).failure().code(1).stderr(contains(sentence));
 }
 
 #[test]

@@ -92,7 +92,7 @@ pub enum PullError {
     #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}: remove some")]
     Handles(usize),
     /// A value is not finite, or it is out of range.
-    #[error("{what} is {value}; it must be {range}")]
+    #[error("{what} is {value:?}; it must be {range}")]
     Value {
         /// Name of the invalid quantity.
         what: &'static str,

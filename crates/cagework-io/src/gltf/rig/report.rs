@@ -1,6 +1,6 @@
 //! Report about the reshaping of a document.
 
-use cagework_core::words::counted;
+use cagework_core::words::{counted, decimals};
 use serde::Serialize;
 
 use super::ground::Ground;
@@ -99,19 +99,19 @@ impl ReshapeReport {
             ),
         );
         if self.lift != 0.0 {
-            notice(1, format!("lifted by {:.4} to stand at the same height", self.lift));
+            notice(1, format!("lifted by {} to stand at the same height", decimals(self.lift, 4)));
         }
         let n = self.clip_lifts.iter().filter(|lift| **lift != 0.0).count();
-        let most = self.clip_lifts.iter().map(|lift| lift.abs()).fold(0.0, f64::max);
+        let most = decimals(self.clip_lifts.iter().map(|lift| lift.abs()).fold(0.0, f64::max), 4);
         let clips = counted(self.clip_lifts.len(), "clip", "clips");
         notice(
             n,
             format!(
-                "lifted or lowered {n} of {clips} by up to {most:.4}, so that their lowest points keep their heights"
+                "lifted or lowered {n} of {clips} by up to {most}, so that their lowest points keep their heights"
             ),
         );
         if let Some([legs, contacts]) = self.feet {
-            let [before, after] = self.slide;
+            let [before, after] = self.slide.map(|slide| decimals(slide, 4));
             notice(
                 1,
                 match (legs, contacts) {
@@ -123,7 +123,7 @@ impl ReshapeReport {
                         counted(legs, "leg", "legs")
                     ),
                     _ => format!(
-                        "held feet in {} of {}: a foot slides by {after:.4} instead of {before:.4}",
+                        "held feet in {} of {}: a foot slides by {after} instead of {before}",
                         counted(contacts, "contact", "contacts"),
                         counted(legs, "leg", "legs")
                     ),
