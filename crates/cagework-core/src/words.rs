@@ -18,10 +18,14 @@ pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(n), if n == 1 { one } else { many })
 }
 
-/// A number with `n` decimals; from a million on, with an exponent: `12.35`, `3.00e30`.
+/// Formats a number with `n` decimals; from a million on, with an exponent: `12.35`, `3.00e30`. Zero has no sign.
 pub fn decimals(x: impl Into<f64>, n: usize) -> String {
     let x = x.into();
-    if x.abs() < 1e6 { format!("{x:.n$}") } else { format!("{x:.n$e}") }
+    let text = if x.abs() < 1e6 { format!("{x:.n$}") } else { format!("{x:.n$e}") };
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|b| matches!(b, b'0' | b'.')) => digits.to_owned(),
+        _ => text,
+    }
 }
 
 #[cfg(test)]
@@ -29,8 +33,8 @@ mod tests {
     use super::decimals;
 
     #[test]
-    fn large_numbers_get_an_exponent() {
-        for (x, text) in [(0.0, "0.00"), (-999_999.0, "-999999.00"), (1e6, "1.00e6"), (3e38, "3.00e38")] {
+    fn large_numbers_get_an_exponent_and_zero_no_sign() {
+        for (x, text) in [(-0.001, "0.00"), (-999_999.0, "-999999.00"), (1e6, "1.00e6"), (3e38, "3.00e38")] {
             assert_eq!(decimals(x, 2), text);
         }
     }
