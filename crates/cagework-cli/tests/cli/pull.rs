@@ -55,7 +55,11 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
     sandbox.write("job.json", format!(r#"{{"grabs": [{{"vertex": {top}, "to": [0, 3e30, 0]}}]}}"#));
     let far = sandbox.json(&format!("{PULL} --json"));
     assert!(far["stretch_max"].as_f64().unwrap() > 1e25, "{far}");
-    sandbox.run(PULL).success().stdout(predicate::str::is_match("stretched to at most .\\...e").unwrap());
+    let has_exponent = |text: &str| {
+        let (_, rest) = text.split_once("stretched to at most ").unwrap_or_default();
+        rest.split_whitespace().next().is_some_and(|number| number.contains('e'))
+    };
+    sandbox.run(PULL).success().stdout(predicate::function(has_exponent));
 
     // 3e30 is between 2^101 and 2^102, where floats of 24 bits have steps of 2^78.
     sandbox.write(
