@@ -166,8 +166,8 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-/// Lists all models to read, and the files to write them to. `shared`: files of the cage and the pose, which are left
-/// out if a folder of models contains them.
+/// Lists all models to read, and the files to write them to. `shared`: files of the cage and the pose. A folder of
+/// models may contain them; they are not listed as models.
 ///
 /// # Errors
 /// If the manifest cannot be read or names no model, or two models have the same output.
