@@ -25,7 +25,7 @@ export default defineConfig({
     baseURL: BASE,
     // Draw few pixels, because the processor computes them. SHARP=1 makes sharp pictures for inspection.
     viewport: { width: 1024, height: 640 },
-    deviceScaleFactor: process.env.SHARP || process.env.PICTURES ? 1 : 0.5,
+    deviceScaleFactor: process.env.PICTURES ? 2 : process.env.SHARP ? 1 : 0.5,
     acceptDownloads: true,
     // Avoid transitions, each frame of which draws the whole page.
     contextOptions: { reducedMotion: "reduce" },

@@ -206,7 +206,7 @@ async function liftsAKnee(page: Page): Promise<void> {
   await page.mouse.move(knee.x - 70, knee.y - 110, { steps: 20 });
   // Leave the worker enough time to compute the pose of the pull.
   await page.waitForTimeout(2000);
-  await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70 });
+  await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70, scale: "css" });
   await page.mouse.up();
 }
 
@@ -251,5 +251,5 @@ test("pictures of the documents", async ({ page }) => {
     for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;
   });
   await drawn(page);
-  await page.locator("#stage").screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80 });
+  await page.locator("#stage").screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80, scale: "css" });
 });

@@ -13,7 +13,7 @@ use super::layout::Camera as Uniform;
 use super::marks::{MarksView, Wires};
 use super::mesh::Mesh;
 use super::model::DrawModel;
-use super::pipelines::{DEPTH_FORMAT, Kind, Layouts, Pipelines, SAMPLES};
+use super::pipelines::{DEPTH_FORMAT, Kind, Layouts, Pipelines};
 use super::scene::{MeshStyle, SceneOptions};
 use super::shadow::ShadowMap;
 use super::slice::SlicePlane;
@@ -29,6 +29,9 @@ const FLOOR_REACH: f32 = 5.0;
 /// Depth range of the gizmo: in front of everything, with depth tests within the gizmo.
 const GIZMO_DEPTHS: [f32; 2] = [0.0, 1e-3];
 
+/// Largest number of samples per pixel: the one that WebGPU has besides 1.
+pub(crate) const MAX_SAMPLES: u32 = 4;
+
 /// Render target of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
@@ -38,23 +41,27 @@ pub struct Target<'a> {
     pub format: wgpu::TextureFormat,
     /// Width and height, pixels.
     pub size: [u32; 2],
+    /// Number of samples per pixel: 1 or [`MAX_SAMPLES`].
+    pub samples: u32,
     /// Pixels per CSS pixel.
     pub scale: f32,
 }
 
-/// Multisampled attachments for colour and depth.
+/// Attachments of a frame.
 #[derive(Debug)]
 struct Targets {
     format: wgpu::TextureFormat,
     size: [u32; 2],
-    color: wgpu::Texture,
+    samples: u32,
+    /// Colours of several samples per pixel; none if the frame is drawn with one sample.
+    color: Option<wgpu::Texture>,
     depth: wgpu::Texture,
 }
 
 impl Drop for Targets {
     /// Frees memory immediately, not at garbage collection: adaptive resolution changes the size often.
     fn drop(&mut self) {
-        self.color.destroy();
+        self.color.iter().for_each(wgpu::Texture::destroy);
         self.depth.destroy();
     }
 }
@@ -270,20 +277,21 @@ impl Renderer {
         target: Target<'_>,
         camera: &Camera,
     ) {
-        let Target { view, format, size, .. } = target;
+        let Target { view, format, size, samples, .. } = target;
         let uniform = self.uniform(target, camera);
         context.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&uniform));
         if let Some(gizmo) = &self.scene.gizmo {
             self.gizmo.update(context, gizmo, camera);
         }
-        if self.pipelines.iter().all(|p| p.format != format) {
-            self.pipelines.push(Pipelines::new(context, &self.layouts, format));
+        let is_for_target = |p: &Pipelines| (p.format, p.samples) == (format, samples);
+        if !self.pipelines.iter().any(is_for_target) {
+            self.pipelines.push(Pipelines::new(context, &self.layouts, format, samples));
         }
-        if self.targets.as_ref().is_none_or(|t| (t.format, t.size) != (format, size)) {
-            self.targets = Some(Targets::new(context, format, size));
+        if self.targets.as_ref().is_none_or(|t| (t.format, t.size, t.samples) != (format, size, samples)) {
+            self.targets = Some(Targets::new(context, format, size, samples));
         }
         let (Some(targets), Some(pipelines)) =
-            (&self.targets, self.pipelines.iter().find(|p| p.format == format))
+            (&self.targets, self.pipelines.iter().find(|p| is_for_target(p)))
         else {
             return;
         };
@@ -301,18 +309,18 @@ impl Renderer {
             }
             self.shadow.is_stale = false;
         }
-        let [color, depth] = [&targets.color, &targets.depth]
-            .map(|texture| texture.create_view(&wgpu::TextureViewDescriptor::default()));
+        let view_of = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (color, depth) = (targets.color.as_ref().map(view_of), view_of(&targets.depth));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &color,
+                view: color.as_ref().unwrap_or(view),
                 depth_slice: None,
-                resolve_target: Some(view),
+                resolve_target: color.as_ref().map(|_| view),
                 ops: wgpu::Operations {
                     load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    // Only the resolved picture is needed.
-                    store: wgpu::StoreOp::Discard,
+                    // Of several samples only the resolved picture is needed.
+                    store: if color.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
@@ -445,9 +453,10 @@ impl Renderer {
 }
 
 impl Targets {
-    fn new(context: &GpuContext, format: wgpu::TextureFormat, size: [u32; 2]) -> Self {
+    fn new(context: &GpuContext, format: wgpu::TextureFormat, size: [u32; 2], samples: u32) -> Self {
         let texture =
-            |label, format| context.target(label, size, SAMPLES, format, wgpu::TextureUsages::empty());
-        Self { format, size, color: texture("samples", format), depth: texture("depth", DEPTH_FORMAT) }
+            |label, format| context.target(label, size, samples, format, wgpu::TextureUsages::empty());
+        let color = (samples > 1).then(|| texture("samples", format));
+        Self { format, size, samples, color, depth: texture("depth", DEPTH_FORMAT) }
     }
 }

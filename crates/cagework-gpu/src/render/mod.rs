@@ -38,6 +38,7 @@ mod texture;
 mod theme;
 
 pub use camera::{AxisView, Camera, CameraPlace, ImagePoint, Projection, Ray};
+pub(crate) use frame::MAX_SAMPLES;
 pub use frame::{Renderer, Target};
 pub use gizmo::{GIZMO_PX, pick_gizmo};
 pub use layers::check_layers;

@@ -8,9 +8,6 @@ use super::model::DrawVertex;
 use super::shaders::{self, DrawBinding, DrawShader};
 use crate::device::GpuContext;
 
-/// Number of samples per pixel, for multisampling.
-pub(super) const SAMPLES: u32 = 4;
-
 /// Depth format: 32-bit floats, which separate even distant handles from the cage's faces.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
@@ -83,12 +80,13 @@ impl Kind {
     }
 }
 
-/// Pipelines for one format, created on first use, so that the first frame is not delayed.
+/// Pipelines for one kind of target, created on first use, so that the first frame is not delayed.
 #[derive(Debug)]
 pub(super) struct Pipelines {
     context: GpuContext,
     layouts: Arc<Layouts>,
     pub(super) format: wgpu::TextureFormat,
+    pub(super) samples: u32,
     made: [OnceLock<wgpu::RenderPipeline>; 15],
 }
 
@@ -176,8 +174,19 @@ impl Layouts {
 }
 
 impl Pipelines {
-    pub(super) fn new(context: &GpuContext, layouts: &Arc<Layouts>, format: wgpu::TextureFormat) -> Self {
-        Self { context: context.clone(), layouts: Arc::clone(layouts), format, made: Default::default() }
+    pub(super) fn new(
+        context: &GpuContext,
+        layouts: &Arc<Layouts>,
+        format: wgpu::TextureFormat,
+        samples: u32,
+    ) -> Self {
+        Self {
+            context: context.clone(),
+            layouts: Arc::clone(layouts),
+            format,
+            samples,
+            made: Default::default(),
+        }
     }
 
     pub(super) fn get(&self, kind: Kind) -> &wgpu::RenderPipeline {
@@ -232,7 +241,7 @@ impl Pipelines {
             },
             depth_stencil: (!is_layer && !is_shadow).then_some(depth_stencil),
             multisample: wgpu::MultisampleState {
-                count: if is_layer || is_shadow { 1 } else { SAMPLES },
+                count: if is_layer || is_shadow { 1 } else { self.samples },
                 ..wgpu::MultisampleState::default()
             },
             fragment: Some(wgpu::FragmentState {

@@ -5,7 +5,7 @@ use glam::Vec2;
 use super::Session;
 use crate::buffers::Allocator;
 use crate::error::GpuError;
-use crate::render::{Target, divide_by_alpha};
+use crate::render::{MAX_SAMPLES, Target, divide_by_alpha};
 
 /// Format of pictures: the GPU converts linear colours to sRGB.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
@@ -42,7 +42,8 @@ impl Session {
         // No overlay covers an exported picture.
         camera.set_free_part(Vec2::from(size.map(|s| s as f32)) / scale, [0.0; 4]);
         let mut encoder = self.encoder();
-        self.encode(&mut encoder, Target { view: &view, format: PICTURE_FORMAT, size, scale }, &camera);
+        let target = Target { view: &view, format: PICTURE_FORMAT, size, samples: MAX_SAMPLES, scale };
+        self.encode(&mut encoder, target, &camera);
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
