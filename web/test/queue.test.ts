@@ -3,7 +3,7 @@
 import { describe, expect, it } from "vitest";
 import { createQueue, follow } from "../src/queue";
 
-/** A promise for a job's result, and `end`, which resolves it. */
+/** A promise that keeps a job running, and `end`, which resolves it. */
 function held() {
   let end = () => {};
   const done = new Promise<void>((resolve) => {

@@ -39,7 +39,7 @@ pub(crate) use transfer::TransferArgs;
 #[derive(Debug, Parser)]
 #[command(name = "cagework", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Errors go to stderr; the exit code is 1 after an error and 2 after a wrong command line.\n\n\
+    after_help = "Errors go to stderr; the exit code is 1 after an error and 2 if the arguments are invalid.\n\n\
     Examples:\n  \
     cagework demo\n  \
     cagework info horse.glb\n  \

@@ -146,7 +146,7 @@ fn winding_of(triangles: impl Iterator<Item = [(DVec3, f64); 3]>) -> f64 {
         let (x, y) = (x * per_size, y * per_size);
         let was_upper = im >= 0.0;
         (re, im) = (re * x - im * y, re * y + im * x);
-        // The sum of two angles of equal sign may exceed half a turn, which changes the product's sign.
+        // The sum of two angles of equal sign may exceed half a turn, which changes the sign of `im`.
         if was_upper && y >= 0.0 && im < 0.0 {
             turns += 1;
         } else if !was_upper && y < 0.0 && im >= 0.0 {

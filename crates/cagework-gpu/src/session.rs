@@ -140,7 +140,7 @@ impl Session {
     /// Binds the model to the cage: on this GPU, or on the CPU if the device only draws.
     ///
     /// # Errors
-    /// [`GpuError::NotReady`] without model or cage; otherwise as [`bind_gpu`].
+    /// [`GpuError::NotReady`] if there is no model or no cage; otherwise as [`bind_gpu`].
     pub async fn bind(
         &mut self,
         options: &BindOptions,

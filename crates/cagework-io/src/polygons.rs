@@ -25,7 +25,7 @@ pub enum PolygonsError {
     Syntax(String),
     /// A count is too large for the size of the file.
     #[error(
-        "its header counts {count} of '{name}', too many for a file of {bytes} bytes: it is damaged or cut off"
+        "its header declares {count} '{name}' elements, too many for a file of {bytes} bytes: it is damaged or cut off"
     )]
     Count {
         /// Kind of the counted elements, such as "vertex" or "face".

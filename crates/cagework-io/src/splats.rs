@@ -39,7 +39,7 @@ pub enum SplatError {
     Damaged(String),
     /// The count of splats does not fit the size of the file.
     #[error(
-        "its header counts {count} splats, which need {needed} bytes, but it has {found}: it is damaged or cut off"
+        "its header declares {count} splats, which need {needed} bytes, but it has {found}: it is damaged or cut off"
     )]
     Count {
         /// Declared number of splats.

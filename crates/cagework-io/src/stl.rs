@@ -100,13 +100,13 @@ fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, Po
         return Err(PolygonsError::Count { name: "triangle".into(), count, bytes: length });
     }
     if count == 0 && follow > 0 {
-        let problem = format!("its header counts 0 facets, but {follow} bytes follow");
+        let problem = format!("its header declares 0 facets, but {follow} bytes follow");
         return Err(PolygonsError::Syntax(problem));
     }
     let (triangles, rest) = bytes[HEADER_BYTES..].split_at(count as usize * TRIANGLE_BYTES);
     if !rest.is_empty() {
         let n = rest.len();
-        notices.push(format!("its header counts {count} facets: the {n} bytes after them are ignored"));
+        notices.push(format!("its header declares {count} facets: the {n} bytes after them are ignored"));
     }
     let is_colored =
         triangles.chunks(TRIANGLE_BYTES).any(|triangle| triangle[TRIANGLE_BYTES - 2..] != [0, 0]);

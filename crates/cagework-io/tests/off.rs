@@ -87,7 +87,7 @@ fn off_files_are_read_with_polygons_and_colours() {
 fn damaged_off_files_are_errors() {
     let good = off("OFF\n8 6 12\n", ["", ""]);
     for (from, to, expected) in [
-        ("OFF\n8", "OFF\n800", "its header counts 800 of 'vertex', too many for a file of"),
+        ("OFF\n8", "OFF\n800", "its header declares 800 'vertex' elements, too many for a file of"),
         ("OFF\n8 6", "OFF\n8 7", "damaged: line 16: the file ends after 6 of 7 faces"),
         ("OFF\n8 6", "OFF\n8 x", "damaged: line 2: 'x' is not a number such as 1.25"),
         ("\n1 0 0\n", "\n1,5 0 0\n", "damaged: line 4: '1,5' is not a number such as 1.25"),

@@ -172,9 +172,9 @@ fn solids_keep_their_names_and_ignored_data_is_listed() {
     bytes[..6].fill(0);
     bytes[80] = 7;
     let short = read("x.stl", &bytes).unwrap();
-    assert_eq!(short.notices, ["its header counts 7 facets: the 250 bytes after them are ignored"]);
+    assert_eq!(short.notices, ["its header declares 7 facets: the 250 bytes after them are ignored"]);
     bytes[80] = 0;
-    assert!(fault("x.stl", &bytes).ends_with("its header counts 0 facets, but 600 bytes follow"));
+    assert!(fault("x.stl", &bytes).ends_with("its header declares 0 facets, but 600 bytes follow"));
 }
 
 /// Errors name the line and the word, and do not quote the messages of the parser library.
@@ -215,7 +215,7 @@ fn damaged_ply_and_stl_files_are_errors() {
         (
             "element vertex 8",
             "element vertex 80000",
-            "its header counts 80000 of 'vertex', too many for a file of",
+            "its header declares 80000 'vertex' elements, too many for a file of",
         ),
         ("element vertex 8", "element vertex 9", "damaged"),
         ("property double x\n", "", "its vertices have no x, y or z"),
@@ -243,7 +243,7 @@ fn damaged_ply_and_stl_files_are_errors() {
     let mut idle = String::from("ply\nformat binary_little_endian 1.0\n");
     (0..2000).for_each(|k| idle += &format!("element a{k} 20000\n"));
     let message = fault("x.ply", (idle + "end_header\n").as_bytes());
-    assert!(message.contains("its header counts 20000 of 'a"), "{message}");
+    assert!(message.contains("its header declares 20000 'a"), "{message}");
     // The reader rewrites the lines of this text, which become longer.
     let empty =
         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
@@ -251,14 +251,15 @@ fn damaged_ply_and_stl_files_are_errors() {
             .to_owned()
             + &"0\n".repeat(500);
     let message = fault("x.ply", empty.as_bytes());
-    let expected = format!("its header counts 500 of 'face', too many for a file of {} bytes", empty.len());
+    let expected =
+        format!("its header declares 500 'face' elements, too many for a file of {} bytes", empty.len());
     assert!(message.contains(&expected), "{message}");
     let mut stl = obj().write(ModelFormat::Stl, &cube()).unwrap();
     assert!(!stl.starts_with(b"solid"), "other programs would read it as text");
     stl.truncate(300);
     let message = fault("x.stl", &stl);
     assert!(
-        message.contains("its header counts 12 of 'triangle', too many for a file of 300 bytes"),
+        message.contains("its header declares 12 'triangle' elements, too many for a file of 300 bytes"),
         "{message}"
     );
     assert!(fault("x.stl", b"solid x\nfacet normal 0 0\n").contains("damaged"));

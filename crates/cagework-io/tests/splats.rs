@@ -440,7 +440,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         assert_eq!(unrotated.notices, ["1 splat has a rotation of length 0, which is ignored"]);
     }
     let many = fault("a.ply", &ply(|_, _| None)[..900]);
-    assert!(many.contains("its header counts 6 splats, which need 648 bytes"), "{many}");
+    assert!(many.contains("its header declares 6 splats, which need 648 bytes"), "{many}");
     let claimed = String::from_utf8_lossy(&ply(|_, _| None)[..800]).replace("vertex 6", "vertex 50000000");
     assert!(fault("a.ply", claimed.as_bytes()).contains("counts 50000000 splats"));
     let packed = text("x y z packed_position packed_rotation packed_scale packed_color");
@@ -468,7 +468,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     assert!(changed(0, b"XXXX").contains("not an SPZ"));
     assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 4 are read"));
     assert!(changed(12, &[4]).contains("degree 4") && changed(13, &[60]).contains("60 fractional bits"));
-    assert!(changed(8, &2_u32.to_le_bytes()).contains("its header counts 2 splats, which need 58 bytes"));
+    assert!(changed(8, &2_u32.to_le_bytes()).contains("its header declares 2 splats, which need 58 bytes"));
     assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
     assert!(changed(8, &[0; 4]).contains("it has no splats"));
     assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));

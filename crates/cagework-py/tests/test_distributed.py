@@ -21,7 +21,7 @@ def name_of_status(dask_worker):
 
 
 def nanny_status():
-    """Status of the nanny, which restarts this worker process, but not if the process dies while the nanny starts it."""
+    """Status of the nanny, which restarts this worker process, but not if the process dies while it starts."""
     worker = distributed.get_worker()
     ask = worker.rpc(worker.nanny).run
     return sync(worker.loop, ask, function=dumps(name_of_status))["result"]

@@ -82,7 +82,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
         if (model) store.set({ model: { ...model, notices: [...new Set([...model.notices, ...notices])] } });
       });
     },
-    /** Removes a model from the cage. */
+    /** Removes a model, and remakes the cage. */
     bin(id: number): boolean {
       settle();
       const label = T.did.binModel(memberOf(id)?.name ?? "");

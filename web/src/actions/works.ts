@@ -12,7 +12,7 @@ import { attempt, type Context } from "./context";
 /** Pause after the last change before the work is saved, ms. */
 const PAUSE_MS = 1500;
 /** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
-const LARGEST = 200 * 1024 ** 2;
+const LARGEST = 200e6;
 
 export interface WorkNeeds {
   /** The project file of the open work. */

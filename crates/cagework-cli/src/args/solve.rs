@@ -40,7 +40,7 @@ pub(crate) struct SolveArgs {
     /// Preconditioner of conjugate gradients (--solver cg).
     #[arg(long, default_value_t, value_parser = words::<Preconditioner>())]
     preconditioner: Preconditioner,
-    /// Number of threads; 0 for all.
+    /// Number of threads; 0 uses one per processor.
     #[arg(long, default_value_t = 0, value_name = "N")]
     threads: usize,
     #[arg(long, help = options::TAU.about(), default_value = "1e-5", value_parser = number::<f32>(options::TAU))]

@@ -97,7 +97,7 @@ fn images_in_the_models_folder_are_embedded_even_through_links() {
     }
 }
 
-/// The content of a file decides whether it is an image, not the `mimeType` in the model.
+/// The content of a file, not the `mimeType` in the model, decides whether it is an image.
 #[test]
 fn files_that_are_not_images_are_not_embedded() {
     let sandbox = with_secret();

@@ -53,7 +53,7 @@ pub(super) fn rings(outline: &[DVec2]) -> Facets {
     Facets { inner, facets }
 }
 
-/// Cuts a simple polygon with the triangulation `triangles` into facets. Each triangle becomes a fan around its
+/// Cuts a simple polygon, triangulated by `triangles`, into facets. Each triangle becomes a fan around its
 /// centroid; the diagonals of the polygon are halved.
 pub(super) fn fans(outline: &[DVec2], triangles: &[[u32; 3]]) -> Facets {
     let n = outline.len() as u32;

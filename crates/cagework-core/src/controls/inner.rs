@@ -113,11 +113,11 @@ pub enum ControlError {
         "the radius of controls inside is {radius}; it must be from {least} to {most}, a quarter of the cage's longest side"
     )]
     Radius {
-        /// The rejected radius, object units.
+        /// The rejected radius, in object units.
         radius: f32,
-        /// The smallest allowed radius, object units.
+        /// The smallest allowed radius, in object units.
         least: f32,
-        /// The largest allowed radius, object units.
+        /// The largest allowed radius, in object units.
         most: f32,
     },
     /// The surface has too many faces.

@@ -142,7 +142,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Sets the cage at rest.
+    /// Sets the cage, in its rest pose.
     pub(crate) async fn set_cage(
         &mut self,
         context: &GpuContext,

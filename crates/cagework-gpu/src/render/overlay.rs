@@ -102,7 +102,7 @@ impl Overlay {
         self.draw_instances(pass, behind, 6, self.count);
     }
 
-    /// Draws all items as faces, two items each, with the current pipeline.
+    /// Draws all items as faces with the current pipeline. Two consecutive items make one face.
     pub(super) fn draw_faces(&self, pass: &mut wgpu::RenderPass<'_>) {
         self.draw_instances(pass, false, 3, self.count / 2);
     }

@@ -74,7 +74,7 @@ pub struct SceneOptions {
     /// Strength, 0 to 1, with which each vertex is blended towards grey or, if [`Self::painted`], towards the colour of
     /// paint, in [`MeshStyle::Solid`] and [`MeshStyle::Clay`]. It shows which vertices stay in place. `[n_vertices]`
     pub greyed: Option<Arc<Vec<f32>>>,
-    /// Whether `greyed` is shown as paint.
+    /// Whether vertices are blended towards the colour of paint, not towards grey.
     pub painted: bool,
     /// Whether the mesh's edges are drawn.
     pub mesh_edges: bool,

@@ -71,7 +71,7 @@ pub(crate) struct ObjDocument {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Materials of the `.mtl` files that were found, by name.
     pub(crate) looks: HashMap<String, Material>,
-    /// Vertex colours after the coordinates of `v` lines, sRGB as written.
+    /// Vertex colours that follow the coordinates of `v` lines, by vertex; sRGB, not converted.
     pub(crate) colors: HashMap<u32, [f32; 3]>,
 }
 

@@ -238,7 +238,7 @@ impl Rig<'_> {
         all[slot.triangles.clone()].iter().map(|t| t.map(|v| v - slot.start)).collect()
     }
 
-    /// Skinning matrices of a primitive after the update of the nodes.
+    /// Skinning matrices of a primitive, or its node if it has no skin, after the nodes have been updated.
     fn frame(
         &self,
         part: &RigPrimitive,
