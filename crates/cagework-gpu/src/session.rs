@@ -218,7 +218,7 @@ impl Session {
         self.bound.as_ref().map(|b| b.weights.as_ref())
     }
 
-    /// Frames that define the columns of the weights after those of the controls; `None` before a bind.
+    /// Coordinate frames that define the columns of the weights after those of the controls; `None` before a bind.
     #[must_use]
     pub fn frames(&self) -> Option<&Frames> {
         self.bound.as_ref().map(|b| b.frames.as_ref())

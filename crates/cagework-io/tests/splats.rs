@@ -442,7 +442,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     let many = fault("a.ply", &ply(|_, _| None)[..900]);
     assert!(many.contains("its header declares 6 splats, which need 648 bytes"), "{many}");
     let claimed = String::from_utf8_lossy(&ply(|_, _| None)[..800]).replace("vertex 6", "vertex 50000000");
-    assert!(fault("a.ply", claimed.as_bytes()).contains("counts 50000000 splats"));
+    assert!(fault("a.ply", claimed.as_bytes()).contains("declares 50000000 splats"));
     let packed = text("x y z packed_position packed_rotation packed_scale packed_color");
     assert!(fault("a.ply", packed.as_bytes()).contains("compressed PLY: convert it with `splat-transform"));
 
@@ -469,7 +469,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 4 are read"));
     assert!(changed(12, &[4]).contains("degree 4") && changed(13, &[60]).contains("60 fractional bits"));
     assert!(changed(8, &2_u32.to_le_bytes()).contains("its header declares 2 splats, which need 58 bytes"));
-    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
+    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("declares 50000000 splats"));
     assert!(changed(8, &[0; 4]).contains("it has no splats"));
     assert!(fault("a.spz", &good[..good.len() - 12]).contains("damaged or cut off"));
     // 29 MB of zeros in a small file: the limit is checked before they are decompressed.
@@ -495,7 +495,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         fault("a.spz", &file)
     };
     assert!(changed(4, &[9]).contains("SPZ of version 9, but versions 1 to 4 are read"));
-    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("counts 50000000 splats"));
+    assert!(changed(8, &50_000_000_u32.to_le_bytes()).contains("declares 50000000 splats"));
     assert!(changed(8, &2_u32.to_le_bytes()).contains("its stream 0 holds 9 bytes, but its array has 18"));
     let without_harmonics = ARRAYS[..3].iter().map(|bytes| (bytes.len(), zstd_frame(bytes)));
     let mut streams: Vec<_> = without_harmonics.collect();
@@ -523,7 +523,7 @@ fn damaged_captures_are_refused_with_value_and_limit() {
     // 20 MB of zeros in a small file: the limit is checked before they are decompressed.
     let streams = [9, 1, 3, 3, 4].map(|size| (size * 1_000_000, zstd_zeros(size * 1_000_000)));
     let mut bomb = spz_4(1_000_000, 0, &[], &streams);
-    assert!(fault("a.spz", &bomb).contains("counts 1000000 splats"), "{} bytes", bomb.len());
+    assert!(fault("a.spz", &bomb).contains("declares 1000000 splats"), "{} bytes", bomb.len());
     bomb.resize(9_000, 0);
     let limited = Model::read_within("a.spz", &bomb, &mut |_| None, 1 << 24).unwrap_err().to_string();
     assert!(limited.contains("MiB of memory, more than the limit of 16 MiB"), "{limited}");

@@ -16,9 +16,9 @@ use crate::surface::Surface;
 
 /// GPU sessions, and the canvas that they draw into.
 pub(crate) struct Gpu {
-    /// The session that draws harmonic coordinates.
+    /// The session that draws the model deformed by harmonic coordinates.
     pub(crate) main: Session,
-    /// The sessions that draw other kinds of coordinates, at most one per kind.
+    /// The sessions that draw it deformed by other kinds of coordinates, at most one per kind.
     pub(crate) others: Vec<(Coordinates, Session)>,
     pub(crate) surface: Surface,
 }

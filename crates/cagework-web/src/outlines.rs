@@ -4,8 +4,8 @@ use cagework_core::field::Field;
 use cagework_core::splats::Splats;
 use glam::{Mat3, Vec2, Vec3};
 
-/// Outline of an ellipsoid in a parallel projection: half axes of an ellipse, and the counter-clockwise angle from the
-/// screen's right to the first half axis, radians.
+/// Outline of an ellipsoid in a parallel projection: semi-axes of an ellipse, and the counter-clockwise angle from the
+/// screen's right to the first semi-axis, radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Outline {
     pub(crate) half_axes: Vec2,

@@ -38,7 +38,7 @@ pub enum CageError {
     /// A coordinate is infinite or not a number.
     #[error("cage vertex {vertex} has a coordinate that is not a finite number")]
     NotFinite {
-        /// Index of the vertex that is not finite.
+        /// Index of a vertex with a coordinate that is not finite.
         vertex: u32,
     },
     /// The cage is too small or too large for f32 and f64 arithmetic.

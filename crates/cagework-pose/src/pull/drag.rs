@@ -34,9 +34,11 @@ const REACH_PER_GRAB_DISTANCE: f64 = 1.2;
 const PIN_RADIUS: f64 = 0.05;
 /// Weight of the samples in a pin's patch.
 const PIN_WEIGHT: f64 = 2e4;
-/// Stiffness mu of grabs and pins, as a multiple of the mean diagonal entry of the matrix of E with fixed samples.
+/// Stiffness mu of grabs and pins, as a multiple of the mean diagonal entry of the matrix of the energy E, fixed samples
+/// included.
 const HANDLE_STIFFNESS: f64 = 1e3;
-/// Regularisation eps, as a fraction of the mean diagonal entry of the matrix of E without fixed samples.
+/// Regularisation eps, as a fraction of the mean diagonal entry of the matrix of the energy E, computed without the
+/// fixed samples.
 pub(super) const REGULARISATION: f64 = 1e-6;
 /// The drag has settled when the last step of a frame changes each coordinate of the cage by less than this, as a
 /// fraction of the model's size. With 1e-4 instead, a pull of the whole model would stop 5 % short of the targets.

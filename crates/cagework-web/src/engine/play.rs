@@ -105,7 +105,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Returns half axes and angle, radians, of three ellipses on the screen: the splat nearest to the pointer at rest,
+    /// Returns semi-axes and angle, radians, of three ellipses on the screen: the splat nearest to the pointer at rest,
     /// the unit sphere's image under the deformation gradient at this splat, and the splat in the pose. `[3, 3]`; empty
     /// if the pointer is not on a capture.
     #[wasm_bindgen(js_name = outlinesAt)]

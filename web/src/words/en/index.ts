@@ -62,10 +62,10 @@ export const EN = {
   /** Language tag of the page, which also determines how numbers, units and lists are written. */
   locale: "en",
   words,
-  /** Downloads the sentences of the tour. They are needed only if the tour is started. */
+  /** Downloads the texts of the tour. They are needed only if the tour is started. */
   tourWords: async () => (await import("./tour")).tourWords,
-  /** Downloads the sentences of the shortcut sheet. */
+  /** Downloads the texts of the shortcut sheet. */
   sheetWords: async () => (await import("./sheet")).sheetWords,
-  /** Downloads the sentences of the gallery. */
+  /** Downloads the texts of the gallery. */
   galleryWords: async () => (await import("./gallery")).galleryWords,
 };

@@ -9,7 +9,7 @@ use crate::geometry::winding_number;
 use crate::mesh::PolygonMesh;
 use crate::voxelize::embedded::{shoot_lines, votes};
 
-/// Asserts that lines cross the cage an even number of times. At every `every`-th centre, the parity along each axis
+/// Asserts that lines cross the cage an even number of times. At every `every`-th cell centre, the parity along each axis
 /// must match the winding number.
 fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     let lines = shoot_lines(cage, grid);

@@ -145,7 +145,7 @@ impl Crate {
     /// a use by the root. Returns the number of tokens of the import.
     fn read_root_import(&mut self, tokens: &[TokenTree], before: Option<&TokenTree>, place: &Place) -> usize {
         let (paths, length) = paths(tokens);
-        // The token before `use` is `pub`, or the parentheses of `pub(crate)`.
+        // The token before `use` in a public import is `pub`, or the parentheses of `pub(crate)`.
         let is_public = match before {
             Some(TokenTree::Ident(word)) => word == "pub",
             Some(TokenTree::Group(group)) => group.delimiter() == Delimiter::Parenthesis,
