@@ -5,11 +5,18 @@ import { TransformControls } from "three/addons/controls/TransformControls.js";
 
 const renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
 renderer.setPixelRatio(devicePixelRatio);
-renderer.setSize(innerWidth, innerHeight);
 document.body.append(renderer.domElement);
 const scene = new THREE.Scene();
-const camera = new THREE.PerspectiveCamera(35, innerWidth / innerHeight, 0.1, 100);
-camera.position.set(2, 2, 6);
+const camera = new THREE.PerspectiveCamera(35, 1, 0.1, 100);
+camera.position.set(2.7, 2.7, 8);
+const resize = () => {
+  camera.aspect = innerWidth / innerHeight;
+  camera.zoom = Math.min(1, camera.aspect);
+  camera.updateProjectionMatrix();
+  renderer.setSize(innerWidth, innerHeight);
+};
+addEventListener("resize", resize);
+resize();
 scene.add(new THREE.HemisphereLight("white", "gray", 4));
 
 const material = new THREE.MeshStandardMaterial({ color: "#d98b4a", roughness: 0.5 });
