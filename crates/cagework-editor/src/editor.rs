@@ -145,6 +145,17 @@ impl Editor {
         first..self.document.models.next_id()
     }
 
+    /// Replaces a model by one with the same surface, see [`Models::replace`]; keeps cage and poses. Returns the id of the
+    /// new model.
+    ///
+    /// # Errors
+    /// If there is no such model. Nothing changes then.
+    pub fn replace_model(&mut self, id: u32, model: Model) -> Result<u32, EditError> {
+        let own = self.document.models.next_id();
+        self.change_models(|all| all.replace(id, model))?;
+        Ok(own)
+    }
+
     /// Changes the [painted amounts](crate::Member::painted) of a model. The key of the models changes only at the next
     /// step, so that the dabs of a stroke do not trigger updates of derived data.
     pub fn paint(&mut self, id: u32, change: impl FnOnce(&mut Vec<u8>)) {

@@ -5,6 +5,7 @@
 //! removed.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -173,6 +174,33 @@ impl Models {
             return Err(EditError::OnlyModel);
         }
         Arc::make_mut(&mut self.members).retain(|member| member.id != id);
+        self.join();
+        Ok(())
+    }
+
+    /// Replaces a model by one with the same surface, such as itself with a skin. The new model has an id of its own, and the
+    /// place, visibility and parts of the old one. Vertices at the same position keep their painted amount; surface
+    /// points stay if the triangles have the same order.
+    ///
+    /// # Errors
+    /// If there is no such model. Nothing changes then.
+    pub fn replace(&mut self, id: u32, model: Model) -> Result<(), EditError> {
+        let place = self.iter().position(|member| member.id == id).ok_or(EditError::NoModel)?;
+        let old = self.members[place].clone();
+        let bits = |p: &Vec3| p.to_array().map(|x| (x + 0.0).to_bits());
+        let amounts: HashMap<_, u8> =
+            old.positions().iter().map(bits).zip(old.painted.iter().copied()).collect();
+        let painted = model.positions.iter().map(|p| (amounts.get(&bits(p)).copied().unwrap_or(0), 1));
+        let painted = if amounts.is_empty() { Vec::new() } else { painted.collect() };
+        self.push(model, Some(MemberSettings { first_triangle: 0, options: old.options.clone(), painted }));
+        let members = Arc::make_mut(&mut self.members);
+        members.swap_remove(place);
+        let corners = |m: &Member| -> Vec<_> {
+            m.triangles().iter().map(|t| t.map(|v| bits(&m.positions()[v as usize]))).collect()
+        };
+        if corners(&members[place]) == corners(&old) {
+            members[place].first_triangle = old.first_triangle;
+        }
         self.join();
         Ok(())
     }

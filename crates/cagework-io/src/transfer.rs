@@ -1,6 +1,9 @@
 //! Joint weights of a body for clothes.
 
+use std::borrow::Cow;
+
 use cagework_core::inpaint::{Inpainted, REACH, inpaint};
+use cagework_core::words::counted;
 use thiserror::Error;
 
 use crate::error::WriteError;
@@ -48,12 +51,7 @@ impl Model {
         body: &Self,
         memory_limit: u64,
     ) -> Result<(Vec<u8>, Inpainted), TransferError> {
-        let mut clothes = self.clone();
-        if matches!(self.document, Document::Obj(_)) {
-            clothes =
-                Self::read(&format!("{}.glb", self.name), &self.write_glb(&self.positions)?, &mut |_| None)?;
-            clothes.set_up(self.up);
-        }
+        let mut clothes = self.as_gltf()?.into_owned();
         clothes.see_from(body.origin);
         let no_skin = || TransferError::NoSkin(body.name.clone());
         let (Document::Gltf(skeleton), Some(player)) = (&body.document, body.player()?) else {
@@ -88,4 +86,44 @@ impl Model {
         }
         Ok((gltf::write_skinned(document, skeleton, (&joints, &found.values))?, found))
     }
+
+    /// Like [`Self::write_with_skin_of`], as a model with the positions, up axis and origin of this one. Its name ends in
+    /// `.glb` if the clothes are not a glTF, and its vertices then are in the order of the GLB.
+    ///
+    /// # Errors
+    /// As [`Self::write_with_skin_of`].
+    pub fn with_skin_of(&self, body: &Self, memory_limit: u64) -> Result<(Self, Inpainted), TransferError> {
+        let (glb, found) = self.write_with_skin_of(body, memory_limit)?;
+        let clothes = self.as_gltf()?;
+        let mut model = Self::read_within(&clothes.name, glb, &mut |_| None, memory_limit)?;
+        model.set_up(self.up);
+        model.see_from(self.origin);
+        // Skinning at rest rounds the positions.
+        model.positions.clone_from(&clothes.positions);
+        Ok((model, found))
+    }
+
+    /// This model as a glTF.
+    fn as_gltf(&self) -> Result<Cow<'_, Self>, TransferError> {
+        if matches!(self.document, Document::Gltf(_)) {
+            return Ok(Cow::Borrowed(self));
+        }
+        let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
+        let mut model = Self::read(&format!("{stem}.glb"), &self.write_glb(&self.positions)?, &mut |_| None)?;
+        model.set_up(self.up);
+        model.see_from(self.origin);
+        Ok(Cow::Owned(model))
+    }
+}
+
+/// How many positions of clothes got their weights in which way, a line each. Ways without positions are left out.
+#[must_use]
+pub fn transfer_report(found: &Inpainted) -> Vec<String> {
+    let ways = [
+        (found.matched, "with the weights of the body"),
+        (found.inpainted, "that continue their neighbours"),
+        (found.copied, "in parts away from the body, with the weights of its closest point"),
+    ];
+    let some = ways.into_iter().filter(|(n, _)| *n > 0);
+    some.map(|(n, way)| format!("{} {way}", counted(n, "position", "positions"))).collect()
 }

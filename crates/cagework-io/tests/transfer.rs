@@ -164,3 +164,17 @@ fn a_body_whose_rest_differs_from_its_bind_pose_is_dressed_at_rest() {
     let fits = |p: &Vec3| clothes.positions.iter().any(|q| q.distance(*p) < 1e-5);
     assert!(shown.iter().all(fits) && dressed.positions.iter().all(fits));
 }
+
+#[test]
+fn clothes_follow_a_clip_of_the_body() {
+    let shirt = tube(0.22, 0.5, 1.5, 7);
+    let (dressed, ..) = transfer(&read("shirt.obj", obj(&shirt).as_bytes()).unwrap());
+    let body = read("body.glb", &body()).unwrap().player().unwrap().unwrap();
+    let player = dressed.player().unwrap().unwrap();
+    let at = player.at_clip_of(&body, 0, 1.0, &[]);
+    // Linear blend skinning: the share y/2 turns by 1.5 radians about the joint at y = 1.
+    let turned = |p: Vec3| Vec3::Y + Quat::from_rotation_z(1.5) * (p - Vec3::Y);
+    for (p, shown) in dressed.positions.iter().zip(skin_vertices(&player.skin, &at.palette, &[])) {
+        assert!(shown.distance(p.lerp(turned(*p), p.y / 2.0)) < 1e-4, "{p} {shown}");
+    }
+}

@@ -1,6 +1,12 @@
 //! Tests of adding and removing models, and of their settings in projects.
 
+use cagework_core::skin::{Joint, Rig};
+use cagework_core::{Bounds, subdivided_box};
+use cagework_io::{TransferError, read_project, transfer_report, write_mesh_glb};
+use glam::Quat;
+
 use super::*;
+use crate::{Command, Contents, Document, Editor, SurfacePoint};
 
 /// Three faces of a tetrahedron translated by `at` along x: one with the material `skin`, two with `cloth`.
 fn model(name: &str, at: f32) -> Model {
@@ -127,4 +133,91 @@ fn a_single_default_model_stores_no_settings() {
     let mut models = Models::default();
     models.add([(model("a.obj", 0.0), None)]);
     assert_eq!(models.settings(), Vec::new());
+}
+
+/// A cube around the origin. `body.glb` has two joints, whose weights change along y; the faces of `shirt.obj` alternate between
+/// two materials.
+fn cube(name: &str, half: f32) -> Model {
+    let bounds = Bounds { min: Vec3::splat(-half), max: Vec3::splat(half) };
+    let mesh = subdivided_box(bounds, 0.0, [3; 3]);
+    let corners = |f: &Vec<u32>| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]];
+    let mesh = TriMesh {
+        positions: mesh.positions.clone(),
+        triangles: mesh.faces.iter().flat_map(corners).collect(),
+    };
+    let joint = |name, y, parent| Joint { name, at: Vec3::Y * y, parent };
+    let share = |p: &Vec3| [(0, 0.5 - p.y), (1, 0.5 + p.y), (0, 0.0), (0, 0.0)];
+    let rig = Rig {
+        joints: vec![joint("hips", -0.5, None), joint("chest", 0.0, Some(0))],
+        influences: mesh.positions.iter().map(share).collect(),
+        clip: "still",
+        times: vec![0.0],
+        turns: vec![vec![Quat::IDENTITY]; 2],
+        root: vec![Vec3::ZERO],
+    };
+    let vertex = |p: &Vec3| format!("v {} {} {}\n", p.x, p.y, p.z);
+    let face =
+        |(k, t): (usize, &[u32; 3])| format!("usemtl {}\nf {} {} {}\n", k % 2, t[0] + 1, t[1] + 1, t[2] + 1);
+    let bytes = match name {
+        "shirt.obj" => {
+            let faces = mesh.triangles.iter().enumerate().map(face);
+            mesh.positions.iter().map(vertex).chain(faces).collect::<String>().into_bytes()
+        }
+        _ => write_mesh_glb(name, &mesh, &[], (name == "body.glb").then_some(&rig)).unwrap(),
+    };
+    Model::read(name, &bytes, &mut |_| None).unwrap()
+}
+
+#[test]
+fn a_model_that_gets_a_skin_keeps_place_paint_and_pins() {
+    for name in ["shirt.glb", "shirt.obj"] {
+        let (body, shirt) = (cube("body.glb", 0.5), cube(name, 0.51));
+        let mut editor = Editor::default();
+        let pins = vec![SurfacePoint { triangle: 5, bary: [1.0, 0.0, 0.0] }];
+        let models = [(shirt.clone(), None), (body.clone(), None)];
+        editor.open(models, Contents { pins: pins.clone(), ..Contents::default() });
+        let amount = |p: &Vec3| (100.0 + 50.0 * p.y + 20.0 * p.x) as u8;
+        let amounts: Vec<u8> = shirt.positions.iter().map(amount).collect();
+        let options = PartOptions { shown: false, rigid: vec![WHOLE.to_owned()], stays: Vec::new() };
+        editor.apply(Command::SetPainted { id: 0, amounts }).unwrap();
+        editor.apply(Command::SetParts { id: 0, options: options.clone() }).unwrap();
+        editor.amend();
+        let before = editor.document().clone();
+        let joints = |editor: &Editor| {
+            let all = editor.document().models.iter();
+            all.map(|member| member.model.counts.joints).collect::<Vec<_>>()
+        };
+
+        let (dressed, found) = shirt.with_skin_of(&body, u64::MAX).unwrap();
+        // A cube of 3 x 3 faces per side has 4^3 - 2^3 vertices.
+        assert_eq!(transfer_report(&found), ["56 positions with the weights of the body"]);
+        let refused = dressed.with_skin_of(&body, u64::MAX).unwrap_err();
+        assert_eq!(refused, TransferError::HasSkin("shirt.glb".into()));
+        assert!(editor.replace_model(7, dressed.clone()).is_err());
+        assert!(editor.document().is_same(&before));
+        let id = editor.replace_model(0, dressed).unwrap();
+        assert!(editor.commit("rig"));
+        let Document { models, cage, pose, .. } = editor.document();
+        assert_eq!((names(models), joints(&editor)), (vec!["shirt.glb", "body.glb"], vec![2, 2]));
+        let member = models.first().unwrap();
+        assert_eq!((member.id, &member.options), (id, &options));
+        assert!(member.positions().iter().zip(&*member.painted).all(|(p, &painted)| painted == amount(p)));
+        assert_eq!((cage, pose), (&before.cage, &before.pose));
+        let place = |models: &Models| models.corners(5).map(|c| c.map(|v| models.positions()[v as usize]));
+        // The GLB of an OBJ sorts triangles by material, so the pin's triangle is not known.
+        let expected = if name == "shirt.glb" { place(&before.models) } else { None };
+        assert_eq!(place(models), expected);
+
+        assert!(editor.undo());
+        assert_eq!((joints(&editor), editor.document() == &before), (vec![0, 2], true));
+        assert!(editor.redo());
+        assert_eq!(joints(&editor), [2, 2]);
+        let project = read_project("a.glb", &editor.write_project("{}").unwrap(), u64::MAX).unwrap().unwrap();
+        let again: Vec<_> = project.models.iter().map(|model| (&*model.name, model.counts.joints)).collect();
+        assert_eq!(again, [("shirt.glb", 2), ("body.glb", 2)]);
+        let settings = editor.document().models.settings();
+        let mut opened = Models::default();
+        opened.add(project.models.into_iter().zip(settings.into_iter().map(Some)));
+        assert_eq!(opened.first().unwrap().painted, editor.document().models.first().unwrap().painted);
+    }
 }

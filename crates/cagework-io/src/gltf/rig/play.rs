@@ -7,6 +7,7 @@ use cagework_core::skin::Skin;
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::clip::{Clip, clips, quaternion, vector};
+use super::skeleton::bare;
 use super::tracks::ChannelTarget;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
@@ -21,6 +22,8 @@ pub struct Player {
     pub skin: Skin,
     clips: Vec<Clip>,
     nodes: Vec<Node>,
+    /// Names of the nodes without their namespaces. `[n_nodes]`
+    node_names: Vec<Option<String>>,
     /// Nodes, each with its parent; parents come first.
     order: Vec<(u32, Option<u32>)>,
     /// Node and inverse bind matrix of each entry of the palette.
@@ -59,6 +62,9 @@ impl Player {
             skin: Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() },
             clips: clips(document),
             nodes: document.root.nodes.clone(),
+            node_names: (0..document.root.nodes.len())
+                .map(|node| Some(bare(document.json["nodes"][node]["name"].as_str()?).to_owned()))
+                .collect(),
             order: worlds.order,
             palette: Vec::new(),
             defaults: Vec::new(),
@@ -171,13 +177,39 @@ impl Player {
     /// clip does not animate, `[n_targets]`; empty for the file's defaults.
     #[must_use]
     pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> RigPose {
+        let clip = clip.and_then(|clip| self.clips.get(clip));
+        self.with(clip.into_iter().flat_map(|clip| clip.at(seconds)), targets)
+    }
+
+    /// Like [`Self::at`], for a clip of another file. It moves the nodes that have the same names.
+    #[must_use]
+    pub fn at_clip_of(&self, other: &Self, clip: usize, seconds: f32, targets: &[f32]) -> RigPose {
+        let own = |n: usize| {
+            let name = other.node_names.get(n)?.as_ref()?;
+            self.node_names.iter().position(|own| own.as_ref() == Some(name))
+        };
+        let values = other.clips.get(clip).into_iter().flat_map(|clip| clip.at(seconds));
+        let named = values.filter_map(|(driven, value)| {
+            let driven = match driven {
+                ChannelTarget::Translation(n) => ChannelTarget::Translation(own(n)?),
+                ChannelTarget::Rotation(n) => ChannelTarget::Rotation(own(n)?),
+                ChannelTarget::Scale(n) => ChannelTarget::Scale(own(n)?),
+                ChannelTarget::Weights(_) | ChannelTarget::MeshWeights(_) => return None,
+            };
+            Some((driven, value))
+        });
+        self.with(named, targets)
+    }
+
+    /// The pose with these values of animated properties.
+    fn with(&self, values: impl Iterator<Item = (ChannelTarget, Vec<f64>)>, targets: &[f32]) -> RigPose {
         let mut nodes = self.nodes.clone();
         let mut weights = if targets.is_empty() { self.defaults.clone() } else { targets.to_vec() };
         weights.resize(self.defaults.len(), 0.0);
         let put = |weights: &mut [f32], first: usize, values: &[f64]| {
             weights.iter_mut().skip(first).zip(values).for_each(|(w, &value)| *w = value as f32);
         };
-        for (driven, value) in self.clips.get(clip.unwrap_or(usize::MAX)).iter().flat_map(|c| c.at(seconds)) {
+        for (driven, value) in values {
             let node = |number: usize| nodes.get(number).is_some();
             match driven {
                 ChannelTarget::Translation(n) if node(n) => {

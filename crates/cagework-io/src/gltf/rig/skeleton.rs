@@ -63,7 +63,7 @@ impl Skeleton {
 
 /// Name without a namespace. Some programs remove the colon from `mixamorig:Hips`, so the prefix `mixamorig` is removed,
 /// too.
-fn bare(name: &str) -> &str {
+pub(super) fn bare(name: &str) -> &str {
     let name = name.rsplit(':').next().unwrap_or(name);
     name.strip_prefix("mixamorig").filter(|rest| !rest.is_empty()).unwrap_or(name)
 }
