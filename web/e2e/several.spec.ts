@@ -3,6 +3,7 @@
  */
 
 import type { Page } from "@playwright/test";
+import { RIG_DEFAULTS } from "../src/defaults";
 import {
   apart,
   BUCKLE,
@@ -164,5 +165,46 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
     await expect(page).toHaveTitle(/body/);
     await bound(page);
     await same();
+  });
+
+  await test.step("the body gets the joints of the shirt and follows its clip, the buckle is too far", async () => {
+    /** Largest movement of a vertex of the body in the clip. */
+    const moves = () =>
+      page.evaluate(
+        async ({ rig, n }) => {
+          const engine = globalThis.cagework?.engine;
+          await engine?.startClip(rig);
+          const [a, b] = [0, 0.5].map((seconds) => {
+            engine?.showClip(0, seconds, new Float32Array(), true);
+            return engine?.clipPositions() ?? [];
+          });
+          engine?.stopClip();
+          return Math.max(
+            ...Array.from({ length: 3 * n }, (_, k) => Math.abs((a?.[k] ?? 0) - (b?.[k] ?? 0))),
+          );
+        },
+        { rig: RIG_DEFAULTS, n: SIZES.body },
+      );
+    await step(page, "Model");
+    const button = row(page, "body.glb").getByRole("button", { name: "Rig like shirt.glb" });
+    expect(await moves()).toBe(0);
+    await button.click();
+    await expect(page.getByText(/\d positions with the weights of the body/)).toBeVisible();
+    await shoot(page, "several-rigged");
+    await expect(button).toHaveCount(0);
+    await expect(row(page, "body.glb")).toContainText(/1 part stays.*painted/);
+    await bound(page);
+    // The chest bends by 0.4 radians about its joint, 1 below the top of the body.
+    expect(await moves()).toBeGreaterThan(0.1);
+    await row(page, "buckle.glb")
+      .getByRole("button", { name: /Rig like/ })
+      .click();
+    await expect(page.getByRole("alert")).toContainText(
+      /buckle\.glb could not be rigged.*No vertex of buckle\.glb/,
+    );
+    await undo(page);
+    await expect(button).toBeVisible();
+    await bound(page);
+    expect(await moves()).toBe(0);
   });
 });

@@ -242,6 +242,19 @@ async function start(opened: OpenedOn & Needs) {
         },
       };
     },
+    /**
+     * Gives a model the joints and joint weights of the model `body`, in a worker of its own, as an undo step. Keeps the
+     * cage and its poses. Resolves with a sentence about the weights.
+     */
+    dress(id: number, body: number, label: string, hear?: Hear): Job<{ readonly report: string }> {
+      const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];
+      const job = reading("dress", { clothes, body: from, used: engine.texturePixels(id) }, hear);
+      return chain(ofNow(job), async (read) => {
+        const [loaded] = load(pkg, read);
+        await engine.replace(id, loaded, label);
+        return { report: read.report };
+      });
+    },
     async openSample(id: string, signal?: AbortSignal): Promise<OpenedFile> {
       const name = SAMPLE_FILES[id];
       if (name) {

@@ -69,7 +69,7 @@ const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
 export function memberOf(id: number, name: string, triangles = 12): MemberInfo {
   const options = { shown: true, rigid: [], stays: [] };
   const parts = ["material:Cloth", "node:Buckle"];
-  return { id, name, format: "obj", vertices: 8, triangles, rigged: false, parts, options, painted: false };
+  return { id, name, format: "obj", vertices: 8, triangles, joints: 0, parts, options, painted: false };
 }
 
 /** The engine's description of a document with these models. */

@@ -8,6 +8,7 @@ use cagework_editor::{DocumentSettings, MemberSettings};
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{
     Look, LookAlpha, LookWrap, Model, RestoreError, Store, StoredArrays, TexturePlan, UpAxis, read_project,
+    transfer_report,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
@@ -117,6 +118,19 @@ impl Loaded {
             return Ok(());
         }
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
+    }
+
+    /// Gives these clothes the joints of `body`, and weights copied from it. Returns how many positions got their weights
+    /// in which way, as an English sentence.
+    ///
+    /// # Errors
+    /// Those of `Model::with_skin_of`; the clothes are then unchanged.
+    #[wasm_bindgen(js_name = takeSkinOf)]
+    pub fn take_skin_of(&mut self, body: &Loaded) -> Result<String, JsValue> {
+        let taken = self.model.with_skin_of(&body.model, READ_LIMIT);
+        let (model, found) = taken.map_err(|e| Fault::new(ErrorName::Error, e))?;
+        self.model = model;
+        Ok(transfer_report(&found).join("; "))
     }
 
     /// Converts the model to arrays, from which [`Self::restore`] recreates it in another instance of the module
@@ -264,7 +278,7 @@ impl Loaded {
         Ok(Self::new(model))
     }
 
-    fn new(model: Model) -> Self {
+    pub(crate) fn new(model: Model) -> Self {
         let (look, textures, side) = (Look::default(), Vec::new(), 0);
         let (poses, more) = (Vec::new(), VecDeque::new());
         Self { model, cage: None, look, textures, side, poses, settings: None, number: 0, more }

@@ -174,9 +174,19 @@ impl Playback {
     fn update(&mut self) {
         let Moment { clip, seconds, targets } = &self.shown;
         let clip = clip.and_then(|clip| self.clips.get(clip));
+        // The first model with the clip leads those without it that have a skeleton with the same names.
+        let leader = self.played.iter().find_map(|one| match (&one.part, clip?.of(one.id)) {
+            (ModelMotion::Player(player), Some(clip)) => Some((player, clip)),
+            _ => None,
+        });
         let at = |one: &PlayedModel| {
             let own = targets.get(one.targets.clone()).unwrap_or_default();
-            posed(&one.part, clip.and_then(|clip| clip.of(one.id)), *seconds, own)
+            match (&one.part, clip.and_then(|clip| clip.of(one.id)), leader) {
+                (ModelMotion::Player(player), None, Some((body, clip))) => {
+                    player.at_clip_of(body, clip, *seconds, own)
+                }
+                (part, clip, _) => posed(part, clip, *seconds, own),
+            }
         };
         self.posed = self.played.iter().map(at).collect();
         self.targets = self.posed.iter().flat_map(|posed| &posed.targets).copied().collect();

@@ -154,7 +154,8 @@ pub(crate) struct MemberInfo {
     format: ModelFormat,
     vertices: usize,
     triangles: usize,
-    rigged: bool,
+    /// Number of joints of its skins.
+    joints: usize,
     /// Names of the parts, prefixed by their kind, such as `material:Cloth`.
     parts: Vec<String>,
     options: PartOptions,
@@ -171,7 +172,7 @@ impl MemberInfo {
             format: model.format(),
             vertices: model.positions.len(),
             triangles: model.triangles.len(),
-            rigged: model.is_rigged(),
+            joints: model.counts.joints,
             parts: model.part_names(),
             options: member.options.clone(),
             painted: !member.painted.is_empty(),

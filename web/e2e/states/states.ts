@@ -40,7 +40,7 @@ type Patch = Partial<AppState>;
 const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
 const ONE = {
   ...memberOf(0, "01", 1234),
-  rigged: true,
+  joints: 4,
   painted: true,
   parts: ["material:1", "node:2", "joint:3", "group:4"],
 };

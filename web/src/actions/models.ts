@@ -2,6 +2,7 @@
 
 import type { MemberInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
+import { sentence } from "../strings";
 import { T } from "../words";
 import type { CageActions } from "./cage";
 import { attempt, type Context, waitFor } from "./context";
@@ -44,8 +45,8 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
       const went = await attempt(ctx, T.models.notAdded, () => {
         ctx.tell.clear();
         return ctx.queue.replace("open", async (signal) => {
-          const { texturePixels } = ctx.engine();
-          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", texturePixels);
+          const used = ctx.engine().texturePixels();
+          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", used);
           settle();
           const n = members().length;
           await models.join(reads, signal, T.did.addModels);
@@ -80,6 +81,20 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
         const notices = await waitFor(ctx, signal, what, () => ctx.session().add(reads, label));
         const { model } = store.get();
         if (model) store.set({ model: { ...model, notices: [...new Set([...model.notices, ...notices])] } });
+      });
+    },
+    /** Gives a model the joints and joint weights of another one. */
+    dress(id: number, body: number): Promise<boolean> {
+      const name = memberOf(id)?.name ?? "";
+      return attempt(ctx, T.models.notDressed(name), () => {
+        ctx.tell.clear();
+        settle();
+        return ctx.queue.replace("open", async (signal) => {
+          const { report } = await waitFor(ctx, signal, T.models.dressing(name), (hear) =>
+            ctx.session().dress(id, body, T.did.dress(name), hear),
+          );
+          ctx.tell.say(sentence(report));
+        });
       });
     },
     /** Removes a model, and remakes the cage. */

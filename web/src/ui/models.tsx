@@ -18,6 +18,7 @@ const WAYS: readonly (readonly [How, IconName])[] = [
 
 export function Models({ app, model }: { app: App; model: ModelInfo }) {
   const [only, ...others] = model.members;
+  const body = model.members.reduce((best, one) => (one.joints > best.joints ? one : best));
   const isTouch = useTouch();
   return (
     <Section title={T.models.title}>
@@ -28,7 +29,7 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
             <Signs />
             <ul class="stack">
               {model.members.map((member) => (
-                <Row key={member.id} app={app} member={member} />
+                <Row key={member.id} app={app} member={member} body={body} />
               ))}
             </ul>
           </>
@@ -52,8 +53,9 @@ function Signs() {
   );
 }
 
-function Row({ app, member }: { app: App; member: MemberInfo }) {
-  const { id, name, options } = member;
+/** `body`: the model with the most joints. */
+function Row({ app, member, body }: { app: App; member: MemberInfo; body: MemberInfo }) {
+  const { id, name, options, joints } = member;
   return (
     <li class="card stack tight" aria-label={name}>
       <div class="row">
@@ -79,6 +81,17 @@ function Row({ app, member }: { app: App; member: MemberInfo }) {
           />
         </div>
       </div>
+      {joints === 0 && body.joints > 0 && (
+        <div class="row">
+          <Button
+            label={T.models.dress(body.name)}
+            icon="bone"
+            kind="small"
+            tip={T.models.dressTip(body.name)}
+            onClick={() => void app.models.dress(id, body.id)}
+          />
+        </div>
+      )}
       <Parts app={app} member={member} />
     </li>
   );

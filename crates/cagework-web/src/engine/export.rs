@@ -298,7 +298,7 @@ impl Engine {
         self.read(|state| {
             let is_alone = state.models().iter().nth(1).is_none();
             for member in state.models().iter() {
-                // Models without this clip contribute no frames, because they stay at rest during playback.
+                // Models without this clip contribute no frames. They stay at rest, or follow the joints of one with it.
                 let has = |name: &&str| is_alone || Clip::named(&member.model.clips(), name).is_ok();
                 let states = member.model.states(clip.as_deref().filter(has));
                 let (own, corners) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use cagework_editor::edit::pick_surface;
 use cagework_gpu::render::check_layers;
+use cagework_io::Model;
 use glam::Vec3;
+use js_sys::Uint8Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -44,50 +46,46 @@ impl Engine {
             added.push((loaded.model, settings));
             page_turn().await;
         }
-        let mut gpu = self.gpu.lock().await;
-        let gpu = gpu.as_mut().ok_or_else(lost)?;
-        self.change(|state| {
+        let added = self.change_models(label, |state| {
             let ids = state.editor.add_models(added);
             state.draws.extend(ids.zip(draws));
-            state.is_adding = true;
+            Ok(())
         });
-        let is_too_much = self.read(|state| {
-            let (positions, triangles) = (state.models().positions(), state.models().triangles());
-            // Count layers from a camera that frames all models. The current camera may be close to one of them, where
-            // the models would cover far more of the picture than usual.
-            let (camera, size) = state.view_of(positions);
-            check_layers(gpu.main.context(), &camera, positions, triangles, size)
-        });
-        let outcome = match is_too_much {
-            Ok(()) => upload(&self.state, gpu).await,
-            Err(error) => Err(error.into()),
-        };
-        self.change(|state| {
-            state.is_adding = false;
-            match (outcome, label) {
-                (Err(fault), _) => {
-                    state.editor.revert();
-                    Err(fault)
-                }
-                (Ok(()), Some(label)) => {
-                    state.editor.commit(label);
-                    Ok(())
-                }
-                (Ok(()), None) => {
-                    state.editor.amend();
-                    Ok(())
-                }
-            }
-        })?;
-        Ok(())
+        Ok(added.await?)
     }
 
-    /// Total number of pixels of the models' textures, at the sizes at which they are drawn.
-    #[wasm_bindgen(getter, js_name = texturePixels)]
+    /// Replaces a model by one with the same surface, as a step of the history, see `Models::replace`. Drops the weights.
+    /// Consumes the JavaScript handle of the model.
+    ///
+    /// # Errors
+    /// If there is no such model, and the errors of `open`. The document is then unchanged.
+    pub async fn replace(&self, id: u32, mut loaded: Loaded, label: String) -> Result<(), JsValue> {
+        let draw = Arc::new(loaded.draw_model());
+        let replaced = self.change_models(Some(label), |state| {
+            let own = state.editor.replace_model(id, loaded.model)?;
+            state.draws.insert(own, draw);
+            Ok(())
+        });
+        Ok(replaced.await?)
+    }
+
+    /// Converts a model to arrays, from which `Loaded.restore` recreates it in a worker.
+    ///
+    /// # Errors
+    /// If no open model has this id.
+    #[wasm_bindgen(js_name = storedModel)]
+    pub fn stored_model(&self, id: u32) -> Result<Vec<Uint8Array>, JsValue> {
+        let model = self.read(|state| Answer::Ok(Model::clone(&state.models().get(id)?.model)))?;
+        Ok(Loaded::new(model).store())
+    }
+
+    /// Total number of pixels of the models' textures, at the sizes at which they are drawn, without those of one model.
+    #[wasm_bindgen(js_name = texturePixels)]
     #[must_use]
-    pub fn texture_pixels(&self) -> f64 {
+    pub fn texture_pixels(&self, without: Option<u32>) -> f64 {
         self.read(|state| {
-            let draws = state.models().iter().filter_map(|member| state.draws.get(&member.id));
+            let ids = state.models().iter().map(|member| member.id).filter(|id| Some(*id) != without);
+            let draws = ids.filter_map(|id| state.draws.get(&id));
             let textures = draws.flat_map(|draw| &draw.textures);
             textures.map(|texture| f64::from(texture.width) * f64::from(texture.height)).sum()
         })
@@ -155,6 +153,45 @@ impl Engine {
             let (center, reach) = state.touched(*id, [x, y], radius)?;
             Some(reach / state.camera.units_per_pixel(center))
         }))
+    }
+}
+
+impl Engine {
+    /// Changes the models and uploads them, as a step of the history if there is a label. An error reverts the change.
+    async fn change_models(
+        &self,
+        label: Option<String>,
+        change: impl FnOnce(&mut State) -> Answer<()>,
+    ) -> Answer<()> {
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        self.change(|state| {
+            change(state)?;
+            state.is_adding = true;
+            Answer::Ok(())
+        })?;
+        let is_too_much = self.read(|state| {
+            let (positions, triangles) = (state.models().positions(), state.models().triangles());
+            // Count layers from a camera that frames all models. The current camera may be close to one of them, where
+            // the models would cover far more of the picture than usual.
+            let (camera, size) = state.view_of(positions);
+            check_layers(gpu.main.context(), &camera, positions, triangles, size)
+        });
+        let outcome = match is_too_much {
+            Ok(()) => upload(&self.state, gpu).await,
+            Err(error) => Err(error.into()),
+        };
+        self.change(|state| {
+            state.is_adding = false;
+            match (&outcome, label) {
+                (Err(_), _) => state.editor.revert(),
+                (Ok(()), Some(label)) => {
+                    state.editor.commit(label);
+                }
+                (Ok(()), None) => state.editor.amend(),
+            }
+        });
+        outcome
     }
 }
 

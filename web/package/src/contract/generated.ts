@@ -564,7 +564,11 @@ export type MemberInfo = {
 /**
  * Identifier, which stays the same for the model's lifetime.
  */
-id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
+id: number, name: string, format: ModelFormat, vertices: number, triangles: number,
+/**
+ * Number of joints of its skins.
+ */
+joints: number,
 /**
  * Names of the parts, prefixed by their kind, such as `material:Cloth`.
  */

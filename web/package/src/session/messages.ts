@@ -135,6 +135,15 @@ export interface Jobs {
     step: Reading;
     output: ReadModel;
   };
+  /**
+   * Gives clothes the joints of a body. `clothes`, `body`: arrays of `Engine.storedModel`; `used`: number of texture
+   * pixels of the other models. `report`: a sentence about the weights.
+   */
+  dress: {
+    input: { clothes: Uint8Array[]; body: Uint8Array[]; used: number };
+    step: Reading;
+    output: ReadModel & { readonly report: string };
+  };
   /** `model`: the vertices that the cage must enclose, `[n_vertices, 3]`, relative to `origin`. */
   readCage: {
     input: {

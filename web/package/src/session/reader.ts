@@ -9,7 +9,7 @@ import type { Jobs, ReadModel } from "./messages";
 
 export type Hear = ((progress: Reading) => void) | undefined;
 
-type RunApart = <K extends "read" | "readCage" | "check" | "repair">(
+type RunApart = <K extends "read" | "readCage" | "check" | "repair" | "dress">(
   job: K,
   input: Jobs[K]["input"],
   hear?: Hear,
@@ -44,7 +44,8 @@ export function createApart(open: () => Client): Apart {
       if (isGood && isShared && !idle) idle = client;
       else client.close();
     };
-    const what = "files" in input ? "reading this file" : "checking the cage";
+    const what =
+      "files" in input ? "reading this file" : job === "dress" ? "copying the joints" : "checking the cage";
     const done = client.run(job, input, hear).done.catch((error: Error) => {
       if (error.name !== "Worker") throw error;
       throw named(

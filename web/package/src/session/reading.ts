@@ -23,6 +23,18 @@ export async function readModel(
   return packed(pkg, loaded, used, tell);
 }
 
+/** Gives clothes the joints and joint weights of a body. */
+export async function dress(
+  pkg: Package,
+  { clothes, body, used }: Jobs["dress"]["input"],
+  tell: Tell,
+): Promise<Jobs["dress"]["output"]> {
+  const [loaded, from] = [pkg.Loaded.restore(clothes), pkg.Loaded.restore(body)];
+  const report = loaded.takeSkinOf(from);
+  from.free();
+  return { ...(await packed(pkg, loaded, used, tell)), report };
+}
+
 /** Prepares all models of a file for drawing, copies them to arrays, and checks the cage of a project. */
 async function packed(pkg: Package, loaded: Loaded, used: number, tell: Tell): Promise<ReadModel> {
   loaded.prepare(used);

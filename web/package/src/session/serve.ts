@@ -13,7 +13,7 @@ import {
   type Step,
   type ToWorker,
 } from "./messages";
-import { check, checked, read, readCage, readModel, readSample } from "./reading";
+import { check, checked, dress, read, readCage, readModel, readSample } from "./reading";
 
 /** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
@@ -162,6 +162,7 @@ function createWork(pkg: Package): Work {
       return { ...checked(pkg, cage, model, smooth), bridged, notices };
     },
     read: (input, step) => readModel(pkg, input, step),
+    dress: (input, step) => dress(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
     check: async ({ cage, model }) => check(pkg, cage, model),
     async repair({ kind, cage, model }) {

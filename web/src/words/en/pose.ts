@@ -140,6 +140,7 @@ export const did = {
   loadControls: "Load inner controls",
   repairCage: "Repair the cage",
   addModels: (n: number) => (n === 1 ? "Add a model" : `Add ${n} models`),
+  dress: (name: string) => `Rig ${name}`,
   binModel: (name: string) => `Remove ${name}`,
   parts: (name: string) => `Change how ${name} follows the cage`,
   paint: "Paint fixed areas",
