@@ -28,9 +28,22 @@ pub fn decimals(x: impl Into<f64>, n: usize) -> String {
     }
 }
 
+/// Formats a number in full, in its shortest form: `-1`, `0.25`, `3e38`.
+pub fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::decimals;
+    use super::{decimals, number};
+
+    #[test]
+    fn whole_numbers_have_no_decimals() {
+        for (x, text) in [(-1.0, "-1"), (0.25, "0.25"), (1e300, "1e300"), (f64::NAN, "NaN")] {
+            assert_eq!(number(x), text);
+        }
+    }
 
     #[test]
     fn large_numbers_get_an_exponent_and_zero_no_sign() {

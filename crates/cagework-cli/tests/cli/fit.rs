@@ -78,7 +78,7 @@ fn invalid_targets_are_rejected_and_nothing_is_written() {
     sandbox
         .run(&format!("{FIT} --target target.obj --lambda=-1"))
         .failure()
-        .stderr(contains("lambda is -1.0; it must be a number of at least 0"));
+        .stderr(contains("lambda is -1; it must be a number of at least 0"));
     for (landmarks, message) in [
         ("[]", "bad.json: has 0 landmarks; expected 1 to 10000"),
         ("{}", "bad.json: a value has the wrong type, at line 1, column 0"),

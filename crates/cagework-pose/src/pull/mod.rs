@@ -31,6 +31,7 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+use cagework_core::words::number;
 use thiserror::Error;
 
 pub use drag::{Drag, DragOptions, REACH, Reach};
@@ -92,7 +93,7 @@ pub enum PullError {
     #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}: remove some")]
     Handles(usize),
     /// A value is not finite, or it is out of range.
-    #[error("{what} is {value:?}; it must be {range}")]
+    #[error("{what} is {}; it must be {range}", number(*value))]
     Value {
         /// Name of the invalid quantity.
         what: &'static str,
