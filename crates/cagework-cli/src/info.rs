@@ -65,7 +65,7 @@ struct SplatInfo {
 struct BoundsInfo {
     min: [f64; 3],
     max: [f64; 3],
-    diagonal: f32,
+    diagonal: f64,
 }
 
 /// Whether the model is a valid cage, and why not.
@@ -166,7 +166,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         bounds: BoundsInfo {
             min: in_world(model, bounds.min),
             max: in_world(model, bounds.max),
-            diagonal: bounds.diagonal(),
+            diagonal: in_single_precision(bounds.max.as_dvec3().distance(bounds.min.as_dvec3())),
         },
         closed: is_closed(&model.triangles, &welded.unique_of),
         cage,
@@ -179,13 +179,19 @@ fn median(mut numbers: Vec<f32>) -> f32 {
     if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
-/// Converts a position to world coordinates with Y up. Along axes on which the origin is 0, converts the `f32` through
-/// its shortest decimal, so that 0.1 in the file is printed as 0.1.
+/// Rounds to the shortest decimal of the nearest `f32`, so that 0.1 in the file is printed as 0.1. A number beyond the
+/// range of `f32`, such as a diagonal of 5e38, is returned as it is.
+fn in_single_precision(x: f64) -> f64 {
+    (x as f32).to_string().parse().ok().filter(|x: &f64| x.is_finite()).unwrap_or(x)
+}
+
+/// Converts a position to world coordinates with Y up. Rounds along axes on which the origin is 0.
 fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     let origin = model.up().vector_turned(model.origin()).to_array();
-    let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
-        if origin == 0.0 { x.to_string().parse().unwrap_or(x.into()) } else { origin + f64::from(x) }
-    });
+    let mut axes = origin
+        .into_iter()
+        .zip(position.to_array())
+        .map(|(origin, x)| if origin == 0.0 { in_single_precision(x.into()) } else { origin + f64::from(x) });
     std::array::from_fn(|_| axes.next().unwrap_or_default())
 }
 

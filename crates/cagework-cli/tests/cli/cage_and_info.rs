@@ -21,6 +21,17 @@ fn info_counts_vertices_and_faces() {
 }
 
 #[test]
+fn diagonal_beyond_single_precision_is_printed() {
+    let sandbox = Sandbox::new();
+    sandbox.write("vast.obj", box_obj(&CORNERS.map(|corner| corner.map(|x| 3e38 * x))));
+    let bounds = &sandbox.json("info vast.obj --json")["bounds"];
+    assert_eq!(bounds["max"], json!([3e38, 3e38, 3e38]));
+    // The diagonal of a cube with edges of 6e38.
+    let diagonal = bounds["diagonal"].as_f64().unwrap();
+    assert!((diagonal / (6e38 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-6, "{bounds}");
+}
+
+#[test]
 fn info_explains_why_a_model_is_not_a_valid_cage() {
     let sandbox = Sandbox::new();
     sandbox.write("open.obj", box_obj(&CORNERS).replace("f 5 6 8 7\n", ""));
