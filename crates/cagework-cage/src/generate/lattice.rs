@@ -80,6 +80,22 @@ impl Lattice {
         (self.center + p * self.cell / self.stretch).as_vec3()
     }
 
+    /// Counts the rows of voxels that [`Self::voxelize`] visits.
+    ///
+    /// # Errors
+    /// If `go_on` cancels.
+    pub(super) fn n_rows(
+        &self,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    ) -> Result<usize, Cancelled> {
+        let points: Vec<DVec3> = positions.iter().map(|&p| self.lattice(p)).collect();
+        let mut rows = 0;
+        self.for_each_footprint(&points, triangles, go_on, |footprint| rows += footprint.n_rows(self.dims))?;
+        Ok(rows)
+    }
+
     /// Finds the voxels that overlap a triangle or contain a vertex.
     ///
     /// # Errors
@@ -92,10 +108,22 @@ impl Lattice {
     ) -> Result<Voxels, Cancelled> {
         let points: Vec<DVec3> = positions.iter().map(|&p| self.lattice(p)).collect();
         let mut voxels = Voxels::new(self.dims);
-        let voxel_of = |p: DVec3| p.floor().to_array().map(|x| x as usize);
         for &p in &points {
             voxels.add(voxel_of(p));
         }
+        self.for_each_footprint(&points, triangles, go_on, |footprint| footprint.add_to(&mut voxels))?;
+        Ok(voxels)
+    }
+
+    /// Calls `each` for every triangle that is not inside one voxel, and for repetitions of a large triangle only once.
+    /// `points`: vertices in lattice coordinates.
+    fn for_each_footprint(
+        &self,
+        points: &[DVec3],
+        triangles: &[[u32; 3]],
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+        mut each: impl FnMut(Footprint),
+    ) -> Result<(), Cancelled> {
         let mut large = HashSet::new();
         for (k, t) in triangles.iter().enumerate() {
             if k % TRIANGLES_PER_CHECK == 0 {
@@ -109,9 +137,13 @@ impl Lattice {
             let footprint = Footprint::new(corners, 0.0);
             let is_large = footprint.n_rows(self.dims) > MAX_ROWS_WITHOUT_LOOKUP;
             if !is_large || large.insert(corners.map(|p| p.to_array().map(f64::to_bits))) {
-                footprint.add_to(&mut voxels);
+                each(footprint);
             }
         }
-        Ok(voxels)
+        Ok(())
     }
+}
+
+fn voxel_of(p: DVec3) -> [usize; 3] {
+    p.floor().to_array().map(|x| x as usize)
 }

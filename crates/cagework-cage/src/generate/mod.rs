@@ -37,6 +37,7 @@ use cagework_core::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
+use lattice::{Lattice, MARGIN_VOXELS};
 pub use options::{
     BOX_DIVISIONS, BOX_MARGIN, CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DIVISIONS,
     GeneratedCage, HULL_TARGET, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry,
@@ -72,6 +73,10 @@ const MAX_FIRST_RATIO: f64 = 5.0;
 /// Estimated ratio of the number of vertices after the collapses within the allowed distance to the final number. If
 /// [`MAX_FIRST_RATIO`] ends the passes early, this ratio predicts the final number.
 const LATER_RATIO: f64 = 3.7;
+
+/// Limit on the rows of voxels in the bounding boxes of all triangles, which many triangles as large as the model
+/// exceed. Voxelising that many rows takes about 2 s.
+const MAX_ROWS: f64 = 1.3e8;
 
 /// Estimated number of vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
@@ -118,18 +123,20 @@ fn generate_plain(
     let bounds = options::check(positions, triangles, options)?;
     let began = progress.now_ms();
     let target = options.target as usize;
-    let base = first_voxels(target);
+    let go_on = |_| {
+        let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
+        if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
+    };
+    let finest = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
+    let affordable = affordable_voxels(finest.n_rows(positions, triangles, &go_on)?);
+    let base = first_voxels(target).min(affordable);
     let most_gaps = target / VERTICES_PER_GAP;
     let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
         // The lattice is refined for gaps only without subdivision: a subdivided surface lies inside its cage, and the
         // finer lattice would leave less space between the cage and the model.
-        (Shape::Follow, 0) => {
+        (Shape::Follow, 0) if affordable == MAX_VOXELS => {
             let clearance = options.distance(bounds);
-            gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &|_| {
-                let event =
-                    ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
-                if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
-            })?
+            gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &go_on)?
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
@@ -193,6 +200,12 @@ fn generate_plain(
 /// cannot follow small gaps.
 fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
+}
+
+/// Computes the number of voxels along the longest side with which voxelising visits about [`MAX_ROWS`] rows, from the
+/// number of rows with [`MAX_VOXELS`].
+fn affordable_voxels(rows: usize) -> usize {
+    ((MAX_VOXELS as f64 * (MAX_ROWS / rows as f64).sqrt()) as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }
 
 /// Outcome of simplifying a hull.

@@ -1,9 +1,12 @@
 use std::ops::ControlFlow;
 
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{CageGenError, CageOptions, CageReport, GeneratedCage, Mirror, Shape, Symmetry, generate};
+use super::{
+    CageGenError, CageOptions, CageReport, GeneratedCage, Lattice, MAX_ROWS, Mirror, Shape, Symmetry,
+    generate,
+};
 use cagework_core::bind::bind;
 use cagework_core::cage::{Cage, subdivided_box};
 use cagework_core::contact::{Corners, meeting};
@@ -431,4 +434,23 @@ fn the_smooth_surface_of_a_cage_encloses_the_model() {
             assert_eq!(made.report.mirror.is_some(), symmetry == Symmetry::Auto);
         }
     }
+}
+
+#[test]
+fn many_large_triangles_get_a_coarse_lattice() {
+    let n = 100_000;
+    let ring = (0..n).map(|i| vec3((i as f32).cos(), (i as f32).sin(), 1.0));
+    let positions: Vec<Vec3> = [Vec3::ZERO].into_iter().chain(ring).collect();
+    let triangles: Vec<[u32; 3]> = (1..n).map(|i| [0, i, i + 1]).collect();
+    let made = generate(&positions, &triangles, &options(400), &Silent).unwrap();
+    // 80 voxels would follow from the target. The bounding box of a triangle has about 4000 rows of 128 voxels.
+    let most = 128.0 * (MAX_ROWS / (4000.0 * f64::from(n))).sqrt();
+    assert!(f64::from(made.report.voxels) < 1.05 * most, "{} voxels, not {most}", made.report.voxels);
+}
+
+#[test]
+fn repeated_triangles_count_once() {
+    let lattice = Lattice::around([DVec3::ZERO, DVec3::ONE], 128, DVec3::ONE, 0);
+    let rows = lattice.n_rows(&[Vec3::ZERO, Vec3::Y, Vec3::Z], &[[0, 1, 2]; 50], &|_| Ok(()));
+    assert_eq!(rows, Ok(128 * 128), "the rows of a square");
 }
