@@ -239,6 +239,13 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
                 d["skins"] = json!([{ "joints": [1] }]);
             }),
         ),
+        (
+            "joints.glb",
+            glb(|d| {
+                nodes(d, 5000, false);
+                d["skins"] = json!(vec![json!({ "joints": (0..5000).collect::<Vec<_>>() }); 800]);
+            }),
+        ),
         ("clip_shared.glb", glb(|d| clip(d, [json!(1 << 20), json!(1 << 20)], "LINEAR", 1000))),
         ("clip_short.glb", glb(|d| clip(d, [json!(3), json!(2)], "LINEAR", 1))),
         ("clip_short_cubic.glb", glb(|d| clip(d, [json!(2), json!(4)], "CUBICSPLINE", 1))),

@@ -37,6 +37,9 @@ const ZEROS_PER_BYTE: u64 = 8;
 /// many takes 0.8 GB.
 const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 
+/// Limit on the joints of all skins. A joint takes up to 0.7 KB in an export, and skins can share their joints.
+const MAX_JOINTS: u64 = 1 << 18;
+
 /// Bytes of JSON per primitive that the estimate of the memory for writing a model already includes.
 const PRIMITIVE_JSON_BYTES: u64 = 6000;
 
@@ -104,11 +107,13 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     }
     let keys = keys_of(document);
     let decoded = model.decoded.saturating_add(unseen.decoded).saturating_add(keys);
+    let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
     for (what, count, limit) in [
         ("vertices", model.vertices, MAX_ELEMENTS),
         ("triangles", model.triangles, MAX_TRIANGLES),
         ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
         ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
+        ("joints of all skins", joints, MAX_JOINTS),
         ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
         ("values of all channels of clips", channel_values(document), MAX_CHANNEL_VALUES.max(held)),
         (
@@ -124,7 +129,6 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     let bytes =
         VERTEX_BYTES * model.vertices + TRIANGLE_BYTES * model.triangles + PRIMITIVE_BYTES * model.primitives;
     let reading = VERTEX_READ_BYTES * model.vertices + TRIANGLE_READ_BYTES * model.triangles;
-    let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
     let rig = rig_bytes(document) + JOINT_BYTES * joints + KEY_BYTES * keys;
     MemoryError::check((held + bytes + reading + rig).saturating_add(copied_bytes(document)), limit)?;
     Ok(bytes)
