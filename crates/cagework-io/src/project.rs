@@ -199,9 +199,11 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     let positions = view(&cage["positions"]).and_then(positions_of).ok_or(damaged("its cage is cut off"))?;
     let faces =
         view(&cage["faces"]).and_then(faces_of).ok_or(damaged("the faces of its cage are cut off"))?;
-    let mut poses = Vec::new();
+    let (mut poses, mut left) = (Vec::new(), bin.len());
     for pose in project["poses"].as_array().into_iter().flatten() {
-        let positions = view(pose).and_then(positions_of).ok_or(damaged("a pose is cut off"))?;
+        let bytes = view(pose).ok_or(damaged("a pose is cut off"))?;
+        left = left.checked_sub(bytes.len()).ok_or(damaged("its poses share their positions"))?;
+        let positions = positions_of(bytes).ok_or(damaged("a pose is cut off"))?;
         poses.push((pose["name"].as_str().unwrap_or_default().to_owned(), positions));
     }
     let settings = project["settings"].as_str().unwrap_or_default().to_owned();

@@ -196,6 +196,18 @@ fn damaged_and_newer_projects_are_errors() {
     assert!(read_project("x.glb", &bytes[..bytes.len() - 9], u64::MAX).is_err());
 }
 
+/// A small file could otherwise hold any number of poses of a large cage.
+#[test]
+fn poses_that_share_their_positions_are_an_error() {
+    let bytes = written(&models()[1]);
+    let mut json = json_of(&bytes);
+    let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];
+    let poses = &mut json["extensions"]["CAGEWORK_project"]["poses"];
+    *poses = vec![poses[0].clone(); 10_000].into();
+    let shared = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX).unwrap_err();
+    assert_eq!(shared.to_string(), "x.glb is a damaged project: its poses share their positions");
+}
+
 /// A point cloud in a project is stored as its file.
 #[test]
 fn point_clouds_survive_in_projects() {
