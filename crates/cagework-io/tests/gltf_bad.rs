@@ -212,6 +212,20 @@ fn memory_is_checked_before_allocation() {
 }
 
 #[test]
+fn joints_clips_and_channels_are_limited() {
+    let channel = json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } });
+    let clip = |n: usize| json!({ "samplers": [{ "input": 0, "output": 0 }], "channels": vec![&channel; n] });
+    for (list, items, expected) in [
+        ("skins", json!(vec![json!({ "joints": vec![0; 1000] }); 263]), "joints of all skins: 263000"),
+        ("animations", json!(vec![clip(1); 16_385]), "clips: 16385, more than the limit of 16384"),
+        ("animations", json!([clip(262_145)]), "channels of all clips: 262145"),
+    ] {
+        let found = fault_of(|b| b.json[list] = items);
+        assert!(found.contains(expected), "{expected}: {found}");
+    }
+}
+
+#[test]
 fn nodes_with_cycles_or_two_parents_are_errors() {
     let nodes = |nodes| fault_of(move |b| b.json["nodes"] = nodes);
     let cycle = json!([{ "mesh": 0 }, { "children": [2] }, { "children": [1] }]);

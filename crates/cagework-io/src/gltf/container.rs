@@ -23,8 +23,8 @@ use crate::siblings::{Image, NOT_AN_IMAGE, Resolve, SiblingError, Siblings};
 /// Limit on the items of each of [`LISTS`]. An item takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
 /// Lists of a document whose lengths are not limited by the size of the buffers.
-const LISTS: [&str; 9] =
-    ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
+const LISTS: [&str; 8] =
+    ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "cameras"];
 /// Limit on the values of a document's JSON; larger texts may have one value per 4 bytes. A value takes up to 200 bytes
 /// while it is read.
 const MAX_JSON_VALUES: u64 = 1 << 22;

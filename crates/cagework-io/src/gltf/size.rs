@@ -40,6 +40,10 @@ const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 /// Limit on the joints of all skins. A joint takes up to 0.7 KB in an export, and skins can share their joints.
 const MAX_JOINTS: u64 = 1 << 18;
 
+/// Limits on clips and on the channels of all clips. The page takes about 10 s of processor time for this many.
+const MAX_CLIPS: u64 = 1 << 14;
+const MAX_CHANNELS: u64 = 1 << 18;
+
 /// Bytes of JSON per primitive that the estimate of the memory for writing a model already includes.
 const PRIMITIVE_JSON_BYTES: u64 = 6000;
 
@@ -108,12 +112,16 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     let keys = keys_of(document);
     let decoded = model.decoded.saturating_add(unseen.decoded).saturating_add(keys);
     let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
+    let clips = document.json["animations"].as_array().map_or(&[][..], Vec::as_slice);
+    let channels: usize = clips.iter().map(|clip| clip["channels"].as_array().map_or(0, Vec::len)).sum();
     for (what, count, limit) in [
         ("vertices", model.vertices, MAX_ELEMENTS),
         ("triangles", model.triangles, MAX_TRIANGLES),
         ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
         ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
         ("joints of all skins", joints, MAX_JOINTS),
+        ("clips", clips.len() as u64, MAX_CLIPS),
+        ("channels of all clips", channels as u64, MAX_CHANNELS),
         ("values of attributes, morph targets and clips", decoded, MAX_DECODED_VALUES),
         ("values of all channels of clips", channel_values(document), MAX_CHANNEL_VALUES.max(held)),
         (
