@@ -1,8 +1,7 @@
 //! `cagework transfer`: gives clothes the skeleton and the joint weights of a body.
 
 use cagework_core::inpaint::Inpainted;
-use cagework_core::words::counted;
-use cagework_io::shown;
+use cagework_io::{shown, transfer_report};
 use serde::Serialize;
 
 use crate::args::TransferArgs;
@@ -35,18 +34,11 @@ pub(crate) fn run(args: &TransferArgs, as_json: bool) -> Result<(), CliError> {
         hint: "`cagework info` describes both files; the memory limit is set by --memory-limit, in MiB",
     })?;
     write(&args.output, &glb)?;
+    let report = transfer_report(&found);
     let Inpainted { matched, inpainted, copied, .. } = found;
     let output = args.output.display().to_string();
     if as_json {
         return print(&json(&TransferSummary { output, matched, inpainted, copied }));
     }
-    let positions = |n| counted(n, "position", "positions");
-    print(&format!(
-        "{} with the weights of the body\n{} that continue their neighbours\n{} in parts away from the body, with the \
-         weights of its closest point\nwrote {}\n",
-        positions(matched),
-        positions(inpainted),
-        positions(copied),
-        shown(&output)
-    ))
+    print(&format!("{}\nwrote {}\n", report.join("\n"), shown(&output)))
 }
