@@ -2,6 +2,7 @@
 
 use cagework_cage::generate::{BOX_DIVISIONS, CageReport};
 use cagework_core::PolygonMesh;
+use cagework_core::words::three_digits;
 use cagework_io::{MemoryError, Model, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -134,15 +135,6 @@ pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3
     write(&output.path, &export(&Model::of_mesh("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
-/// Formats a length with three significant digits.
-fn three_digits(length: f32) -> String {
-    let after_point = 2.0 - length.log10().floor();
-    match after_point {
-        -4.0..=8.0 => format!("{length:.0$}", after_point.max(0.0) as usize),
-        _ => format!("{length:.2e}"),
-    }
-}
-
 fn text(summary: &CageSummary) -> String {
     let around = match summary.models {
         1 => String::new(),
@@ -182,18 +174,4 @@ fn text(summary: &CageSummary) -> String {
         text.push_str(&format!("\nnote: {notice}"));
     }
     text + &notices
-}
-
-#[cfg(test)]
-mod tests {
-    use super::three_digits;
-
-    #[test]
-    fn lengths_have_three_significant_digits() {
-        for (length, text) in
-            [(0.0213, "0.0213"), (3.79, "3.79"), (50_100.0, "50100"), (2.5e-8, "2.50e-8"), (0.0, "0.00e0")]
-        {
-            assert_eq!(three_digits(length), text);
-        }
-    }
 }

@@ -1,7 +1,6 @@
-//! `cagework transfer`: gives clothes the skeleton and the joint weights of a body.
+//! `cagework transfer`: gives clothes the skeleton, the joint weights and the morph targets of a body.
 
-use cagework_core::inpaint::Inpainted;
-use cagework_io::{shown, transfer_report};
+use cagework_io::{TransferOptions, TransferReport, shown, transfer_report};
 use serde::Serialize;
 
 use crate::args::TransferArgs;
@@ -13,32 +12,28 @@ use crate::load::load_model;
 #[derive(Debug, Serialize)]
 struct TransferSummary {
     output: String,
-    /// Numbers of positions by the origin of their weights: the closest point of the body, their neighbours, or the
-    /// closest point for a part that is nowhere near the body.
-    matched: usize,
-    inpainted: usize,
-    copied: usize,
+    #[serde(flatten)]
+    report: TransferReport,
 }
 
 /// Runs `cagework transfer`.
 ///
 /// # Errors
-/// If a file cannot be read or written, the body has no skin, or the clothes have one or are not near the body.
+/// If a file cannot be read or written, the body has nothing that the clothes lack, or the clothes are not near the body.
 pub(crate) fn run(args: &TransferArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output], &[&args.body, &args.clothes])?;
     let (up, memory) = (args.read.axis(), args.read.memory);
     let [body, clothes] = [load_model(&args.body, up, memory)?, load_model(&args.clothes, up, memory)?];
-    let done = clothes.write_with_skin_of(&body, memory.bytes());
-    let (glb, found) = done.map_err(|e| CliError::Mismatch {
+    let options = TransferOptions { push_out: args.push_out, memory_limit: memory.bytes() };
+    let done = clothes.transfer_from(&body, &options);
+    let (glb, report) = done.map_err(|e| CliError::Mismatch {
         message: e.to_string(),
         hint: "`cagework info` describes both files; the memory limit is set by --memory-limit, in MiB",
     })?;
     write(&args.output, &glb)?;
-    let report = transfer_report(&found);
-    let Inpainted { matched, inpainted, copied, .. } = found;
     let output = args.output.display().to_string();
     if as_json {
-        return print(&json(&TransferSummary { output, matched, inpainted, copied }));
+        return print(&json(&TransferSummary { output, report }));
     }
-    print(&format!("{}\nwrote {}\n", report.join("\n"), shown(&output)))
+    print(&format!("{}\nwrote {}\n", transfer_report(&report).join("\n"), shown(&output)))
 }

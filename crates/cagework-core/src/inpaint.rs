@@ -1,4 +1,5 @@
-//! Copies values of one surface, such as joint weights of a body, to another one near it, such as clothes.
+//! Copies values of one surface, such as joint weights of a body, to another one near it, such as clothes; and finds and
+//! moves vertices of one surface inside another ([`clear`]).
 //!
 //! A vertex takes the values of the closest point if that point is near and faces the same way. The values of all other
 //! vertices minimise the squared graph Laplacian, so that they continue those of their neighbours smoothly.
@@ -7,6 +8,7 @@
 //! things differ. An edge has the weight 1/length instead of cotangents, so degenerate triangles and edges of three
 //! faces need no treatment. The inner side of a thick cloth, which faces the body, takes the values of the outer side.
 
+mod side;
 mod tree;
 
 use glam::Vec3;
@@ -14,7 +16,8 @@ use glam::Vec3;
 use crate::deform::vertex_normals;
 use crate::mesh::{Bounds, TriMesh, Weld, weld};
 use crate::team::map_indices;
-use tree::TriangleTree;
+pub use side::{Inside, clear};
+use tree::{Hit, TriangleTree};
 
 /// Largest distance between a vertex and the point whose values it takes, as a fraction of the source's diagonal.
 pub const REACH: f32 = 0.025;
@@ -50,48 +53,106 @@ pub struct Inpainted {
 /// Copies non-negative `values`, `[n_vertices][n_columns]`, from the vertices of `source` to those of `target`.
 #[must_use]
 pub fn inpaint(source: &TriMesh, values: &[f32], n_columns: usize, target: &TriMesh) -> Inpainted {
-    let (source_seams, _, source_normals) = welded(source);
-    let (seams, cloth, normals) = welded(target);
-    let TriMesh { positions, triangles } = &cloth;
-    let size = Bounds::of(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
-    let cosine = |a: Vec3, b: Vec3| a.normalize_or_zero().dot(b);
+    Inpainting::new(source, target).weights(values, n_columns)
+}
 
-    let tree = TriangleTree::new(source);
-    let found = map_indices(positions.len(), |v| {
-        let Some(hit) = tree.closest(positions[v]) else { return (false, vec![0.0; n_columns]) };
-        let normal = hit.blend(|v| source_normals[source_seams.unique_of[v] as usize]);
-        let is_match = hit.distance as f32 <= REACH * size && cosine(normal, normals[v]) >= MIN_COSINE;
-        (is_match, (0..n_columns).map(|c| hit.blend(|v| values[v * n_columns + c])).collect())
-    });
-    let mut known: Vec<bool> = found.iter().map(|&(is_match, _)| is_match).collect();
-    let mut all: Vec<f32> = found.into_iter().flat_map(|(_, row)| row).collect();
+/// How values get from one surface to another, for any values. Vertices at the same position have the same values.
+pub struct Inpainting {
+    seams: Weld,
+    cloth: TriMesh,
+    /// Point of the source that each position is matched to, or closest to. `[n_positions]`
+    hits: Vec<Option<Hit>>,
+    /// Point of the outer side of the cloth, for positions on its inner side. `[n_positions]`
+    outer: Vec<Option<Hit>>,
+    is_free: Vec<bool>,
+    graph: Graph,
+    counts: [usize; 3],
+}
 
-    let mut outer = cloth.clone();
-    outer.triangles.retain(|corners| corners.iter().all(|&v| known[v as usize]));
-    let tree = TriangleTree::new(&outer);
-    let behind = map_indices(positions.len(), |v| {
-        let hit = tree.closest(positions[v]).filter(|_| !known[v])?;
-        let way = hit.blend(|v| positions[v]) - positions[v];
-        let is_inner = hit.distance as f32 <= MAX_THICKNESS * size
-            && cosine(hit.blend(|v| normals[v]), normals[v]) <= MAX_SIDES_COSINE
-            && cosine(way, normals[v]) <= MAX_BEHIND_COSINE;
-        is_inner.then_some(hit)
-    });
-    for (v, hit) in behind.into_iter().enumerate().filter_map(|(v, hit)| Some((v, hit?))) {
-        known[v] = true;
-        (0..n_columns).for_each(|c| all[v * n_columns + c] = hit.blend(|v| all[v * n_columns + c]));
+impl Inpainting {
+    /// Matches the vertices of `target` to points of `source`.
+    #[must_use]
+    pub fn new(source: &TriMesh, target: &TriMesh) -> Self {
+        let (source_seams, _, source_normals) = welded(source);
+        let (seams, cloth, normals) = welded(target);
+        let TriMesh { positions, triangles } = &cloth;
+        let size = Bounds::of(&source.positions).map_or(0.0, |bounds| bounds.diagonal());
+        let cosine = |a: Vec3, b: Vec3| a.normalize_or_zero().dot(b);
+
+        let tree = TriangleTree::new(source);
+        let hits = map_indices(positions.len(), |v| tree.closest(positions[v]));
+        let is_match = |(v, hit): (usize, &Option<Hit>)| {
+            hit.as_ref().is_some_and(|hit| {
+                let normal = hit.blend(|v| source_normals[source_seams.unique_of[v] as usize]);
+                hit.distance as f32 <= REACH * size && cosine(normal, normals[v]) >= MIN_COSINE
+            })
+        };
+        let mut known: Vec<bool> = hits.iter().enumerate().map(is_match).collect();
+
+        let mut matched = cloth.clone();
+        matched.triangles.retain(|corners| corners.iter().all(|&v| known[v as usize]));
+        let tree = TriangleTree::new(&matched);
+        let outer = map_indices(positions.len(), |v| {
+            let hit = tree.closest(positions[v]).filter(|_| !known[v])?;
+            let way = hit.blend(|v| positions[v]) - positions[v];
+            let is_inner = hit.distance as f32 <= MAX_THICKNESS * size
+                && cosine(hit.blend(|v| normals[v]), normals[v]) <= MAX_SIDES_COSINE
+                && cosine(way, normals[v]) <= MAX_BEHIND_COSINE;
+            is_inner.then_some(hit)
+        });
+        known.iter_mut().zip(&outer).for_each(|(known, hit)| *known |= hit.is_some());
+
+        let graph = Graph::new(positions, triangles);
+        let reached = graph.reached(&known);
+        let is_free: Vec<bool> =
+            reached.iter().zip(&known).map(|(&reached, &known)| reached && !known).collect();
+        let count = |marks: &[bool], mark: bool| marks.iter().filter(|&&is| is == mark).count();
+        let counts = [count(&known, true), count(&is_free, true), count(&reached, false)];
+        Self { seams, cloth, hits, outer, is_free, graph, counts }
     }
 
-    let graph = Graph::new(positions, triangles);
-    let reached = graph.reached(&known);
-    let is_free: Vec<bool> = reached.iter().zip(&known).map(|(&reached, &known)| reached && !known).collect();
-    graph.fill(&is_free, &mut all, n_columns);
-    let row = |&v: &u32| &all[v as usize * n_columns..][..n_columns];
-    Inpainted {
-        values: seams.unique_of.iter().flat_map(row).map(|value| value.max(0.0)).collect(),
-        matched: known.iter().filter(|&&known| known).count(),
-        inpainted: is_free.iter().filter(|&&free| free).count(),
-        copied: reached.iter().filter(|&&reached| !reached).count(),
+    /// Distinct positions of the target's vertices.
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        &self.cloth.positions
+    }
+
+    /// Position of each vertex of the target.
+    #[must_use]
+    pub fn position_of(&self) -> &[u32] {
+        &self.seams.unique_of
+    }
+
+    /// Numbers of positions: matched, inpainted and copied, as in [`Inpainted`].
+    #[must_use]
+    pub fn counts(&self) -> [usize; 3] {
+        self.counts
+    }
+
+    /// Copies `values`, `[n_source_vertices][n_columns]`, to the distinct positions. Returns `[n_positions][n_columns]`.
+    #[must_use]
+    pub fn values(&self, values: &[f32], n_columns: usize) -> Vec<f32> {
+        let n = n_columns;
+        let rows = map_indices(self.hits.len(), |p| match &self.hits[p] {
+            Some(hit) => (0..n).map(|c| hit.blend(|v| values[v * n + c])).collect(),
+            None => vec![0.0; n],
+        });
+        let mut all: Vec<f32> = rows.concat();
+        for (p, hit) in self.outer.iter().enumerate().filter_map(|(p, hit)| Some((p, hit.as_ref()?))) {
+            (0..n).for_each(|c| all[p * n + c] = hit.blend(|v| all[v * n + c]));
+        }
+        self.graph.fill(&self.is_free, &mut all, n);
+        all
+    }
+
+    /// Copies non-negative `values`, such as joint weights, to all vertices.
+    #[must_use]
+    pub fn weights(&self, values: &[f32], n_columns: usize) -> Inpainted {
+        let all = self.values(values, n_columns);
+        let row = |&p: &u32| &all[p as usize * n_columns..][..n_columns];
+        let values = self.seams.unique_of.iter().flat_map(row).map(|value| value.max(0.0)).collect();
+        let [matched, inpainted, copied] = self.counts;
+        Inpainted { values, matched, inpainted, copied }
     }
 }
 

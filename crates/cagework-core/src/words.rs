@@ -34,9 +34,18 @@ pub fn number(x: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
+/// Formats a length with three significant digits.
+pub fn three_digits(length: f32) -> String {
+    let after_point = 2.0 - length.log10().floor();
+    match after_point {
+        -4.0..=8.0 => format!("{length:.0$}", after_point.max(0.0) as usize),
+        _ => format!("{length:.2e}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{decimals, number};
+    use super::{decimals, number, three_digits};
 
     #[test]
     fn whole_numbers_have_no_decimals() {
@@ -49,6 +58,15 @@ mod tests {
     fn large_numbers_get_an_exponent_and_zero_no_sign() {
         for (x, text) in [(-0.001, "0.00"), (-999_999.0, "-999999.00"), (1e6, "1.00e6"), (3e38, "3.00e38")] {
             assert_eq!(decimals(x, 2), text);
+        }
+    }
+
+    #[test]
+    fn lengths_have_three_significant_digits() {
+        for (length, text) in
+            [(0.0213, "0.0213"), (3.79, "3.79"), (50_100.0, "50100"), (2.5e-8, "2.50e-8"), (0.0, "0.00e0")]
+        {
+            assert_eq!(three_digits(length), text);
         }
     }
 }

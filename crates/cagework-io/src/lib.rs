@@ -71,7 +71,9 @@ pub use textures::TexturePlan;
 pub use timeline::{
     Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline, TimelineError, check_times,
 };
-pub use transfer::{TransferError, transfer_report};
+pub use transfer::{
+    Penetration, TargetReport, TransferError, TransferOptions, TransferReport, transfer_report,
+};
 pub use up::{UpAxis, lies_on_back};
 
 /// Compiles the README's example.

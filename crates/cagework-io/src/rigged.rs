@@ -164,8 +164,10 @@ impl Model {
         let all_moved = |by: &[DVec3]| Ok(rig.held(&options.parts, &rest, self.all_moved(&rig, by)?));
         let by: Vec<DVec3> = all_moved(by)?;
         let by_poses = poses.iter().map(|(_, by)| all_moved(by)).collect::<Result<Vec<_>, WriteError>>()?;
-        let poses: Vec<PoseDisplacements<'_>> =
-            poses.iter().zip(&by_poses).map(|((name, _), by)| PoseDisplacements { name, by }).collect();
+        let poses = poses.iter().zip(&by_poses);
+        let poses: Vec<PoseDisplacements<'_>> = poses
+            .map(|((name, _), by)| PoseDisplacements { name, default: 0.0, by: Box::new(|| by.into()) })
+            .collect();
         let is_outside = self.all_outside(&rig, outside);
         let up = self.up.vector_turned_back(DVec3::Y);
         gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))

@@ -14,6 +14,7 @@ mod options;
 mod pull;
 mod reshape;
 mod splats;
+mod transfer;
 mod work;
 
 use pyo3::pymodule;
@@ -36,6 +37,8 @@ mod native {
     use crate::reshape::reshape;
     #[pymodule_export]
     use crate::splats::Splats;
+    #[pymodule_export]
+    use crate::transfer::transfer;
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "this is the conventional name in Python")]
     const __version__: &str = env!("CARGO_PKG_VERSION");

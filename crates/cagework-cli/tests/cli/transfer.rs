@@ -24,9 +24,13 @@ fn clothes_get_joints_and_what_does_not_fit_is_refused() {
     let info = sandbox.json("info out.glb --json");
     assert_eq!((&info["skins"], &info["joints"]), (&1.into(), &16.into()));
 
+    let pushed = sandbox.json("transfer body.glb suit.glb --push-out 0.01 -o far.glb --json");
+    assert_eq!((&pushed["rest"]["left"]["count"], &pushed["joints"]), (&0.into(), &16.into()));
+
     let refused = |args: &str, what: &str| drop(sandbox.run(args).failure().stderr(contains(what)));
     refused("transfer suit.glb suit.glb -o no.glb", "suit.glb has no skin");
     refused("transfer body.glb body.glb -o no.glb", "body.glb has a skin already");
+    refused("transfer body.glb suit.glb --push-out 0 -o no.glb", "--push-out");
     refused("transfer body.glb suit.glb -o no.obj", "the name must end in .glb");
     refused("transfer body.glb suit.glb -o body.glb", "body.glb");
     suit.positions.iter_mut().for_each(|p| *p *= 100.0);

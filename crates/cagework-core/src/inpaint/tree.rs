@@ -20,7 +20,9 @@ pub(super) struct TriangleTree<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Hit {
     pub(super) corners: [u32; 3],
-    pub(super) barycentric: [f32; 3],
+    pub(super) triangle: u32,
+    /// Barycentric coordinates.
+    pub(super) shares: [f64; 3],
     pub(super) distance: f64,
 }
 
@@ -78,8 +80,8 @@ impl<'a> TriangleTree<'a> {
             let hit = closest_point_on_triangle(point, self.corners(triangle));
             let distance = hit.point.distance(point);
             if best.is_none_or(|best| distance < best.distance) {
-                let barycentric = hit.barycentric.map(|share| share as f32);
-                *best = Some(Hit { corners: self.mesh.triangles[triangle as usize], barycentric, distance });
+                let corners = self.mesh.triangles[triangle as usize];
+                *best = Some(Hit { corners, triangle, shares: hit.barycentric, distance });
             }
         }
     }
@@ -92,7 +94,8 @@ impl Hit {
         f32: std::ops::Mul<T, Output = T>,
         T: std::ops::Add<Output = T>,
     {
-        let ([a, b, c], [u, v, w]) = (self.corners.map(|v| value(v as usize)), self.barycentric);
+        let ([a, b, c], [u, v, w]) =
+            (self.corners.map(|v| value(v as usize)), self.shares.map(|share| share as f32));
         u * a + v * b + w * c
     }
 }

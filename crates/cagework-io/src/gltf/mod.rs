@@ -28,6 +28,7 @@ mod skin;
 mod splats;
 mod transfer;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use ::gltf::json::Root;
@@ -59,7 +60,7 @@ pub(crate) use rig::joints_with_vertices;
 pub use rig::{
     Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
 };
-pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm};
+pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm, write_moved, write_targets};
 pub(crate) use size::{MAX_PRIMITIVES, MAX_TRIANGLES};
 pub(crate) use splats::write as write_splats;
 pub(crate) use transfer::write_skinned;
@@ -259,6 +260,19 @@ pub(crate) struct GltfParts {
 }
 
 impl GltfDocument {
+    /// For each vertex of this document, the vertex of an earlier version of it. An edit may copy meshes, and vertices are in
+    /// the order of meshes.
+    pub(crate) fn vertices_in(&self, earlier: &Self) -> Vec<u32> {
+        let place = |of: &Self, slot: &Slot| (of.instances[slot.instance as usize].node, slot.primitive);
+        let starts: HashMap<_, u32> =
+            earlier.slots.iter().map(|slot| (place(earlier, slot), slot.start)).collect();
+        let own = |slot: &Slot| {
+            let start = starts.get(&place(self, slot)).copied().unwrap_or(slot.start);
+            start..start + slot.count
+        };
+        self.slots.iter().flat_map(own).collect()
+    }
+
     pub(crate) fn into_parts(self) -> GltfParts {
         let Self { json, buffers, images, text, packed, is_decoded, bytes, slots, .. } = self;
         let slots = slots.into_iter().map(|s| {

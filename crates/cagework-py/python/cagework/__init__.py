@@ -27,6 +27,7 @@ from cagework._native import (
     pull,
     read_model,
     reshape,
+    transfer,
 )
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "read_model",
     "reshape",
     "show",
+    "transfer",
 ]
 
 

@@ -53,7 +53,7 @@ pub use play::{Player, RigPose};
 pub(crate) use poses::PoseDisplacements;
 pub use report::ReshapeReport;
 pub use reshape::ReshapeOptions;
-pub(crate) use reshape::{reshape, skeleton};
+pub(crate) use reshape::{reshape, skeleton, write_moved, write_targets};
 pub use skeleton::Skeleton;
 pub(crate) use skeleton::joints_with_vertices;
 use vrm::VrmPoint;

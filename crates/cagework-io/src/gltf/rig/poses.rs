@@ -1,5 +1,6 @@
 //! Appends cage poses as morph targets.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use glam::{DMat3, DVec3};
@@ -14,10 +15,13 @@ use crate::error::WriteError;
 use crate::gltf::pack::push;
 use crate::timeline::Timeline;
 
-/// Displacements of all points in a pose, world space as in the file. `[n_points]`
+/// A pose that becomes a morph target.
 pub(crate) struct PoseDisplacements<'a> {
     pub(crate) name: &'a str,
-    pub(crate) by: &'a [DVec3],
+    /// Default weight of the target.
+    pub(crate) default: f32,
+    /// Returns the displacements of all points, world space as in the file. `[n_points]`
+    pub(crate) by: Box<dyn Fn() -> Cow<'a, [DVec3]> + 'a>,
 }
 
 /// Appends one morph target per pose to every mesh, and an animation that plays them if there is a timeline. `rigid`:
@@ -53,7 +57,7 @@ pub(super) fn append<'p>(
     // Process poses one at a time: gradients need more memory than the output.
     let mut moved = vec![BTreeSet::new(); poses.len()];
     for (pose, moved) in poses.iter().zip(&mut moved) {
-        let by = held(rig, rigid, pose.by);
+        let by = held(rig, rigid, &(pose.by)());
         let turned = SurfaceGradients::new(triangles, &by);
         for part in &rig.parts {
             let mesh = edit.mesh_of(&part.instance);
@@ -83,8 +87,9 @@ pub(super) fn append<'p>(
         }
     }
     let names: Vec<&str> = poses.iter().map(|pose| pose.name).collect();
+    let defaults: Vec<f32> = poses.iter().map(|pose| pose.default).collect();
     for (&mesh, &n_before) in &meshes {
-        pad(&mut edit.json["meshes"][mesh]["weights"], n_before, poses.len());
+        pad(&mut edit.json["meshes"][mesh]["weights"], n_before, &defaults);
         let extras = &mut edit.json["meshes"][mesh]["extras"];
         if !extras.is_object() {
             *extras = json!({});
@@ -103,7 +108,7 @@ pub(super) fn append<'p>(
         let Some(n_before) = targets_of(&edit.json, node) else { continue };
         let weights = &mut edit.json["nodes"][node]["weights"];
         if weights.is_array() {
-            pad(weights, n_before, poses.len());
+            pad(weights, n_before, &defaults);
         } else if let Some(node) = edit.json["nodes"][node].as_object_mut() {
             // Remove the null member that indexing the JSON has created.
             node.shift_remove("weights");
@@ -123,7 +128,7 @@ pub(super) fn append<'p>(
             let Ok(values) = rig.document.source().floats::<1>(output.accessor, "weights") else { continue };
             let padded: Vec<[f32; 1]> = values
                 .chunks(n_before)
-                .flat_map(|key| key.iter().copied().chain((0..poses.len()).map(|_| [0.0])))
+                .flat_map(|key| key.iter().copied().chain(defaults.iter().map(|&default| [default])))
                 .collect();
             let accessor = edit.write(None, &padded, false, false);
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
@@ -144,10 +149,11 @@ pub(super) fn append<'p>(
     Ok(moved.iter().enumerate().map(targets).collect())
 }
 
-/// Returns the displacements of all points in a pose, with the meshes of rigid nodes moved rigidly. Ends of morph
+/// Returns the displacements of all points in a pose from those of the vertices or of all points, with the meshes of rigid nodes moved rigidly. Ends of morph
 /// targets move with the rest shape, so that their deltas are unchanged.
-fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
+pub(super) fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
     let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
+    all.resize(rig.n_vertices + rig.extras.len(), DVec3::ZERO);
     for part in &rig.parts {
         if let Some(motion) = part.instance.node.and_then(|node| motions.get(&node)) {
             let own = part.rest().into_iter().zip(&mut all[part.first..]);
@@ -164,11 +170,11 @@ fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> 
     all
 }
 
-/// Appends zero weights for the morph targets of the poses.
-fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
+/// Appends the default weights of the morph targets of the poses.
+fn pad(weights: &mut Value, n_before: usize, defaults: &[f32]) {
     let mut all = weights.as_array().cloned().unwrap_or_default();
     all.resize(n_before, json!(0.0));
-    all.extend((0..n_poses).map(|_| json!(0.0)));
+    all.extend(defaults.iter().map(|&default| json!(default)));
     *weights = all.into();
 }
 

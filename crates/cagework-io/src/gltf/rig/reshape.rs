@@ -177,6 +177,33 @@ pub(crate) fn reshape(
     Ok((glb, report))
 }
 
+/// Writes the document with its vertices displaced by `by`, `[n_vertices]`, and its joints in place. Ends of morph targets
+/// move with the vertices.
+pub(crate) fn write_moved(
+    document: &GltfDocument,
+    rig: &Rig<'_>,
+    triangles: &[[u32; 3]],
+    by: &[DVec3],
+) -> Result<Vec<u8>, WriteError> {
+    let by = poses::held(rig, (&[], &[]), by);
+    let is_outside = vec![false; by.len()];
+    let options = ReshapeOptions { joints: Joints::Stay, ..ReshapeOptions::default() };
+    Ok(reshape(document, rig, triangles, (&by, &is_outside), &[], (&options, DVec3::Y))?.0)
+}
+
+/// Writes the document with `poses`, whose displacements are those of the vertices, as morph targets without an animation.
+pub(crate) fn write_targets(
+    document: &GltfDocument,
+    rig: &Rig<'_>,
+    triangles: &[[u32; 3]],
+    poses: &[PoseDisplacements<'_>],
+) -> Result<Vec<u8>, WriteError> {
+    let mut edit = Edit::new(document);
+    separate(rig, &mut edit);
+    poses::append(rig, &mut edit, triangles, (poses, None), (&[], &[]))?;
+    edit.finish()
+}
+
 /// Computes how the joints of a document move when its points are displaced by `by`.
 pub(crate) fn skeleton(
     document: &GltfDocument,
