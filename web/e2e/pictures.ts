@@ -251,5 +251,7 @@ test("pictures of the documents", async ({ page }) => {
     for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;
   });
   await drawn(page);
-  await page.locator("#stage").screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80, scale: "css" });
+  await page
+    .locator("#stage")
+    .screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80, scale: "css" });
 });
