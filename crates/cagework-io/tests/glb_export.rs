@@ -290,6 +290,15 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
 }
 
 /// GLB exports of several poses keep colours, textures and opacity of materials, and vertex colours.
+/// The name of a model may be a path on the user's machine.
+#[test]
+fn a_glb_of_an_obj_is_named_after_the_file_without_its_folder() {
+    let model = read("/home/me/a.b.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let glb = json_of(&model.write_glb(&model.positions).unwrap());
+    assert_eq!(glb["nodes"][0]["name"], "a.b");
+    assert_eq!(glb["meshes"][0]["name"], "a.b");
+}
+
 #[test]
 fn obj_and_ply_become_a_glb_with_materials_and_colours() {
     let mtl = "newmtl red\nKd 1 0.5 0\nd 0.25\nnewmtl blue\nKd 0 0 0\nmap_Kd t.png\n";

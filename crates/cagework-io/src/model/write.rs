@@ -1,6 +1,8 @@
 //! Writes a model with new positions.
 
 use std::borrow::Cow;
+use std::ffi::OsStr;
+use std::path::Path;
 
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
@@ -273,8 +275,8 @@ impl Model {
             }
             Document::Obj(document) => document,
         };
-        // Build a GLB of the rest shape, then patch it like a glTF source.
-        let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
+        // Build a GLB of the rest shape, then patch it like a glTF source. The name may be a path, which stays private.
+        let stem = Path::new(&self.name).file_stem().and_then(OsStr::to_str).unwrap_or_default();
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
         let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, (Some(self.origin), false))?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
