@@ -41,7 +41,7 @@ pub struct Target<'a> {
     pub format: wgpu::TextureFormat,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Number of samples per pixel: 1 or [`MAX_SAMPLES`].
+    /// Number of samples per pixel: 1 or 4, as WebGPU has it.
     pub samples: u32,
     /// Pixels per CSS pixel.
     pub scale: f32,
