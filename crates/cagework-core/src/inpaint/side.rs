@@ -15,7 +15,7 @@ use crate::team::map_indices;
 /// Points that are less deep inside count as outside, as a fraction of the surface's diagonal: coordinates are rounded.
 const MIN_DEPTH: f64 = 1e-5;
 /// Points move if they are closer than this fraction of the required distance, so that rounding moves none.
-const NEAR: f64 = 0.999;
+const MOVE_THRESHOLD: f64 = 0.999;
 /// Number of times that points move. The first move can bring a point close to another part, such as an arm.
 const ROUNDS: usize = 4;
 
@@ -58,7 +58,7 @@ pub fn clear(surface: &TriMesh, points: &mut [Vec3], distance: Option<f32>) -> [
     let Some(distance) = distance.map(f64::from) else { return [before; 2] };
     for _ in 0..ROUNDS {
         let moved = map_indices(points.len(), |v| {
-            let (_, at, out) = side(points[v]).filter(|&(signed, ..)| signed < NEAR * distance)?;
+            let (_, at, out) = side(points[v]).filter(|&(signed, ..)| signed < MOVE_THRESHOLD * distance)?;
             (out != DVec3::ZERO).then(|| (at + distance * out).as_vec3())
         });
         if moved.iter().all(Option::is_none) {
