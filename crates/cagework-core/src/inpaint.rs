@@ -16,7 +16,7 @@ use glam::Vec3;
 use crate::deform::vertex_normals;
 use crate::mesh::{Bounds, TriMesh, Weld, weld};
 use crate::team::map_indices;
-pub use side::{Inside, clear};
+pub use side::{Cleared, Inside, clear};
 use tree::{Hit, TriangleTree};
 
 /// Largest distance between a vertex and the point whose values it takes, as a fraction of the source's diagonal.

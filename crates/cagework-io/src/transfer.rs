@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-use cagework_core::inpaint::{Inpainting, Inside, REACH, clear};
+use cagework_core::inpaint::{Cleared, Inpainting, Inside, REACH, clear};
 use cagework_core::skin::Skin;
 use cagework_core::words::{counted, three_digits};
 use glam::{DVec3, Mat4, Vec3};
@@ -173,8 +173,11 @@ impl Model {
             takes_skin.then(|| inpainting.weights(&weights_of(&player, &joints), joints.len()).values);
 
         let mut rest = inpainting.positions().to_vec();
-        let [inside, left] = clear(&surface, &mut rest, options.push_out);
+        let mut least = options.push_out.map_or_else(Vec::new, |distance| vec![distance; rest.len()]);
+        let Cleared { inside, left, distances } = clear(&surface, &mut rest, &least);
         report.rest = Penetration { inside, left };
+        // Targets do not move vertices that are closer at rest, because there is no room.
+        least.iter_mut().zip(distances).for_each(|(least, at_rest)| *least = least.min(at_rest));
         let mut base: Vec<Vec3> = rest.iter().zip(inpainting.positions()).map(|(a, b)| *a - *b).collect();
         let existing: HashSet<String> =
             clothes.player()?.map_or_else(HashSet::new, |own| own.targets().0.iter().cloned().collect());
@@ -194,7 +197,7 @@ impl Model {
             surface.positions = moved(&body.positions, &of_body);
             let mut posed: Vec<Vec3> = moved(&rest, &by);
             let before = posed.clone();
-            let [inside, left] = clear(&surface, &mut posed, options.push_out);
+            let Cleared { inside, left, .. } = clear(&surface, &mut posed, &least);
             for ((by, from), to) in by.iter_mut().zip(before).zip(posed) {
                 if from != to && share != 0.0 {
                     *by += (to - from) / share;

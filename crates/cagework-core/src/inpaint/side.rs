@@ -14,8 +14,8 @@ use crate::team::map_indices;
 
 /// Points that are less deep inside count as outside, as a fraction of the surface's diagonal: coordinates are rounded.
 const MIN_DEPTH: f64 = 1e-5;
-/// Points move if they are closer than this fraction of the required distance, so that rounding moves none.
-const MOVE_THRESHOLD: f64 = 0.999;
+/// Points do not move if they are closer by less than this fraction of their distance, so that rounding moves none.
+const SLACK: f64 = 1e-3;
 /// Number of times that points move. The first move can bring a point close to another part, such as an arm.
 const ROUNDS: usize = 4;
 
@@ -28,12 +28,25 @@ pub struct Inside {
     pub depth: f32,
 }
 
-/// Counts the `points` inside `surface`, before and after those that are closer to it than `distance` moved out to this
-/// distance: away from the closest point or, if inside, through it. `None` moves none. Each point moves on its own.
-pub fn clear(surface: &TriMesh, points: &mut [Vec3], distance: Option<f32>) -> [Inside; 2] {
+/// Result of [`clear`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cleared {
+    /// Points that were inside.
+    pub inside: Inside,
+    /// Points that are inside now.
+    pub left: Inside,
+    /// Signed distances now, negative inside. `[n_points]`
+    pub distances: Vec<f32>,
+}
+
+/// Counts the `points` inside `surface`. Those closer to it than their distance in `least` move out to this distance: away
+/// from the closest point or, if inside, through it. Each point moves on its own; in a gap that is too narrow it stays at the
+/// best place that it reaches. `least`: `[n_points]`, object units, or empty to move none.
+pub fn clear(surface: &TriMesh, points: &mut [Vec3], least: &[f32]) -> Cleared {
     let (_, surface, _) = welded(surface);
     let (tree, normals) = (TriangleTree::new(&surface), Pseudonormals::new(&surface));
-    let least = MIN_DEPTH * Bounds::of(&surface.positions).map_or(0.0, |bounds| f64::from(bounds.diagonal()));
+    let least_depth =
+        MIN_DEPTH * Bounds::of(&surface.positions).map_or(0.0, |bounds| f64::from(bounds.diagonal()));
     // Signed distance, negative inside, and the closest point with the direction out of the surface.
     let side = |p: Vec3| {
         let hit = tree.closest(p)?;
@@ -43,30 +56,40 @@ pub fn clear(surface: &TriMesh, points: &mut [Vec3], distance: Option<f32>) -> [
         let away = p.as_dvec3() - at;
         let is_inside = away.dot(normal) < 0.0;
         let out = if is_inside { -away } else { away };
-        let out = if hit.distance > least { out.normalize_or_zero() } else { normal.normalize_or_zero() };
+        let out =
+            if hit.distance > least_depth { out.normalize_or_zero() } else { normal.normalize_or_zero() };
         Some((if is_inside { -hit.distance } else { hit.distance }, at, out))
     };
-    let inside = |points: &[Vec3]| {
-        let depths = map_indices(points.len(), |v| side(points[v]).map_or(0.0, |(signed, ..)| -signed));
-        let deep = depths.iter().filter(|&&depth| depth > least);
-        deep.fold(Inside::default(), |all, &depth| Inside {
-            count: all.count + 1,
-            depth: all.depth.max(depth as f32),
+    let reached = map_indices(points.len(), |v| {
+        let (mut p, least) = (points[v], least.get(v).map_or(f64::NEG_INFINITY, |&least| least.into()));
+        let (first, ..) = side(p)?;
+        let mut best = (f64::NEG_INFINITY, p);
+        for _ in 0..=ROUNDS {
+            let (signed, at, out) = side(p)?;
+            if signed > best.0 {
+                best = (signed, p);
+            }
+            if signed >= least - SLACK * least.abs() || out == DVec3::ZERO {
+                break;
+            }
+            p = (at + least * out).as_vec3();
+        }
+        Some((first, best))
+    });
+    let inside = |distances: &mut dyn Iterator<Item = f64>| {
+        distances.filter(|&distance| distance < -least_depth).fold(Inside::default(), |all, distance| {
+            Inside { count: all.count + 1, depth: all.depth.max(-distance as f32) }
         })
     };
-    let before = inside(points);
-    let Some(distance) = distance.map(f64::from) else { return [before; 2] };
-    for _ in 0..ROUNDS {
-        let moved = map_indices(points.len(), |v| {
-            let (_, at, out) = side(points[v]).filter(|&(signed, ..)| signed < MOVE_THRESHOLD * distance)?;
-            (out != DVec3::ZERO).then(|| (at + distance * out).as_vec3())
-        });
-        if moved.iter().all(Option::is_none) {
-            break;
-        }
-        points.iter_mut().zip(moved).for_each(|(p, moved)| *p = moved.unwrap_or(*p));
-    }
-    [before, inside(points)]
+    let of = |k: usize| reached[k].unwrap_or((f64::INFINITY, (f64::INFINITY, points[k])));
+    let n = points.len();
+    let result = Cleared {
+        inside: inside(&mut (0..n).map(|k| of(k).0)),
+        left: inside(&mut (0..n).map(|k| of(k).1.0)),
+        distances: (0..n).map(|k| of(k).1.0 as f32).collect(),
+    };
+    points.iter_mut().zip(&reached).for_each(|(p, reached)| *p = reached.map_or(*p, |(_, best)| best.1));
+    result
 }
 
 /// Sums of face normals around corners, weighted by the angle, and at edges. Zero on the rims of holes.
@@ -150,7 +173,7 @@ mod tests {
             let offset = Vec3::new(share(31), share(59), share(113)) - 0.5;
             let mut point = [a.lerp(b, share(7)) + share(17) * 0.2 * offset];
             let is_inside = winding_number(point[0].as_dvec3(), corners.iter().copied()) > 0.5;
-            let [before, after] = clear(&mesh, &mut point, Some(0.02));
+            let Cleared { inside: before, left: after, .. } = clear(&mesh, &mut point, &[0.02]);
             // Points within rounding of the surface count as outside.
             let distance = |p: Vec3| TriangleTree::new(&mesh).closest(p).map_or(0.0, |hit| hit.distance);
             assert!(before.count == usize::from(is_inside) || before.depth < 1e-4, "{k}: {before:?}");
@@ -167,9 +190,22 @@ mod tests {
         // Without its base, the spike is open at z = 0. Its faces at the rim lean over the first point.
         mesh.triangles.remove(0);
         let mut points = [Vec3::new(0.2, -0.05, -0.05), Vec3::new(0.12, 0.09, 0.3)];
-        let depths = points.map(|p| clear(&mesh, &mut [p], None)[0].count);
+        let depths = points.map(|p| clear(&mesh, &mut [p], &[]).inside.count);
         assert_eq!(depths, [0, 0]);
         points[1] = Vec3::new(0.14, 0.115, 0.3);
-        assert_eq!(clear(&mesh, &mut points, None)[0].count, 1);
+        assert_eq!(clear(&mesh, &mut points, &[]).inside.count, 1);
+    }
+
+    #[test]
+    fn points_in_a_narrow_gap_stay_between_its_sides() {
+        // Two sheets at x = 0 and x = 0.015 that face each other.
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let positions = [0.0, 0.015].into_iter().flat_map(|x| corners.map(|[y, z]| Vec3::new(x, y, z)));
+        let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
+        let mesh = TriMesh { positions: positions.collect(), triangles };
+        let mut point = [Vec3::new(0.004, 0.2, 0.1)];
+        let cleared = clear(&mesh, &mut point, &[0.02]);
+        assert_eq!([cleared.inside.count, cleared.left.count], [0, 0]);
+        assert!((0.004..0.011).contains(&point[0].x), "{}", point[0]);
     }
 }
