@@ -243,8 +243,8 @@ async function start(opened: OpenedOn & Needs) {
       };
     },
     /**
-     * Gives a model the joints and joint weights of the model `body`, in a worker of its own, as an undo step. Keeps the
-     * cage and its poses. Resolves with a sentence about the weights.
+     * Gives a model the joints, joint weights and morph targets of the model `body`, in a worker of its own, as an undo
+     * step. Keeps the cage and its poses. Resolves with a sentence about what was copied.
      */
     dress(id: number, body: number, label: string, hear?: Hear): Job<{ readonly report: string }> {
       const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];

@@ -1,5 +1,5 @@
 //! Copies values of one surface, such as joint weights of a body, to another one near it, such as clothes; and finds and
-//! moves vertices of one surface inside another ([`clear`]).
+//! moves vertices of one surface inside another ([`push_out`]).
 //!
 //! A vertex takes the values of the closest point if that point is near and faces the same way. The values of all other
 //! vertices minimise the squared graph Laplacian, so that they continue those of their neighbours smoothly.
@@ -12,11 +12,12 @@ mod side;
 mod tree;
 
 use glam::Vec3;
+use serde::Serialize;
 
 use crate::deform::vertex_normals;
 use crate::mesh::{Bounds, TriMesh, Weld, weld};
 use crate::team::map_indices;
-pub use side::{Cleared, Inside, clear};
+pub use side::{InsidePoints, Separation, push_out};
 use tree::{Hit, TriangleTree};
 
 /// Largest distance between a vertex and the point whose values it takes, as a fraction of the source's diagonal.
@@ -37,23 +38,15 @@ const MAX_STEPS: usize = 300;
 /// Number of free vertices up to which they need no start from a coarser graph.
 const COARSEST: usize = 50;
 
-/// Values of each vertex of the target, and how they were found.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Inpainted {
-    /// Values, non-negative. `[n_vertices][n_columns]`
-    pub values: Vec<f32>,
-    /// Number of distinct positions with the values of the closest point, or of the outer side.
+/// Numbers of distinct positions of the target, by the origin of their values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Origins {
+    /// With the values of the closest point of the source, or of the outer side of a thick cloth.
     pub matched: usize,
-    /// Number of positions whose values continue those of their neighbours.
+    /// With values that continue those of their neighbours.
     pub inpainted: usize,
-    /// Number of positions in parts without any match, such as buttons. They have the values of the closest point.
+    /// In parts without any match, such as buttons, with the values of the closest point.
     pub copied: usize,
-}
-
-/// Copies non-negative `values`, `[n_vertices][n_columns]`, from the vertices of `source` to those of `target`.
-#[must_use]
-pub fn inpaint(source: &TriMesh, values: &[f32], n_columns: usize, target: &TriMesh) -> Inpainted {
-    Inpainting::new(source, target).weights(values, n_columns)
 }
 
 /// How values get from one surface to another, for any values. Vertices at the same position have the same values.
@@ -66,7 +59,7 @@ pub struct Inpainting {
     outer: Vec<Option<Hit>>,
     is_free: Vec<bool>,
     graph: Graph,
-    counts: [usize; 3],
+    origins: Origins,
 }
 
 impl Inpainting {
@@ -107,8 +100,12 @@ impl Inpainting {
         let is_free: Vec<bool> =
             reached.iter().zip(&known).map(|(&reached, &known)| reached && !known).collect();
         let count = |marks: &[bool], mark: bool| marks.iter().filter(|&&is| is == mark).count();
-        let counts = [count(&known, true), count(&is_free, true), count(&reached, false)];
-        Self { seams, cloth, hits, outer, is_free, graph, counts }
+        let origins = Origins {
+            matched: count(&known, true),
+            inpainted: count(&is_free, true),
+            copied: count(&reached, false),
+        };
+        Self { seams, cloth, hits, outer, is_free, graph, origins }
     }
 
     /// Distinct positions of the target's vertices.
@@ -123,10 +120,10 @@ impl Inpainting {
         &self.seams.unique_of
     }
 
-    /// Numbers of positions: matched, inpainted and copied, as in [`Inpainted`].
+    /// Numbers of positions by the origin of their values.
     #[must_use]
-    pub fn counts(&self) -> [usize; 3] {
-        self.counts
+    pub fn origins(&self) -> Origins {
+        self.origins
     }
 
     /// Copies `values`, `[n_source_vertices][n_columns]`, to the distinct positions. Returns `[n_positions][n_columns]`.
@@ -145,14 +142,12 @@ impl Inpainting {
         all
     }
 
-    /// Copies non-negative `values`, such as joint weights, to all vertices.
+    /// Copies non-negative `values`, such as joint weights, to all vertices. Returns `[n_vertices][n_columns]`, not negative.
     #[must_use]
-    pub fn weights(&self, values: &[f32], n_columns: usize) -> Inpainted {
+    pub fn weights(&self, values: &[f32], n_columns: usize) -> Vec<f32> {
         let all = self.values(values, n_columns);
         let row = |&p: &u32| &all[p as usize * n_columns..][..n_columns];
-        let values = self.seams.unique_of.iter().flat_map(row).map(|value| value.max(0.0)).collect();
-        let [matched, inpainted, copied] = self.counts;
-        Inpainted { values, matched, inpainted, copied }
+        self.seams.unique_of.iter().flat_map(row).map(|value| value.max(0.0)).collect()
     }
 }
 

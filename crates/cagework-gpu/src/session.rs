@@ -396,8 +396,8 @@ impl Session {
         self.camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
         let camera = self.camera;
         let mut encoder = self.encoder();
-        let is_slow = cfg!(target_family = "wasm") && self.context.is_software();
-        let samples = if is_slow { 1 } else { MAX_SAMPLES };
+        let is_software_in_browser = cfg!(target_family = "wasm") && self.context.is_software();
+        let samples = if is_software_in_browser { 1 } else { MAX_SAMPLES };
         self.encode(&mut encoder, Target { view: target, format, size, samples, scale }, &camera);
         self.context.queue.submit([encoder.finish()]);
         Ok(())

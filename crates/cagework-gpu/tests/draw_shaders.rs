@@ -1,5 +1,5 @@
-//! Compares the draw shaders with the draw table and with the layouts of the Rust structs. The tests need no GPU: they parse the shaders
-//! with naga, as wgpu does.
+//! Compares the draw shaders with the draw table and with the layouts of the Rust structs. The tests need no GPU: they
+//! parse the shaders with naga, as wgpu does.
 
 use std::mem::{offset_of, size_of};
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-use cagework_core::inpaint::{Cleared, Inpainting, Inside, REACH, clear};
+use cagework_core::inpaint::{Inpainting, InsidePoints, Origins, REACH, Separation, push_out};
 use cagework_core::skin::Skin;
 use cagework_core::words::{counted, three_digits};
 use glam::{DVec3, Mat4, Vec3};
@@ -49,12 +49,9 @@ pub enum TransferError {
 /// What [`Model::transfer_from`] did. Counts are of distinct positions of the clothes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TransferReport {
-    /// With the values of the closest point of the body, or of the outer side of the cloth.
-    pub matched: usize,
-    /// Whose values continue those of their neighbours.
-    pub inpainted: usize,
-    /// In parts away from the body, with the values of its closest point.
-    pub copied: usize,
+    /// Positions by the origin of their weights and displacements.
+    #[serde(flatten)]
+    pub origins: Origins,
     /// Number of joints that were added; 0 if the clothes have a skin, or the body has none.
     pub joints: usize,
     /// Targets of the body that move nothing on the clothes. They are left out.
@@ -73,9 +70,9 @@ pub struct TransferReport {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Penetration {
     /// Before.
-    pub inside: Inside,
+    pub inside: InsidePoints,
     /// After; equal to `inside` without [`TransferOptions::push_out`].
-    pub left: Inside,
+    pub left: InsidePoints,
 }
 
 /// A morph target that clothes took over.
@@ -163,18 +160,17 @@ impl Model {
 
         let mut surface = body.tri_mesh();
         let inpainting = Inpainting::new(&surface, &clothes.tri_mesh());
-        if inpainting.counts()[0] == 0 {
+        if inpainting.origins().matched == 0 {
             return Err(TransferError::Far(self.name.clone()));
         }
         let mut report = TransferReport { push_out: options.push_out, ..TransferReport::default() };
         report.joints = if takes_skin { joints.len() } else { 0 };
-        [report.matched, report.inpainted, report.copied] = inpainting.counts();
-        let weights =
-            takes_skin.then(|| inpainting.weights(&weights_of(&player, &joints), joints.len()).values);
+        report.origins = inpainting.origins();
+        let weights = takes_skin.then(|| inpainting.weights(&weights_of(&player, &joints), joints.len()));
 
         let mut rest = inpainting.positions().to_vec();
         let mut least = options.push_out.map_or_else(Vec::new, |distance| vec![distance; rest.len()]);
-        let Cleared { inside, left, distances } = clear(&surface, &mut rest, &least);
+        let Separation { inside, left, distances } = push_out(&surface, &mut rest, &least);
         report.rest = Penetration { inside, left };
         // Targets do not move vertices that are closer at rest, because there is no room.
         least.iter_mut().zip(distances).for_each(|(least, at_rest)| *least = least.min(at_rest));
@@ -197,7 +193,7 @@ impl Model {
             surface.positions = moved(&body.positions, &of_body);
             let mut posed: Vec<Vec3> = moved(&rest, &by);
             let before = posed.clone();
-            let Cleared { inside, left, .. } = clear(&surface, &mut posed, &least);
+            let Separation { inside, left, .. } = push_out(&surface, &mut posed, &least);
             for ((by, from), to) in by.iter_mut().zip(before).zip(posed) {
                 if from != to && share != 0.0 {
                     *by += (to - from) / share;
@@ -364,13 +360,12 @@ pub fn transfer_report(report: &TransferReport) -> Vec<String> {
     let targets = |n| counted(n, "morph target", "morph targets");
     let mut lines = Vec::new();
     let mut add = |n: usize, line: String| lines.extend((n > 0).then_some(line));
-    let TransferReport { matched, inpainted, copied, still_targets, existing_targets, .. } = *report;
-    add(matched, format!("{} with the weights of the body", positions(matched)));
+    let TransferReport { origins, still_targets, existing_targets, .. } = *report;
+    let Origins { matched, inpainted, copied } = origins;
+    add(matched, format!("{} like the closest point of the body", positions(matched)));
     add(inpainted, format!("{} that continue their neighbours", positions(inpainted)));
-    add(
-        copied,
-        format!("{} in parts away from the body, with the weights of its closest point", positions(copied)),
-    );
+    add(copied, format!("{} in parts away from the body, like its closest point", positions(copied)));
+    add(report.joints, format!("{} of the body", counted(report.joints, "joint", "joints")));
     add(report.targets.len(), format!("{} of the body", targets(report.targets.len())));
     add(still_targets, format!("{} left out, which move nothing", targets(still_targets)));
     add(existing_targets, format!("{} left out, whose names the clothes have", targets(existing_targets)));
@@ -378,7 +373,7 @@ pub fn transfer_report(report: &TransferReport) -> Vec<String> {
     for (at, Penetration { inside, left }) in
         std::iter::once(("at rest".to_owned(), report.rest)).chain(of_targets)
     {
-        let by = |Inside { count, depth }| match count {
+        let by = |InsidePoints { count, depth }| match count {
             0 => "none".to_owned(),
             _ => format!("{}, up to {} deep", positions(count), three_digits(depth)),
         };

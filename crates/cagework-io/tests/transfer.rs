@@ -1,10 +1,11 @@
-//! Clothes get the skeleton and the joint weights and the morph targets of a body: `Model::transfer_from`.
+//! Clothes get the skeleton, the joint weights and the morph targets of a body: `Model::transfer_from`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
 mod common;
 
 use cagework_core::TriMesh;
+use cagework_core::inpaint::Origins;
 use cagework_core::skin::{Joint, Rig, skin_vertices};
 use cagework_io::{
     Model, Penetration, ReshapeOptions, TransferError, TransferOptions, TransferReport, write_mesh_glb,
@@ -85,7 +86,7 @@ fn assert_dressed(dressed: &Model, clothes: &[Vec3]) {
 fn a_shirt_without_a_skeleton_follows_the_body() {
     let shirt = tube(0.22, 0.5, 1.5, 7);
     let (dressed, json, report) = transfer(&read("shirt.obj", obj(&shirt).as_bytes()).unwrap());
-    assert_eq!([report.matched, report.inpainted, report.copied], [24 * 8, 0, 0]);
+    assert_eq!(report.origins, Origins { matched: 24 * 8, inpainted: 0, copied: 0 });
     assert_eq!((dressed.counts.skins, dressed.counts.joints), (1, 2));
     let joint = |k: usize| &json["nodes"][json["skins"][0]["joints"][k].as_u64().unwrap() as usize];
     assert_eq!([&joint(0)["name"], &joint(1)["name"]], ["hips", "spine"]);
@@ -117,7 +118,7 @@ fn a_glb_keeps_its_names_and_transforms() {
     let highest = clothes.positions.iter().map(|p| p.y).fold(0.0, f32::max);
     assert!((highest - 1.8).abs() < 1e-5, "{highest}");
     let (dressed, json, report) = transfer(&clothes);
-    assert_eq!((report.matched, dressed.counts.skins, dressed.counts.meshes), (24 * 12, 2, 2));
+    assert_eq!((report.origins.matched, dressed.counts.skins, dressed.counts.meshes), (24 * 12, 2, 2));
     assert_eq!(
         [&json["nodes"][0]["name"], &json["nodes"][0]["scale"]],
         [&json!("shirt"), &json!([0.01, 0.01, 0.01])]
@@ -159,7 +160,7 @@ fn a_body_whose_rest_differs_from_its_bind_pose_is_dressed_at_rest() {
     let clothes = TriMesh { positions: body.positions.clone(), triangles: body.triangles.clone() };
     let clothes = read("clothes.obj", obj(&clothes).as_bytes()).unwrap();
     let (dressed, _, report) = transferred(&rigged().glb(), &clothes, None);
-    assert!(report.matched > 0);
+    assert!(report.origins.matched > 0);
     let player = dressed.player().unwrap().unwrap();
     let pose = player.at(None, 0.0, &[]);
     let shown = skin_vertices(&player.skin, &pose.palette, &pose.targets);

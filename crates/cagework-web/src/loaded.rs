@@ -120,8 +120,8 @@ impl Loaded {
         Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
     }
 
-    /// Gives these clothes the joints of `body`, and weights copied from it. Returns how many positions got their weights
-    /// in which way, as an English sentence.
+    /// Gives these clothes the joints, joint weights and morph targets of `body`. Returns what was copied, as an English
+    /// sentence.
     ///
     /// # Errors
     /// Those of `Model::with_skin_of`; the clothes are then unchanged.

@@ -101,8 +101,7 @@ impl Surface {
             config.usage |= wgpu::TextureUsages::COPY_DST;
         }
         surface.configure(&context.device, &config);
-        let is_software = context.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
-        let (in_flight, is_slow) = (Arc::default(), Arc::new(AtomicBool::new(is_software)));
+        let (in_flight, is_slow) = (Arc::default(), Arc::new(AtomicBool::new(context.is_software())));
         Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
     }
 
@@ -159,15 +158,16 @@ impl Surface {
         };
         let [width, height] = [self.config.width, self.config.height];
         sessions.truncate(width as usize);
-        let n_parts = sessions.len();
-        let size = [width / n_parts as u32, height];
-        if self.parts.len() != n_parts {
+        let n_parts = sessions.len() as u32;
+        if self.parts.len() != sessions.len() {
             self.drop_parts();
-            self.parts = (0..n_parts).map(|_| self.make_part(&context, size)).collect();
+            let left = |k: u32| k * width / n_parts;
+            let widths = (0..n_parts).map(|k| left(k + 1) - left(k));
+            self.parts = widths.map(|width| self.make_part(&context, [width, height])).collect();
         }
         for (texture, session) in self.parts.iter().zip(sessions) {
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            session.frame(&view, self.format, size, scale)?;
+            session.frame(&view, self.format, [texture.width(), height], scale)?;
         }
         self.put_together(&context, &frame.texture);
         self.in_flight.fetch_add(1, Ordering::Relaxed);
@@ -182,12 +182,14 @@ impl Surface {
         Ok(if is_rough { FrameOutcome::Roughly } else { FrameOutcome::Sharply })
     }
 
-    /// Copies the sessions' textures to the canvas, side by side. If their number does not divide the width, columns
-    /// between them stay empty.
+    /// Copies the sessions' textures to the canvas, side by side.
     fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
-        let between = (self.parts.len() as u32 - 1).max(1);
-        let left = |k: u32, part: &wgpu::Texture| k * (self.config.width - part.width()) / between;
-        let parts: Vec<_> = (0u32..).zip(&self.parts).map(|(k, part)| (left(k, part), part)).collect();
+        let mut right = 0;
+        let parts = self.parts.iter().map(|part| {
+            right += part.width();
+            (right - part.width(), part)
+        });
+        let parts: Vec<_> = parts.collect();
         let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         // `draws_only` is constant in each build, so the compiler removes the painter from the WebGPU build.
         if let Some(painter) = self.painter.as_ref().filter(|_| context.draws_only()) {

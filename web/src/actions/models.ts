@@ -83,7 +83,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
         if (model) store.set({ model: { ...model, notices: [...new Set([...model.notices, ...notices])] } });
       });
     },
-    /** Gives a model the joints and joint weights of another one. */
+    /** Gives a model the joints, joint weights and morph targets of another one. */
     dress(id: number, body: number): Promise<boolean> {
       const name = memberOf(id)?.name ?? "";
       return attempt(ctx, T.models.notDressed(name), () => {

@@ -20,7 +20,7 @@ fn clothes_get_joints_and_what_does_not_fit_is_refused() {
     sandbox
         .run("transfer body.glb suit.glb -o out.glb")
         .success()
-        .stdout(contains("positions with the weights of the body").and(contains("wrote out.glb")));
+        .stdout(contains("positions like the closest point of the body").and(contains("wrote out.glb")));
     let info = sandbox.json("info out.glb --json");
     assert_eq!((&info["skins"], &info["joints"]), (&1.into(), &16.into()));
 

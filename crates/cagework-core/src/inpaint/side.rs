@@ -21,20 +21,20 @@ const ROUNDS: usize = 4;
 
 /// Number of points inside a surface, and the greatest distance of one to the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Inside {
+pub struct InsidePoints {
     /// Number of points.
     pub count: usize,
     /// Greatest distance, object units.
     pub depth: f32,
 }
 
-/// Result of [`clear`].
+/// Result of [`push_out`].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cleared {
+pub struct Separation {
     /// Points that were inside.
-    pub inside: Inside,
+    pub inside: InsidePoints,
     /// Points that are inside now.
-    pub left: Inside,
+    pub left: InsidePoints,
     /// Signed distances now, negative inside. `[n_points]`
     pub distances: Vec<f32>,
 }
@@ -42,7 +42,7 @@ pub struct Cleared {
 /// Counts the `points` inside `surface`. Those closer to it than their distance in `least` move out to this distance: away
 /// from the closest point or, if inside, through it. Each point moves on its own; in a gap that is too narrow it stays at the
 /// best place that it reaches. `least`: `[n_points]`, object units, or empty to move none.
-pub fn clear(surface: &TriMesh, points: &mut [Vec3], least: &[f32]) -> Cleared {
+pub fn push_out(surface: &TriMesh, points: &mut [Vec3], least: &[f32]) -> Separation {
     let (_, surface, _) = welded(surface);
     let (tree, normals) = (TriangleTree::new(&surface), Pseudonormals::new(&surface));
     let least_depth =
@@ -77,13 +77,14 @@ pub fn clear(surface: &TriMesh, points: &mut [Vec3], least: &[f32]) -> Cleared {
         Some((first, best))
     });
     let inside = |distances: &mut dyn Iterator<Item = f64>| {
-        distances.filter(|&distance| distance < -least_depth).fold(Inside::default(), |all, distance| {
-            Inside { count: all.count + 1, depth: all.depth.max(-distance as f32) }
-        })
+        distances.filter(|&distance| distance < -least_depth).fold(
+            InsidePoints::default(),
+            |all, distance| InsidePoints { count: all.count + 1, depth: all.depth.max(-distance as f32) },
+        )
     };
     let of = |k: usize| reached[k].unwrap_or((f64::INFINITY, (f64::INFINITY, points[k])));
     let n = points.len();
-    let result = Cleared {
+    let result = Separation {
         inside: inside(&mut (0..n).map(|k| of(k).0)),
         left: inside(&mut (0..n).map(|k| of(k).1.0)),
         distances: (0..n).map(|k| of(k).1.0 as f32).collect(),
@@ -173,7 +174,7 @@ mod tests {
             let offset = Vec3::new(share(31), share(59), share(113)) - 0.5;
             let mut point = [a.lerp(b, share(7)) + share(17) * 0.2 * offset];
             let is_inside = winding_number(point[0].as_dvec3(), corners.iter().copied()) > 0.5;
-            let Cleared { inside: before, left: after, .. } = clear(&mesh, &mut point, &[0.02]);
+            let Separation { inside: before, left: after, .. } = push_out(&mesh, &mut point, &[0.02]);
             // Points within rounding of the surface count as outside.
             let distance = |p: Vec3| TriangleTree::new(&mesh).closest(p).map_or(0.0, |hit| hit.distance);
             assert!(before.count == usize::from(is_inside) || before.depth < 1e-4, "{k}: {before:?}");
@@ -190,10 +191,10 @@ mod tests {
         // Without its base, the spike is open at z = 0. Its faces at the rim lean over the first point.
         mesh.triangles.remove(0);
         let mut points = [Vec3::new(0.2, -0.05, -0.05), Vec3::new(0.12, 0.09, 0.3)];
-        let depths = points.map(|p| clear(&mesh, &mut [p], &[]).inside.count);
+        let depths = points.map(|p| push_out(&mesh, &mut [p], &[]).inside.count);
         assert_eq!(depths, [0, 0]);
         points[1] = Vec3::new(0.14, 0.115, 0.3);
-        assert_eq!(clear(&mesh, &mut points, &[]).inside.count, 1);
+        assert_eq!(push_out(&mesh, &mut points, &[]).inside.count, 1);
     }
 
     #[test]
@@ -204,8 +205,8 @@ mod tests {
         let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]];
         let mesh = TriMesh { positions: positions.collect(), triangles };
         let mut point = [Vec3::new(0.004, 0.2, 0.1)];
-        let cleared = clear(&mesh, &mut point, &[0.02]);
-        assert_eq!([cleared.inside.count, cleared.left.count], [0, 0]);
+        let separation = push_out(&mesh, &mut point, &[0.02]);
+        assert_eq!([separation.inside.count, separation.left.count], [0, 0]);
         assert!((0.004..0.011).contains(&point[0].x), "{}", point[0]);
     }
 }

@@ -52,9 +52,10 @@ fn a_cloth_beside_an_arm_stays_with_its_body() {
         body.positions.iter().flat_map(|p| if p.x > 0.0 { [0.0, 1.0] } else { [1.0, 0.0] }).collect();
     let bulge = |u: f32, v: f32| 0.01 + 0.075 * (4.0 * u * (1.0 - u) * 4.0 * v * (1.0 - v)).powi(2);
     let cloth = sheet(20, |u, v| Vec3::new(bulge(u, v), u, v));
-    let done = inpaint(&body, &values, 2, &cloth);
-    assert!(done.inpainted > 50 && done.copied == 0, "{} of {}", done.inpainted, done.matched);
-    for (p, row) in cloth.positions.iter().zip(done.values.chunks(2)) {
+    let inpainting = Inpainting::new(&body, &cloth);
+    let Origins { matched, inpainted, copied } = inpainting.origins();
+    assert!(inpainted > 50 && copied == 0, "{inpainted} of {matched}");
+    for (p, row) in cloth.positions.iter().zip(inpainting.weights(&values, 2).chunks(2)) {
         assert!((row[0] - 1.0).abs() < 1e-3 && row[1] < 1e-3, "{p}: {row:?}");
     }
 }
@@ -68,10 +69,10 @@ fn both_sides_of_a_thick_cloth_get_the_same_values() {
     // A button: a part without a match, as it stands on its edge.
     let button = sheet(2, |u, v| Vec3::new(0.5, 0.5 + 0.1 * u, 0.04 + 0.01 * v));
     let cloth = joined(&[outer, inner, button]);
-    let done = inpaint(&body, &values, 2, &cloth);
-    assert_eq!((done.matched, done.inpainted, done.copied), (200, 0, 9));
-    for (p, row) in cloth.positions.iter().zip(done.values.chunks(2)) {
+    let inpainting = Inpainting::new(&body, &cloth);
+    assert_eq!(inpainting.origins(), Origins { matched: 200, inpainted: 0, copied: 9 });
+    for (p, row) in cloth.positions.iter().zip(inpainting.weights(&values, 2).chunks(2)) {
         assert!((row[0] - p.x).abs() < 1e-5, "{p}: {row:?}");
     }
-    assert_eq!(inpaint(&TriMesh::default(), &[], 2, &cloth).matched, 0);
+    assert_eq!(Inpainting::new(&TriMesh::default(), &cloth).origins().matched, 0);
 }

@@ -1,8 +1,8 @@
 //! Levels of unknowns of the classic method: boundary cells are neighbours with fixed values.
 //!
 //! The finest level is that of K. Smith's paper (`docs/method.md`, sources): the six arms of each stencil are one cell
-//! long, and each cell is the average of its neighbours. Coarser levels, used only by multigrid, keep every second cell; there, an arm
-//! ends at the first boundary cell.
+//! long, and each cell is the average of its neighbours. Coarser levels, used only by multigrid, keep every second cell;
+//! there, an arm ends at the first boundary cell.
 
 use crate::grid::Grid;
 use crate::levels::Boundary;

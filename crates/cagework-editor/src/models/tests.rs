@@ -190,7 +190,10 @@ fn a_model_that_gets_a_skin_keeps_place_paint_and_pins() {
 
         let (dressed, found) = shirt.with_skin_of(&body, u64::MAX).unwrap();
         // A cube of 3 x 3 faces per side has 4^3 - 2^3 vertices.
-        assert_eq!(transfer_report(&found), ["56 positions with the weights of the body"]);
+        assert_eq!(
+            transfer_report(&found),
+            ["56 positions like the closest point of the body", "2 joints of the body"]
+        );
         let refused = dressed.with_skin_of(&body, u64::MAX).unwrap_err();
         assert_eq!(refused, TransferError::HasSkin("shirt.glb".into()));
         assert!(editor.replace_model(7, dressed.clone()).is_err());

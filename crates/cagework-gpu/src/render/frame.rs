@@ -29,7 +29,7 @@ const FLOOR_REACH: f32 = 5.0;
 /// Depth range of the gizmo: in front of everything, with depth tests within the gizmo.
 const GIZMO_DEPTHS: [f32; 2] = [0.0, 1e-3];
 
-/// Largest number of samples per pixel: the one that WebGPU has besides 1.
+/// Largest number of samples per pixel. WebGPU supports 1 and 4.
 pub(crate) const MAX_SAMPLES: u32 = 4;
 
 /// Render target of a frame.
@@ -41,7 +41,7 @@ pub struct Target<'a> {
     pub format: wgpu::TextureFormat,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Number of samples per pixel: 1 or 4, as WebGPU has it.
+    /// Number of samples per pixel: 1 or 4.
     pub samples: u32,
     /// Pixels per CSS pixel.
     pub scale: f32,

@@ -41,8 +41,8 @@ const MAX_CHANNEL_VALUES: u64 = 1 << 27;
 const MAX_JOINTS: u64 = 1 << 18;
 
 /// Limits on clips and on the channels of all clips. The page takes about 10 s of processor time for this many.
-const MAX_CLIPS: u64 = 1 << 14;
-const MAX_CHANNELS: u64 = 1 << 18;
+const MAX_CLIPS: u64 = 1 << 12;
+const MAX_CHANNELS: u64 = 1 << 17;
 
 /// Bytes of JSON per primitive that the estimate of the memory for writing a model already includes.
 const PRIMITIVE_JSON_BYTES: u64 = 6000;

@@ -136,8 +136,9 @@ export interface Jobs {
     output: ReadModel;
   };
   /**
-   * Gives clothes the joints of a body. `clothes`, `body`: arrays of `Engine.storedModel`; `used`: number of texture
-   * pixels of the other models. `report`: a sentence about the weights.
+   * Gives clothes the joints, joint weights and morph targets of a body. `clothes`, `body`: arrays of
+   * `Engine.storedModel`; `used`: number of texture pixels of the other models. `report`: a sentence about what was
+   * copied.
    */
   dress: {
     input: { clothes: Uint8Array[]; body: Uint8Array[]; used: number };

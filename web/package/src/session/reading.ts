@@ -23,7 +23,7 @@ export async function readModel(
   return packed(pkg, loaded, used, tell);
 }
 
-/** Gives clothes the joints and joint weights of a body. */
+/** Gives clothes the joints, joint weights and morph targets of a body. */
 export async function dress(
   pkg: Package,
   { clothes, body, used }: Jobs["dress"]["input"],

@@ -18,7 +18,7 @@ export const models = {
   },
   dress: (body: string) => `Rig like ${body}`,
   dressTip: (body: string) =>
-    `Copies the joints of ${body} and their weights; its clips then move this model`,
+    `Copies the joints, weights and morph targets of ${body}; its clips then move this model`,
   dressing: (name: string) => `Copying joints to ${name}`,
   bin: (name: string) => `Remove ${name} from the cage`,
   is: { hidden: "hidden", rigid: "keeps its shape", stays: "stays as it is", painted: "painted" },

@@ -149,8 +149,8 @@ pub(super) fn append<'p>(
     Ok(moved.iter().enumerate().map(targets).collect())
 }
 
-/// Returns the displacements of all points in a pose from those of the vertices or of all points, with the meshes of rigid nodes moved rigidly. Ends of morph
-/// targets move with the rest shape, so that their deltas are unchanged.
+/// Returns the displacements of all points in a pose, with the meshes of rigid nodes moved rigidly. Ends of morph targets
+/// move with the rest shape, so that their deltas are unchanged. `by`: displacements of all points, or of the vertices.
 pub(super) fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
     let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
     all.resize(rig.n_vertices + rig.extras.len(), DVec3::ZERO);
