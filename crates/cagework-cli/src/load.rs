@@ -175,13 +175,13 @@ pub(crate) fn generate_for(
 /// bounding box's diagonal.
 ///
 /// # Errors
-/// If `positions` is empty, or the box overflows or degenerates in `f32`.
+/// If `positions` is empty, or the box is too small, too large or too far from the origin for `f32`.
 pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Result<PolygonMesh, CliError> {
     let bounds = Bounds::of(positions)
         .ok_or_else(|| CliError::Cage { name: "box cage".into(), source: CageError::Empty })?;
     let mesh = subdivided_box(bounds, margin, [divisions; 3]);
     Cage::new(&mesh).map_err(|source| CliError::Mismatch {
-        message: format!("box cage: its coordinates do not fit in 32-bit floats: {source}"),
+        message: format!("box cage: {source}"),
         hint: "move the model closer to the origin, scale it, or give a smaller --margin",
     })?;
     Ok(mesh)

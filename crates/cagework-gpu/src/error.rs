@@ -1,7 +1,7 @@
 //! Errors of operations on the GPU. Binding and deformation can then run on the CPU instead.
 
 use cagework_core::options::Solver;
-use cagework_core::{BindError, Cancelled};
+use cagework_core::{BindError, Cancellation};
 use thiserror::Error;
 
 use crate::plan::PlanError;
@@ -57,7 +57,7 @@ pub enum GpuError {
     },
     /// The GPU did not finish a submission in time.
     #[error(
-        "the GPU did not answer within {seconds} s: its driver hangs, or it is too slow for this grid; use a smaller grid, or the CPU"
+        "the GPU did not answer within {seconds} s: its driver hangs, or the work is too large for it; use a smaller grid or picture, or the CPU"
     )]
     Timeout {
         /// Time limit, seconds.
@@ -98,8 +98,8 @@ pub enum GpuError {
     Bind(#[from] BindError),
 }
 
-impl From<Cancelled> for GpuError {
-    fn from(cancelled: Cancelled) -> Self {
-        Self::Bind(BindError::Cancelled(cancelled))
+impl From<Cancellation> for GpuError {
+    fn from(cancellation: Cancellation) -> Self {
+        Self::Bind(BindError::Cancelled(cancellation))
     }
 }

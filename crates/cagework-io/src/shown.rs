@@ -57,6 +57,7 @@ pub fn json_fault(text: &[u8], error: &serde_json::Error) -> String {
         Category::Eof => "the JSON ends too early: the file is cut off".to_owned(),
         Category::Data => value_fault(&error.to_string()),
         _ if error.to_string().starts_with("number out of range") => "a number is out of range".to_owned(),
+        _ if error.to_string().starts_with("recursion limit") => "the JSON is nested too deeply".to_owned(),
         _ => "the JSON is damaged".to_owned(),
     };
     let (line, column) = (error.line(), error.column());
@@ -93,6 +94,10 @@ mod tests {
         assert_eq!(
             message(&format!("{}\u{1b}\n\t{{\"a\": 1 b", " ".repeat(50))),
             "the JSON is damaged, at line 1, column 51, after '\\u{1b}'"
+        );
+        assert_eq!(
+            message(&"[".repeat(1000)),
+            format!("the JSON is nested too deeply, at line 1, column 128, after '{}'", "[".repeat(40))
         );
         let kinds = [
             (

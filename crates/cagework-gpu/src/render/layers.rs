@@ -7,8 +7,8 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 /// Limit on overdraw for software rasterisers: pixels, counted once per triangle that covers them. At the native limit,
-/// a picture takes 10 s of one core in llvmpipe; at the page's limit, a frame takes about 1 s in SwiftShader.
-const MAX_SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 2.5e7 } else { 1e8 };
+/// a picture takes up to 10 s of two cores in llvmpipe; at the page's limit, a frame takes about 1 s in SwiftShader.
+const MAX_SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 2.5e7 } else { 4e7 };
 
 /// Cost of a triangle per pixel of its longest side, in addition to its area, because slivers have almost no
 /// area. Measured with a fan of 100,000 slivers in SwiftShader (browsers) and llvmpipe.

@@ -61,7 +61,7 @@ pub use rig::{
     Clip, Feet, Ground, JointPoint, Joints, Player, ReshapeOptions, ReshapeReport, RigPose, Skeleton, Vrm,
 };
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm, write_moved, write_targets};
-pub(crate) use size::{MAX_PRIMITIVES, MAX_TRIANGLES};
+pub(crate) use size::MAX_TRIANGLES;
 pub(crate) use splats::write as write_splats;
 pub(crate) use transfer::write_skinned;
 

@@ -22,7 +22,7 @@ pub(crate) const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
 /// Limit on the number of primitives, and also on the number of morph targets, each summed over all nodes. A primitive
 /// or target takes several KB in an export.
-pub(crate) const MAX_PRIMITIVES: u64 = 1 << 17;
+pub(crate) const MAX_PRIMITIVES: u64 = 1 << 16;
 
 /// Limit on decoded values: vertices times attributes and morph targets, indices, keys of clips. Decoding this many
 /// takes 1 to 2 s.

@@ -10,9 +10,12 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::package::fault;
 use super::xml::{attributes, span_of};
-use crate::gltf::{MAX_ELEMENTS, MAX_PRIMITIVES, MAX_TRIANGLES};
+use crate::gltf::{MAX_ELEMENTS, MAX_TRIANGLES};
 use crate::polygons::PolygonsError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
+
+/// Limit on the objects of a part, and on the objects of the build with every placement counted.
+pub(super) const MAX_OBJECTS: u64 = 1 << 17;
 
 /// Group of properties, and index in the group.
 pub(super) type Property = (u32, u32);
@@ -81,8 +84,8 @@ impl PartCounts {
         let (count, what, limit) = match name {
             "vertex" => (&mut self.vertices, "vertices", MAX_ELEMENTS),
             "triangle" => (&mut self.triangles, "triangles", MAX_TRIANGLES),
-            "object" => (&mut self.objects, "objects", MAX_PRIMITIVES),
-            "component" | "item" => (&mut self.placements, "objects", MAX_PRIMITIVES),
+            "object" => (&mut self.objects, "objects", MAX_OBJECTS),
+            "component" | "item" => (&mut self.placements, "objects", MAX_OBJECTS),
             "base" | "color" => (&mut self.colors, "colours", MAX_COLORS),
             _ => return Ok(()),
         };

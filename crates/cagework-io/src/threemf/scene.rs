@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use glam::DAffine3;
 
 use super::package::{Package, fault, part_name};
-use super::part::{ModelPart, Object, PartCounts, Placement};
-use crate::gltf::{MAX_ELEMENTS, MAX_PRIMITIVES, MAX_TRIANGLES};
+use super::part::{MAX_OBJECTS, ModelPart, Object, PartCounts, Placement};
+use crate::gltf::{MAX_ELEMENTS, MAX_TRIANGLES};
 use crate::polygons::{Polygons, PolygonsError};
 use crate::shown::shown;
 
@@ -150,7 +150,7 @@ impl Scene {
             all.add(self.measure(self.target(0, item)?, 0, &mut states)?);
         }
         for (count, what, limit) in [
-            (all.instances, "objects", MAX_PRIMITIVES),
+            (all.instances, "objects", MAX_OBJECTS),
             (all.vertices, "vertices", MAX_ELEMENTS),
             (all.triangles, "triangles", MAX_TRIANGLES),
         ] {
