@@ -10,7 +10,7 @@ use cagework_cage::samples;
 use cagework_core::bind::bind;
 use cagework_core::mesh::TriMesh;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 
 /// Target numbers of cage vertices; 80 is the default of the options.
 const TARGETS: [u32; 3] = [24, 80, 200];
@@ -59,7 +59,7 @@ fn main() {
 /// Prints a row of the table. Returns whether the cage is valid, encloses the model and has a small rest error.
 fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
     let options = CageOptions { target, ..CageOptions::default() };
-    let run = || generate(&mesh.positions, &mesh.triangles, &options, &Silent);
+    let run = || generate(&mesh.positions, &mesh.triangles, &options, &NoProgress);
     let generated = match run() {
         Ok(generated) => generated,
         Err(error) => {
@@ -70,7 +70,7 @@ fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
     let fastest = cagework_benches::fastest_ms(TIMES, || drop(run()));
     let checked = check(&generated.cage.to_polygon_mesh(), Some(&mesh.positions), None);
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    let bound = bind(&mesh.positions, &generated.cage, &options, &Silent);
+    let bound = bind(&mesh.positions, &generated.cage, &options, &NoProgress);
     let (outside, rest) = match &bound {
         Ok(binding) => (binding.report.outside_vertices, binding.report.rest_error.max_rel),
         Err(_) => (mesh.positions.len() as u64, f64::INFINITY),

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use cagework_cage::samples;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::skin::Skin;
 use cagework_core::{Cage, TriMesh, bind};
 use cagework_gpu::render::DrawModel;
@@ -59,7 +59,7 @@ fn summary(mut times: Vec<f64>) -> String {
 fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindOptions) {
     let mesh = TriMesh { positions: positions.to_vec(), triangles: triangles.to_vec() };
     let weights = |points: &[Vec3]| {
-        let binding = bind(points, cage, options, &Silent).expect("it binds");
+        let binding = bind(points, cage, options, &NoProgress).expect("it binds");
         binding.frames.folded(&binding.weights)
     };
     let probes = Probes::new(&mesh, cage).expect("it has a surface");
@@ -131,7 +131,7 @@ fn main() {
     let cage = Cage::new(&creature_cage()).expect("it is a cage");
     let options = BindOptions { grid: 32, ..BindOptions::default() };
     pull(&positions, &triangles, &cage, &options);
-    let binding = bind(&positions, &cage, &options, &Silent).expect("it binds");
+    let binding = bind(&positions, &cage, &options, &NoProgress).expect("it binds");
     let gpu = context();
     println!(
         "{}: {} vertices, {} triangles, {} cage vertices, {} weights",

@@ -8,7 +8,7 @@ use std::time::Instant;
 use cagework_core::bind::bind;
 use cagework_core::grid::Grid;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::sample::Stencils;
 use cagework_core::sample::embedded::Sampler;
 use cagework_core::solve::BatchSolver as _;
@@ -64,7 +64,7 @@ impl Input {
     #[must_use]
     pub fn bind(&self, method: Method, solver: Solver, grid: u32, threads: usize) -> Binding {
         let options = BindOptions { method, solver, grid, threads, ..BindOptions::default() };
-        bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
+        bind(&self.points, &self.cage, &options, &NoProgress).expect("the input can be bound")
     }
 
     /// Builds the grid levels of the input's cage for the embedded method. `grid`: cells along the cage's longest side.

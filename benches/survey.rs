@@ -19,7 +19,7 @@ use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::bind::bind;
 use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
 use cagework_tests::Random;
 use glam::{Quat, Vec3, Vec3Swizzles as _, vec3};
@@ -275,7 +275,8 @@ fn print_row(name: &str, target: u32, row: [f64; COLUMNS.len()]) {
 fn row(model: &TriMesh, target: u32) -> [f64; COLUMNS.len()] {
     let options = CageOptions { target, ..CageOptions::default() };
     let mut made = None;
-    let ms = fastest_ms(1, || made = generate(&model.positions, &model.triangles, &options, &Silent).ok());
+    let ms =
+        fastest_ms(1, || made = generate(&model.positions, &model.triangles, &options, &NoProgress).ok());
     let cage = made.expect("any model has a cage").cage;
     let mesh = cage.to_polygon_mesh();
     let mut neighbours = vec![BTreeSet::new(); mesh.positions.len()];
@@ -360,7 +361,7 @@ fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
         *p + u * (rest * angle.sin() - d.dot(u)) + w * (radius - rest * angle.cos() - d.dot(w))
     };
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    let Ok(binding) = bind(&model.positions, cage, &options, &Silent) else { return [f64::INFINITY; 2] };
+    let Ok(binding) = bind(&model.positions, cage, &options, &NoProgress) else { return [f64::INFINITY; 2] };
     let posed: Vec<Vec3> = cage.positions().iter().map(bend).collect();
     let moved = deform_bound(&binding.weights, &binding.frames, &posed);
     let right: Vec<Vec3> = model.positions.iter().map(bend).collect();

@@ -11,7 +11,7 @@
 @group(0) @binding(3) var<storage, read_write> splats: array<vec4f>;
 
 /// Value of `Work::mode`: also compute the turns.
-const WITH_TURNS = 1u;
+const ROTATIONS = 1u;
 /// Number of Newton steps. Five suffice if the singular values are within a factor of 10 of each other; the other five
 /// are for stronger deformations.
 const STEPS = 10u;
@@ -94,7 +94,7 @@ fn deform_splats(@builtin(global_invocation_id) id: vec3u) {
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
     let bent = f * covariance * transpose(f);
     var turn = vec3f(0.0);
-    if work.mode == WITH_TURNS { turn = turn_vector(turn_of(f)); }
+    if work.mode == ROTATIONS { turn = turn_vector(turn_of(f)); }
     splats[3u * splat] = vec4f(center.xyz + by, center.w + turn.z);
     splats[3u * splat + 1u] = vec4f(bent[0], bent[1].y);
     splats[3u * splat + 2u] = vec4f(bent[1].z, bent[2].z, turn.xy);

@@ -4,7 +4,7 @@
 struct Surface {
     /// Factor of vertex colour and texture, linear RGBA. For CLAY, the colour itself.
     base_color: vec4f,
-    /// Source of the colour: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
+    /// Source of the colour: MATERIAL, WEIGHTS, ERRORS, CLAY or ALPHA_BLENDING.
     mode: u32,
     /// Fragments with an alpha below this are discarded.
     alpha_cutoff: f32,
@@ -20,7 +20,7 @@ const MATERIAL = 0u;
 const WEIGHTS = 1u;
 const ERRORS = 2u;
 const CLAY = 3u;
-const BLENDED = 4u;
+const ALPHA_BLENDING = 4u;
 
 /// At a vertex value of 1, blending towards grey replaces the share GREY_DESATURATION of a colour by a grey of
 /// GREY_BRIGHTNESS times the colour's luminance.

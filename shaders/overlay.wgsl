@@ -22,7 +22,7 @@ struct Style {
 const STATE_SHIFT = 28u;
 const INDEX_MASK = 0x0fffffffu;
 /// State of items that are not drawn.
-const HIDDEN = 15u;
+const HIDDEN_STATE = 15u;
 
 @group(1) @binding(0) var<uniform> style: Style;
 

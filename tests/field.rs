@@ -5,7 +5,7 @@
 use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{self, Field, FieldWeights, InverseField, bend_vertices};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::sample::ClosestOnCage;
 use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
 use cagework_tests::random::Random;
@@ -15,7 +15,7 @@ use glam::{Mat3, Vec3};
 fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec3>, Cage, Field) {
     let sample = samples::build(id).unwrap();
     let cage = Cage::new(&sample.cage).unwrap();
-    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &NoProgress).unwrap();
     let field = weights.pose(cage.positions(), &posed(&sample));
     (sample.mesh.positions, cage, field)
 }
@@ -31,7 +31,7 @@ fn deep_vertices(positions: &[Vec3], cage: &Cage, field: &Field, cells: f32) -> 
 fn field_approximates_the_exact_deformation_of_vertices_inside() {
     let (positions, cage, field) = field_of("strider", |sample| sample.poses[0].1.clone());
     let posed = &samples::build("strider").unwrap().poses[0].1;
-    let binding = bind(&positions, &cage, &BindOptions::default(), &Silent).unwrap();
+    let binding = bind(&positions, &cage, &BindOptions::default(), &NoProgress).unwrap();
     let exact = deform_bound(&binding.weights, &binding.frames, posed);
     let mut bent = positions.clone();
     bend_vertices(&field, &mut bent);
@@ -115,7 +115,7 @@ fn points_in_bar() -> Vec<Vec3> {
 fn field_and_gradient_match_points_that_are_bound() {
     let (cage, posed) = bent_bar();
     let points = points_in_bar();
-    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &NoProgress).unwrap();
     let field = weights.pose(cage.positions(), &posed);
     // The expected gradients are central differences between bound points 2e-3 of the diagonal apart. These points are
     // bound on a finer grid than the field.
@@ -126,7 +126,7 @@ fn field_and_gradient_match_points_that_are_bound() {
     };
     let all: Vec<Vec3> = points.iter().flat_map(|&p| around(p)).collect();
     let options = BindOptions { grid: 128, ..BindOptions::default() };
-    let binding = bind(&all, &cage, &options, &Silent).unwrap();
+    let binding = bind(&all, &cage, &options, &NoProgress).unwrap();
     let moved = deform_bound(&binding.weights, &binding.frames, &posed);
     let (mut errors, mut gradient_errors) = (Vec::new(), Vec::new());
     for (k, &p) in points.iter().enumerate() {
@@ -161,7 +161,7 @@ fn quantiles(values: &mut [f32]) -> [f32; 2] {
 #[test]
 fn mapped_points_are_mapped_back() {
     let (cage, posed) = bent_bar();
-    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &Silent).unwrap();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &NoProgress).unwrap();
     let field = weights.pose(cage.positions(), &posed);
     let inverse = InverseField::new(&field);
     for p in points_in_bar() {

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use cagework_core::bind::BindError;
 use cagework_core::deform::{deform_bound, deform_vertices};
 use cagework_core::options::{BindOptions, Method, Solver};
-use cagework_core::progress::{ProgressEvent, Silent};
+use cagework_core::progress::{NoProgress, ProgressEvent};
 use cagework_core::{Binding, Bounds, Cage, Coordinates, Frames, Weights, subdivided_box};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
@@ -55,7 +55,7 @@ fn options(method: Method, solver: Solver) -> BindOptions {
 
 fn on_cpu(options: &BindOptions) -> Binding {
     let (positions, cage) = input();
-    cagework_core::bind(&positions, &cage, options, &Silent).expect("it binds")
+    cagework_core::bind(&positions, &cage, options, &NoProgress).expect("it binds")
 }
 
 fn posed(cage: &[Vec3]) -> Vec<Vec3> {
@@ -79,7 +79,7 @@ fn session_equals_the_cpu() {
         for solver in [Solver::Multigrid, Solver::Jacobi] {
             let options = options(method, solver);
             let cpu = on_cpu(&options);
-            let report = block_on(session.bind(&options, &Silent)).expect("it binds");
+            let report = block_on(session.bind(&options, &NoProgress)).expect("it binds");
             assert!(report.converged && report.adapter.is_some());
             assert_close(&dense(weights(&session)), &dense(&cpu.weights), WEIGHT_TOLERANCE);
             session.pose(&pose);
@@ -147,7 +147,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let bounds = Bounds::of(&positions).expect("there are some");
     // Green coordinates are defined inside the cage only.
     let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
-    let green = Coordinates::Green.weights(&positions, &cage, u64::MAX, &Silent).expect("all are inside");
+    let green = Coordinates::Green.weights(&positions, &cage, u64::MAX, &NoProgress).expect("all are inside");
     let pose = posed(cage.positions());
     let expected = flat(&deform_vertices(&green, &Coordinates::Green.columns(&cage, &pose)));
     for draws_only in [false, true] {
@@ -169,7 +169,7 @@ fn session_that_only_draws_equals_the_cpu() {
     let mut session = session_with(&only);
     let (_, cage) = input();
     let options = options(Method::Embedded, Solver::Multigrid);
-    let report = block_on(session.bind(&options, &Silent)).expect("it binds");
+    let report = block_on(session.bind(&options, &NoProgress)).expect("it binds");
     assert!(report.converged && report.adapter.is_none());
     let cpu = on_cpu(&options);
     assert_eq!(weights(&session), &cpu.weights);
@@ -194,12 +194,12 @@ fn several_batches_give_the_same_weights() {
     // At this grid, a field of all columns exceeds the binding limit below, while the sampling table does not.
     let options = BindOptions { grid: 48, ..options(Method::Embedded, Solver::Multigrid) };
     let mut whole = session();
-    let report = block_on(whole.bind(&options, &Silent)).expect("it binds");
+    let report = block_on(whole.bind(&options, &NoProgress)).expect("it binds");
     // The limit allows batches of 16 of the 112 columns on the finest level.
     let limit = (report.levels[0] + 2) * 4 * 16 + 100;
     let limited = ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() };
     let mut split = session_with(&limited);
-    block_on(split.bind(&options, &Silent)).expect("it binds");
+    block_on(split.bind(&options, &NoProgress)).expect("it binds");
     assert_close(&dense(weights(&split)), &dense(weights(&whole)), WEIGHT_TOLERANCE);
 }
 
@@ -207,20 +207,20 @@ fn several_batches_give_the_same_weights() {
 fn memory_error_leaves_the_session_usable() {
     let mut session = session();
     let small = BindOptions { memory_limit: 6 << 20, ..options(Method::Embedded, Solver::Jacobi) };
-    let error = block_on(session.bind(&small, &Silent)).unwrap_err();
+    let error = block_on(session.bind(&small, &NoProgress)).unwrap_err();
     let is_memory = matches!(
         error,
         GpuError::Plan(PlanError::Memory { .. })
             | GpuError::Bind(BindError::Memory { .. } | BindError::WeightsMemory { .. })
     );
     assert!(is_memory, "{error}");
-    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &NoProgress)).expect("it binds");
 }
 
 #[test]
 fn cancel_between_slices_keeps_the_old_weights() {
     let mut session = session();
-    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &NoProgress)).expect("it binds");
     let before = weights(&session).clone();
     let cancel = |event: ProgressEvent| {
         if event.delta.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -234,7 +234,7 @@ fn cancel_between_slices_keeps_the_old_weights() {
 #[test]
 fn lost_device_is_an_error_and_recovery_restores_everything() {
     let mut session = session();
-    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &NoProgress)).expect("it binds");
     let pose = posed(session.cage_positions());
     session.pose(&pose);
     session.set_scene(SceneOptions { mesh: MeshStyle::Weights { column: 3 }, ..SceneOptions::default() });
@@ -247,7 +247,7 @@ fn lost_device_is_an_error_and_recovery_restores_everything() {
     for error in [
         block_on(session.picture(size, 1.0)).map(drop).unwrap_err(),
         block_on(session.read_positions()).map(drop).unwrap_err(),
-        block_on(session.bind(&BindOptions::default(), &Silent)).map(drop).unwrap_err(),
+        block_on(session.bind(&BindOptions::default(), &NoProgress)).map(drop).unwrap_err(),
     ] {
         assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
     }
@@ -267,7 +267,7 @@ fn lost_device_is_an_error_and_recovery_restores_everything() {
 fn missing_model_or_cage_is_named() {
     let mut session = Session::new(context(&ContextOptions::default()));
     let bind = |session: &mut Session| {
-        block_on(session.bind(&BindOptions::default(), &Silent)).map(drop).unwrap_err().to_string()
+        block_on(session.bind(&BindOptions::default(), &NoProgress)).map(drop).unwrap_err().to_string()
     };
     assert!(bind(&mut session).contains("no model"));
     block_on(session.set_model(DrawModel::plain(vec![Vec3::ZERO], Vec::new()))).expect("a point is a model");
@@ -294,7 +294,7 @@ fn mismatched_inputs_are_named() {
 #[test]
 fn another_cage_drops_the_weights() {
     let mut session = session();
-    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &NoProgress)).expect("it binds");
     let (positions, cage) = input();
     block_on(session.set_cage(&cage)).expect("the cage is good");
     assert!(session.weights().is_none() && session.frames().is_none());

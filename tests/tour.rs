@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use cagework_cage::samples::{self, Sample};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::{Method, Solver};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Binding, Cage, ControlSet, Coordinates, InnerControls, bind};
 use glam::{DVec3, Vec3};
 
@@ -19,7 +19,7 @@ fn sample(id: &str) -> (Sample, Cage) {
 }
 
 fn bound(sample: &Sample, cage: &Cage, options: BindOptions) -> Binding {
-    bind(&sample.mesh.positions, cage, &options, &Silent).unwrap()
+    bind(&sample.mesh.positions, cage, &options, &NoProgress).unwrap()
 }
 
 /// Returns the options of the method in K. Smith's paper (docs/method.md, sources).
@@ -87,7 +87,7 @@ fn only_harmonic_coordinates_leave_the_upper_jaw_and_green_keeps_details() {
     let (rest, posed) = (&clamp.mesh.positions, &clamp.poses[0].1);
     let binding = bound(&clamp, &cage, BindOptions::default());
     let by_formula = |kind: Coordinates| {
-        let weights = kind.weights(rest, &cage, 1 << 30, &Silent).unwrap();
+        let weights = kind.weights(rest, &cage, 1 << 30, &NoProgress).unwrap();
         cagework_core::deform::deform_vertices(&weights, &kind.columns(&cage, posed))
     };
     let shapes = [
@@ -127,7 +127,7 @@ fn smooth_cage_avoids_sharp_folds() {
     let (rest, posed) = (&clamp.mesh.positions, &clamp.poses[0].1);
     let folds = |smooth| {
         let set = ControlSet::new(&cage, smooth, InnerControls::default()).unwrap();
-        let binding = bind(rest, &set, &BindOptions::default(), &Silent).unwrap();
+        let binding = bind(rest, &set, &BindOptions::default(), &NoProgress).unwrap();
         sharpest_fold(&clamp.mesh.triangles, rest, &deform_bound(&binding.weights, &binding.frames, posed))
     };
     let (plain, smooth) = (folds(0), folds(2));

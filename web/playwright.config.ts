@@ -1,5 +1,5 @@
 import { defineConfig } from "@playwright/test";
-import { WITH_WEBGPU } from "./e2e/browser";
+import { WEBGPU_LAUNCH } from "./e2e/browser";
 
 /** Address at which e2e/server.mjs serves the built page. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
@@ -29,7 +29,7 @@ export default defineConfig({
     acceptDownloads: true,
     // Avoid transitions, each frame of which draws the whole page.
     contextOptions: { reducedMotion: "reduce" },
-    launchOptions: WITH_WEBGPU,
+    launchOptions: WEBGPU_LAUNCH,
   },
   webServer: {
     command: "node e2e/server.mjs",

@@ -26,9 +26,9 @@ export const licencesOfWorkers = (): Plugin => ({
 });
 
 /** Vite's warning about Node modules that gltf-transform and draco3dgltf import, but use only in Node. */
-export const FOR_NODE = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
+export const NODE_MODULE_WARNING = /^Module "(node:)?(fs|path)" has been externalized .*\/node_modules\//;
 
-const PUBLIC = join(import.meta.dirname, "public");
+const PUBLIC_FOLDER = join(import.meta.dirname, "public");
 
 /** Writes the service worker, preceded by the names of all files of this build. */
 const writeServiceWorker: Plugin = {
@@ -40,13 +40,13 @@ const writeServiceWorker: Plugin = {
       const built = Object.values(bundle).filter(({ fileName }) => !isLicences(fileName));
       const entry = built.find((file) => file.type === "chunk" && file.isEntry)?.fileName;
       if (!entry) throw new Error("the build has no entry");
-      const named = readdirSync(PUBLIC, { recursive: true, withFileTypes: true })
+      const named = readdirSync(PUBLIC_FOLDER, { recursive: true, withFileTypes: true })
         .filter((file) => file.isFile())
-        .map((file) => join(file.parentPath, file.name).slice(PUBLIC.length + 1));
+        .map((file) => join(file.parentPath, file.name).slice(PUBLIC_FOLDER.length + 1));
       const hashed = built.map(({ fileName }) => fileName).filter((name) => name !== "index.html");
       const worker = readFileSync(join(import.meta.dirname, "src/offline/worker.js"), "utf8");
       const hash = createHash("sha256").update(worker);
-      for (const name of named) hash.update(readFileSync(join(PUBLIC, name)));
+      for (const name of named) hash.update(readFileSync(join(PUBLIC_FOLDER, name)));
       for (const file of built) hash.update(file.type === "chunk" ? file.code : file.source);
       const build = { id: hash.digest("hex").slice(0, 16), entry, hashed, named };
       const source = `const BUILD = ${JSON.stringify(build, null, 2)};\n${worker}`;
@@ -115,7 +115,7 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     rolldownOptions: {
       onwarn(warning, print) {
-        if (!FOR_NODE.test(warning.message)) print(warning);
+        if (!NODE_MODULE_WARNING.test(warning.message)) print(warning);
       },
       checks: { pluginTimings: false },
     },

@@ -12,7 +12,7 @@ use cagework_core::bind::SolvedCage;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{CELLS, Field, FieldWeights};
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::splats::{SortedSplats, SplatPose, Splats, deform_splats};
 use cagework_core::team::Team;
 use cagework_core::{Bounds, Cage};
@@ -38,13 +38,17 @@ fn main() {
     let model = Model::read(&path, &bytes, &mut |_| None).expect("the file is a model");
     let splats = model.splats().expect("the file has splats");
     let (positions, triangles) = model.states(None).expect("no clip was given");
-    let made = generate(&positions, &triangles, &CageOptions::default(), &Silent).expect("it has a cage");
+    let made = generate(&positions, &triangles, &CageOptions::default(), &NoProgress).expect("it has a cage");
     let cage = &made.cage;
     println!("{} splats, {}-vertex cage", splats.len(), cage.n_vertices());
     let options = BindOptions { threads, ..BindOptions::default() };
-    let weights = FieldWeights::bind(cage, CELLS, &options, &Silent).expect("the cage can be bound");
+    let weights = FieldWeights::bind(cage, CELLS, &options, &NoProgress).expect("the cage can be bound");
     let fine = BindOptions { grid: FINE_GRID, ..options };
-    errors(splats, cage, &FieldWeights::bind(cage, CELLS, &fine, &Silent).expect("the cage can be bound"));
+    errors(
+        splats,
+        cage,
+        &FieldWeights::bind(cage, CELLS, &fine, &NoProgress).expect("the cage can be bound"),
+    );
     times(splats, cage, &weights, &Team::new(threads));
 }
 
@@ -80,12 +84,12 @@ fn errors(splats: &Splats, cage: &Cage, weights: &FieldWeights) {
     let poses = poses(cage, diagonal);
     let fields = poses.each_ref().map(|(_, posed)| weights.pose(cage.positions(), posed));
     let options = BindOptions { grid: FINE_GRID, ..BindOptions::default() };
-    let solved = SolvedCage::new(cage, &options, &Silent).expect("the cage can be solved");
+    let solved = SolvedCage::new(cage, &options, &NoProgress).expect("the cage can be solved");
     let mut all: [Errors; 3] = Default::default();
     for first in (0..splats.len()).step_by(RUN) {
         let run = first..splats.len().min(first + RUN);
         let points: Vec<Vec3> = run.clone().flat_map(|s| points_of(splats, s, STEP * diagonal)).collect();
-        let binding = solved.bind(&points, (0, 0), &Silent).expect("the splats can be bound");
+        let binding = solved.bind(&points, (0, 0), &NoProgress).expect("the splats can be bound");
         for ((_, posed), (field, errors)) in poses.iter().zip(fields.iter().zip(&mut all)) {
             let moved = deform_bound(&binding.weights, &binding.frames, posed);
             for (splat, moved) in run.clone().zip(moved.chunks_exact(POINTS)) {
@@ -200,6 +204,6 @@ fn times(capture: &Splats, cage: &Cage, weights: &FieldWeights, team: &Team) {
     }
     timed("cage", 3, &mut || {
         let (positions, triangles) = splats.shells();
-        let _ = generate(&positions, &triangles, &CageOptions::default(), &Silent);
+        let _ = generate(&positions, &triangles, &CageOptions::default(), &NoProgress);
     });
 }

@@ -1,6 +1,6 @@
 use cagework_core::deform::deform_bound;
 use cagework_core::options::{Method, Solver};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, InnerControls, InnerElement};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use cagework_tests::cages::{blocks, cage, cuboid, icosphere};
@@ -272,7 +272,8 @@ fn back_ends_and_methods_agree_on_inner_controls() {
     let (one, all) = (bound(&points, &set, edit(1)), bound(&points, &set, edit(0)));
     assert_eq!((&one.weights, &one.frames), (&all.weights, &all.frames));
     let context = block_on(GpuContext::new(&ContextOptions::default())).expect("a Vulkan adapter");
-    let gpu = block_on(bind_on(&points, &set, &options, &Silent, &context)).expect("points inside are bound");
+    let gpu =
+        block_on(bind_on(&points, &set, &options, &NoProgress, &context)).expect("points inside are bound");
     let classic = bound(&points, &set, |o| {
         *o = BindOptions { method: Method::Classic, solver: Solver::Multigrid, ..options };
     });
@@ -315,7 +316,8 @@ fn many_small_balls_do_not_stall_the_solve() {
     let all = bound(&points, &set, |o| *o = BindOptions { threads: 0, ..options });
     assert_eq!(one.weights, all.weights);
     let context = block_on(GpuContext::new(&ContextOptions::default())).expect("a Vulkan adapter");
-    let gpu = block_on(bind_on(&points, &set, &options, &Silent, &context)).expect("points inside are bound");
+    let gpu =
+        block_on(bind_on(&points, &set, &options, &NoProgress, &context)).expect("points inside are bound");
     for binding in [one, gpu] {
         let report = &binding.report;
         assert!(report.converged && report.iterations <= 15, "{:?}", report.delta_history);

@@ -1,5 +1,5 @@
 use cagework_core::deform::deform_bound;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_tests::cages::{cage, cuboid, l_shape};
 use glam::Vec3;
@@ -92,7 +92,7 @@ fn weights_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
         let bounds = fine.bounds();
         let points = scattered(300, bounds.min, bounds.max);
         let options = BindOptions { grid: 32, tau: 1e-7, ..BindOptions::default() };
-        let by_route = bind(&points, &fine, &options, &Silent).unwrap();
+        let by_route = bind(&points, &fine, &options, &NoProgress).unwrap();
         let smooth = bound(&points, &set, |options| options.grid = 32);
         assert_eq!(smooth.weights.n_columns() - smooth.frames.n_columns(), cage.n_vertices());
         let outside: Vec<u32> = by_route.outside.iter().map(|o| o.vertex).collect();
@@ -137,7 +137,7 @@ fn samples_of_a_smooth_cage_equal_those_of_the_subdivided_cage_times_its_rows() 
         let bounds = fine.bounds();
         let options = BindOptions { grid: 32, tau: 1e-7, ..BindOptions::default() };
         let scattered = scattered(300, bounds.min, bounds.max);
-        let outside = bind(&scattered, &fine, &options, &Silent).unwrap().outside;
+        let outside = bind(&scattered, &fine, &options, &NoProgress).unwrap().outside;
         let is_inside = |v: usize| !outside.iter().any(|o| o.vertex as usize == v);
         let points: Vec<Vec3> = (0..300).filter(|&v| is_inside(v)).map(|v| scattered[v]).collect();
         assert!(points.len() > 100, "{} inside", points.len());

@@ -1,8 +1,8 @@
 //! Helpers for the tests of controls.
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};
-use cagework_core::progress::Silent;
+use cagework_core::bind::pipeline::{FieldStorage, PreparedBind};
+use cagework_core::progress::NoProgress;
 use cagework_core::solve::rows::LANES;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, bind};
 use glam::Vec3;
@@ -11,16 +11,16 @@ use glam::Vec3;
 pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut BindOptions)) -> Binding {
     let mut options = BindOptions { tau: 1e-7, ..BindOptions::default() };
     edit(&mut options);
-    bind(points, set, &options, &Silent).expect("points inside are bound")
+    bind(points, set, &options, &NoProgress).expect("points inside are bound")
 }
 
 /// Samples weights before each point's row is corrected to sum to 1 and to reproduce the point at rest.
 /// `[n_controls][n_points]`; all points must be different and inside.
 pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOptions) -> Vec<Vec<f32>> {
-    let watch = Watch::new(&Silent);
+    let watch = Watch::new(&NoProgress);
     let mut prepared =
-        PreparedBind::new(points, controls, options, FieldsOn::Host, &watch).expect("they are inside");
-    let blocks = prepared.solve_on_host(&watch).expect("Silent never cancels").blocks;
+        PreparedBind::new(points, controls, options, FieldStorage::Host, &watch).expect("they are inside");
+    let blocks = prepared.solve_on_host(&watch).expect("NoProgress never cancels").blocks;
     let lanes = blocks
         .iter()
         .flat_map(|block| (0..LANES).map(move |lane| block.iter().map(|row| row[lane]).collect()));

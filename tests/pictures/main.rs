@@ -9,7 +9,7 @@ mod scenes;
 use std::sync::Arc;
 
 use cagework_core::options::{BindOptions, Method};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::slice::Slice;
 use cagework_gpu::render::{
     AxisView, Camera, Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, Projection, SceneOptions, Selection,
@@ -131,7 +131,7 @@ fn sliced(device: &ContextOptions, method: Method, with_values: bool, theme: The
     let mut slice = Slice::new(&cage, &options, 2, 0.5);
     if column.is_some() {
         let weights =
-            cagework_core::bind(&slice.centers(), &cage, &options, &Silent).expect("it binds").weights;
+            cagework_core::bind(&slice.centers(), &cage, &options, &NoProgress).expect("it binds").weights;
         slice.set_weights(weights).expect("a row for each cell");
     }
     session.camera_mut().look_along(AxisView::Front);

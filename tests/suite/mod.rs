@@ -14,7 +14,7 @@ pub(crate) mod shapes;
 
 use cagework_core::bind::{BindError, Binding};
 use cagework_core::options::{BindOptions, Method};
-use cagework_core::progress::{Progress, Silent};
+use cagework_core::progress::{NoProgress, Progress};
 use cagework_core::{Cage, Weights};
 use glam::{DVec3, Vec3};
 
@@ -50,7 +50,7 @@ impl BackEnd {
     ) -> Result<Binding, BindError> {
         let mut options = BindOptions { grid: GRID, tau: TAU, ..self.options };
         edit(&mut options);
-        (self.bind)(points, cage, &options, &Silent)
+        (self.bind)(points, cage, &options, &NoProgress)
     }
 
     /// Like [`Self::try_bind`], but panics on errors.

@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::BackEnd;
 
 /// Number of points, from the first one, whose weights have also been computed by Walk on Spheres.
-const N_WALKED: usize = 100;
+const N_WALK_VERTICES: usize = 100;
 
 /// Largest allowed mean error of a weight at g = 64, 1.5 times the measured 6.9e-5. With the weights of the nearest
 /// cell centre instead of interpolated weights, the mean error is 3.3e-4.
@@ -71,7 +71,7 @@ fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
     let error = mean_difference(&weights, npy!("weights_fem"));
     assert!(error <= limit, "mean difference from finite elements is {error:e}, more than {limit:e}");
     // Walk on Spheres is independent of the finite elements. Its own mean error is at most one standard error.
-    let walked = &weights[..N_WALKED * cage.n_vertices()];
+    let walked = &weights[..N_WALK_VERTICES * cage.n_vertices()];
     let noise = mean_difference(&vec![0.0; walked.len()], npy!("stderr_wos"));
     let (error, limit) = (mean_difference(walked, npy!("weights_wos")), limit + noise);
     assert!(error <= limit, "mean difference from Walk on Spheres is {error:e}, more than {limit:e}");

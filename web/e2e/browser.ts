@@ -1,6 +1,6 @@
 /** Launch options of Debian's Chromium, in which the tests run. */
 
-const QUIET = [
+const QUIET_FLAGS = [
   "--headless=new",
   "--no-sandbox",
   "--disable-quic",
@@ -18,11 +18,11 @@ const SOFTWARE = ["--use-angle=gl-egl", "--ignore-gpu-blocklist"];
 
 const launch = (args: readonly string[]) => ({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: [...args, ...SOFTWARE, ...QUIET],
+  args: [...args, ...SOFTWARE, ...QUIET_FLAGS],
 });
 
 /** Launch options of Chromium with WebGPU. */
-export const WITH_WEBGPU = launch(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
+export const WEBGPU_LAUNCH = launch(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
 
 /** Launch options of Chromium with WebGL2. The processor composes the page, and WebGPU canvases are not supported. */
-export const WITH_WEBGL = launch(["--disable-gpu-compositing"]);
+export const WEBGL_LAUNCH = launch(["--disable-gpu-compositing"]);

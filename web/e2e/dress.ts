@@ -1,12 +1,12 @@
 /** The sample "wardrobe": a dressmaker's dummy, a dress and a belt, each a surface through elliptic cross-sections. */
 
-import type { Dropped } from "./support";
+import type { DroppedFile } from "./support";
 import { Builder } from "./wardrobe";
 
 /** Height and semi-axes of an elliptic cross-section, metres. */
 type Ring = readonly [y: number, x: number, z: number];
 
-const AROUND = 64;
+const N_AROUND = 64;
 
 /** Knots of the dummy's profile from the base to the neck. */
 const DUMMY: readonly Ring[] = [
@@ -87,13 +87,13 @@ function turned(sections: readonly Ring[], fold: (y: number) => number = () => 0
   const positions: number[] = [];
   const indices: number[] = [];
   for (const [j, [y, rx, rz]] of sections.entries()) {
-    for (let i = 0; i < AROUND; i++) {
-      const angle = (2 * Math.PI * i) / AROUND;
+    for (let i = 0; i < N_AROUND; i++) {
+      const angle = (2 * Math.PI * i) / N_AROUND;
       const radius = 1 + fold(y) * Math.cos(8 * angle);
       positions.push(rx * radius * Math.cos(angle), y, rz * radius * Math.sin(angle));
       if (j === 0) continue;
-      const [a, b] = [j * AROUND + i, j * AROUND + ((i + 1) % AROUND)];
-      indices.push(a - AROUND, a, b - AROUND, b - AROUND, a, b);
+      const [a, b] = [j * N_AROUND + i, j * N_AROUND + ((i + 1) % N_AROUND)];
+      indices.push(a - N_AROUND, a, b - N_AROUND, b - N_AROUND, a, b);
     }
   }
   return { positions, indices };
@@ -103,7 +103,7 @@ function file(
   name: string,
   colour: [number, number, number],
   mesh: ReturnType<typeof turned>,
-): Promise<Dropped> {
+): Promise<DroppedFile> {
   const all = new Builder();
   const made = all.document.createMesh(name).addPrimitive(all.primitive(mesh, all.material(name, colour)));
   all.add(all.document.createNode(name).setMesh(made));
@@ -111,7 +111,7 @@ function file(
 }
 
 /** Writes the files of dummy, dress and belt. */
-export const dressed = (): Promise<Dropped[]> =>
+export const dressed = (): Promise<DroppedFile[]> =>
   Promise.all([
     file("dummy", [0.72, 0.62, 0.5], turned(rings(DUMMY, 4))),
     file(

@@ -3,13 +3,13 @@
 import { readFileSync } from "node:fs";
 import type { Download, Page } from "@playwright/test";
 import { validationErrors } from "./models";
-import { bound, type Dropped, expect, largestMove, modelPositions, openWith } from "./support";
+import { bound, type DroppedFile, expect, largestMove, modelPositions, openWith } from "./support";
 import { pointsOf, SIZES, wardrobe } from "./wardrobe";
 
 /** Tolerance for distances between vertices of a rigid model, relative to the model's size. */
-export const RIGID = 1e-5;
+export const RIGID_TOLERANCE = 1e-5;
 /** Tolerance for exported positions, object units. */
-export const SAME = 1e-5;
+export const POSITION_TOLERANCE = 1e-5;
 /** Length of the buckle's diagonal, rounded up, object units. */
 export const BUCKLE = 0.2;
 
@@ -21,7 +21,7 @@ export const press = (page: Page, name: string) => page.getByRole("button", { na
 export const undo = (page: Page) => page.keyboard.press("Control+z");
 
 /** Drops body, shirt and buckle, waits until they are bound and opens the list of models. */
-export async function dressed(page: Page): Promise<readonly Dropped[]> {
+export async function dressed(page: Page): Promise<readonly DroppedFile[]> {
   const files = await wardrobe();
   await openWith(page, files);
   await expect(page).toHaveTitle(/body\.glb and 2 more/);
@@ -51,7 +51,7 @@ export function apart(all: readonly number[]) {
 }
 
 /** Clicks the export button of the given kind; returns the `n` files that it downloads. */
-export async function downloads(page: Page, kind: string, n: number): Promise<Dropped[]> {
+export async function downloads(page: Page, kind: string, n: number): Promise<DroppedFile[]> {
   await step(page, "Export");
   const heard: Download[] = [];
   const hear = (file: Download) => heard.push(file);
@@ -79,7 +79,7 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
     expect(await validationErrors(file?.bytes ?? new Uint8Array())).toEqual([]);
     found[name] = file ? await pointsOf(file) : [];
     expect(found[name].length).toBe(3 * SIZES[name]);
-    expect(largestMove(found[name], drawn[name]), `${name} as it is drawn`).toBeLessThan(SAME);
+    expect(largestMove(found[name], drawn[name]), `${name} as it is drawn`).toBeLessThan(POSITION_TOLERANCE);
   }
   return found;
 }
@@ -92,7 +92,7 @@ export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" |
 export function still(
   points: readonly number[],
   rest: readonly number[],
-  within = SAME,
+  within = POSITION_TOLERANCE,
 ): [skin: number, trousers: number] {
   const half = SIZES.body / 2;
   const kept = Array.from({ length: SIZES.body }, (_, v) =>

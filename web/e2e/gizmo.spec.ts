@@ -6,7 +6,7 @@ import { box } from "./models";
 import { bound, cagePositions, drawn, expect, handle, openWith, reachable, shoot, test } from "./support";
 
 /** Tolerance for coordinates that a drag must not change, object units. The cage is two units long. */
-const ALIKE = 1e-4;
+const POSITION_TOLERANCE = 1e-4;
 
 /** A position at which the pointer hits a handle of the gizmo, in window pixels. */
 interface Grip {
@@ -93,7 +93,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
       for (const other of [0, 1, 2]) {
         const far = largest(along(other, moved));
         if (other === axis) expect(far, `${name} moves along ${name}`).toBeGreaterThan(0.01);
-        else expect(far, `${name} does not move along ${"xyz"[other]}`).toBeLessThan(ALIKE);
+        else expect(far, `${name} does not move along ${"xyz"[other]}`).toBeLessThan(POSITION_TOLERANCE);
       }
       const others = along(axis, moved).filter((d, i) => i !== vertex && Math.abs(d) > 0);
       expect(others, "only what is selected").toEqual([]);
@@ -103,7 +103,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
 
   await test.step("a square moves in its plane", async () => {
     const moved = await pull(page, { plane: 1 }, outwards);
-    expect(largest(along(1, moved))).toBeLessThan(ALIKE);
+    expect(largest(along(1, moved))).toBeLessThan(POSITION_TOLERANCE);
     expect(largest([...along(0, moved), ...along(2, moved)])).toBeGreaterThan(0.01);
   });
 
@@ -111,7 +111,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     await page.keyboard.press("a");
     await page.keyboard.press("e");
     const turned = await pull(page, { axis: 1 }, across);
-    expect(largest(along(1, turned)), "heights stay").toBeLessThan(ALIKE);
+    expect(largest(along(1, turned)), "heights stay").toBeLessThan(POSITION_TOLERANCE);
     expect(largest([...along(0, turned), ...along(2, turned)])).toBeGreaterThan(0.05);
     const from = middle(turned.before);
     const reach = (list: number[]) =>
@@ -119,7 +119,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
         Math.hypot(...point(list, i).map((p, axis) => p - (from[axis] ?? 0))),
       );
     const before = reach(turned.before);
-    expect(largest(reach(turned.after).map((r, i) => r - (before[i] ?? 0)))).toBeLessThan(ALIKE);
+    expect(largest(reach(turned.after).map((r, i) => r - (before[i] ?? 0)))).toBeLessThan(POSITION_TOLERANCE);
   });
 
   await test.step("the outer ring rotates around the view direction", async () => {
@@ -146,7 +146,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   await test.step("a box stretches along its axis", async () => {
     await page.keyboard.press("t");
     const scaled = await pull(page, { axis: 1 }, outwards);
-    expect(largest([...along(0, scaled), ...along(2, scaled)])).toBeLessThan(ALIKE);
+    expect(largest([...along(0, scaled), ...along(2, scaled)])).toBeLessThan(POSITION_TOLERANCE);
     const from = middle(scaled.before)[1] ?? 0;
     const pairs = scaled.after
       .map((value, k) => [(scaled.before[k] ?? 0) - from, value - from] as const)
@@ -163,7 +163,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
     for (let k = 0; k < steps; k++) await page.keyboard.press("Control+z");
     const rest = await page.evaluate(() => Array.from(globalThis.cagework?.engine.restPositions() ?? []));
     expect(largest((await cagePositions(page)).map((value, k) => value - (rest[k] ?? 0)))).toBeLessThan(
-      ALIKE,
+      POSITION_TOLERANCE,
     );
   });
 

@@ -11,10 +11,10 @@ import {
   dropBox,
   expect,
   largestMove,
+  OVERSIZE_BYTES,
   open,
   shoot,
   spoilReading,
-  TOO_MUCH,
   test,
 } from "./support";
 
@@ -92,7 +92,7 @@ test("saved work that crashes the page twice is not opened a third time, and sta
       clearInterval(timer);
       globalThis.cagework?.engine.setCagePositions(new Float32Array(bytes / 4));
     }, 20);
-  }, TOO_MUCH);
+  }, OVERSIZE_BYTES);
   await page.reload();
   const question = page.getByRole("dialog", { name: "Cagework stopped again" });
   await expect(question).toContainText("It happened while opening Rat.cagework.glb.", { timeout: 60_000 });

@@ -1,4 +1,4 @@
-// Serves a folder (dist/ by default) at the root and below the path BELOW. Sets no header except Content-Type.
+// Serves a folder (dist/ by default) at the root and below the path SUBFOLDER. Sets no header except Content-Type.
 
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
@@ -7,7 +7,7 @@ import { extname, join, normalize } from "node:path";
 // The port is an option, so that tests of two working copies can run at once. With 0 the system chooses a free port.
 const PORT = Number(process.env.E2E_PORT ?? 4179);
 const FOLDER = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
-const BELOW = "/~student/some%20where/cagework";
+const SUBFOLDER = "/~student/some%20where/cagework";
 
 const TYPES = {
   ".html": "text/html",
@@ -24,7 +24,7 @@ const TYPES = {
 
 createServer(async (request, response) => {
   const { pathname } = new URL(request.url ?? "/", "http://localhost");
-  const inner = pathname.startsWith(`${BELOW}/`) ? pathname.slice(BELOW.length) : pathname;
+  const inner = pathname.startsWith(`${SUBFOLDER}/`) ? pathname.slice(SUBFOLDER.length) : pathname;
   const path = normalize(decodeURIComponent(inner.endsWith("/") ? `${inner}index.html` : inner));
   try {
     const bytes = await readFile(join(FOLDER, path));

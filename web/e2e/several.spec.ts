@@ -11,12 +11,12 @@ import {
   downloads,
   dressed,
   exportsEach,
+  POSITION_TOLERANCE,
   paintable,
   press,
-  RIGID,
+  RIGID_TOLERANCE,
   row,
   rows,
-  SAME,
   step,
   still,
   undo,
@@ -96,7 +96,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
     expect(worst(bent.buckle), "bent by default").toBeGreaterThan(0.01);
     await press(page, "buckle.glb keeps its shape");
     await expect(row(page, "buckle.glb")).toContainText("keeps its shape");
-    expect(worst(apart(await modelPositions(page)).buckle)).toBeLessThan(RIGID * BUCKLE);
+    expect(worst(apart(await modelPositions(page)).buckle)).toBeLessThan(RIGID_TOLERANCE * BUCKLE);
 
     await row(page, "body.glb").getByText("How parts follow the cage").click();
     await press(page, "Trousers stays as it is");
@@ -132,7 +132,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
 
   const exported = await test.step("each model is exported to its own file", async () => {
     const found = await exportsEach(page);
-    expect(worst(found.buckle)).toBeLessThan(RIGID * BUCKLE);
+    expect(worst(found.buckle)).toBeLessThan(RIGID_TOLERANCE * BUCKLE);
     const before = await pointsOf(files[0] ?? { bytes: new Uint8Array() });
     const [skin, trousers] = still(found.body, before, 0);
     expect([skin > 0, trousers], "the trousers to the last bit").toEqual([true, 1]);
@@ -152,7 +152,7 @@ test("a body, its shirt and a buckle share a cage, and are painted, undone, expo
       await expect(row(page, name)).toContainText(text);
     const again = await exportsEach(page);
     for (const name of ["body", "shirt", "buckle"] as const)
-      expect(largestMove(again[name], exported[name]), name).toBeLessThan(SAME);
+      expect(largestMove(again[name], exported[name]), name).toBeLessThan(POSITION_TOLERANCE);
   };
 
   await test.step("a project restores everything", async () => {

@@ -16,7 +16,7 @@ declare global {
 export const SCREENS = join(import.meta.dirname, "../../target/screens");
 
 /** A rare performance warning of the software GL driver, which is ignored. */
-const OF_THE_DRIVER = /GL Driver Message .*queueSerial/;
+const DRIVER_WARNING = /GL Driver Message .*queueSerial/;
 
 /** The test function. A test fails if the page has logged errors or warnings, or if a request has failed. */
 export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }>({
@@ -33,7 +33,7 @@ export const test = base.extend<{ complaints: string[]; serviceWorker: boolean }
       const complaints: string[] = [];
       page.on("console", (message) => {
         if (message.type() !== "error" && message.type() !== "warning") return;
-        if (!OF_THE_DRIVER.test(message.text())) complaints.push(message.text());
+        if (!DRIVER_WARNING.test(message.text())) complaints.push(message.text());
       });
       page.on("pageerror", (error) => complaints.push(`${error.name}: ${error.message}`));
       page.on("response", (response) => {
@@ -57,7 +57,7 @@ export async function open(page: Page, address = "./"): Promise<void> {
 }
 
 /** Opens the page and drops files on it without waiting for the sample. */
-export async function openWith(page: Page, files: readonly Dropped[]): Promise<void> {
+export async function openWith(page: Page, files: readonly DroppedFile[]): Promise<void> {
   await page.goto("./");
   await page.waitForFunction(() => globalThis.cagework !== undefined);
   await drop(page, files);
@@ -260,13 +260,13 @@ export function largestMove(a: readonly number[], b: readonly number[]): number 
   return largest;
 }
 
-export interface Dropped {
+export interface DroppedFile {
   readonly name: string;
   readonly bytes: Uint8Array;
 }
 
 /** Creates a DataTransfer with the files in the page, and returns a handle to it. */
-export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHandle<DataTransfer>> {
+export async function carry(page: Page, files: readonly DroppedFile[]): Promise<JSHandle<DataTransfer>> {
   const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
   return page.evaluateHandle((packed) => {
     const transfer = new DataTransfer();
@@ -286,7 +286,7 @@ export async function letGo(page: Page, data: JSHandle<DataTransfer>): Promise<v
 }
 
 /** Drops files on the view. */
-export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
+export async function drop(page: Page, files: readonly DroppedFile[]): Promise<void> {
   await letGo(page, await carry(page, files));
 }
 
@@ -358,17 +358,17 @@ const isSharp = () => {
 };
 
 /** Timeout of a screenshot's wait for full resolution, ms. The canvas stays at low resolution during computations. */
-const SHARPENED = 2000;
+const SHARP_TIMEOUT_MS = 2000;
 
 /** Saves a screenshot if the environment variable `SHARP` is set. */
 export async function shoot(page: Page, name: string): Promise<void> {
   if (!process.env.SHARP) return;
-  await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
+  await page.waitForFunction(isSharp, undefined, { timeout: SHARP_TIMEOUT_MS }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }
 
 /** Clicks the export button of the given kind; returns the downloaded file. */
-export async function download(page: Page, kind: string): Promise<Dropped> {
+export async function download(page: Page, kind: string): Promise<DroppedFile> {
   await page.getByRole("button", { name: "Export", exact: false }).first().click();
   const [file] = await Promise.all([
     page.waitForEvent("download"),
@@ -378,7 +378,7 @@ export async function download(page: Page, kind: string): Promise<Dropped> {
 }
 
 /** Size of an array that does not fit into the memory of a wasm module, bytes. Copying the array into it traps. */
-export const TOO_MUCH = 2_400_000_000;
+export const OVERSIZE_BYTES = 2_400_000_000;
 
 /** Crashes the wasm module outside any promise, so that the error reaches the window. */
 export async function crash(page: Page, how: "panic" | "out of memory"): Promise<void> {
@@ -392,7 +392,7 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
         else engine?.setCagePositions(new Float32Array(bytes / 4));
       });
     },
-    [how, TOO_MUCH] as const,
+    [how, OVERSIZE_BYTES] as const,
   );
 }
 
@@ -407,7 +407,7 @@ export async function spoilReading(
   const { trap, hang } = sizes;
   const spoiled = `const real = Blob.prototype.arrayBuffer;
     Blob.prototype.arrayBuffer = async function () {
-      if (this.size === ${trap}) return new ArrayBuffer(${TOO_MUCH});
+      if (this.size === ${trap}) return new ArrayBuffer(${OVERSIZE_BYTES});
       if (${hang === "any"} || this.size === ${hang === "any" ? -1 : hang}) for (;;);
       return real.call(this);
     };`;

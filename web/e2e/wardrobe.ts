@@ -1,12 +1,12 @@
 /** Three models for one cage: a body, a shirt and a buckle, made by formula. */
 
 import { Document, type Material, type Node, NodeIO } from "@gltf-transform/core";
-import type { Dropped } from "./support";
+import type { DroppedFile } from "./support";
 
 /** Number of vertices of each model, summed over its primitives. */
 export const SIZES = { body: 2 * 13 * 24, shirt: 15 * 24, buckle: 8 } as const;
 
-const AROUND = 24;
+const N_AROUND = 24;
 /** Largest radius of the body, which is 2 high and closed at both ends. Its lower half has another material. */
 const RADIUS = 0.35;
 const radiusAt = (y: number) => RADIUS * Math.sqrt(Math.max(0, Math.sin((Math.PI * y) / 2)));
@@ -17,12 +17,12 @@ function sleeve(from: number, to: number, rings: number, radius: (y: number) => 
   const indices: number[] = [];
   for (let j = 0; j < rings; j++) {
     const y = from + ((to - from) * j) / (rings - 1);
-    for (let i = 0; i < AROUND; i++) {
-      const angle = (2 * Math.PI * i) / AROUND;
+    for (let i = 0; i < N_AROUND; i++) {
+      const angle = (2 * Math.PI * i) / N_AROUND;
       positions.push(radius(y) * Math.cos(angle), y, radius(y) * Math.sin(angle));
       if (j === 0) continue;
-      const [a, b] = [j * AROUND + i, j * AROUND + ((i + 1) % AROUND)];
-      indices.push(a - AROUND, a, b - AROUND, b - AROUND, a, b);
+      const [a, b] = [j * N_AROUND + i, j * N_AROUND + ((i + 1) % N_AROUND)];
+      indices.push(a - N_AROUND, a, b - N_AROUND, b - N_AROUND, a, b);
     }
   }
   return { positions, indices };
@@ -70,12 +70,12 @@ export class Builder {
     return node;
   }
 
-  async file(name: string): Promise<Dropped> {
+  async file(name: string): Promise<DroppedFile> {
     return { name, bytes: await new NodeIO().writeBinary(this.document) };
   }
 }
 
-function body(): Promise<Dropped> {
+function body(): Promise<DroppedFile> {
   const all = new Builder();
   const mesh = all.document.createMesh("body");
   mesh.addPrimitive(all.primitive(sleeve(1, 2, 13, radiusAt), all.material("Skin", [0.8, 0.55, 0.4])));
@@ -85,7 +85,7 @@ function body(): Promise<Dropped> {
 }
 
 /** Writes a sleeve around the upper body, skinned to two joints that a clip animates. */
-function shirt(): Promise<Dropped> {
+function shirt(): Promise<DroppedFile> {
   const all = new Builder();
   const { document } = all;
   const cloth = sleeve(0.9, 1.7, 15, (y) => 1.12 * radiusAt(y));
@@ -129,7 +129,7 @@ function shirt(): Promise<Dropped> {
 }
 
 /** Writes a box in front of the body. */
-function buckle(): Promise<Dropped> {
+function buckle(): Promise<DroppedFile> {
   const all = new Builder();
   const positions = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((k) => [
     k & 1 ? 0.08 : -0.08,
@@ -150,10 +150,10 @@ function buckle(): Promise<Dropped> {
   return all.file("buckle.glb");
 }
 
-export const wardrobe = (): Promise<Dropped[]> => Promise.all([body(), shirt(), buckle()]);
+export const wardrobe = (): Promise<DroppedFile[]> => Promise.all([body(), shirt(), buckle()]);
 
 /** Reads the positions of all vertices of a GLB: its meshes in order, and their primitives in order. */
-export async function pointsOf({ bytes }: Pick<Dropped, "bytes">): Promise<number[]> {
+export async function pointsOf({ bytes }: Pick<DroppedFile, "bytes">): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();
   const primitives = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());
   return primitives.flatMap((primitive) => [...(primitive.getAttribute("POSITION")?.getArray() ?? [])]);

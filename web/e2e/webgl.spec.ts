@@ -3,7 +3,7 @@
 import type { Page } from "@playwright/test";
 import { RIG_DEFAULTS } from "../src/defaults";
 import { PSEUDO } from "../src/words/pseudo";
-import { WITH_WEBGL } from "./browser";
+import { WEBGL_LAUNCH } from "./browser";
 import {
   complaintsOfAxe,
   exportsAPicture,
@@ -15,7 +15,7 @@ import {
 } from "./stories";
 import { bound, expect, grip, open, shoot, test } from "./support";
 
-test.use({ launchOptions: WITH_WEBGL });
+test.use({ launchOptions: WEBGL_LAUNCH });
 
 /**
  * Removes `navigator.gpu`. If the page requested an adapter, Chromium would warn in the console, and warnings fail the

@@ -1,7 +1,7 @@
 import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { defineConfig } from "@playwright/test";
-import { WITH_WEBGL } from "../e2e/browser";
+import { WEBGL_LAUNCH } from "../e2e/browser";
 
 const PORT = 8897;
 /** The folder that JupyterLab shows. `widget.spec.ts` reads the pose that the notebook writes there. */
@@ -49,7 +49,7 @@ export default defineConfig({
     baseURL: `http://127.0.0.1:${PORT}/`,
     viewport: { width: 1440, height: 900 },
     screenshot: "only-on-failure",
-    launchOptions: WITH_WEBGL,
+    launchOptions: WEBGL_LAUNCH,
   },
   webServer: {
     command: `${process.env.NOTEBOOK_PYTHON} -m jupyterlab --no-browser --allow-root --port ${PORT} --ServerApp.token= --ServerApp.root_dir=. --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate`,

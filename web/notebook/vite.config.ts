@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { gzipSync } from "node:zlib";
 import { defineConfig, type Plugin } from "vite";
-import { FOR_NODE, findLicences, LICENCES, licencesOfWorkers } from "../vite.config";
+import { findLicences, LICENCES, licencesOfWorkers, NODE_MODULE_WARNING } from "../vite.config";
 
 const here = import.meta.dirname;
 const source = join(here, "../package/src");
@@ -54,7 +54,7 @@ export default defineConfig({
     lib: { entry: join(here, "widget.ts"), formats: ["es"], fileName: () => "widget.js" },
     rolldownOptions: {
       onwarn: (warning, warn) => {
-        if (!FOR_NODE.test(warning.message)) warn(warning);
+        if (!NODE_MODULE_WARNING.test(warning.message)) warn(warning);
       },
     },
   },

@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { expect, test } from "@playwright/test";
 
 const TARGET = join(import.meta.dirname, "../../target");
-const WRITTEN = join(TARGET, "notebook-lab/pose.json");
+const POSE_FILE = join(TARGET, "notebook-lab/pose.json");
 /** Tolerance for rounding to float32, which has 24 significant bits, of coordinates below 4 object units. */
 const ROUNDING = 4 * 2 ** -24;
 
@@ -19,14 +19,14 @@ type Points = number[][];
  * along each axis.
  */
 const written = (): { rest: Points; pose: Points; max: number[] } =>
-  JSON.parse(readFileSync(WRITTEN, "utf8"));
+  JSON.parse(readFileSync(POSE_FILE, "utf8"));
 
 /** Finds the largest difference between two lists of points. */
 const difference = (a: Points, b: Points) =>
   a.length === b.length ? Math.max(...a.flat().map((x, k) => Math.abs(x - (b.flat()[k] ?? 0)))) : Infinity;
 
 test("a cell draws the widget, and its pose is one array in the notebook and in Python", async ({ page }) => {
-  rmSync(WRITTEN, { force: true });
+  rmSync(POSE_FILE, { force: true });
   const outside: string[] = [];
   page.on("request", (request) => {
     if (!/^(data:|blob:|http:\/\/127\.0\.0\.1)/.test(request.url())) outside.push(request.url());
@@ -51,7 +51,7 @@ test("a cell draws the widget, and its pose is one array in the notebook and in 
   const slider = page.locator(".widget-slider [role=slider]");
   await slider.focus();
   await page.keyboard.press("End");
-  await expect.poll(() => existsSync(WRITTEN)).toBe(true);
+  await expect.poll(() => existsSync(POSE_FILE)).toBe(true);
   await expect.poll(() => written().pose[0]?.[2]).toBeCloseTo(2 * (written().rest[0]?.[2] ?? 0), 9);
   const longer = written().rest.map(([x = 0, y = 0, z = 0]) => [x, y, 2 * z]);
   await expect.poll(async () => difference(await poseOf(), longer)).toBeLessThan(ROUNDING);

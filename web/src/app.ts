@@ -3,7 +3,7 @@
 import { createBind } from "./actions/bind";
 import { createCage } from "./actions/cage";
 import { createClips } from "./actions/clips";
-import type { Context, Tell } from "./actions/context";
+import type { Context, Messages } from "./actions/context";
 import { createControls } from "./actions/controls";
 import { createEdit } from "./actions/edit";
 import { createExports } from "./actions/exports";
@@ -35,13 +35,13 @@ const CLIPS = ".glb,.gltf";
 const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MODEL_TYPES}`;
 
 /** Media query for windows in which the See panel covers the panel of the step; stage.css has the same query. */
-const NARROW = "(max-width: 1279.98px)";
+const NARROW_WINDOW = "(max-width: 1279.98px)";
 
 export interface Needs {
   store: Store;
   /** Returns the session. Throws until it is open. */
   session: () => Session;
-  tell: Tell;
+  tell: Messages;
   /** Rectangle of the view in the window. */
   viewport: () => DOMRect;
 }
@@ -112,7 +112,7 @@ export function createApp({ store, session, tell, viewport }: Needs) {
     location.reload();
   };
   const mac = isMac(navigator.platform);
-  const narrow = matchMedia(NARROW);
+  const narrow = matchMedia(NARROW_WINDOW);
   const app = {
     ctx,
     store,

@@ -66,7 +66,7 @@ export function hasUnmadeCage(state: AppState): boolean {
 }
 
 /** Fraction of the requested vertices below which the panel explains why a generated cage has so few. */
-const FEW = 0.9;
+const MIN_VERTEX_SHARE = 0.9;
 
 /**
  * Whether a generated cage has far fewer vertices than the maximum, because fewer already follow the shape closely
@@ -75,7 +75,7 @@ const FEW = 0.9;
 export function isCageSparse(state: AppState): boolean {
   const { cage, cageOptions, cageSource, sampleCage } = state;
   const isGenerated = cage !== null && cageSource === "auto" && !sampleCage && !hasUnmadeCage(state);
-  return isGenerated && cage.info.vertices < FEW * cageOptions.target;
+  return isGenerated && cage.info.vertices < MIN_VERTEX_SHARE * cageOptions.target;
 }
 
 /** Whether the page asks the user to pull the sample, because nothing has been changed yet. */

@@ -6,7 +6,7 @@ import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
 import { type Canvases, type OpenedOn, openOn } from "@cagework/core/session/open";
-import { createApart, type Hear, load } from "@cagework/core/session/reader";
+import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
 import { polygons } from "@cagework/core/session/reading";
 import type {
   BindEvent,
@@ -38,7 +38,7 @@ declare global {
 }
 
 /** Time after which drawing starts even if no model has been opened, ms. */
-const LONGEST_EMPTY = 3000;
+const MAX_EMPTY_MS = 3000;
 
 /**
  * Samples that are read as files: from the folder `samples`, except the knot, whose splats Rust computes by a formula.
@@ -122,7 +122,7 @@ async function start(opened: OpenedOn & Needs) {
       () => !client.isBusy(),
     ),
   );
-  setTimeout(begin, LONGEST_EMPTY);
+  setTimeout(begin, MAX_EMPTY_MS);
   /** The canvas in use. WebGL2 reports a lost context only by an event of the canvas. */
   let guarded: HTMLCanvasElement;
   const guard = (canvas: HTMLCanvasElement) => {
@@ -144,13 +144,13 @@ async function start(opened: OpenedOn & Needs) {
     controls: engine.cageControls(),
   });
 
-  const openApart = () => createClient(module, openWorker);
-  const reading = createApart(openApart);
-  const checking = createApart(openApart);
+  const openSeparateWorker = () => createClient(module, openWorker);
+  const reading = createSeparateWorkers(openSeparateWorker);
+  const checking = createSeparateWorkers(openSeparateWorker);
   /** Worker for pulls, opened when first needed. It is separate so that binds do not delay pulls. */
   let puller: Client | undefined;
   const pulling = () => {
-    puller ??= openApart();
+    puller ??= openSeparateWorker();
     return puller;
   };
   /** Rejects the job with "Cancelled" if models or cage have changed when it is done. */
@@ -202,7 +202,7 @@ async function start(opened: OpenedOn & Needs) {
      * reading fails or crashes, the open model is not affected. `used`: pixels of the textures of other models that are
      * drawn together with this one.
      */
-    readFiles: (files: readonly NamedFile[], used: number, hear?: Hear): Job<ReadFile> =>
+    readFiles: (files: readonly NamedFile[], used: number, hear?: ReadListener): Job<ReadFile> =>
       reading("read", { files, up: undefined, used }, hear),
     /**
      * Until the returned function is called, one worker reads all files. The worker is replaced only after a failure.
@@ -246,7 +246,7 @@ async function start(opened: OpenedOn & Needs) {
      * Gives a model the joints, joint weights and morph targets of the model `body`, in a worker of its own, as an undo
      * step. Keeps the cage and its poses. Resolves with a sentence about what was copied.
      */
-    dress(id: number, body: number, label: string, hear?: Hear): Job<{ readonly report: string }> {
+    dress(id: number, body: number, label: string, hear?: ReadListener): Job<{ readonly report: string }> {
       const [clothes, from] = [engine.storedModel(id), engine.storedModel(body)];
       const job = reading("dress", { clothes, body: from, used: engine.texturePixels(id) }, hear);
       return chain(ofNow(job), async (read) => {
@@ -281,7 +281,7 @@ async function start(opened: OpenedOn & Needs) {
     /** Reads the page's settings of a project. Defaults replace invalid values; `notices` name the invalid values. */
     readSettings: pkg.readSettings,
     /** Reads a cage from a file, like a model, and checks it. */
-    readCage(files: readonly NamedFile[], hear?: Hear): Job<CheckedCage> {
+    readCage(files: readonly NamedFile[], hear?: ReadListener): Job<CheckedCage> {
       const { smooth } = engine.cageControls();
       const input = {
         files,

@@ -32,7 +32,7 @@ export interface ShareLink {
 }
 
 /** Maximum length of a fragment that is decoded, characters. A pose of 400 cage vertices takes about 3 kB. */
-const LONGEST = 16_384;
+const MAX_FRAGMENT_LENGTH = 16_384;
 
 /** Encodes the fragment of a link, including the #. */
 export async function encodeShare(shared: ShareLink): Promise<string> {
@@ -56,7 +56,7 @@ export async function decodeShare(fragment: string): Promise<ShareLink | undefin
   const clip = fields.get("clip");
   if (sample === null && pose === null) return undefined;
   if (!sample) throw new PageError(T.link.noSample);
-  if (fragment.length > LONGEST) throw new PageError(T.link.long(LONGEST));
+  if (fragment.length > MAX_FRAGMENT_LENGTH) throw new PageError(T.link.long(MAX_FRAGMENT_LENGTH));
   return {
     sample,
     ...(pose === null ? {} : { pose: await read("pose", pose) }),

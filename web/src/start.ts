@@ -20,7 +20,7 @@ import { T } from "./words";
 import { hasEntries } from "./works/database";
 
 /** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a barely visible difference. */
-const MOST_SHARP = 2;
+const MAX_PIXEL_RATIO = 2;
 
 export interface Start {
   app: App;
@@ -38,7 +38,7 @@ export function startUp({ app, stage, crashes, offline }: Start): void {
   const resize = () => {
     const { clientWidth, clientHeight } = stage.viewport;
     if (clientWidth === 0 || clientHeight === 0) return;
-    session.engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
+    session.engine.resize(clientWidth, clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio));
     session.engine.cover(...coveredIn(stage.viewport));
   };
   new ResizeObserver(resize).observe(stage.viewport);

@@ -6,10 +6,10 @@ import type {
   CageState,
   Check,
   InnerKind,
-  Lack,
   Legend,
   ModelInfo,
   Stage,
+  WebGpuFault,
 } from "./contract";
 import {
   BIND_DEFAULTS,
@@ -147,7 +147,7 @@ export const PERSON_STATE = {
   step: "model" as StepName,
   adapter: "",
   /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
-  lack: null as Lack | null,
+  lack: null as WebGpuFault | null,
   /** Identifiers of the built-in samples. */
   samples: [] as readonly string[],
   /** Describes the operation that blocks the page; null without one. */

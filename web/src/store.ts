@@ -3,7 +3,7 @@
 import type { Crash } from "./crash";
 
 const THEME = "cagework.theme";
-const SEEN = "cagework.seen.";
+const SEEN_PREFIX = "cagework.seen.";
 const TOUR = "cagework.tour";
 
 const CRASH = "cagework.crash";
@@ -50,11 +50,11 @@ export function saveTheme(theme: Theme): void {
 
 /** Whether the user has closed a notice. */
 export function hasSeen(notice: string): boolean {
-  return readItem(SEEN + notice) !== null;
+  return readItem(SEEN_PREFIX + notice) !== null;
 }
 
 export function markSeen(notice: string): void {
-  writeItem(SEEN + notice, "yes");
+  writeItem(SEEN_PREFIX + notice, "yes");
 }
 
 /** Reads the stop at which the user left the tour, from 0. */

@@ -27,7 +27,7 @@ import { INITIAL } from "../src/state";
 import { type Explanation, textOf } from "../src/strings";
 
 /** A job that the tested code has requested. The test resolves or rejects it. */
-export interface Asked {
+export interface JobRequest {
   readonly kind: string;
   readonly input: unknown;
   resolve(output: unknown): void;
@@ -40,7 +40,7 @@ export interface Fake {
   readonly store: Store;
   readonly engine: Engine;
   readonly mirror: DocumentMirror;
-  readonly asked: Asked[];
+  readonly asked: JobRequest[];
   readonly said: string[];
   /** Buttons of the last message in `said`. */
   offered: readonly { readonly label: string; run(): void }[];
@@ -115,9 +115,9 @@ export function cageOf(n: number, height = 0): CheckedCage {
 }
 
 /** Controls of a cage without smoothing and without interior controls. */
-export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
+export const PLAIN_CONTROLS: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
-export const OPENED: OpenedFile = { model: MODEL, check: null, settings: null, notices: [] };
+export const OPENED_FILE: OpenedFile = { model: MODEL, check: null, settings: null, notices: [] };
 
 /** A report of a converged multigrid bind on a grid of 64; `patch` replaces fields. */
 export function reportOf(patch: Partial<BindReport> = {}): BindReport {
@@ -165,7 +165,7 @@ export function reportOf(patch: Partial<BindReport> = {}): BindReport {
 export const settled = () => new Promise((resolve) => setTimeout(resolve));
 
 export function createFake(): Fake {
-  const asked: Asked[] = [];
+  const asked: JobRequest[] = [];
   const said: string[] = [];
   const problems: Fake["problems"] = [];
   const calls: string[] = [];
@@ -174,7 +174,7 @@ export function createFake(): Fake {
   const did: string[] = [];
 
   function job<T>(kind: string, input: unknown): Job<T> {
-    let entry: Asked | undefined;
+    let entry: JobRequest | undefined;
     const done = new Promise<T>((resolve, reject) => {
       entry = { kind, input, resolve: (output) => resolve(output as T), reject, cancelled: false };
       asked.push(entry);
@@ -194,7 +194,7 @@ export function createFake(): Fake {
   let posed = rest.positions;
   let committed = posed;
   let revision = 0;
-  const controlsNow = () => rest.controls ?? PLAIN;
+  const controlsNow = () => rest.controls ?? PLAIN_CONTROLS;
   const stateOf = (): CageState => ({
     usable: true,
     controls: controlsNow(),

@@ -5,7 +5,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 const FRAME = 16;
 
 /** A time longer than the delay after which an idle page draws a sharp frame, ms. */
-const LONG = 2000;
+const IDLE_MS = 2000;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -33,7 +33,7 @@ describe("frames", () => {
     const { frames, drawn } = slow(() => true);
     frames.ask();
     frames.ask();
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([false]);
   });
 
@@ -45,7 +45,7 @@ describe("frames", () => {
     }
     expect(drawn.length).toBeGreaterThan(40);
     expect(drawn.every((sharp) => !sharp)).toBe(true);
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn.filter((sharp) => sharp)).toEqual([true]);
     expect(drawn.at(-1)).toBe(true);
   });
@@ -56,34 +56,34 @@ describe("frames", () => {
       (sharp) => sharp,
       () => isCalm,
     );
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([false]);
     isCalm = true;
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([false, true]);
   });
 
   it("a busy GPU is tried again with the same request", () => {
     let isBusy = true;
     const { drawn } = slow((sharp) => (isBusy && sharp ? undefined : sharp));
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn.length).toBeGreaterThan(10);
     isBusy = false;
     drawn.length = 0;
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([true]);
   });
 
   it("a new request takes precedence over sharpening", () => {
     let isBusy = true;
     const { frames, drawn } = slow((sharp) => (isBusy && sharp ? undefined : sharp));
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     drawn.length = 0;
     frames.ask();
     vi.advanceTimersByTime(4 * FRAME);
     expect(drawn).toContain(false);
     isBusy = false;
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn.at(-1)).toBe(true);
   });
 
@@ -91,7 +91,7 @@ describe("frames", () => {
     const { frames, drawn } = slow((sharp) => sharp);
     frames.stop();
     frames.ask();
-    vi.advanceTimersByTime(LONG);
+    vi.advanceTimersByTime(IDLE_MS);
     expect(drawn).toEqual([]);
   });
 });

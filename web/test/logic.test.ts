@@ -16,7 +16,7 @@ import { hintOf } from "../src/ui/status";
 import { placeTip } from "../src/ui/tips";
 import { nextTool } from "../src/ui/toolbar";
 import { recognise } from "../src/ui/unsupported";
-import { PLAIN } from "./fake";
+import { PLAIN_CONTROLS } from "./fake";
 
 describe("typed amounts", () => {
   const type = (keys: string) => [...keys].reduce((typed, key) => nextAmount(typed, key) ?? typed, "");
@@ -190,7 +190,7 @@ it("faults are marked in step Cage, and elsewhere if they prevent a bind", () =>
   const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
   const at = (step: StepName, usable: boolean) => {
     const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
-    const cage = { usable, info, controls: PLAIN, radius: 0 };
+    const cage = { usable, info, controls: PLAIN_CONTROLS, radius: 0 };
     return drawn({ ...INITIAL, step, cage }).problems;
   };
   expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);

@@ -1,6 +1,6 @@
 import { type Client, named } from "@cagework/core/session/client";
 import { readFiles, siblingOf } from "@cagework/core/session/files";
-import { createApart } from "@cagework/core/session/reader";
+import { createSeparateWorkers } from "@cagework/core/session/reader";
 import { expect, it } from "vitest";
 import type { NamedFile } from "../src/contract";
 import { T } from "../src/words";
@@ -28,7 +28,7 @@ function workers() {
 
 it("each file is read by a worker of its own", async () => {
   const { opened, open } = workers();
-  const apart = createApart(open);
+  const apart = createSeparateWorkers(open);
   for (const k of [0, 1]) {
     const job = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
     opened[k]?.answer({ vertices: 3 });
@@ -40,7 +40,7 @@ it("each file is read by a worker of its own", async () => {
 
 it("shared reading uses one worker until it breaks or sharing ends", async () => {
   const { opened, open } = workers();
-  const apart = createApart(open);
+  const apart = createSeparateWorkers(open);
   const release = apart.share();
   const read = () => apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   const first = read();
@@ -57,7 +57,7 @@ it("shared reading uses one worker until it breaks or sharing ends", async () =>
 
 it("a cancellation or another file ends the current read", async () => {
   const { opened, open } = workers();
-  const apart = createApart(open);
+  const apart = createSeparateWorkers(open);
   const first = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   const second = apart("read", { files: [file("b.obj")], up: undefined, used: 0 });
   await expect(first.done).rejects.toMatchObject({ name: "Cancelled" });
@@ -68,7 +68,7 @@ it("a cancellation or another file ends the current read", async () => {
 
 it("a broken worker becomes a readable error; errors of the file are passed on", async () => {
   const { opened, open } = workers();
-  const apart = createApart(open);
+  const apart = createSeparateWorkers(open);
   const broken = apart("read", { files: [file("a.obj")], up: undefined, used: 0 });
   opened[0]?.fail(named("Worker", "unreachable"));
   await expect(broken.done).rejects.toThrow("reading this file failed unexpectedly");
@@ -79,7 +79,7 @@ it("a broken worker becomes a readable error; errors of the file are passed on",
 
 it("a file above the size limit starts no worker", async () => {
   const { opened, open } = workers();
-  const job = createApart(open)("read", {
+  const job = createSeparateWorkers(open)("read", {
     files: [file("a.glb"), file("huge.bin", 5 * 2 ** 30)],
     up: undefined,
     used: 0,

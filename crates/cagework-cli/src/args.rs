@@ -237,7 +237,7 @@ pub(crate) struct DeformArgs {
     #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only", "ground", "feet"])]
     pub(crate) dynamic: Option<String>,
     /// With --dynamic or --lattice, and for splats and points: steps of Catmull-Clark subdivision of the cage, as for `bind`.
-    #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = number::<u32>(options::SMOOTH))]
+    #[arg(long, default_value_t = 0, value_name = "STEPS", value_parser = number::<u32>(options::SMOOTH_STEPS))]
     pub(crate) smooth: u32,
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::Frames;
 use cagework_core::deform::OutsideVertex;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::words::counted;
 use cagework_core::{BindOptions, Controls, InnerControls, Weights, bind};
 use cagework_io::{Model, SavedWeights, write_inner_controls};
@@ -82,7 +82,7 @@ pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Re
     let probes = Probes::new(&mesh, controls).map_err(wrong)?;
     let options =
         BindOptions { grid: args.grid, memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
-    let bound = bind(probes.points(), controls, &options, &Silent)?;
+    let bound = bind(probes.points(), controls, &options, &NoProgress)?;
     Pull::new(&mesh, controls, probes, &bound.frames.folded(&bound.weights)).map_err(wrong)
 }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 static IS_CANCELLED: AtomicBool = AtomicBool::new(false);
 
 /// Number of running operations that poll [`cancelled`].
-static N_POLLING: AtomicUsize = AtomicUsize::new(0);
+static N_POLLS: AtomicUsize = AtomicUsize::new(0);
 
 /// Whether a signal has requested to cancel the work.
 pub(crate) fn cancelled() -> bool {
@@ -19,14 +19,14 @@ pub(crate) struct CancelGuard(());
 
 impl CancelGuard {
     pub(crate) fn start() -> Self {
-        N_POLLING.fetch_add(1, Ordering::SeqCst);
+        N_POLLS.fetch_add(1, Ordering::SeqCst);
         Self(())
     }
 }
 
 impl Drop for CancelGuard {
     fn drop(&mut self) {
-        N_POLLING.fetch_sub(1, Ordering::SeqCst);
+        N_POLLS.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
             }
             let cancels = matches!(signal, SIGINT | SIGTERM | SIGHUP);
             let first = cancels && !IS_CANCELLED.swap(true, Ordering::SeqCst);
-            if !first || N_POLLING.load(Ordering::SeqCst) == 0 {
+            if !first || N_POLLS.load(Ordering::SeqCst) == 0 {
                 abandon(&mut || drop(emulate_default_handler(signal)));
             }
         }

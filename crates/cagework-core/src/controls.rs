@@ -137,7 +137,7 @@ mod tests {
     use crate::cage::subdivided_box;
     use crate::mesh::Bounds;
     use crate::options::BindOptions;
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     /// Largest error that f32 rounding and the solver's tolerance cause together.
     const ROUNDING: f32 = 2e-5;
@@ -179,7 +179,7 @@ mod tests {
             })
             .collect();
         let options = BindOptions { grid: 16, tau: 1e-7, ..BindOptions::default() };
-        let binding = bind(&points, controls, &options, &Silent).unwrap();
+        let binding = bind(&points, controls, &options, &NoProgress).unwrap();
         assert_eq!(binding.weights.n_columns(), 8);
         assert!(binding.report.raw_error.point_rel.max < f64::from(ROUNDING));
         for (v, p) in points.iter().enumerate() {

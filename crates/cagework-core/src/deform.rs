@@ -89,7 +89,7 @@ pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Ve
     .to.to_array(),
     f32::MAX
 )]
-pub struct NotFinite {
+pub struct NonFinitePoint {
     /// Index of the point.
     pub point: usize,
     /// Position with a coordinate that is infinite or NaN.
@@ -100,14 +100,18 @@ pub struct NotFinite {
 /// come from outside the program.
 ///
 /// # Errors
-/// [`NotFinite`] for the first point whose position is not finite.
+/// [`NonFinitePoint`] for the first point whose position is not finite.
 ///
 /// # Panics
 /// As [`deform_bound`].
-pub fn deform_finite(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Result<Vec<Vec3>, NotFinite> {
+pub fn deform_finite(
+    weights: &Weights,
+    frames: &Frames,
+    controls: &[Vec3],
+) -> Result<Vec<Vec3>, NonFinitePoint> {
     let points = deform_bound(weights, frames, controls);
     match points.iter().position(|p| !p.is_finite()) {
-        Some(point) => Err(NotFinite { point, to: points[point] }),
+        Some(point) => Err(NonFinitePoint { point, to: points[point] }),
         None => Ok(points),
     }
 }

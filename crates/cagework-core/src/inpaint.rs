@@ -36,7 +36,7 @@ const MIN_RELATIVE_LENGTH: f64 = 1e-3;
 const TOLERANCE: f64 = 1e-4;
 const MAX_STEPS: usize = 300;
 /// Number of free vertices up to which they need no start from a coarser graph.
-const COARSEST: usize = 50;
+const MAX_COARSEST_VERTICES: usize = 50;
 
 /// Numbers of distinct positions of the target, by the origin of their values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -220,7 +220,7 @@ impl Graph {
     /// graph and its diagonal `D`. They start from the solution of a coarser graph.
     fn fill(&self, is_free: &[bool], values: &mut [f32], n_columns: usize) {
         let free: Vec<u32> = (0..is_free.len() as u32).filter(|&v| is_free[v as usize]).collect();
-        if free.len() > COARSEST {
+        if free.len() > MAX_COARSEST_VERTICES {
             self.start(is_free, values, n_columns);
         }
         let mut near: Vec<u32> = free.clone();

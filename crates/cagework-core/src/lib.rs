@@ -47,7 +47,7 @@ pub use coordinates::{ClosedFormError, Coordinates};
 pub use frames::Frames;
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use options::BindOptions;
-pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
+pub use progress::{Cancellation, Progress, ProgressEvent, Stage};
 pub use report::BindReport;
 pub use weights::Weights;
 

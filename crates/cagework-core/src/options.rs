@@ -167,7 +167,7 @@ pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
 /// Error: a number is out of the range of its option.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{option} is {value}; it must be {allowed}")]
-pub struct OutOfRange {
+pub struct RangeError {
     /// Name of the option, as users write it.
     pub option: &'static str,
     /// The value as given.
@@ -243,7 +243,7 @@ pub const SPARSIFY: Number = Number {
 };
 
 /// The `smooth` option: number of subdivision steps from the cage to its surface.
-pub const SMOOTH: Number = Number {
+pub const SMOOTH_STEPS: Number = Number {
     name: "smooth",
     help: "Steps of Catmull-Clark subdivision of the cage, whose smooth surface the model follows; the vertices remain the controls",
     unit: "steps",
@@ -272,8 +272,8 @@ impl Number {
     /// Checks a value.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value is not allowed.
-    pub fn check(&self, value: impl Into<f64>) -> Result<(), OutOfRange> {
+    /// [`RangeError`] if the value is not allowed.
+    pub fn check(&self, value: impl Into<f64>) -> Result<(), RangeError> {
         let value = value.into();
         if (self.is_allowed)(value) { Ok(()) } else { Err(self.refuse(&value.to_string())) }
     }
@@ -281,14 +281,14 @@ impl Number {
     /// Parses and checks a value.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value is not allowed, or if the text is not a number of type `T`.
-    pub fn parse<T: FromStr + Into<f64> + Copy>(&self, text: &str) -> Result<T, OutOfRange> {
+    /// [`RangeError`] if the value is not allowed, or if the text is not a number of type `T`.
+    pub fn parse<T: FromStr + Into<f64> + Copy>(&self, text: &str) -> Result<T, RangeError> {
         let value: T = text.parse().map_err(|_| self.refuse(text))?;
         self.check(value).map(|()| value)
     }
 
-    fn refuse(&self, value: &str) -> OutOfRange {
-        OutOfRange { option: self.name, value: value.to_owned(), allowed: self.allowed }
+    fn refuse(&self, value: &str) -> RangeError {
+        RangeError { option: self.name, value: value.to_owned(), allowed: self.allowed }
     }
 }
 
@@ -361,8 +361,8 @@ impl BindOptions {
     /// Checks the range of every option.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first invalid option.
-    pub fn check(&self) -> Result<(), OutOfRange> {
+    /// [`RangeError`] for the first invalid option.
+    pub fn check(&self) -> Result<(), RangeError> {
         GRID.check(self.grid)?;
         TAU.check(self.tau)?;
         MAX_ITERATIONS.check(self.max_iterations)?;

@@ -66,9 +66,9 @@ impl<F: Fn(ProgressEvent) -> ControlFlow<()> + Sync> Progress for F {
 
 /// A [`Progress`] that ignores reports and never cancels.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
+pub struct NoProgress;
 
-impl Progress for Silent {
+impl Progress for NoProgress {
     fn report(&self, _event: ProgressEvent) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -77,4 +77,4 @@ impl Progress for Silent {
 /// Error of work that was cancelled through [`Progress`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("cancelled")]
-pub struct Cancelled;
+pub struct Cancellation;

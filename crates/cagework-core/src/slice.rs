@@ -154,7 +154,7 @@ mod tests {
     use crate::cage::Cage;
     use crate::cage::subdivided_box;
     use crate::mesh::Bounds;
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     fn box_cage() -> Cage {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 2.0, 4.0) };
@@ -203,7 +203,7 @@ mod tests {
         let mut slice = Slice::new(&cage, &options, 1, 0.4);
         assert_eq!(slice.values(0), None);
         let centers = slice.centers();
-        let weights = crate::bind(&centers, &cage, &options, &Silent).unwrap().weights;
+        let weights = crate::bind(&centers, &cage, &options, &NoProgress).unwrap().weights;
         assert!(slice.set_weights(weights.with_rows(&[0])).is_err());
         slice.set_weights(weights).unwrap();
         for column in [0, 5] {

@@ -121,7 +121,7 @@ impl Splats {
     /// which the gradient of the field is the identity stay identical to the last bit.
     #[must_use]
     pub fn deformed(&self, field: &Field) -> Self {
-        struct Bent {
+        struct DeformedSplat {
             position: Vec3,
             shape: Option<(Vec3, Quat, Mat3)>,
         }
@@ -132,7 +132,7 @@ impl Splats {
                 let turn = if self.degree > 0 { turn_of(gradient) } else { Mat3::IDENTITY };
                 (scale, rotation, turn)
             });
-            Bent { position: position + field.displacement(position), shape }
+            DeformedSplat { position: position + field.displacement(position), shape }
         };
         let mut deformed = self.clone();
         let n = n_harmonics(self.degree);
@@ -325,7 +325,7 @@ pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
     /// Largest number of sweeps; three or four suffice.
     const SWEEPS: usize = 8;
     /// Largest cosine between two columns that count as orthogonal: f32 rounding.
-    const ORTHOGONAL: f32 = 1e-7;
+    const MAX_COLUMN_COSINE: f32 = 1e-7;
     let largest = axes.to_cols_array().iter().fold(0.0_f32, |a, x| a.max(x.abs()));
     if largest == 0.0 || !largest.is_finite() {
         return (Vec3::ZERO, Quat::IDENTITY);
@@ -336,7 +336,7 @@ pub fn decompose(axes: Mat3) -> (Vec3, Quat) {
         for (i, j) in [(0, 1), (0, 2), (1, 2)] {
             let (a, b) = (columns[i], columns[j]);
             let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
-            if ab.abs() <= ORTHOGONAL * (aa * bb).sqrt() {
+            if ab.abs() <= MAX_COLUMN_COSINE * (aa * bb).sqrt() {
                 continue;
             }
             is_done = false;

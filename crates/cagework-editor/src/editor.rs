@@ -15,7 +15,7 @@ use crate::edit::{Constraint, Element, Gesture, GestureKind, Pull, Selection, Sh
 use crate::error::EditError;
 use crate::history::History;
 use crate::models::{Models, NewModel};
-use crate::options::{PROPORTIONAL, Tools};
+use crate::options::{PROPORTIONAL_RADIUS, Tools};
 use crate::settings::DocumentSettings;
 use crate::surface::SurfacePoint;
 use crate::view::{DocumentView, PoseView, SelectionView};
@@ -427,10 +427,11 @@ impl Editor {
     }
 
     /// Changes how clicks and gestures act on the cage, and updates the gesture in progress. Radii outside the range of
-    /// [`PROPORTIONAL`] become its nearest end.
+    /// [`PROPORTIONAL_RADIUS`] become its nearest end.
     pub fn set_tools(&mut self, tools: Tools, view: &dyn View) {
-        let proportional =
-            PROPORTIONAL.slider.map_or(tools.proportional, |of| tools.proportional.clamp(of.min, of.max));
+        let proportional = PROPORTIONAL_RADIUS
+            .slider
+            .map_or(tools.proportional, |of| tools.proportional.clamp(of.min, of.max));
         self.tools = Tools { proportional, ..tools };
         if let Some(gesture) = &self.gesture {
             let pull = self.pull(gesture.start());

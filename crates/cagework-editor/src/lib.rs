@@ -26,7 +26,7 @@ pub use editor::{Contents, Editor};
 pub use error::EditError;
 pub use history::HISTORY_BYTES;
 pub use models::{Member, MemberSettings, Models, NewModel, PartOptions};
-pub use options::{BRUSH, PROPORTIONAL, Tools};
+pub use options::{BRUSH, PROPORTIONAL_RADIUS, Tools};
 pub use settings::DocumentSettings;
 pub use surface::SurfacePoint;
 pub use view::{DocumentView, PoseView, SelectionView};

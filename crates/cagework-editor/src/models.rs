@@ -22,7 +22,7 @@ use crate::error::EditError;
 /// triangles of models that are opened later.
 const MAX_FIRST: u32 = u32::MAX / 2;
 /// Name that stands for a whole model in a list of part names.
-const WHOLE: &str = "all";
+const WHOLE_MODEL: &str = "all";
 
 /// Visibility of a model, and which of its parts the cage does not bend.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -286,7 +286,7 @@ impl Models {
     /// If there is no such model, or a name selects no part. Nothing changes then.
     pub fn set_options(&mut self, id: u32, options: PartOptions) -> Result<(), EditError> {
         let model = &self.get(id)?.model;
-        for name in options.rigid.iter().chain(&options.stays).filter(|name| *name != WHOLE) {
+        for name in options.rigid.iter().chain(&options.stays).filter(|name| *name != WHOLE_MODEL) {
             model.select(name)?;
         }
         self.member_mut(id)?.options = options;
@@ -480,7 +480,7 @@ impl Member {
     }
 
     fn selects(&self, name: &str) -> bool {
-        name == WHOLE || self.model.select(name).is_ok()
+        name == WHOLE_MODEL || self.model.select(name).is_ok()
     }
 
     /// Parts that stay in place or are rigid. Vertex indices are relative to the model.
@@ -493,9 +493,9 @@ impl Member {
             return Ok(Parts::default());
         }
         let of_parts = |names: &[String]| -> Vec<String> {
-            names.iter().filter(|name| *name != WHOLE).cloned().collect()
+            names.iter().filter(|name| *name != WHOLE_MODEL).cloned().collect()
         };
-        let is_whole = |names: &[String]| names.iter().any(|name| name == WHOLE);
+        let is_whole = |names: &[String]| names.iter().any(|name| name == WHOLE_MODEL);
         let PartOptions { rigid, stays, .. } = &self.options;
         let named: Vec<(String, f32)> = of_parts(stays).into_iter().map(|name| (name, 1.0)).collect();
         let mut parts = self.model.parts(&named, &of_parts(rigid))?;

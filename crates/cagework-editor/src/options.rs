@@ -30,7 +30,7 @@ impl Default for Tools {
 }
 
 /// Radius of proportional editing.
-pub const PROPORTIONAL: Number = Number {
+pub const PROPORTIONAL_RADIUS: Number = Number {
     name: "proportional",
     help: "Distance within which vertices follow the selection",
     unit: "fraction of the cage's diagonal",
@@ -51,7 +51,7 @@ pub const BRUSH: Number = Number {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::edit::tests::{Flat, cube};
+    use crate::edit::tests::{FrontView, cube};
     use crate::{Command, Contents, Editor};
 
     #[test]
@@ -59,9 +59,13 @@ mod tests {
         let mut editor = Editor::default();
         let (element, pivot) = (Element::Face, Pivot::Last);
         let tools = Tools { element, symmetry: true, pivot, proportional: 7.0, proportional_on: true };
-        editor.set_tools(tools, &Flat);
+        editor.set_tools(tools, &FrontView);
         let view = editor.view();
-        assert_eq!((view.tools.proportional, view.unmatched), (1.0, 0), "the largest radius of PROPORTIONAL");
+        assert_eq!(
+            (view.tools.proportional, view.unmatched),
+            (1.0, 0),
+            "the largest radius of PROPORTIONAL_RADIUS"
+        );
         editor.open([], Contents::default());
         let kept = Tools { element: Element::Vertex, symmetry: false, proportional: 1.0, ..tools };
         assert_eq!(editor.tools(), kept);
@@ -74,7 +78,7 @@ mod tests {
         let mut editor = Editor::default();
         editor.apply(Command::ReplaceCage { mesh, controls: None, notices: Vec::new() }).unwrap();
         assert_eq!(editor.view().unmatched, 0);
-        editor.set_tools(Tools { symmetry: true, ..Tools::default() }, &Flat);
+        editor.set_tools(Tools { symmetry: true, ..Tools::default() }, &FrontView);
         assert_eq!(editor.view().unmatched, 2, "vertices 0 and 1 were images of each other");
     }
 
@@ -82,7 +86,7 @@ mod tests {
     fn faces_are_selected_only_while_the_cage_is_reshaped() {
         let mut editor = Editor::default();
         editor.set_editing_rest(true);
-        editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &Flat);
+        editor.set_tools(Tools { element: Element::Face, ..Tools::default() }, &FrontView);
         editor.set_editing_rest(false);
         assert_eq!(editor.tools().element, Element::Vertex);
     }

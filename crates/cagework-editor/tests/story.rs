@@ -2,7 +2,7 @@
 
 use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::deform::deform_vertices;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{BindOptions, Bounds, TriMesh, Weights, bind, subdivided_box};
 use cagework_editor::edit::{GestureKind, SelectMode};
@@ -37,7 +37,7 @@ fn two_blocks() -> [NewModel; 2] {
 fn bound(document: &Document, grid: u32) -> Weights {
     let set = document.cage.set.as_ref().expect("valid input");
     let options = BindOptions { grid, ..BindOptions::default() };
-    let bound = bind(document.models.positions(), set, &options, &Silent).expect("valid input");
+    let bound = bind(document.models.positions(), set, &options, &NoProgress).expect("valid input");
     bound.frames.folded(&bound.weights)
 }
 
@@ -48,7 +48,7 @@ fn pulled(document: &Document, weights: &Weights, vertex: u32, by: DVec3) -> Vec
     let cage = document.cage.set.as_ref().expect("valid input").cage();
     let probes = Probes::new(&mesh, cage).expect("valid input");
     let options = BindOptions { grid: 16, ..BindOptions::default() };
-    let of_probes = bind(probes.points(), cage, &options, &Silent).expect("valid input");
+    let of_probes = bind(probes.points(), cage, &options, &NoProgress).expect("valid input");
     let of_probes = of_probes.frames.folded(&of_probes.weights);
     let pull = Pull::new(&mesh, cage, probes, &of_probes).expect("valid input");
     let grab = Grip::new(Handle::Vertex(vertex), &pull, &mesh.triangles, weights).expect("valid input");
@@ -77,7 +77,7 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     editor.amend();
     let models = editor.document().models.clone();
     let options = CageOptions { target: 40, ..CageOptions::default() };
-    let made = generate(models.positions(), models.triangles(), &options, &Silent).unwrap();
+    let made = generate(models.positions(), models.triangles(), &options, &NoProgress).unwrap();
     let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
     editor.apply(cage(made.cage.to_polygon_mesh())).unwrap();
     editor.amend();
@@ -261,8 +261,8 @@ fn saved_and_opened(saved: &Editor) -> Document {
 
 #[test]
 fn gestures_end_in_one_step_or_in_none() {
-    struct Flat;
-    impl cagework_core::view::View for Flat {
+    struct FrontView;
+    impl cagework_core::view::View for FrontView {
         fn project(&self, point: Vec3) -> Option<(glam::Vec2, f32)> {
             Some((point.truncate(), 1.0))
         }
@@ -288,7 +288,7 @@ fn gestures_end_in_one_step_or_in_none() {
         assert!(editor.begin(GestureKind::Grab, glam::Vec2::ZERO, free));
         assert!(!editor.begin(GestureKind::Scale, glam::Vec2::ZERO, free), "one at a time");
         for x in 1..=10 {
-            editor.drag(&Flat, |gesture| gesture.drag(glam::Vec2::new(x as f32, 0.0)));
+            editor.drag(&FrontView, |gesture| gesture.drag(glam::Vec2::new(x as f32, 0.0)));
         }
         assert_eq!(editor.view().selected.center, None);
         assert_eq!(editor.end(keep), keep);

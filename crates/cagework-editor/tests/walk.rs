@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 /// A user action.
 #[derive(Clone, Debug)]
-enum Act {
+enum UserAction {
     Do(Command),
     Select(Vec<u32>),
     Reshape(bool),
@@ -88,16 +88,16 @@ fn command() -> impl Strategy<Value = Command> {
     ]
 }
 
-fn act() -> impl Strategy<Value = Act> {
+fn act() -> impl Strategy<Value = UserAction> {
     prop_oneof![
-        12 => command().prop_map(Act::Do),
-        4 => prop::collection::vec(0..12_u32, 0..5).prop_map(Act::Select),
-        2 => any::<bool>().prop_map(Act::Reshape),
-        3 => vector().prop_map(Act::Shift),
-        8 => Just(Act::Commit),
-        1 => Just(Act::Revert),
-        3 => Just(Act::Undo),
-        2 => Just(Act::Redo),
+        12 => command().prop_map(UserAction::Do),
+        4 => prop::collection::vec(0..12_u32, 0..5).prop_map(UserAction::Select),
+        2 => any::<bool>().prop_map(UserAction::Reshape),
+        3 => vector().prop_map(UserAction::Shift),
+        8 => Just(UserAction::Commit),
+        1 => Just(UserAction::Revert),
+        3 => Just(UserAction::Undo),
+        2 => Just(UserAction::Redo),
     ]
 }
 
@@ -173,21 +173,21 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
             for act in acts {
                 let before = editor.document().clone();
                 match act {
-                    Act::Do(command) => {
+                    UserAction::Do(command) => {
                         if editor.apply(command).is_ok() {
                             done.set(done.get() + 1);
                         } else {
                             prop_assert_eq!(editor.document(), &before);
                         }
                     }
-                    Act::Select(vertices) => {
+                    UserAction::Select(vertices) => {
                         let n = editor.document().pose.len() as u32;
                         let there: Vec<u32> = vertices.into_iter().filter(|&v| v < n).collect();
                         editor.selection.change(&there, SelectMode::Replace);
                     }
-                    Act::Reshape(on) => editor.set_editing_rest(on),
-                    Act::Shift(by) => drop(editor.shift(by)),
-                    Act::Commit => {
+                    UserAction::Reshape(on) => editor.set_editing_rest(on),
+                    UserAction::Shift(by) => drop(editor.shift(by)),
+                    UserAction::Commit => {
                         let was_committed = editor.commit("step");
                         steps.set(steps.get() + usize::from(was_committed));
                         // Undo and redo together restore a committed document exactly.
@@ -197,9 +197,9 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
                             prop_assert_eq!(editor.document(), &now);
                         }
                     }
-                    Act::Revert => editor.revert(),
-                    Act::Undo => drop(editor.undo()),
-                    Act::Redo => drop(editor.redo()),
+                    UserAction::Revert => editor.revert(),
+                    UserAction::Undo => drop(editor.undo()),
+                    UserAction::Redo => drop(editor.redo()),
                 }
                 is_valid(&editor)?;
             }

@@ -1,7 +1,7 @@
 //! Bind on the GPU: solving and sampling run as kernels, geometry and assembly on the CPU.
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, PreparedBind, Solution};
+use cagework_core::bind::pipeline::{FieldStorage, PreparedBind, Solution};
 use cagework_core::options::{BindOptions, Solver};
 use cagework_core::solve::rows::{Row, ZERO};
 use cagework_core::solve::stop::SolveReport;
@@ -73,7 +73,7 @@ pub async fn bind_on<'a>(
         return Err(GpuError::Solver(options.solver));
     }
     let watch = Watch::new(progress);
-    let mut prepared = PreparedBind::new(positions, controls.into(), options, FieldsOn::Device, &watch)?;
+    let mut prepared = PreparedBind::new(positions, controls.into(), options, FieldStorage::Device, &watch)?;
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
     let limit = options.memory_limit;
     let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit)?;

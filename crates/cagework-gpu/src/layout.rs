@@ -35,7 +35,7 @@ pub mod mode {
     /// Mode of `prolong_correction`: overwrite values by the mean of their coarse neighbours.
     pub const PROLONG_REPLACE: u32 = 1;
     /// Mode of `deform_splats`: also compute rotations.
-    pub const WITH_TURNS: u32 = 1;
+    pub const ROTATIONS: u32 = 1;
     /// Mode of `count_splats` and `scatter_splats`: sort by the lower digit of the depth.
     pub const LOWER_DIGIT: u32 = 0;
     /// Mode of `count_splats` and `scatter_splats`: sort by the higher digit, after the sort by the lower digit.

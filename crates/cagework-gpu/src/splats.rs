@@ -459,7 +459,7 @@ impl SplatKernels {
         });
         if let Some((_, launch)) = self.deform.as_ref().filter(|_| is_moved) {
             let (groups, stride) = launch.groups(depths.n_splats);
-            let mode = if self.degree > 0 { mode::WITH_TURNS } else { 0 };
+            let mode = if self.degree > 0 { mode::ROTATIONS } else { 0 };
             let work = Work { count: depths.n_splats, stride, mode, ..Work::default() };
             context.queue.write_buffer(&self.works, 0, bytemuck::bytes_of(&work));
             pass.set_pipeline(&launch.pipeline);

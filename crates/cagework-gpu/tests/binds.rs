@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::{Backend, BindOptions, CellShape, DeltaNorm, Method, Solver};
-use cagework_core::progress::{ProgressEvent, Silent};
+use cagework_core::progress::{NoProgress, ProgressEvent};
 use cagework_core::{BindError, Binding, Cage, Weights, bind};
 use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu};
 use glam::Vec3;
@@ -48,7 +48,7 @@ fn dense(weights: &Weights) -> Vec<f32> {
 }
 
 fn on_gpu(context: &GpuContext, positions: &[Vec3], cage: &Cage, options: &BindOptions) -> Binding {
-    block_on(bind_gpu(positions, cage, options, &Silent, context)).expect("the bind succeeds").0
+    block_on(bind_gpu(positions, cage, options, &NoProgress, context)).expect("the bind succeeds").0
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn weights_equal_the_cpus() {
     for method in [Method::Embedded, Method::Classic] {
         for solver in [Solver::Multigrid, Solver::Jacobi] {
             let options = options(method, solver);
-            let cpu = bind(&positions, &cage, &options, &Silent).unwrap();
+            let cpu = bind(&positions, &cage, &options, &NoProgress).unwrap();
             let gpu = on_gpu(&context, &positions, &cage, &options);
             assert_close(&dense(&gpu.weights), &dense(&cpu.weights), WEIGHT_TOLERANCE);
             assert_eq!(gpu.outside, cpu.outside);
@@ -77,7 +77,7 @@ fn delta_and_residual_equal_the_cpus() {
     let (context, cage, positions) = (gpu(), cage([3, 2, 2]), points());
     // Compare only the first cycle of multigrid, whose delta and residual are far above rounding errors.
     let options = options(Method::Embedded, Solver::Multigrid);
-    let cpu = bind(&positions, &cage, &options, &Silent).unwrap().report;
+    let cpu = bind(&positions, &cage, &options, &NoProgress).unwrap().report;
     let gpu = on_gpu(&context, &positions, &cage, &options).report;
     for (gpu, cpu) in
         [(gpu.delta_history[0], cpu.delta_history[0]), (gpu.residual_history[0], cpu.residual_history[0])]
@@ -88,7 +88,7 @@ fn delta_and_residual_equal_the_cpus() {
     for delta_norm in [DeltaNorm::Euclidean, DeltaNorm::Literal] {
         let options =
             BindOptions { delta_norm, max_iterations: 40, ..self::options(Method::Classic, Solver::Jacobi) };
-        let cpu = bind(&positions, &cage, &options, &Silent).unwrap().report;
+        let cpu = bind(&positions, &cage, &options, &NoProgress).unwrap().report;
         let gpu = on_gpu(&context, &positions, &cage, &options).report;
         assert_eq!(gpu.delta_history.len() as u32, 40 / gpu.delta_interval);
         for (k, gpu_delta) in gpu.delta_history.iter().enumerate() {
@@ -119,7 +119,7 @@ fn plan_errors_state_size_and_limit() {
     let (cage, positions) = (cage([3, 2, 2]), points());
     let options = options(Method::Embedded, Solver::Multigrid);
     let tiny = gpu_with(&ContextOptions { max_binding_bytes: Some(4096), ..ContextOptions::default() });
-    let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &tiny)).unwrap_err();
+    let error = block_on(bind_gpu(&positions, &cage, &options, &NoProgress, &tiny)).unwrap_err();
     assert!(matches!(error, GpuError::Plan(PlanError::Binding { limit: 4096, .. })), "{error}");
     with_prepared(&positions, &cage, &options, |prepared| {
         let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
@@ -138,7 +138,7 @@ fn plan_errors_state_size_and_limit() {
 fn unsupported_solver_is_an_error() {
     let (context, cage, positions) = (gpu(), cage([1, 1, 1]), egg(3, 4).positions);
     let options = options(Method::Embedded, Solver::ConjugateGradient);
-    let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap_err();
+    let error = block_on(bind_gpu(&positions, &cage, &options, &NoProgress, &context)).unwrap_err();
     assert_eq!(error, GpuError::Solver(Solver::ConjugateGradient));
     assert!(error.to_string().starts_with("the solver cg runs on the CPU only"), "{error}");
 }
@@ -159,7 +159,7 @@ fn results_are_reproducible() {
 fn one_level_converges_too() {
     let (context, cage, positions) = (gpu(), cage([1, 1, 1]), egg(3, 4).positions);
     let options = BindOptions { grid: 8, tau: 1e-6, ..BindOptions::default() };
-    let cpu = bind(&positions, &cage, &options, &Silent).unwrap();
+    let cpu = bind(&positions, &cage, &options, &NoProgress).unwrap();
     assert_eq!(cpu.report.levels.len(), 1, "{:?}", cpu.report.levels);
     let gpu = on_gpu(&context, &positions, &cage, &options);
     assert!(gpu.report.converged);
@@ -189,10 +189,10 @@ fn cancel_stops_the_solve() {
 fn invalid_input_gives_the_cpus_errors() {
     let (context, cage) = (gpu(), cage([1, 1, 1]));
     let options = BindOptions { grid: 8, cell_shape: CellShape::Cubic, ..BindOptions::default() };
-    let error = block_on(bind_gpu(&[], &cage, &options, &Silent, &context)).unwrap_err();
+    let error = block_on(bind_gpu(&[], &cage, &options, &NoProgress, &context)).unwrap_err();
     assert_eq!(error, GpuError::Bind(BindError::EmptyMesh));
     let positions = [Vec3::ZERO, Vec3::NAN];
-    let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap_err();
+    let error = block_on(bind_gpu(&positions, &cage, &options, &NoProgress, &context)).unwrap_err();
     assert_eq!(error, GpuError::Bind(BindError::NotFinite { vertex: 1 }));
 }
 
@@ -201,7 +201,7 @@ fn a_lost_device_is_an_error() {
     let (context, cage, positions) = (gpu(), cage([2, 2, 2]), points());
     context.device.destroy();
     let options = options(Method::Embedded, Solver::Multigrid);
-    let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap_err();
+    let error = block_on(bind_gpu(&positions, &cage, &options, &NoProgress, &context)).unwrap_err();
     assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
 }
 
@@ -217,7 +217,7 @@ fn deformed_mesh_equals_the_cpus() {
     let (cage, mesh) = (cage([3, 2, 2]), egg(15, 17));
     let positions = points();
     let options = options(Method::Embedded, Solver::Multigrid);
-    let binding = bind(&positions, &cage, &options, &Silent).unwrap();
+    let binding = bind(&positions, &cage, &options, &NoProgress).unwrap();
     assert!(!binding.outside.is_empty());
     let posed: Vec<Vec3> = cage
         .positions()
@@ -241,7 +241,7 @@ fn deformed_mesh_equals_the_cpus() {
         });
     }
     let context = gpu();
-    let (on_gpu, weights) = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap();
+    let (on_gpu, weights) = block_on(bind_gpu(&positions, &cage, &options, &NoProgress, &context)).unwrap();
     assert_eq!(on_gpu.outside, binding.outside);
     let deformer = block_on(Deformer::new(&context, &weights, &mesh.triangles)).unwrap();
     deformer.pose(&context, &posed);

@@ -5,7 +5,7 @@ use std::mem::{offset_of, size_of};
 
 use cagework_gpu::render::colormap;
 use cagework_gpu::render::layout::{
-    Camera, GizmoView, HIDDEN, STATE_SHIFT, SliceView, Style, Surface, surface_mode,
+    Camera, GizmoView, HIDDEN_STATE, STATE_SHIFT, SliceView, Style, Surface, surface_mode,
 };
 use cagework_gpu::render::model::DrawVertex;
 use cagework_gpu::render::shaders::{self, ALL, DrawBinding, DrawShader};
@@ -173,9 +173,9 @@ fn constants_equal_those_of_rust() {
     same(&shaders::MESH, "WEIGHTS", f64::from(surface_mode::WEIGHTS));
     same(&shaders::MESH, "ERRORS", f64::from(surface_mode::ERRORS));
     same(&shaders::MESH, "CLAY", f64::from(surface_mode::CLAY));
-    same(&shaders::MESH, "BLENDED", f64::from(surface_mode::BLENDED));
+    same(&shaders::MESH, "ALPHA_BLENDING", f64::from(surface_mode::ALPHA_BLENDING));
     same(&shaders::LINES, "STATE_SHIFT", f64::from(STATE_SHIFT));
-    same(&shaders::LINES, "HIDDEN", f64::from(HIDDEN));
+    same(&shaders::LINES, "HIDDEN_STATE", f64::from(HIDDEN_STATE));
     // Compare as f32, because the shader's constant is parsed as f64.
     assert_eq!(constant(&shaders::MESH, "NEGATIVE_THRESHOLD") as f32, colormap::NEGATIVE_THRESHOLD);
 }

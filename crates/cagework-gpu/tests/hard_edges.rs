@@ -5,7 +5,7 @@ mod support;
 
 use cagework_core::bind::bind;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{Bounds, Cage, subdivided_box};
 use cagework_gpu::Session;
 use cagework_gpu::render::{DrawModel, DrawVertex, SceneOptions};
@@ -65,7 +65,7 @@ fn drawn(model: DrawModel) -> ([Vec<u8>; 2], Vec<Vec3>) {
     let cage = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.2, [1; 3]);
     let cage = Cage::new(&cage).expect("a box is a cage");
     let options = BindOptions { grid: 16, ..BindOptions::default() };
-    let binding = bind(&model.positions, &cage, &options, &Silent).expect("the bind succeeds");
+    let binding = bind(&model.positions, &cage, &options, &NoProgress).expect("the bind succeeds");
     let n = model.positions.len();
     block_on(session.set_model(model)).expect("the model is set");
     block_on(session.set_cage(&cage)).expect("the cage is set");

@@ -130,7 +130,7 @@ fn constants_equal_those_of_rust() {
     same(&kernels::SUM_SQUARES, "REDUCE_LANES", stencil::REDUCE_LANES as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);
     same(&kernels::COUNT_SPLATS, "BINS", f64::from(BINS));
-    same(&kernels::DEFORM_SPLATS, "WITH_TURNS", f64::from(mode::WITH_TURNS));
+    same(&kernels::DEFORM_SPLATS, "ROTATIONS", f64::from(mode::ROTATIONS));
     same(&kernels::SCATTER_SPLATS, "FLOATER", f64::from(FLOATER));
     same(&kernels::COUNT_SPLATS, "LOWER_DIGIT", f64::from(mode::LOWER_DIGIT));
     let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);

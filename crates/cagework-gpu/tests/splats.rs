@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::splats::{Splats, n_harmonics};
 use cagework_core::{Bounds, Cage, subdivided_box};
 use cagework_gpu::render::{DrawModel, Projection, SceneOptions, ViewOptions};
@@ -135,7 +135,7 @@ fn bent_bar() -> (Splats, Cage, Vec<Vec3>, Field) {
     };
     let pose: Vec<Vec3> = cage.positions().iter().map(bend).collect();
     let options = BindOptions { grid: 48, ..BindOptions::default() };
-    let weights = FieldWeights::bind(&cage, 32, &options, &Silent).unwrap();
+    let weights = FieldWeights::bind(&cage, 32, &options, &NoProgress).unwrap();
     let field = weights.pose(cage.positions(), &pose);
     (splats, cage, pose, field)
 }

@@ -19,8 +19,8 @@ pub struct MemoryError {
 const MIB: u64 = 1 << 20;
 
 /// Size up to which every file may be unpacked, bytes.
-const MAX_UNPACKED: u64 = 64 * MIB;
-/// Contents above [`MAX_UNPACKED`] may have at most this many times the size of the compressed file. Compression
+const MAX_UNPACKED_BYTES: u64 = 64 * MIB;
+/// Contents above [`MAX_UNPACKED_BYTES`] may have at most this many times the size of the compressed file. Compression
 /// typically shrinks the XML of models to 1/10 of its size, and splats to 1/2.
 const MAX_RATIO: u64 = 100;
 
@@ -29,7 +29,7 @@ const MAX_RATIO: u64 = 100;
 /// # Errors
 /// A message for the user, if the contents exceed both limits.
 pub(crate) fn check_unpacked(unpacked: u64, file: u64) -> Result<(), String> {
-    if unpacked <= MAX_UNPACKED.max(file.saturating_mul(MAX_RATIO)) {
+    if unpacked <= MAX_UNPACKED_BYTES.max(file.saturating_mul(MAX_RATIO)) {
         return Ok(());
     }
     Err(format!(

@@ -147,13 +147,13 @@ impl RawSplats {
     /// [`SplatError::Value`] for the first number that is out of its range and cannot be repaired.
     pub(crate) fn finish(self, near: bool, records: Records) -> Result<ReadSplats, SplatError> {
         let Self { mut splats, positions } = self;
-        const FINITE: &str = "all numbers must be finite";
+        const FINITE_RULE: &str = "all numbers must be finite";
         let n_harmonics = cagework_core::splats::n_harmonics(splats.degree);
         let (mut n_negative, mut n_unrotated, mut n_opacities) = (0, 0, 0);
         for (splat, position) in positions.iter().enumerate() {
             let wrong = |what, value: String, limit| Err(SplatError::Value { splat, what, value, limit });
             if !position.as_vec3().is_finite() {
-                return wrong("the position", position.to_string(), FINITE);
+                return wrong("the position", position.to_string(), FINITE_RULE);
             }
             let scale = &mut splats.scales[splat];
             if let Some(axis) = (0..3).find(|&axis| scale[axis].is_nan()) {
@@ -171,7 +171,7 @@ impl RawSplats {
             let rotation = &mut splats.rotations[splat];
             let largest = rotation.to_array().iter().fold(0.0_f32, |a, x| a.max(x.abs()));
             if !rotation.is_finite() {
-                return wrong("the rotation", rotation.to_string(), FINITE);
+                return wrong("the rotation", rotation.to_string(), FINITE_RULE);
             }
             // The reciprocal of a smaller number can overflow.
             if largest < f32::MIN_POSITIVE {
@@ -182,7 +182,7 @@ impl RawSplats {
             }
             let opacity = &mut splats.opacities[splat];
             if opacity.is_nan() {
-                return wrong("the opacity", opacity.to_string(), FINITE);
+                return wrong("the opacity", opacity.to_string(), FINITE_RULE);
             }
             if !(0.0..=1.0).contains(opacity) {
                 n_opacities += 1;
@@ -194,7 +194,7 @@ impl RawSplats {
                 .chain(harmonics)
                 .find(|c| !c.abs().cmple(Vec3::splat(MAX_COLOR)).all())
             {
-                let limit = if color.is_nan() { FINITE } else { "the limit is 1e15" };
+                let limit = if color.is_nan() { FINITE_RULE } else { "the limit is 1e15" };
                 return wrong("the colour", color.to_string(), limit);
             }
         }

@@ -78,10 +78,10 @@ impl UpAxis {
 }
 
 /// Ratio of the extents along z and y above which a model can lie on its back.
-const LYING: f32 = 1.2;
+const MIN_LYING_RATIO: f32 = 1.2;
 /// Distance from the lowest coordinate along an axis, as a fraction of the extent along z, within which a vertex counts
 /// as lying on the flat side.
-const FLAT: f32 = 0.01;
+const MAX_FLAT_SIDE_DISTANCE: f32 = 0.01;
 /// Minimum number of vertices on the flat side: as a fraction of all vertices, and as a multiple of the number of
 /// vertices near the lowest y.
 const FEET: f32 = 0.005;
@@ -93,9 +93,11 @@ const MORE_FEET: usize = 3;
 pub fn lies_on_back(positions: &[Vec3]) -> bool {
     let Some(bounds) = Bounds::of(positions) else { return false };
     let extent = bounds.extent();
-    let at = |axis: usize| positions.iter().filter(|p| p[axis] - bounds.min[axis] <= FLAT * extent.z).count();
+    let at = |axis: usize| {
+        positions.iter().filter(|p| p[axis] - bounds.min[axis] <= MAX_FLAT_SIDE_DISTANCE * extent.z).count()
+    };
     let [y, z] = [at(1), at(2)];
-    extent.z > LYING * extent.y && z as f32 >= FEET * positions.len() as f32 && z >= MORE_FEET * y
+    extent.z > MIN_LYING_RATIO * extent.y && z as f32 >= FEET * positions.len() as f32 && z >= MORE_FEET * y
 }
 
 #[cfg(test)]

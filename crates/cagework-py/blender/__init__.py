@@ -6,7 +6,7 @@ from . import binding, operators, panel
 
 CLASSES = [binding.Binding, *operators.CLASSES, panel.Panel]
 HANDLERS = ["depsgraph_update_post", "frame_change_post"]
-FORGET = ["undo_post", "redo_post", "load_post"]
+RESET_EVENTS = ["undo_post", "redo_post", "load_post"]
 
 
 def register():
@@ -15,14 +15,14 @@ def register():
     bpy.types.Mesh.cagework = bpy.props.PointerProperty(type=binding.Binding)
     for name in HANDLERS:
         getattr(bpy.app.handlers, name).append(binding.on_update)
-    for name in FORGET:
+    for name in RESET_EVENTS:
         getattr(bpy.app.handlers, name).append(binding.forget)
 
 
 def unregister():
     for name in HANDLERS:
         getattr(bpy.app.handlers, name).remove(binding.on_update)
-    for name in FORGET:
+    for name in RESET_EVENTS:
         getattr(bpy.app.handlers, name).remove(binding.forget)
     del bpy.types.Mesh.cagework
     for each in reversed(CLASSES):

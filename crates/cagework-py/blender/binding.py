@@ -16,7 +16,7 @@ from cagework._sparse import csr_array
 
 KEY = "Cagework"
 # A matrix counts as singular if its determinant is at most this fraction of the cube of its largest entry.
-SINGULAR = 1e-12
+MIN_DETERMINANT = 1e-12
 
 
 class Binding(bpy.types.PropertyGroup):
@@ -118,7 +118,7 @@ def cage_mesh(cage, depsgraph):
 
 def singular(matrix):
     matrix = np.asarray(matrix, np.float64)[:3, :3]
-    return abs(np.linalg.det(matrix)) <= SINGULAR * np.abs(matrix).max() ** 3
+    return abs(np.linalg.det(matrix)) <= MIN_DETERMINANT * np.abs(matrix).max() ** 3
 
 
 def fixed(obj):

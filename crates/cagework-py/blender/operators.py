@@ -34,7 +34,7 @@ def bound_mesh(context):
     return next((o for o in meshes(context) if o.data.cagework.stamp), None)
 
 
-class OnBound:
+class BoundObjectOperator:
     """Base class of operators for a bound mesh."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -48,7 +48,7 @@ class OnBound:
         return {"CANCELLED"}
 
 
-class MakeCage(OnBound, bpy.types.Operator):
+class MakeCage(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.make_cage"
     bl_label = "Make Cage"
     bl_description = "Make a cage around the selected meshes, without their modifiers and shape keys"
@@ -98,7 +98,7 @@ class MakeCage(OnBound, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class Bind(OnBound, bpy.types.Operator):
+class Bind(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.bind"
     bl_label = "Bind"
     bl_description = "Compute the weights. The current shape of the cage becomes its rest shape"
@@ -178,7 +178,7 @@ class Bind(OnBound, bpy.types.Operator):
         return self.finish(context, self.jobs)
 
 
-class Reset(OnBound, bpy.types.Operator):
+class Reset(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.reset"
     bl_label = "Reset Cage"
     bl_description = "Give the cage's vertices the shape that it had when the mesh was bound"
@@ -204,7 +204,7 @@ def write_cage(cage, local):
         cage.data.update_tag()
 
 
-class Pull(OnBound, bpy.types.Operator):
+class Pull(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.pull"
     bl_label = "Pull"
     bl_description = "Drag a point of the mesh; the cage follows with little bending"
@@ -313,7 +313,7 @@ def copy_key(obj, name):
     return key
 
 
-class SaveKey(OnBound, bpy.types.Operator):
+class SaveKey(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.save_key"
     bl_label = "Save as Shape Key"
     bl_description = "Keep the current deformation as a shape key with the value 0"
@@ -325,7 +325,7 @@ class SaveKey(OnBound, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class Bake(OnBound, bpy.types.Operator):
+class Bake(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.bake"
     bl_label = "Bake"
     bl_description = "Write the deformation in a range of frames, so that it plays without this extension"
@@ -415,7 +415,7 @@ def curves(keys):
     return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
 
 
-class Unbind(OnBound, bpy.types.Operator):
+class Unbind(BoundObjectOperator, bpy.types.Operator):
     bl_idname = "cagework.unbind"
     bl_label = "Unbind"
     bl_description = "Remove the weights and the live shape key. Saved shape keys stay"

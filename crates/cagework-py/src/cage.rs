@@ -6,7 +6,7 @@ use cagework_cage::CageOptions;
 use cagework_cage::check::check_smooth;
 use cagework_cage::generate::{CageReport, generate};
 use cagework_core::crossing::notices;
-use cagework_core::options::{GRID, SMOOTH};
+use cagework_core::options::{GRID, SMOOTH_STEPS};
 use cagework_core::{Cage as CoreCage, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
 use glam::DVec3;
@@ -74,7 +74,7 @@ impl Cage {
 
 /// Converts a number of subdivision steps. `smooth` is a float, so that any number gets the error message of the core.
 fn steps(smooth: f64) -> PyResult<u32> {
-    SMOOTH.check(smooth).map_err(error::option)?;
+    SMOOTH_STEPS.check(smooth).map_err(error::option)?;
     Ok(smooth as u32)
 }
 

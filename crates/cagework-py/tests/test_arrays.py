@@ -10,7 +10,7 @@ from support import box
 
 CUBE = cw.Cage(*box())
 POINTS = np.zeros((5, 3))
-N_MANY = 200_000
+N_POINTS = 200_000
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def allocated(call):
 
 
 def test_points_and_weights_are_not_copied():
-    points = np.random.default_rng(2).uniform(-0.9, 0.9, (N_MANY, 3)).astype(np.float32)
+    points = np.random.default_rng(2).uniform(-0.9, 0.9, (N_POINTS, 3)).astype(np.float32)
     cw.bind(points[:10], CUBE, grid=8)  # The first call imports modules, which would count as allocations.
     peak_bytes, (weights, _) = allocated(lambda: cw.bind(points, CUBE, grid=16))
-    assert weights.shape == (N_MANY, 8) and peak_bytes < points.nbytes / 10
+    assert weights.shape == (N_POINTS, 8) and peak_bytes < points.nbytes / 10
     # The index arrays of the weights are views of Rust's memory, not copies.
-    assert all(not a.flags.owndata for a in (weights.indices, weights.indptr)) and weights.nnz == 8 * N_MANY
+    assert all(not a.flags.owndata for a in (weights.indices, weights.indptr)) and weights.nnz == 8 * N_POINTS
     # Fortran order requires a copy, which this measurement must detect.
     assert allocated(lambda: cw.bind(np.asfortranarray(points), CUBE, grid=8))[0] > points.nbytes
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from support import bent, box, command
 
-AFFINE = np.array([[1.5, 0.25, 0.0], [0.0, 0.75, -0.5], [0.1, 0.0, 1.0]])
+AFFINE_MATRIX = np.array([[1.5, 0.25, 0.0], [0.0, 0.75, -0.5], [0.1, 0.0, 1.0]])
 SHIFT = np.array([0.3, 0.0, -0.2])
 
 
@@ -18,9 +18,9 @@ def points():
 
 
 def test_affine_motions_are_exact(cage, points):
-    field = cw.Field(cage, cage.vertices @ AFFINE.T + SHIFT, cells=24)
-    assert np.allclose(field.map(points), points @ AFFINE.T + SHIFT, atol=1e-5)
-    assert np.allclose(field.gradient(points), AFFINE, atol=1e-3)
+    field = cw.Field(cage, cage.vertices @ AFFINE_MATRIX.T + SHIFT, cells=24)
+    assert np.allclose(field.map(points), points @ AFFINE_MATRIX.T + SHIFT, atol=1e-5)
+    assert np.allclose(field.gradient(points), AFFINE_MATRIX, atol=1e-3)
     assert np.allclose(field.inverse(field.map(points)), points, atol=1e-5)
     # Far outside, nothing moves.
     far = np.full((1, 3), 50.0)

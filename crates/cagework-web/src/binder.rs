@@ -12,7 +12,7 @@ use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{self, Lattice};
 use cagework_core::options::OutsidePolicy;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, Coordinates, PolygonMesh};
 use cagework_editor::CageControls;
@@ -32,7 +32,7 @@ use crate::problems::{self, Check};
 use crate::views::object;
 
 pub(crate) use results::Offsets;
-pub use results::{Bound, BuiltSample, Polygons};
+pub use results::{BindResult, BuiltSample, Polygons};
 
 /// Number of model vertices that [`Binder::carry_poses`] binds along with the new cage's controls. The controls may all
 /// be outside the old cage, and a bind without a point inside the cage fails.
@@ -74,7 +74,7 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-    ) -> Result<Bound, JsValue> {
+    ) -> Result<BindResult, JsValue> {
         let mut request: JsBindOptions = decode(options)?;
         request.options.extra_points = extra_points;
         let set = control_set(&cage, &corners, controls)?;
@@ -82,7 +82,7 @@ impl Binder {
         drop(positions);
         let binding = self.run(&at, &set, request, progress).await?;
         let report = object(&binding.report);
-        Ok(Bound {
+        Ok(BindResult {
             weights: binding.weights,
             offsets: Offsets { frames: binding.frames, outside: binding.outside },
             report,
@@ -101,12 +101,12 @@ impl Binder {
         cage: &[f32],
         corners: &[u32],
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
-    ) -> Result<Bound, JsValue> {
+    ) -> Result<BindResult, JsValue> {
         let set = control_set(cage, corners, controls)?;
         let kind: Coordinates = decode(kind)?;
         let weights =
-            kind.weights(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
-        Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
+            kind.weights(&points(positions), set.cage(), READ_LIMIT, &NoProgress).map_err(Fault::from)?;
+        Ok(BindResult { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 
     /// Computes the coordinates at the cell centres of a slice, for `Engine.takeSlice`; undefined if no centre is
@@ -125,7 +125,7 @@ impl Binder {
         fraction: f32,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-    ) -> Result<Option<Bound>, JsValue> {
+    ) -> Result<Option<BindResult>, JsValue> {
         let request: JsBindOptions = decode(options)?;
         let set = control_set(&cage, &corners, controls)?;
         let centers = Slice::new(&set, &request.options, axis.min(2), fraction).centers();
@@ -139,7 +139,7 @@ impl Binder {
         };
         let n_controls = Controls::from(&set).n_controls() as u32;
         let (weights, offsets) = (binding.weights.columns(0..n_controls), Offsets::default());
-        Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
+        Ok(Some(BindResult { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
     /// Computes the harmonic coordinates at the points of a lattice around a cage. With `cells`, the number of cells
@@ -157,7 +157,7 @@ impl Binder {
         cells: Option<u32>,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
-    ) -> Result<Bound, JsValue> {
+    ) -> Result<BindResult, JsValue> {
         let mut request: JsBindOptions = decode(options)?;
         request.options.outside = OutsidePolicy::Extend;
         let cells = cells.unwrap_or(field::CLIP_CELLS);
@@ -166,7 +166,7 @@ impl Binder {
         let lattice = Lattice::new(Controls::from(&set).surface(), cells);
         let binding = self.run(&lattice.points(), &set, request, progress).await?;
         let offsets = Offsets { frames: binding.frames, outside: Vec::new() };
-        Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })
+        Ok(BindResult { weights: binding.weights, offsets, report: JsValue::UNDEFINED })
     }
 
     /// Generates a cage whose surface after `smooth` subdivision steps encloses the model. `progress` as for `bind`.
@@ -213,7 +213,8 @@ impl Binder {
         // Bind model vertices too. If the new cage surrounds the old one, they are the only points inside the old cage,
         // and a bind without a point inside fails.
         at.extend(points(model).into_iter().take(MODEL_SAMPLES));
-        let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
+        let bound =
+            cagework_core::bind(&at, &set, &BindOptions::default(), &NoProgress).map_err(Fault::from)?;
         let poses = points(poses);
         let carried = poses.chunks_exact(n_old).flat_map(|pose| {
             let moved = deform_bound(&bound.weights, &bound.frames, pose);

@@ -32,7 +32,7 @@ use crate::opening::{CageContents, OpenContents, PoseContents};
 use crate::options::{Colour, JsBindOptions, JsRigOptions, JsSceneOptions, SliceShown, fields};
 use crate::settings::{NUMBERS, Settings};
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Largest, Legend, MemberInfo, Mend,
+    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, LargestWeight, Legend, MemberInfo, Mend,
     ModelInfo, Problem, TargetView, View,
 };
 
@@ -132,7 +132,7 @@ fn generated_types_are_up_to_date() {
         ClipView,
         TargetView,
         ColorMap,
-        Largest,
+        LargestWeight,
         Legend,
         Element,
         Pivot,

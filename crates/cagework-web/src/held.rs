@@ -8,7 +8,7 @@ use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
 use serde::Deserialize;
 
-use crate::puller::ON_CAGE;
+use crate::puller::CAGE_SEED;
 use crate::state::State;
 
 /// Maximum distance of a vertex from the mirror image of a surface point, as a fraction of the diagonal of model and
@@ -73,7 +73,7 @@ impl State {
     }
 
     /// Returns the weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle,
-    /// or [`ON_CAGE`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
+    /// or [`CAGE_SEED`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
     pub(crate) fn grip_of(
         &self,
         grab: Grab,
@@ -84,7 +84,7 @@ impl State {
             Grab::Vertex(vertex) => {
                 let mut row = vec![0.0; self.pose().len()];
                 *row.get_mut(vertex as usize)? = 1.0;
-                return Some((row, ON_CAGE));
+                return Some((row, CAGE_SEED));
             }
         };
         let corners = self.models().corners(point.triangle)?;

@@ -25,7 +25,7 @@ pub(crate) async fn page_turn() {
     let _: Result<JsValue, JsValue> = JsFuture::from(promise).await;
 }
 
-/// Fetches the weights of a `Bound` in chunks and checks them. `rows(start, end)` returns, or promises, the column
+/// Fetches the weights of a `BindResult` in chunks and checks them. `rows(start, end)` returns, or promises, the column
 /// indices and values of the weights `start` to `end - 1`, counted over all rows.
 pub(crate) async fn weights(n_columns: u32, indptr: &[u32], rows: &Function) -> Result<Weights, JsValue> {
     let n = indptr.last().copied().unwrap_or(0);

@@ -43,7 +43,7 @@ impl FileBytes {
 
 /// A model with its materials, and the other contents of its file.
 #[wasm_bindgen]
-pub struct Loaded {
+pub struct LoadedModel {
     pub(crate) model: Model,
     cage: Option<PolygonMesh>,
     look: Look,
@@ -59,13 +59,13 @@ pub struct Loaded {
 }
 
 #[wasm_bindgen]
-impl Loaded {
+impl LoadedModel {
     /// Reads a model of any supported format, or a project. Call [`Self::prepare`] next. `sibling` is called with the
     /// path of each file that the model refers to, and returns a Uint8Array or undefined.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Result<Loaded, JsValue> {
+    pub fn read(name: &str, bytes: FileBytes, sibling: &Function) -> Result<LoadedModel, JsValue> {
         Ok(Self::from_bytes(name, bytes.0, sibling)?)
     }
 
@@ -126,7 +126,7 @@ impl Loaded {
     /// # Errors
     /// Those of `Model::with_skin_of`; the clothes are then unchanged.
     #[wasm_bindgen(js_name = takeSkinOf)]
-    pub fn take_skin_of(&mut self, body: &Loaded) -> Result<String, JsValue> {
+    pub fn take_skin_of(&mut self, body: &LoadedModel) -> Result<String, JsValue> {
         let taken = self.model.with_skin_of(&body.model, READ_LIMIT);
         let (model, found) = taken.map_err(|e| Fault::new(ErrorName::Error, e))?;
         self.model = model;
@@ -151,7 +151,7 @@ impl Loaded {
     /// Rebuilds a model from the arrays of [`Self::store`].
     ///
     /// # Errors If the arrays are not from [`Self::store`].
-    pub fn restore(arrays: Vec<Uint8Array>) -> Result<Loaded, JsValue> {
+    pub fn restore(arrays: Vec<Uint8Array>) -> Result<LoadedModel, JsValue> {
         let mut arrays = arrays.into_iter();
         let mut next = || arrays.next().map(|array| array.to_vec());
         Ok(Self::restored(&mut StoredArrays(&mut next))
@@ -167,7 +167,7 @@ impl Loaded {
     /// Removes and returns the next remaining model of a project; undefined after the last one.
     #[wasm_bindgen(js_name = takeNext)]
     #[must_use]
-    pub fn take_next(&mut self) -> Option<Loaded> {
+    pub fn take_next(&mut self) -> Option<LoadedModel> {
         self.more.pop_front()
     }
 
@@ -251,7 +251,7 @@ impl Loaded {
     }
 }
 
-impl Loaded {
+impl LoadedModel {
     fn from_bytes(name: &str, bytes: Vec<u8>, sibling: &Function) -> Answer<Self> {
         if let Some(project) = read_project(name, &bytes, READ_LIMIT)? {
             let mut models = project.models.into_iter().enumerate().map(|(number, model)| {

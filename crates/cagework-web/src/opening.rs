@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::arrays::{points, polygon_mesh};
 use crate::error::Answer;
-use crate::loaded::Loaded;
+use crate::loaded::LoadedModel;
 
 /// Contents that the page opens together with models.
 #[derive(Deserialize)]
@@ -18,7 +18,7 @@ pub(crate) struct OpenContents {
     /// JSON of the page's settings in a project.
     settings: Option<String>,
     cage: Option<CageContents>,
-    /// Poses of a sample. The poses of a project are in its `Loaded`.
+    /// Poses of a sample. The poses of a project are in its `LoadedModel`.
     poses: Vec<PoseContents>,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct PoseContents {
 
 impl OpenContents {
     /// Converts the contents for the editor. Also returns the settings of the project. `first`: the first model.
-    pub(crate) fn read(self, first: &Loaded) -> Answer<(Contents, DocumentSettings)> {
+    pub(crate) fn read(self, first: &LoadedModel) -> Answer<(Contents, DocumentSettings)> {
         let settings = self.settings.as_deref().map(DocumentSettings::read).unwrap_or_default();
         let of_project = self.poses.is_empty();
         let given: Vec<(String, Vec<Vec3>)> = if of_project {

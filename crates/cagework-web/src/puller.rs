@@ -1,7 +1,7 @@
 //! Pulling of the model's surface. It runs in a separate worker, so that binds and long frames of the page do not block
 //! it.
 
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, ControlSet, TriMesh, bind};
 use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull};
 use glam::{DVec3, Vec3};
@@ -14,7 +14,7 @@ use crate::error::Answer;
 use crate::options::decode;
 
 /// Value in the `seeds` of [`Puller::grab`] that marks a grip on a cage vertex.
-pub(crate) const ON_CAGE: u32 = u32::MAX;
+pub(crate) const CAGE_SEED: u32 = u32::MAX;
 
 /// A prepared model with its cage, and the drag in progress.
 #[wasm_bindgen]
@@ -115,7 +115,7 @@ impl Puller {
 impl Puller {
     fn of(mesh: &TriMesh, set: &ControlSet) -> Answer<Self> {
         let probes = Probes::new(mesh, set)?;
-        let bound = bind(probes.points(), set, &BindOptions::default(), &Silent)?;
+        let bound = bind(probes.points(), set, &BindOptions::default(), &NoProgress)?;
         let pull = Pull::new(mesh, set, probes, &bound.frames.folded(&bound.weights))?;
         Ok(Self { pull, drag: None })
     }
@@ -130,7 +130,7 @@ impl Puller {
     ) -> Answer<Drag> {
         let rows = rows.chunks_exact(self.pull.n_cage().max(1));
         let grip = |(row, &seed): (&[f64], &u32)| {
-            if seed == ON_CAGE {
+            if seed == CAGE_SEED {
                 let vertex = row.iter().position(|&w| w == 1.0).unwrap_or(usize::MAX);
                 return self.pull.on_cage(vertex as u32);
             }
@@ -160,7 +160,7 @@ mod tests {
         row[3] = 1.0;
         let options = DragOptions::default();
         let start = flat(cage.positions());
-        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, options).unwrap());
+        puller.drag = Some(puller.begin(&start, &row, &[CAGE_SEED], 1, options).unwrap());
         let to = cage.positions()[3] + 0.1 * Vec3::Y;
         let mut moved = Vec::new();
         for _ in 0..20 {
@@ -168,7 +168,7 @@ mod tests {
         }
         assert!(moved[3].distance(to) < 1e-2, "{} {to}", moved[3]);
         assert_eq!(puller.stays().len(), sample.mesh.positions.len());
-        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, options).err();
+        let none = puller.begin(&start, &vec![0.0; n], &[CAGE_SEED], 1, options).err();
         assert!(none.is_some(), "no vertex of the cage");
     }
 }

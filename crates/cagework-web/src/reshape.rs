@@ -12,11 +12,11 @@ use crate::arrays::{flat, pose};
 use crate::binder::{Binder, Offsets};
 use crate::controls::control_set;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::loaded::Loaded;
+use crate::loaded::LoadedModel;
 use crate::options::{JsBindOptions, JsRigOptions, decode};
 
 #[wasm_bindgen]
-impl Loaded {
+impl LoadedModel {
     /// Triangles of the model. `[n_triangles, 3]`
     #[wasm_bindgen(getter)]
     #[must_use]
@@ -51,7 +51,7 @@ impl Binder {
     #[allow(clippy::too_many_arguments, reason = "JavaScript passes arrays as separate arguments")]
     pub async fn reshape(
         &self,
-        loaded: &Loaded,
+        loaded: &LoadedModel,
         cage: Vec<f32>,
         corners: Vec<u32>,
         #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
@@ -111,7 +111,7 @@ pub struct Deformer {
 
 #[wasm_bindgen]
 impl Deformer {
-    /// Creates a deformer from the arrays of a `Bound` with `n_controls` controls.
+    /// Creates a deformer from the arrays of a `BindResult` with `n_controls` controls.
     ///
     /// # Errors
     /// If the arrays do not match each other or `n_controls`.

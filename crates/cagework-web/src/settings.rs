@@ -1,8 +1,10 @@
 //! Reads the page's settings of a project. Project files are untrusted, so each value is checked.
 
 use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, DIVISIONS, TARGET, VOXELS};
-use cagework_core::options::{GRID, INNER_RADIUS, MAX_ITERATIONS, Number, OutOfRange, SMOOTH, SPARSIFY, TAU};
-use cagework_editor::{BRUSH, PROPORTIONAL};
+use cagework_core::options::{
+    GRID, INNER_RADIUS, MAX_ITERATIONS, Number, RangeError, SMOOTH_STEPS, SPARSIFY, TAU,
+};
+use cagework_editor::{BRUSH, PROPORTIONAL_RADIUS};
 use cagework_io::value_fault;
 use cagework_pose::pull::REACH;
 use serde::Serialize;
@@ -28,9 +30,9 @@ pub(crate) const NUMBERS: [Number; 14] = [
     CLEARANCE,
     VOXELS,
     DIVISIONS,
-    SMOOTH,
+    SMOOTH_STEPS,
     INNER_RADIUS,
-    PROPORTIONAL,
+    PROPORTIONAL_RADIUS,
     BRUSH,
     REACH,
 ];
@@ -86,7 +88,7 @@ impl Settings {
     fn group<T: Default + Serialize + DeserializeOwned>(
         &mut self,
         given: Option<Value>,
-        check: impl Fn(&T) -> Result<(), OutOfRange>,
+        check: impl Fn(&T) -> Result<(), RangeError>,
     ) -> Option<Map<String, Value>> {
         let Value::Object(given) = given? else { return None };
         let defaults = fields(&T::default());

@@ -473,7 +473,7 @@ mod tests {
     use super::*;
     use crate::held::Grab;
     use crate::playing::ModelMotion;
-    use crate::puller::ON_CAGE;
+    use crate::puller::CAGE_SEED;
 
     /// Creates a state with a model in a box cage. Its mesh and cage are marked as uploaded, its weights are not.
     fn uploaded() -> State {
@@ -627,7 +627,7 @@ mod tests {
         assert_eq!(state.pins_beside(at + Vec2::new(15.0, 0.0)), pins);
         let bound = (&Weights::with_room(8, 0, 0), &Frames::default());
         let (row, seed) = state.grip_of(Grab::Vertex(1), bound).unwrap();
-        assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], ON_CAGE));
+        assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], CAGE_SEED));
         assert!(state.grip_of(Grab::Vertex(8), bound).is_none());
     }
 

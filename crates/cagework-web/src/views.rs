@@ -300,13 +300,13 @@ pub(crate) struct Legend {
     pub(crate) logarithmic: bool,
     pub(crate) map: ColorMap,
     /// Largest of the displayed weights; null for other quantities.
-    pub(crate) largest: Option<Largest>,
+    pub(crate) largest: Option<LargestWeight>,
 }
 
 /// The largest weight, and the index of the model vertex that has it.
 #[derive(Clone, Copy, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-pub(crate) struct Largest {
+pub(crate) struct LargestWeight {
     pub(crate) value: f32,
     pub(crate) vertex: u32,
 }

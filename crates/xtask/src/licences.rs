@@ -18,7 +18,7 @@ const NOTICES: &str = "licences.txt";
 /// Name of the file with the licences of Rust's standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
 /// Files in the page's folder in which Vite lists the npm packages of the page and of its workers; see vite.config.ts.
-const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
+const NPM_LICENCES: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
 /// Beginnings of the names of files that contain licences or required notices, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
@@ -38,7 +38,7 @@ struct Part {
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
-    write(folder, of_web(folder, &OF_NPM)?)
+    write(folder, of_web(folder, &NPM_LICENCES)?)
 }
 
 /// Lists the packages compiled into the two wasm files, and the npm packages in Vite's lists `of_npm` in `folder`.
@@ -77,7 +77,7 @@ pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_package(dist: &Path, folder: &Path) -> Result<(), String> {
-    write(folder, of_web(dist, &OF_NPM[..1])?)
+    write(folder, of_web(dist, &NPM_LICENCES[..1])?)
 }
 
 /// Writes the notices of the notebook widget into `folder`. The folder `files` contains Vite's lists of the npm
@@ -86,7 +86,7 @@ pub(crate) fn of_package(dist: &Path, folder: &Path) -> Result<(), String> {
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_widget(files: &Path, folder: &Path) -> Result<(), String> {
-    write(folder, of_web(files, &OF_NPM)?)
+    write(folder, of_web(files, &NPM_LICENCES)?)
 }
 
 fn host() -> Result<String, String> {
@@ -153,8 +153,8 @@ fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
 
 /// Reads a list in which Vite names the packages that it has bundled.
 fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
-    let found: Vec<Value> =
-        serde_json::from_str(json).map_err(|e| format!("{} cannot be read: {e}", OF_NPM.join(" or ")))?;
+    let found: Vec<Value> = serde_json::from_str(json)
+        .map_err(|e| format!("{} cannot be read: {e}", NPM_LICENCES.join(" or ")))?;
     let word = |of: &Value, key: &str| of[key].as_str().unwrap_or_default().to_owned();
     let part = |of: &Value| Part {
         name: format!("{} v{}", word(of, "name"), word(of, "version")),

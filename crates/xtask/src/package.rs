@@ -13,7 +13,7 @@ const PACKAGE: &str = "web/package";
 /// Folder for the licences of everything compiled into the package; ignored by git.
 const NOTICES: &str = "web/package/licences";
 /// Folders whose files are copied into the blank project, each with the folder to copy to.
-const COPIED: [(&str, &str); 3] = [
+const COPIED_FOLDERS: [(&str, &str); 3] = [
     ("web/package/examples", ""),
     ("web/package/examples/stackblitz", "stackblitz"),
     ("web/package/test", ""),
@@ -80,7 +80,7 @@ fn blank_project(tarball: &str) -> Result<String, String> {
     let three = format!("three@{three}");
     let quiet = ["--prefer-offline", "--no-audit", "--no-fund", "--ignore-scripts"];
     run("npm", &[&["install", "--prefix", &project], &quiet[..], &[tarball, &three]].concat(), &[])?;
-    for (from, to) in COPIED {
+    for (from, to) in COPIED_FOLDERS {
         let (from, to) = (root().join(from), folder.join(to));
         std::fs::create_dir_all(&to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;
         let entries = from.read_dir().map_err(|e| format!("cannot read {}: {e}", from.display()))?;

@@ -22,7 +22,7 @@ pub(crate) fn build() -> Result<(), String> {
 /// Arguments of Cargo that select the packages of all test builds. They are always the same, so that builds share
 /// features and artifacts. Benches have no tests but need criterion, which takes half a minute to build; xtask has
 /// other features.
-const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
+const TEST_PACKAGES: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
 /// Runs the Rust, Python and TypeScript tests, and the tests of the page in browsers.
 pub(crate) fn test() -> Result<(), String> {
@@ -31,7 +31,7 @@ pub(crate) fn test() -> Result<(), String> {
     // Run two tasks in parallel, because most Rust tests leave one of two cores idle.
     beside("test-beside", || {
         run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
-        run("cargo", &[&["test", "--locked"], &TESTED[..]].concat(), &[])?;
+        run("cargo", &[&["test", "--locked"], &TEST_PACKAGES[..]].concat(), &[])?;
         // A fixed seed gives the same inputs in each run; `cargo xtask fuzz` alone uses new ones each time.
         fuzz(&["--minutes", "0.1", "--seed", "1"])?;
         validate_exports()
@@ -41,11 +41,11 @@ pub(crate) fn test() -> Result<(), String> {
 
 /// Builds the Rust tests, what they run, and the native module of the Python package.
 pub(crate) fn build_tests() -> Result<(), String> {
-    run("cargo", &[&["test", "--locked", "--no-run"], &TESTED[..]].concat(), &[])?;
+    run("cargo", &[&["test", "--locked", "--no-run"], &TEST_PACKAGES[..]].concat(), &[])?;
     // `cargo test` omits the native module, which has no Rust tests. The example needs the features of the tests, which
     // therefore apply to the whole build.
     let native = ["--lib", "--example", "export_samples"];
-    run("cargo", &[&["build", "--quiet", "--locked"], &TESTED[..], &native].concat(), &[])
+    run("cargo", &[&["build", "--quiet", "--locked"], &TEST_PACKAGES[..], &native].concat(), &[])
 }
 
 /// Checks what [`check()`] checks, except benches, xtask and documentation, while it builds the tests. `.ci/run` sets
@@ -74,7 +74,7 @@ pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
     // Built with the features of `cargo test`, so that no dependency is built again.
     run(
         "cargo",
-        &[&["test", "--quiet", "--locked"], &TESTED[..], &["--test", "fuzz", "--"], args].concat(),
+        &[&["test", "--quiet", "--locked"], &TEST_PACKAGES[..], &["--test", "fuzz", "--"], args].concat(),
         &[],
     )
 }

@@ -14,9 +14,9 @@ const NAMES = [
 ];
 const ATTRIBUTES = ["aria-label", "aria-valuetext", "title", "placeholder", "alt", "data-tip"];
 
-/** How far glyphs may reach beyond their box, CSS pixels: sideways (`ASIDE`), and above or below (`ABOVE`). */
-const ASIDE = 1.5;
-const ABOVE = 4;
+/** How far glyphs may reach beyond their box, CSS pixels: sideways (`MAX_REACH_ASIDE`), and above or below (`MAX_REACH_ABOVE`). */
+const MAX_REACH_ASIDE = 1.5;
+const MAX_REACH_ABOVE = 4;
 
 /** Whether a text has two unaccented letters in a row, outside `NAMES`. The pseudo-locale accents all letters. */
 const isPlain = (text: string) =>
@@ -77,9 +77,9 @@ function cutOff(node: Node, parent: Element, text: string): string[] {
       ...(box === document.documentElement ? [] : [box.getBoundingClientRect()]),
       ...(isRoot ? [new DOMRect(0, 0, innerWidth, innerHeight)] : []),
     ]) {
-      const over = [around.left - ASIDE - left, right - around.right - ASIDE];
+      const over = [around.left - MAX_REACH_ASIDE - left, right - around.right - MAX_REACH_ASIDE];
       if (!scrolls && overflowY !== "auto" && overflowY !== "scroll")
-        over.push(around.top - ABOVE - top, bottom - around.bottom - ABOVE);
+        over.push(around.top - MAX_REACH_ABOVE - top, bottom - around.bottom - MAX_REACH_ABOVE);
       const by = Math.max(...over);
       if (by > 0)
         return [`cut off by ${Math.ceil(by)} pixels at ${box.tagName} ${box.className || box.id}: ${text}`];

@@ -38,7 +38,7 @@ type Patch = Partial<AppState>;
 
 // Made-up names contain no letters, so that `inspect` does not report them as untranslated.
 const BOUNDS = { min: [0, 0, 0], max: [1, 2, 3] } as ModelInfo["bounds"];
-const ONE = {
+const MEMBER = {
   ...memberOf(0, "01", 1234),
   joints: 4,
   painted: true,
@@ -58,12 +58,12 @@ const RIG: ModelInfo = {
   rigged: true,
   vrm: true,
   bounds: BOUNDS,
-  members: [ONE],
+  members: [MEMBER],
 };
-const SEVERAL: ModelInfo = {
+const TWO_MODELS: ModelInfo = {
   ...RIG,
   members: [
-    { ...ONE, options: { shown: false, rigid: ["material:1"], stays: ["node:2"] } },
+    { ...MEMBER, options: { shown: false, rigid: ["material:1"], stays: ["node:2"] } },
     { ...memberOf(1, "02"), parts: [], options: { shown: true, rigid: ["all"], stays: [] } },
     { ...memberOf(2, "03"), parts: [], options: { shown: true, rigid: [], stays: ["all"] } },
     { ...memberOf(3, "04"), parts: [], options: { shown: true, rigid: ["1", "2"], stays: ["3", "4"] } },
@@ -75,10 +75,15 @@ const CAGE: CageState = {
   radius: 0.1,
   info: { vertices: 80, edges: 200, faces: 122, quads: 80, triangles: 122, bounds: BOUNDS, notices: [] },
 };
-const INSIDE: readonly InnerElement[] = [{ point: 0 }, { line: [1, 2] }, { face: [3, 4, 5] }, { point: 6 }];
-const CONTROLLED: CageState = {
+const INNER_ELEMENTS: readonly InnerElement[] = [
+  { point: 0 },
+  { line: [1, 2] },
+  { face: [3, 4, 5] },
+  { point: 6 },
+];
+const CAGE_WITH_CONTROLS: CageState = {
   ...CAGE,
-  controls: { smooth: 2, inner: 7, elements: [...INSIDE], radius: null },
+  controls: { smooth: 2, inner: 7, elements: [...INNER_ELEMENTS], radius: null },
 };
 const NONE = {
   vertices: new Uint32Array(),
@@ -87,7 +92,7 @@ const NONE = {
   points: new Float32Array(),
   outside: new Uint32Array(),
 };
-const GOOD: Check = { problems: [], ...NONE };
+const PASSED_CHECK: Check = { problems: [], ...NONE };
 const checkOf = (mends: readonly (Mend | null)[], severity: "error" | "note", count: number): Check => ({
   problems: mends.map((fix, k) => ({ code: "model_outside", severity, message: `${k}.`, count, fix })),
   ...NONE,
@@ -110,8 +115,15 @@ const reportBy = (way: Partial<BindOptions>): BindReport =>
     outside_vertices: 2,
   });
 const REPORT = reportBy({});
-const EARLIER = [...solvers(32), { solver: "cg", preconditioner: "v_cycle" } as const].map(reportBy);
-const BOUND: Patch = { model: RIG, cage: CAGE, check: GOOD, bound: true, report: REPORT, steps: 1 };
+const EARLIER_REPORTS = [...solvers(32), { solver: "cg", preconditioner: "v_cycle" } as const].map(reportBy);
+const BOUND_STATE: Patch = {
+  model: RIG,
+  cage: CAGE,
+  check: PASSED_CHECK,
+  bound: true,
+  report: REPORT,
+  steps: 1,
+};
 const RUN = { ...INITIAL.bindOptions, solver: "cg" } as const;
 const selected = (count: number, last: number | null): AppState["selected"] => ({
   count,
@@ -121,10 +133,10 @@ const selected = (count: number, last: number | null): AppState["selected"] => (
 const of = <K extends keyof AppState>(key: K, values: readonly AppState[K][], also: Patch = {}): Patch[] =>
   values.map((value) => ({ ...also, [key]: value }) as Patch);
 
-/** For each step, changes of `BOUND` with which its panel shows as much as it can contain. */
+/** For each step, changes of `BOUND_STATE` with which its panel shows as much as it can contain. */
 const full = (): Record<AppState["step"], Patch> => ({
   model: {
-    model: SEVERAL,
+    model: TWO_MODELS,
     sample: "rat",
     painting: { id: 0, radius: 0.1, erase: false },
     works: [work("here")],
@@ -133,14 +145,14 @@ const full = (): Record<AppState["step"], Patch> => ({
   },
   cage: {
     check: checkOf(MENDS, "error", 2),
-    cage: { ...CONTROLLED, usable: false },
+    cage: { ...CAGE_WITH_CONTROLS, usable: false },
     editingRest: true,
     tools: { ...INITIAL.tools, element: "face" },
     placing: "line",
     cageProgress: 0.5,
   },
   bind: {
-    earlier: EARLIER,
+    earlier: EARLIER_REPORTS,
     appliedOptions: { ...INITIAL.bindOptions, grid: 32 },
     bindOptions: { ...RUN, method: "classic", preconditioner: "v_cycle" },
     lack: "NoAdapter",
@@ -158,8 +170,8 @@ const full = (): Record<AppState["step"], Patch> => ({
     legend: { low: 0, high: 1, logarithmic: false, map: "viridis", largest: null },
   },
   export: {
-    model: SEVERAL,
-    cage: CONTROLLED,
+    model: TWO_MODELS,
+    cage: CAGE_WITH_CONTROLS,
     poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }],
   },
 });
@@ -169,7 +181,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
   model: [
     { model: null, cage: null, bound: false },
     { works: [work("here"), work("nowhere")], lack: "NoWebGPU" },
-    { model: SEVERAL, sample: "rat", undo: T.did.grab, redo: T.did.pull },
+    { model: TWO_MODELS, sample: "rat", undo: T.did.grab, redo: T.did.pull },
     ...of("painting", [
       { id: 0, radius: 0.1, erase: false },
       { id: 0, radius: 0.1, erase: true },
@@ -194,8 +206,8 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { check: checkOf(MENDS, "error", 1), cage: { ...CAGE, usable: false }, bound: false },
     { check: checkOf([null], "note", 1) },
     { cage: { ...CAGE, info: { ...CAGE.info, vertices: 30 } } },
-    { cage: CONTROLLED, selected: selected(1, 81) },
-    ...of("placing", ["point", "line", "face"], { cage: CONTROLLED }),
+    { cage: CAGE_WITH_CONTROLS, selected: selected(1, 81) },
+    ...of("placing", ["point", "line", "face"], { cage: CAGE_WITH_CONTROLS }),
     ...(["vertex", "edge", "face"] as const).map((element) => ({
       tools: { ...INITIAL.tools, element },
       editingRest: true,
@@ -208,7 +220,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
   ],
   bind: [
     { bound: false, report: null },
-    { earlier: EARLIER, appliedOptions: { ...INITIAL.bindOptions, grid: 32 } },
+    { earlier: EARLIER_REPORTS, appliedOptions: { ...INITIAL.bindOptions, grid: 32 } },
     { bindOptions: { ...INITIAL.bindOptions, method: "classic", solver: "jacobi", backend: "gpu" } },
     { bindOptions: { ...INITIAL.bindOptions, method: "classic" } },
     { bindOptions: { ...INITIAL.bindOptions, solver: "jacobi" } },
@@ -234,7 +246,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     {},
     { bound: false, report: null },
     { selected: selected(1, 1), pins: [{ triangle: 0, bary: [1, 0, 0] }], pullWhole: true },
-    { selected: selected(1, 81), cage: CONTROLLED },
+    { selected: selected(1, 81), cage: CAGE_WITH_CONTROLS },
     {
       selected: selected(3, 1),
       tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
@@ -292,13 +304,13 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
         }),
       ),
     ),
-    { scene: { ...INITIAL.scene, compare: ["harmonic", "mean_value", "green"] }, cage: CONTROLLED },
+    { scene: { ...INITIAL.scene, compare: ["harmonic", "mean_value", "green"] }, cage: CAGE_WITH_CONTROLS },
   ],
   export: [
     { model: null, cage: null, bound: false },
     { bound: false, report: null },
-    { cage: CONTROLLED },
-    { model: SEVERAL, poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }] },
+    { cage: CAGE_WITH_CONTROLS },
+    { model: TWO_MODELS, poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }] },
     { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
     { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true } },
     { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true, compress: "meshopt" } },
@@ -313,7 +325,7 @@ const work = (where: "here" | "elsewhere" | "nowhere") => ({
   where,
   stopped: true as const,
 });
-/** States that show a dialog, as changes of `BOUND`. */
+/** States that show a dialog, as changes of `BOUND_STATE`. */
 const DIALOGS: readonly Patch[] = [
   { sheetOpen: true },
   { waysOpen: true, lack: "NoDevice" },
@@ -351,7 +363,7 @@ async function start(): Promise<void> {
   const show = (patch: Patch) => {
     legend = patch.legend ?? null;
     const samples = Object.keys(T.samples);
-    store.set({ ...INITIAL, ...BOUND, adapter: "1", samples, ...patch, legend });
+    store.set({ ...INITIAL, ...BOUND_STATE, adapter: "1", samples, ...patch, legend });
   };
 
   /** Waits until components are rendered (in microtasks) and effects have run (in a task). */

@@ -2,7 +2,7 @@
 
 import { named } from "./session/client";
 
-const MOST = 0xffffffff;
+const MAX_INDEX = 0xffffffff;
 
 function wrong(message: string): Error {
   return named("Error", message);
@@ -31,7 +31,7 @@ export function trianglesOf(name: string, given: ArrayLike<number>): Uint32Array
 export function indicesOf(name: string, given: ArrayLike<number>): Uint32Array {
   lengthOf(name, given);
   if (given instanceof Uint32Array) return given;
-  const wrongOne = Array.from(given).findIndex((x) => !Number.isInteger(x) || x < 0 || x > MOST);
+  const wrongOne = Array.from(given).findIndex((x) => !Number.isInteger(x) || x < 0 || x > MAX_INDEX);
   if (wrongOne >= 0) {
     throw wrong(`${name} has ${given[wrongOne]} at ${wrongOne}; it must contain non-negative integers`);
   }

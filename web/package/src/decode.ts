@@ -12,7 +12,7 @@ import { fetchPart } from "./session/parts";
 const GLB = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
 /** Deviation from 1 up to which the sum of a vertex's weights is attributed to rounding and is not corrected. */
-const ROUNDED = 1e-6;
+const SUM_TOLERANCE = 1e-6;
 
 /** Decompresses a GLB or glTF to a plain GLB. */
 export async function decompress(
@@ -58,7 +58,7 @@ function normaliseWeights(document: Document): void {
     for (let v = 0; v < (all[0]?.getCount() ?? 0); v += 1) {
       const weights = all.map((set) => set.getElement(v, []));
       const sum = weights.flat().reduce((a, b) => a + b, 0);
-      if (!(sum > 0) || Math.abs(sum - 1) <= ROUNDED) continue;
+      if (!(sum > 0) || Math.abs(sum - 1) <= SUM_TOLERANCE) continue;
       for (const [k, set] of all.entries()) {
         set.setElement(v, weights[k]?.map((weight) => weight / sum) ?? []);
       }

@@ -6,12 +6,12 @@
 import { poseOf } from "./check";
 import { CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
 import { attachPointer } from "./element/pointer";
-import { openView, type Ready, sceneOf, type View } from "./element/view";
+import { type OpenedModel, openView, sceneOf, type View } from "./element/view";
 import { named } from "./session/client";
-import type { Bound, Cage, File, NameOption } from "./types";
+import type { BindResult, Cage, File, NameOption } from "./types";
 
 /** Maximum device pixel ratio. A ratio of 3 takes 2.25 times as many pixels as 2, for a barely visible difference. */
-const MOST_SHARP = 2;
+const MAX_PIXEL_RATIO = 2;
 /** Default number of cells along the cage's longest side. */
 const GRID = 64;
 
@@ -33,7 +33,7 @@ export interface Source extends NameOption {
   readonly file: File;
   readonly cage?: Cage | undefined;
   /** Result of `bind` for the model and `cage`. */
-  readonly bound?: Bound | undefined;
+  readonly bound?: BindResult | undefined;
 }
 
 // Servers have no HTMLElement. They can import this module, but it defines no element there.
@@ -47,7 +47,7 @@ export class CageDeformer extends Base {
   #shown: View | undefined;
   /** Number of calls of `#open` and `#close`. A result that belongs to an earlier call is ignored. */
   #asked = 0;
-  #bound: Promise<Ready> | undefined;
+  #bound: Promise<OpenedModel> | undefined;
   /** The argument of `show`, until `src` changes. */
   #source: Source | undefined;
   #canvas: HTMLCanvasElement | undefined;
@@ -186,7 +186,7 @@ export class CageDeformer extends Base {
     );
   }
 
-  async #show(source: Source | string, asked: number): Promise<Ready> {
+  async #show(source: Source | string, asked: number): Promise<OpenedModel> {
     this.#say("Opening");
     const number = (name: string, usual: number) => Number(this.getAttribute(name) ?? usual);
     const given = typeof source === "string" ? download(new URL(source, this.baseURI)) : source;
@@ -240,7 +240,7 @@ export class CageDeformer extends Base {
   #resize(): void {
     const { clientWidth, clientHeight } = this;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.#shown?.engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
+    this.#shown?.engine.resize(clientWidth, clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio));
   }
 
   #say(words: string): void {

@@ -7,13 +7,13 @@ import { loadPart } from "./session/parts";
 import type { Api } from "./types";
 
 /** Maximum number of parallel workers. A bind keeps one core busy, and each worker takes memory. */
-const MOST = 4;
+const MAX_WORKERS = 4;
 
 const api = /* @__PURE__ */ createApi(async () => {
   const { WEBGPU } = await loadPart(import("./session/webgpu"));
   const module = await compile(WEBGPU.wasm);
   await WEBGPU.pkg.default({ module_or_path: module });
-  const most = Math.min(MOST, navigator.hardwareConcurrency);
+  const most = Math.min(MAX_WORKERS, navigator.hardwareConcurrency);
   const openClient = () => createClient(module, WEBGPU.openWorker);
   return { pkg: WEBGPU.pkg, openClient, most, hasGpu: "gpu" in navigator };
 });

@@ -76,7 +76,7 @@ export interface Weights {
   readonly controls: number;
 }
 
-export interface Bound {
+export interface BindResult {
   readonly weights: Weights;
   /** The report that `cagework bind --report` writes. */
   readonly report: BindReport;
@@ -133,7 +133,7 @@ export type FieldCallOptions = BindCallOptions & { readonly cells?: number | und
 
 /** The functions that index.ts exports and documents. */
 export interface Api {
-  bind(points: ArrayLike<number>, cage: Cage, options?: BindCallOptions): Promise<Bound>;
+  bind(points: ArrayLike<number>, cage: Cage, options?: BindCallOptions): Promise<BindResult>;
   generateCage(mesh: Mesh, options?: CageCallOptions): Promise<GeneratedCage>;
   deform(weights: Weights, posed: ArrayLike<number>): Promise<Float32Array>;
   field(cage: Cage, posed: ArrayLike<number>, options?: FieldCallOptions): Promise<Field>;

@@ -3,9 +3,9 @@
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { type Browser, test as base, chromium, expect, type Page } from "@playwright/test";
-import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
+import { WEBGL_LAUNCH, WEBGPU_LAUNCH } from "../../e2e/browser";
 import type { CageDeformer } from "../src/element";
-import type { Bound } from "../src/types";
+import type { BindResult } from "../src/types";
 
 /** Folder of the screenshots that the tests save for visual inspection. */
 const SCREENS = join(import.meta.dirname, "../../../target/screens");
@@ -17,7 +17,7 @@ interface Example {
   camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
   posed: { array: Float32Array };
   position: { array: Float32Array };
-  weights: Bound["weights"];
+  weights: BindResult["weights"];
 }
 
 interface Browsers {
@@ -28,9 +28,9 @@ interface Browsers {
 /** Opens pages, and fails if one writes an error or a warning to its console. */
 const test = base.extend<{ visit: (how: keyof Browsers, address: string) => Promise<Page> }, Browsers>({
   // biome-ignore lint/correctness/noEmptyPattern: Playwright reads what a fixture needs from its pattern.
-  webgpu: [async ({}, use) => opened(WITH_WEBGPU, use), { scope: "worker" }],
+  webgpu: [async ({}, use) => opened(WEBGPU_LAUNCH, use), { scope: "worker" }],
   // biome-ignore lint/correctness/noEmptyPattern: as above.
-  webgl: [async ({}, use) => opened(WITH_WEBGL, use), { scope: "worker" }],
+  webgl: [async ({}, use) => opened(WEBGL_LAUNCH, use), { scope: "worker" }],
   visit: async ({ baseURL, viewport, webgpu, webgl }, use) => {
     const complaints: string[] = [];
     const pages: Page[] = [];
@@ -51,7 +51,7 @@ const test = base.extend<{ visit: (how: keyof Browsers, address: string) => Prom
   },
 });
 
-async function opened(options: typeof WITH_WEBGL, use: (browser: Browser) => Promise<void>): Promise<void> {
+async function opened(options: typeof WEBGL_LAUNCH, use: (browser: Browser) => Promise<void>): Promise<void> {
   const browser = await chromium.launch(options);
   await use(browser);
   await browser.close();

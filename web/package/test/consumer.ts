@@ -1,12 +1,12 @@
 /** Code of a user of the package. The tests compile it against the published types. */
 
-import { type Bound, bind, deform, generateCage, reshape } from "@cagework/core";
+import { type BindResult, bind, deform, generateCage, reshape } from "@cagework/core";
 import type { CageDeformer } from "@cagework/core/element";
 import { CageDeformer as Follower, type Geometry } from "@cagework/core/three";
 
 export async function follow(glb: ArrayBuffer, positions: number[], triangles: Uint16Array): Promise<number> {
   const cage = await generateCage({ positions, triangles }, { target: 60, quads: false });
-  const { weights, report }: Bound = await bind(positions, cage, {
+  const { weights, report }: BindResult = await bind(positions, cage, {
     grid: 32,
     signal: AbortSignal.timeout(1000),
   });

@@ -11,7 +11,7 @@ import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 /** Number of earlier reports kept for comparing methods. */
-const EARLIER = 4;
+const MAX_EARLIER_REPORTS = 4;
 
 export function createBind(ctx: Context) {
   const { store } = ctx;
@@ -32,7 +32,7 @@ export function createBind(ctx: Context) {
     const { report: last, earlier } = store.get();
     const before = last && last !== coarse ? [last, ...earlier] : earlier;
     if (pass === "coarse") coarse = report;
-    store.set({ report, earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER) });
+    store.set({ report, earlier: before.filter((e) => !sameWay(e, report)).slice(0, MAX_EARLIER_REPORTS) });
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
     // Colours of weights or errors may have been chosen before there were weights.
@@ -171,11 +171,11 @@ export function sameWay(a: BindReport, b: BindReport): boolean {
 }
 
 /** Maximum number of points of a curve. A longer curve loses every second point; the plot is only 328 pixels wide. */
-const LONGEST = 600;
+const MAX_CURVE_POINTS = 600;
 
 /** Appends a point to a curve, unless its delta is not positive or its iteration equals that of the last point. */
 export function grown(curve: BindRun["curve"], iteration: number, delta: number | null): BindRun["curve"] {
   if (delta === null || !(delta > 0) || curve.at(-1)?.[0] === iteration) return curve;
   const next = [...curve, [iteration, delta] as const];
-  return next.length > LONGEST ? next.filter((_, i) => i % 2 === 0 || i === next.length - 1) : next;
+  return next.length > MAX_CURVE_POINTS ? next.filter((_, i) => i % 2 === 0 || i === next.length - 1) : next;
 }

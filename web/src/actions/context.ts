@@ -12,7 +12,7 @@ export interface Fix {
   run: () => void;
 }
 
-export interface Tell {
+export interface Messages {
   /** Shows a short message that disappears by itself. */
   say(text: Message, ...fixes: Fix[]): void;
   /** Shows an error that stays until it is closed or fixed. */
@@ -26,7 +26,7 @@ export interface Context {
   readonly engine: () => Engine;
   readonly store: Store;
   readonly queue: Queue;
-  readonly tell: Tell;
+  readonly tell: Messages;
   /** Rectangle of the view in the window. */
   readonly viewport: () => DOMRect;
   /** Returns the button that runs the fix of an error. */
@@ -49,7 +49,7 @@ export async function attempt(
 }
 
 /** Number of vertices above which opening a file asks the user first, because the browser may run out of memory. */
-const LARGE = 2_000_000;
+const MAX_UNASKED_VERTICES = 2_000_000;
 
 /**
  * Blocks the page until a job is done, and shows its progress with a cancel button. Asks for confirmation if the result
@@ -71,7 +71,7 @@ export async function waitFor<T extends object>(
   try {
     const read = await job.done;
     const { vertices = 0 } = read as Partial<ReadFile>;
-    if (vertices > LARGE) {
+    if (vertices > MAX_UNASKED_VERTICES) {
       await new Promise<void>((goOn, giveUp) => {
         cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
         const busyStep = T.opening.large(vertices);

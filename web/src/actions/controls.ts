@@ -11,7 +11,7 @@ import type { Edit } from "./edit";
 export type Place = readonly [x: number, y: number, z: number];
 
 /** Maximum distance between two clicks, CSS pixels, at which the second click ends the bone. */
-const SAME_PX = 6;
+const MAX_CLICK_DISTANCE_PX = 6;
 
 export function createControls(
   ctx: Context,
@@ -73,7 +73,7 @@ export function createControls(
       if (!placing || !store.get().cage?.usable) return;
       if (placing === "point") actions.add("point", [middle(x, y)]);
       else if (placing === "face") actions.addSheet(middle(x, y));
-      else if (last && Math.hypot(x - last.x, y - last.y) < SAME_PX) {
+      else if (last && Math.hypot(x - last.x, y - last.y) < MAX_CLICK_DISTANCE_PX) {
         actions.finish();
         return;
       } else {

@@ -38,7 +38,7 @@ const BETWEEN_MS = 250;
 const OCTETS = "application/octet-stream";
 
 /** Maximum length of a picture's longer side, pixels. */
-const LONGEST_SIDE = 8192;
+const MAX_PICTURE_SIDE = 8192;
 
 export function createExports(ctx: Context, project: Project, pull: Pick<Pulling, "released">) {
   let scale = 2;
@@ -113,7 +113,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
 
   const picture = () => {
     const { width, height } = ctx.viewport();
-    const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
+    const fit = Math.min(scale, MAX_PICTURE_SIDE / Math.max(width, height, 1));
     return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), alone);
   };
 

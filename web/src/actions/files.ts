@@ -37,10 +37,10 @@ export interface FileNeeds {
  * Limit on the estimated work of the automatic bind of a project, in updates of one value at a grid node. This many
  * take about 10 s on one processor core; the options of a project file could request hours of work.
  */
-const MOST_UPDATES = 1e10;
+const MAX_UPDATES = 1e10;
 
 /** What is opened together with a model: further models, a cage, and bind options. */
-interface Along {
+interface Companions {
   readonly others: readonly ReadResult[];
   readonly cageFiles: readonly NamedFile[] | undefined;
   readonly signal: AbortSignal;
@@ -51,7 +51,7 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
   const { store } = ctx;
   let prepared: Promise<void> = Promise.resolve();
 
-  const take = async (opened: OpenedFile, sample: string | null, along: Partial<Along> = {}) => {
+  const take = async (opened: OpenedFile, sample: string | null, along: Partial<Companions> = {}) => {
     const { others = [], cageFiles, signal, bind } = along;
     // A cage generation or bind in progress is for the previous model.
     for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
@@ -103,15 +103,15 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
   };
 
   /**
-   * If a bind with the options of a project would exceed `MOST_UPDATES`, replaces the options by the defaults. Keeps
+   * If a bind with the options of a project would exceed `MAX_UPDATES`, replaces the options by the defaults. Keeps
    * the memory limit.
    */
   const limitWork = () => {
     const { bindOptions, model } = store.get();
     const updates = ctx.engine().estimateUpdates(bindOptions);
-    if (updates <= MOST_UPDATES) return;
+    if (updates <= MAX_UPDATES) return;
     store.set({ bindOptions: { ...BIND_DEFAULTS, memory_limit: bindOptions.memory_limit } });
-    ctx.tell.say(T.opening.longBind(model?.name ?? "", updates / (MOST_UPDATES / 10)));
+    ctx.tell.say(T.opening.longBind(model?.name ?? "", updates / (MAX_UPDATES / 10)));
   };
 
   /**
@@ -151,7 +151,11 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
     });
 
   /** Saves the open work, then opens another model. */
-  const replace = async (open: () => Promise<OpenedFile>, sample: string | null, along: Partial<Along>) => {
+  const replace = async (
+    open: () => Promise<OpenedFile>,
+    sample: string | null,
+    along: Partial<Companions>,
+  ) => {
     needs.settle();
     needs.overtaken(sample);
     await needs.works.flush();

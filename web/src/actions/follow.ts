@@ -14,7 +14,7 @@ import type { View } from "./view";
 /** Pause after the last change before binding, ms. */
 const PAUSE_MS = 150;
 /** Maximum number of cells along the cage's longest side with which the page binds automatically. */
-const FINEST = 128;
+const MAX_AUTOMATIC_GRID = 128;
 
 export interface Followers {
   bind: Pick<BindActions, "covers" | "start">;
@@ -44,7 +44,8 @@ export function followCage(ctx: Context, { bind, edit, view, pull }: Followers):
       const options = optionsInUse(store.get());
       // During a gesture, try again after a pause. If the gesture changes nothing, its end does not call `bindSoon`.
       if (edit.active()) bindSoon(PAUSE_MS);
-      else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
+      else if (cage?.usable && !bind.covers() && options.grid <= MAX_AUTOMATIC_GRID)
+        void bind.start(true, options);
     }, pause);
   };
   let isFirst = true;

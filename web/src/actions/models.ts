@@ -10,7 +10,7 @@ import type { Edit } from "./edit";
 import { modelsOf, type ReadResult, readModels } from "./read";
 
 /** Treatment of a part that does not follow the cage: it keeps its shape, or it stays in place. */
-export type How = "rigid" | "stays";
+export type Treatment = "rigid" | "stays";
 
 export interface ModelNeeds {
   readonly cage: Pick<CageActions, "load" | "regenerate">;
@@ -118,7 +118,7 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
      * Makes a part keep its shape or stay in place. If it already does, makes it follow the cage again. "all" is the
      * whole model.
      */
-    part(id: number, name: string, how: How) {
+    part(id: number, name: string, how: Treatment) {
       const member = memberOf(id);
       if (!member) return;
       const { options } = member;

@@ -8,11 +8,11 @@ import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 
 /** Distance of a grabbed point from its target above which the target is shown, as a fraction of the model's size. */
-const OFF = 0.01;
+const MIN_SHOWN_DISTANCE = 0.01;
 /** Maximum number of frames that are solved after the pointer is released. */
-const SETTLING = 30;
+const MAX_SETTLING_FRAMES = 30;
 /** Reach, as a fraction of the model's size, above which the pull moves the whole model. */
-const WIDEST = SLIDERS.reach.max / 2;
+const MAX_LOCAL_REACH = SLIDERS.reach.max / 2;
 /** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
 const NUDGE_PAUSE_MS = 600;
 
@@ -66,7 +66,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       grabs: drag.grabs.length,
       options: {
         reach:
-          pullWhole || (drag.reach ?? 0) > WIDEST
+          pullWhole || (drag.reach ?? 0) > MAX_LOCAL_REACH
             ? "whole"
             : drag.reach === null
               ? "automatic"
@@ -97,11 +97,11 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       if (current !== drag) return;
       engine().setCagePositions(cage);
       const [first] = drag.grabs;
-      if (typeof first === "object") show(first, error > OFF ? drag.to : undefined);
+      if (typeof first === "object") show(first, error > MIN_SHOWN_DISTANCE ? drag.to : undefined);
       answered = asked;
       settling += drag.letGo ? 1 : 0;
       const isDone = settled && answered === drag.wanted;
-      if (drag.letGo && (isDone || settling > SETTLING)) {
+      if (drag.letGo && (isDone || settling > MAX_SETTLING_FRAMES)) {
         finish(drag);
         return;
       }
@@ -213,7 +213,7 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       store.set({ gesture: null });
     },
     active: (): boolean => current !== undefined && !current.letGo,
-    /** If the pointer was released, waits until the pull has ended, at most `SETTLING` frames later. */
+    /** If the pointer was released, waits until the pull has ended, at most `MAX_SETTLING_FRAMES` frames later. */
     released: (): Promise<unknown> => (current?.letGo ? ended : Promise.resolve()),
     /** Scales how far the drag reaches along the surface. */
     reach(factor: number) {

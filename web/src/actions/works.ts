@@ -12,7 +12,7 @@ import { attempt, type Context } from "./context";
 /** Pause after the last change before the work is saved, ms. */
 const PAUSE_MS = 1500;
 /** Size above which projects are not saved automatically, bytes. Each save would cause a noticeable pause. */
-const LARGEST = 200e6;
+const MAX_SAVED_BYTES = 200e6;
 
 export interface WorkNeeds {
   /** The project file of the open work. */
@@ -52,9 +52,9 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     try {
       const when = Date.now();
       const file = new Blob([write() as BlobPart]);
-      if (file.size > LARGEST) {
+      if (file.size > MAX_SAVED_BYTES) {
         hasFailed = true;
-        ctx.tell.say(T.works.large(name, file.size, LARGEST));
+        ctx.tell.say(T.works.large(name, file.size, MAX_SAVED_BYTES));
         return;
       }
       if (!current) {

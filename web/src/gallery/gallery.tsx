@@ -8,7 +8,7 @@ import { type Message, messageOf, sentence } from "../strings";
 import { Button, Say } from "../ui/controls";
 import { GALLERY, loadGallery, T } from "../words";
 import links from "./links.json";
-import { type Live, openLive } from "./live";
+import { type LiveExample, openLive } from "./live";
 
 type Id = keyof typeof GALLERY.examples;
 const LINKS: Readonly<Record<Id, string>> = links;
@@ -17,7 +17,7 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 /** Share of an example that must be in view before it is opened. */
-const IN_VIEW = 0.3;
+const MIN_VISIBLE_SHARE = 0.3;
 
 /**
  * Settles when the examples requested so far are open. They are opened one at a time: opening several at once would not
@@ -36,7 +36,7 @@ function theme(): "light" | "dark" {
 function Example({ id }: { id: Id }) {
   const { title, text } = GALLERY.examples[id];
   const view = useRef<HTMLDivElement>(null);
-  const live = useRef<Live | undefined>(undefined);
+  const live = useRef<LiveExample | undefined>(undefined);
   const [isLive, setIsLive] = useState(false);
   const [failure, setFailure] = useState<Message>();
 
@@ -70,7 +70,7 @@ function Example({ id }: { id: Id }) {
         else if (!isOpened) inTurn(open);
         isOpened ||= entry?.isIntersecting === true;
       },
-      { threshold: IN_VIEW },
+      { threshold: MIN_VISIBLE_SHARE },
     );
     watch.observe(view.current);
     dark.addEventListener("change", () => live.current?.dress(theme()));

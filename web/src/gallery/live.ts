@@ -10,9 +10,9 @@ import type { ShareLink } from "../share";
 const MOVE_MS = 1800;
 const CLIP_MS = 4000;
 /** Maximum device pixel ratio. It is low, because the gallery draws six views. */
-const MOST_SHARP = 1.5;
+const MAX_PIXEL_RATIO = 1.5;
 
-export type Live = Awaited<ReturnType<typeof openLive>>;
+export type LiveExample = Awaited<ReturnType<typeof openLive>>;
 
 /** Opens the link in `holder`, bound and in its pose. `lost` is called if the GPU device is lost. */
 export async function openLive(
@@ -61,7 +61,7 @@ export async function openLive(
   const resize = () => {
     const { clientWidth, clientHeight } = holder;
     if (clientWidth > 0 && clientHeight > 0)
-      engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
+      engine.resize(clientWidth, clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio));
   };
   const dress = (theme: SceneOptions["theme"]) =>
     engine.setScene({ ...SCENE_DEFAULTS, ...seen?.scene, theme });

@@ -5,7 +5,7 @@ import type { NamedFile } from "../contract";
 import type { DropPlace } from "../state";
 
 /** Maximum number of files that are read from dropped folders, in case a whole disk is dropped. */
-const MOST_FILES = 2000;
+const MAX_FILES = 2000;
 
 export function attachDrop(panel: HTMLElement, app: App): void {
   const { store } = app;
@@ -56,7 +56,7 @@ async function collect(data: DataTransfer): Promise<NamedFile[]> {
 }
 
 async function walk(entry: FileSystemEntry, folder: string, into: NamedFile[]): Promise<void> {
-  if (into.length >= MOST_FILES || entry.name.startsWith(".")) return;
+  if (into.length >= MAX_FILES || entry.name.startsWith(".")) return;
   const path = folder === "" ? entry.name : `${folder}/${entry.name}`;
   if (isFile(entry)) {
     const file = await new Promise<File>((resolve, reject) => entry.file(resolve, reject));

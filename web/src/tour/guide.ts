@@ -22,10 +22,10 @@ export interface GuideNeeds {
 }
 
 /** Keys of the settings that are restored when the tour ends. */
-const KEPT = ["step", "bindOptions", "seeOpen", "slice"] as const;
+const RESTORED_KEYS = ["step", "bindOptions", "seeOpen", "slice"] as const;
 
-interface Before {
-  readonly settings: Pick<AppState, (typeof KEPT)[number]>;
+interface StateBeforeTour {
+  readonly settings: Pick<AppState, (typeof RESTORED_KEYS)[number]>;
   readonly scene: AppState["scene"];
   readonly work: AppState["works"][number] | undefined;
   readonly sample: string | null;
@@ -35,7 +35,7 @@ interface Before {
 
 export function createGuide(ctx: Context, { bind, edit, view, files, works }: GuideNeeds) {
   const { store } = ctx;
-  let before: Before | undefined;
+  let before: StateBeforeTour | undefined;
   /** Incremented whenever other binds or another stop start. Asynchronous work with an older value is ignored. */
   let turn = 0;
   /** The sample that the tour has opened, or that was open and unmodified at its start. */
@@ -48,7 +48,7 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     if (tour) store.set({ tour: { ...tour, ...patch } });
   };
 
-  const putBack = ({ settings, scene }: Before) => {
+  const putBack = ({ settings, scene }: StateBeforeTour) => {
     const { theme } = store.get().scene;
     store.set(settings);
     view.scene({ ...scene, theme, compare: SCENE_DEFAULTS.compare, slice: "off" });
@@ -139,7 +139,9 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
         // Save pending changes of the work before the tour replaces it.
         await works.flush();
         const state = store.get();
-        const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
+        const settings = Object.fromEntries(
+          RESTORED_KEYS.map((key) => [key, state[key]]),
+        ) as StateBeforeTour["settings"];
         const work = state.works.find(({ where }) => where === "here");
         before = { settings, scene: state.scene, work, sample: state.sample, link: location.hash };
         const isUntouched = state.sampleCage && !state.posed && state.undo === null && !work;

@@ -11,15 +11,15 @@ import { choicesOf, Segments, Slider, Toggle } from "./controls";
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
  * resolution.
  */
-const COARSEST = SLIDERS.voxels.min;
+const MIN_VOXELS = SLIDERS.voxels.min;
 /** Width below which gaps of the model are closed, voxels. */
 const GAP_VOXELS = 3;
 
 /** The slider for closeness is logarithmic in `detail`: 0 is the coarsest detail, 1 the finest. */
 const { min: FINEST_DETAIL, max: COARSEST_DETAIL } = SLIDERS.detail;
-const FINER = COARSEST_DETAIL / FINEST_DETAIL;
-const detailOf = (closeness: number) => COARSEST_DETAIL * FINER ** -closeness;
-const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Math.log(FINER);
+const DETAIL_RATIO = COARSEST_DETAIL / FINEST_DETAIL;
+const detailOf = (closeness: number) => COARSEST_DETAIL * DETAIL_RATIO ** -closeness;
+const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Math.log(DETAIL_RATIO);
 
 export function Automatic({ app }: { app: App }) {
   const { cageOptions: options, cageClip, model } = app.store.get();
@@ -67,10 +67,10 @@ export function Automatic({ app }: { app: App }) {
         label={T.cage.gaps}
         {...SLIDERS.voxels}
         format={(value) =>
-          value === COARSEST ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
+          value === MIN_VOXELS ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
         }
-        value={options.voxels || COARSEST}
-        onInput={(voxels) => change({ voxels: voxels === COARSEST ? 0 : voxels })}
+        value={options.voxels || MIN_VOXELS}
+        onInput={(voxels) => change({ voxels: voxels === MIN_VOXELS ? 0 : voxels })}
       />
       {named.length > 0 && (
         <label class="stack tight">

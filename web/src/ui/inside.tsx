@@ -10,7 +10,7 @@ import { Button, Section, Segments, Slider, Toggle } from "./controls";
 import type { IconName } from "./icons";
 
 /** Default number of subdivision steps. More steps change the surface little. */
-const USUAL_STEPS = 2;
+const DEFAULT_STEPS = 2;
 const STEPS = ["1", "2", "3"] as const;
 const KINDS: readonly (readonly [InnerKind, IconName])[] = [
   ["point", "vertex"],
@@ -26,7 +26,7 @@ export function Smooth({ app, cage }: { app: App; cage: CageState }) {
         label={T.cage.smoothOn}
         sentence={T.cage.smoothSentence}
         on={smooth > 0}
-        onChange={(on) => app.cage.setSmooth(on ? USUAL_STEPS : 0)}
+        onChange={(on) => app.cage.setSmooth(on ? DEFAULT_STEPS : 0)}
       />
       {smooth > 0 && (
         <Segments

@@ -1,6 +1,6 @@
 /** The models that share the cage, and how their parts follow it. */
 
-import type { How } from "../actions/models";
+import type { Treatment } from "../actions/models";
 import type { App } from "../app";
 import type { MemberInfo, ModelInfo } from "../contract";
 import { SLIDERS } from "../defaults";
@@ -11,7 +11,7 @@ import { Icon, type IconName } from "./icons";
 import { useTouch } from "./touch";
 
 const ALL = "all";
-const WAYS: readonly (readonly [How, IconName])[] = [
+const WAYS: readonly (readonly [Treatment, IconName])[] = [
   ["rigid", "rigid"],
   ["stays", "stays"],
 ];

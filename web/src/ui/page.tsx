@@ -5,7 +5,7 @@ import { type FunctionComponent, render } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { attempt } from "../actions/context";
 import type { App } from "../app";
-import type { Lack } from "../contract";
+import type { WebGpuFault } from "../contract";
 import { loadSheet, T } from "../words";
 import { Bar } from "./bar";
 import { Hover } from "./hover";
@@ -92,7 +92,7 @@ function Dialogs({ app }: { app: App }) {
   );
 }
 
-export function mountUnsupported(lack: Lack): void {
+export function mountUnsupported(lack: WebGpuFault): void {
   document.body.replaceChildren();
   render(<Unsupported lack={lack} />, document.body);
 }

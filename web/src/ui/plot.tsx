@@ -20,17 +20,17 @@ export const KINDS = ["now", "before", "earlier"] as const;
  * If the longest curve has more than this many times the iterations of the shortest, the horizontal axis is
  * logarithmic. On a linear axis the short curve would look like a vertical line.
  */
-const FAR_APART = 20;
+const MIN_LENGTH_RATIO = 20;
 
 const WIDTH = 328;
 const HEIGHT = 168;
-const LEFT = 38;
-const RIGHT = 8;
-const TOP = 8;
-const BOTTOM = 26;
+const LEFT_MARGIN = 38;
+const RIGHT_MARGIN = 8;
+const TOP_MARGIN = 8;
+const BOTTOM_MARGIN = 26;
 /** Height of a text line, and width reserved for a letter, with or without accents, in units of the `viewBox`. */
 const LABEL = 11;
-const LETTER = 5.8;
+const LETTER_WIDTH = 5.8;
 
 export interface Scale {
   lowest: number;
@@ -57,7 +57,7 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
     lowest,
     highest: Math.max(highest, lowest + 1),
     last,
-    logarithmic: last > FAR_APART * Math.min(...lasts),
+    logarithmic: last > MIN_LENGTH_RATIO * Math.min(...lasts),
   };
 }
 
@@ -69,16 +69,18 @@ export type Place = readonly [x: number, y: number];
  * threshold's line, which is at height `at`, and returns the first that no curve crosses, or else the first of all.
  */
 export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
-  const right = WIDTH - RIGHT - 4 - width;
-  const places = [LEFT + 4, right, (LEFT + right) / 2].flatMap((x) =>
-    [at + LABEL, at - 4].filter((y) => y <= HEIGHT - BOTTOM && y >= TOP + LABEL).map((y) => ({ x, y })),
+  const right = WIDTH - RIGHT_MARGIN - 4 - width;
+  const places = [LEFT_MARGIN + 4, right, (LEFT_MARGIN + right) / 2].flatMap((x) =>
+    [at + LABEL, at - 4]
+      .filter((y) => y <= HEIGHT - BOTTOM_MARGIN && y >= TOP_MARGIN + LABEL)
+      .map((y) => ({ x, y })),
   );
   const isFree = ({ x, y }: { x: number; y: number }) =>
     lines.every((line) => {
       const heights = heightsBetween(line, x - 3, x + width + 3);
       return heights.every((one) => one > y + 4) || heights.every((one) => one < y - LABEL);
     });
-  return places.find(isFree) ?? places[0] ?? { x: LEFT + 4, y: at - 4 };
+  return places.find(isFree) ?? places[0] ?? { x: LEFT_MARGIN + 4, y: at - 4 };
 }
 
 /** Finds the heights of a polyline between two horizontal positions: at its corners and at both positions. */
@@ -96,10 +98,10 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   const { lowest, highest, last, logarithmic } = scaleOf(curves, tau);
   const along = (iteration: number) =>
     logarithmic ? Math.log(Math.max(1, iteration)) / Math.log(last) : iteration / last;
-  const x = (iteration: number) => LEFT + along(iteration) * (WIDTH - LEFT - RIGHT);
+  const x = (iteration: number) => LEFT_MARGIN + along(iteration) * (WIDTH - LEFT_MARGIN - RIGHT_MARGIN);
   const y = (delta: number) => {
     const share = (Math.log10(Math.max(delta, 1e-30)) - lowest) / (highest - lowest);
-    return HEIGHT - BOTTOM - Math.min(1, Math.max(0, share)) * (HEIGHT - TOP - BOTTOM);
+    return HEIGHT - BOTTOM_MARGIN - Math.min(1, Math.max(0, share)) * (HEIGHT - TOP_MARGIN - BOTTOM_MARGIN);
   };
   const stride = Math.ceil((highest - lowest) / 5);
   const powers = Array.from(
@@ -108,9 +110,9 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   );
   const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
   const bottom = HEIGHT - 8;
-  const middle = (LEFT + WIDTH - RIGHT) / 2;
+  const middle = (LEFT_MARGIN + WIDTH - RIGHT_MARGIN) / 2;
   const lines = curves.map(({ points }) => points.map(([i, delta]): Place => [x(i), y(delta)]));
-  const label = placeLabel(lines, y(tau), T.bind.doneBelow.length * LETTER);
+  const label = placeLabel(lines, y(tau), T.bind.doneBelow.length * LETTER_WIDTH);
   return (
     <svg
       viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
@@ -120,12 +122,18 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
     >
       {powers.map((power) => (
         <g key={power}>
-          <line x1={LEFT} x2={WIDTH - RIGHT} y1={y(10 ** power)} y2={y(10 ** power)} class="grid" />
-          <Label x={LEFT - 6} y={y(10 ** power) + 3.5} text={`1e${power}`} anchor="end" />
+          <line
+            x1={LEFT_MARGIN}
+            x2={WIDTH - RIGHT_MARGIN}
+            y1={y(10 ** power)}
+            y2={y(10 ** power)}
+            class="grid"
+          />
+          <Label x={LEFT_MARGIN - 6} y={y(10 ** power) + 3.5} text={`1e${power}`} anchor="end" />
         </g>
       ))}
-      <Label x={LEFT} y={bottom} text={logarithmic ? "1" : "0"} anchor="middle" />
-      <Label x={WIDTH - RIGHT} y={bottom} text={count(last)} anchor="end" />
+      <Label x={LEFT_MARGIN} y={bottom} text={logarithmic ? "1" : "0"} anchor="middle" />
+      <Label x={WIDTH - RIGHT_MARGIN} y={bottom} text={count(last)} anchor="end" />
       <Label
         x={middle}
         y={bottom}
@@ -134,7 +142,7 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
       />
       {tau > 0 && (
         <>
-          <line x1={LEFT} x2={WIDTH - RIGHT} y1={y(tau)} y2={y(tau)} class="tau" />
+          <line x1={LEFT_MARGIN} x2={WIDTH - RIGHT_MARGIN} y1={y(tau)} y2={y(tau)} class="tau" />
           <Label x={label.x} y={label.y} text={T.bind.doneBelow} anchor="start" />
         </>
       )}

@@ -10,14 +10,14 @@ import { Badge, Facts, Fold, Say } from "./controls";
  * Rest error below which the bound model at rest looks like the original, as a fraction of the cage's diagonal: a tenth
  * of a pixel if the diagonal spans a screen 4,000 pixels wide.
  */
-const INVISIBLE = 2.5e-5;
+const MAX_INVISIBLE_ERROR = 2.5e-5;
 
 /** Says in one sentence whether the solver converged and how closely the weights reproduce the model at rest. */
 export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
   const { stopped, invisible, off } = T.report.verdicts;
   if (!report.converged) return stopped;
   const { max_rel } = report.rest_error;
-  return max_rel < INVISIBLE ? invisible : off(scientific(max_rel * 100));
+  return max_rel < MAX_INVISIBLE_ERROR ? invisible : off(scientific(max_rel * 100));
 }
 
 export function ReportCard({ report }: { report: BindReport }) {

@@ -5,7 +5,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
-import type { Fix, Tell } from "../actions/context";
+import type { Fix, Messages } from "../actions/context";
 import { type Message, textOf } from "../strings";
 import { T } from "../words";
 import { Button, IconButton, Say } from "./controls";
@@ -21,7 +21,7 @@ const SHOWN_WITH_BUTTON_MS = 12_000;
  */
 const READ_MS = 1000;
 /** Maximum number of visible messages of a kind, so that they do not hide the model. */
-const MOST = 3;
+const MAX_TOASTS = 3;
 
 interface Toast {
   readonly id: number;
@@ -38,7 +38,7 @@ let next = 0;
 
 export interface ToastParts {
   readonly Toasts: () => preact.JSX.Element;
-  readonly tell: Tell;
+  readonly tell: Messages;
   /** Shows an offer that stays until it is taken or closed. */
   offer(text: string, fix: Fix): void;
 }
@@ -53,7 +53,7 @@ export function createToasts(): ToastParts {
     const others = list.value.filter((other) => !isSame(other));
     next += 1;
     const all = [...others, { ...toast, id: next, since: performance.now() }];
-    const latest = all.filter(({ stays }) => !stays).slice(-MOST);
+    const latest = all.filter(({ stays }) => !stays).slice(-MAX_TOASTS);
     list.value = all.filter((one) => one.stays || latest.includes(one));
   };
   const closing = (list: typeof said) => (id: number) => {

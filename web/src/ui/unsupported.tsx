@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
-import type { Lack } from "../contract";
+import type { WebGpuFault } from "../contract";
 import { hasSeen, markSeen } from "../store";
 import { T } from "../words";
 import { Button, Fold, IconButton } from "./controls";
@@ -44,7 +44,7 @@ function wayOf({ browser, system }: ReturnType<typeof recognise>): Way | undefin
 }
 
 /** Why WebGPU is missing, as a sentence. */
-export function sayLack(lack: Lack, secure: boolean): string {
+export function sayLack(lack: WebGpuFault, secure: boolean): string {
   return lack === "NoWebGPU" && !secure ? T.without.insecure : T.without.reasons[lack];
 }
 
@@ -127,7 +127,7 @@ export function Notice({ app }: { app: App }) {
 }
 
 /** Shown instead of the page if WebGL2 is missing, too. */
-export function Unsupported({ lack }: { lack: Lack }) {
+export function Unsupported({ lack }: { lack: WebGpuFault }) {
   return (
     <main class="unsupported">
       <div class="unsupported-card">

@@ -4,7 +4,7 @@
  */
 
 const PREFIX = "cagework.work.";
-const OWN = "cagework.work";
+const OWN_KEY = "cagework.work";
 /** Time to wait for a lock, ms. After a reload, the previous page may still hold it. */
 const PATIENCE_MS = 1000;
 
@@ -30,8 +30,8 @@ export async function heldIds(): Promise<ReadonlySet<string>> {
 /** Remembers, across reloads, which work this tab has open. */
 export function rememberOwn(id: string | null): void {
   try {
-    if (id === null) sessionStorage.removeItem(OWN);
-    else sessionStorage.setItem(OWN, id);
+    if (id === null) sessionStorage.removeItem(OWN_KEY);
+    else sessionStorage.setItem(OWN_KEY, id);
   } catch {
     // Storage is forbidden, so no work is saved either.
   }
@@ -40,7 +40,7 @@ export function rememberOwn(id: string | null): void {
 /** Reads the id stored by `rememberOwn`. */
 export function ownId(): string | null {
   try {
-    return sessionStorage.getItem(OWN);
+    return sessionStorage.getItem(OWN_KEY);
   } catch {
     return null;
   }

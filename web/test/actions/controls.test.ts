@@ -5,7 +5,7 @@ import { createBind } from "../../src/actions/bind";
 import { createCage } from "../../src/actions/cage";
 import { createControls } from "../../src/actions/controls";
 import { createEdit } from "../../src/actions/edit";
-import { cageOf, createFake, PLAIN } from "../fake";
+import { cageOf, createFake, PLAIN_CONTROLS } from "../fake";
 
 /** A page with a cage of four vertices. */
 function page() {
@@ -66,7 +66,7 @@ test("a link contains smoothing and inner controls; opening it adds no undo step
   expect(controls.shared()).toBe(undefined);
   const elements = [{ point: 0 }];
   const positions = Float32Array.of(...new Float32Array(12), 0.25, 0.5, 0);
-  showCage({ ...cageOf(5), positions, controls: { ...PLAIN, smooth: 1, inner: 1, elements } });
+  showCage({ ...cageOf(5), positions, controls: { ...PLAIN_CONTROLS, smooth: 1, inner: 1, elements } });
   const shared = controls.shared();
   expect(shared?.inner).toEqual([0.25, 0.5, 0]);
   const other = page();

@@ -4,7 +4,7 @@ import { createFiles } from "../../src/actions/files";
 import type { BindOptions } from "../../src/contract";
 import { BIND_DEFAULTS } from "../../src/defaults";
 import { MODEL_STATE, PERSON_STATE } from "../../src/state";
-import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED, settled } from "../fake";
+import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED_FILE, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
 
@@ -48,7 +48,7 @@ it("asks whether to stand a model up that seems to lie on its back", async () =>
   await settled();
   asked[0]?.resolve({});
   await settled();
-  asked[1]?.resolve({ ...OPENED, model: { ...MODEL, suggestedUp: "z" } });
+  asked[1]?.resolve({ ...OPENED_FILE, model: { ...MODEL, suggestedUp: "z" } });
   await opened;
   expect(said).toContain("The model seems to lie on its back.");
   offers()[0]?.run();
@@ -63,7 +63,7 @@ it("a dropped model gets a cage and is bound; the previous work is saved first",
   expect(store.get().busy).toBe("Opening cube.obj");
   asked[0]?.resolve({ vertices: 4 });
   await settled();
-  asked[1]?.resolve(OPENED);
+  asked[1]?.resolve(OPENED_FILE);
   expect(await opened).toBe(true);
   await settled();
   expect(steps).toEqual(["keep", "leave", "make a cage", "bind"]);
@@ -85,7 +85,7 @@ it("models dropped together are read before the cage is made; unreadable ones ar
     { name: "shirt.gltf" },
     { name: "skin.png" },
   ]);
-  asked[3]?.resolve(OPENED);
+  asked[3]?.resolve(OPENED_FILE);
   expect(await opened).toBe(true);
   await settled();
   expect(steps).toEqual(["keep", "leave", "join shirt.gltf", "load body-cage.obj"]);
@@ -103,7 +103,7 @@ it("a second file cancels reading the first", async () => {
   expect(asked.map(({ cancelled }) => cancelled)).toEqual([true, false]);
   asked[1]?.resolve({ vertices: 4 });
   await settled();
-  asked[2]?.resolve({ ...OPENED, model: { ...MODEL, name: "b.obj" } });
+  asked[2]?.resolve({ ...OPENED_FILE, model: { ...MODEL, name: "b.obj" } });
   expect(await Promise.all([first, second])).toEqual([false, true]);
   expect([store.get().model?.name, problems, steps.filter((step) => step === "keep").length]).toEqual([
     "b.obj",
@@ -146,7 +146,7 @@ it("a cage file dropped with a model is loaded; an empty file and a drop without
   await settled();
   asked[0]?.resolve({ vertices: 4 });
   await settled();
-  asked[1]?.resolve(OPENED);
+  asked[1]?.resolve(OPENED_FILE);
   await opened;
   await settled();
   expect(steps).toContain("load cube-cage.obj");
@@ -163,7 +163,7 @@ it("a project restores settings except the memory limit, and reports what it can
   asked[0]?.resolve({ vertices: 4 });
   await settled();
   const settings = JSON.stringify({ bind: { ...store.get().bindOptions, grid: 32, memory_limit: 99 } });
-  asked[1]?.resolve({ ...OPENED, settings, notices: ["the pose is damaged"] });
+  asked[1]?.resolve({ ...OPENED_FILE, settings, notices: ["the pose is damaged"] });
   await opened;
   expect([store.get().bindOptions, said]).toMatchObject([
     { grid: 32, memory_limit: 7 },
@@ -194,7 +194,7 @@ it("a project that asks for a long bind gets the default options", async () => {
   asked[0]?.resolve({ vertices: 4 });
   await settled();
   const settings = JSON.stringify({ bind: { ...store.get().bindOptions, solver: "jacobi" } });
-  asked[1]?.resolve({ ...OPENED, settings });
+  asked[1]?.resolve({ ...OPENED_FILE, settings });
   await opened;
   expect(store.get().bindOptions.solver).toBe("multigrid");
   expect(said.at(-1)).toContain("a solve of about 5 min: the default settings are used instead");
@@ -223,7 +223,7 @@ it("a new model resets model settings; user settings, backend and memory limit s
   await settled();
   asked[0]?.resolve({ vertices: 4 });
   await settled();
-  asked[1]?.resolve(OPENED);
+  asked[1]?.resolve(OPENED_FILE);
   await opened;
   expect(persons()).toEqual(before);
   expect(store.get()).toMatchObject({

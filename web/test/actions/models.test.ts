@@ -6,7 +6,13 @@ import { cageOf, createFake, memberOf, modelOf, settled } from "../fake";
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
 const none = new Uint32Array();
 const CHECK = { vertices: none, edges: none, faces: none, points: new Float32Array(), outside: none };
-const OUTSIDE = { code: "model_outside", severity: "warning", message: "", count: 1, fix: null } as const;
+const OUTSIDE_FAULT = {
+  code: "model_outside",
+  severity: "warning",
+  message: "",
+  count: 1,
+  fix: null,
+} as const;
 
 /** A page with a bound body in a cage. */
 function page() {
@@ -107,7 +113,7 @@ it("a model outside the cage is reported once, with the offer of a new cage", as
   const { models, read, mirror, said, offer, steps } = page();
   const added = models.add([file("skirt.glb"), file("body-cage.obj")]);
   await settled();
-  mirror.know({ ...CHECK, problems: [OUTSIDE] });
+  mirror.know({ ...CHECK, problems: [OUTSIDE_FAULT] });
   await read("skirt.glb");
   await added;
   expect(said).toEqual(["The added model reaches outside the cage."]);

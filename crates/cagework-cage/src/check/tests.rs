@@ -8,7 +8,7 @@ use cagework_core::cage::subdivided_box;
 use cagework_core::crossing::notices;
 use cagework_core::mesh::{Bounds, PolygonMesh};
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::words::grouped;
 
 fn box_mesh(divisions: u32) -> PolygonMesh {
@@ -122,7 +122,7 @@ fn intersections_are_reported_with_their_location() {
     let said = &crossing.problem(Code::SelfIntersection).unwrap().message;
     assert!(said.starts_with("The cage goes through itself: "), "{said}");
     assert_eq!(notices(&cage), [said.as_str()]);
-    let bound = bind(&[Vec3::ZERO], &cage, &BindOptions { grid: 16, ..BindOptions::default() }, &Silent);
+    let bound = bind(&[Vec3::ZERO], &cage, &BindOptions { grid: 16, ..BindOptions::default() }, &NoProgress);
     assert!(bound.unwrap().report.notices.contains(said));
     let problem = found.problem(Code::SelfIntersection).unwrap();
     assert!(problem.message.contains(&format!("near {:?}", problem.places.points[0])), "{}", problem.message);

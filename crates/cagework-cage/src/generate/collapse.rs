@@ -14,7 +14,7 @@ use super::guarded::GuardedSurface;
 use super::quadric::Quadric;
 use super::shell::Spacing;
 use cagework_core::contact::Corners;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 
 /// Offsets along the normal that are tried for the merged vertex, voxels.
 const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
@@ -145,8 +145,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
     pub(super) fn run(
         &mut self,
         target: usize,
-        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-    ) -> Result<usize, Cancelled> {
+        go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+    ) -> Result<usize, Cancellation> {
         self.heap.clear();
         self.wait_for_all();
         let before = self.count;

@@ -8,7 +8,7 @@ use super::voxels::Voxels;
 use super::{CageOptions, MAX_VOXELS};
 use cagework_core::cage::Cage;
 use cagework_core::geometry::{winding_number, winding_number_of_mesh};
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 use cagework_core::words::decimals;
 
 /// Largest allowed cosine of the angle between the directions from a sheet to its two walls. Creases whose walls open
@@ -111,8 +111,8 @@ pub(super) fn narrow_gaps(
     bounds: [DVec3; 2],
     clearance: f64,
     [base, most]: [usize; 2],
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<NarrowGaps, Cancelled> {
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<NarrowGaps, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
@@ -162,8 +162,8 @@ fn resolution_of_narrows(
     triangles: &[[u32; 3]],
     bounds: [DVec3; 2],
     (clearance, stretch): (f64, DVec3),
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<f64, Cancelled> {
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<f64, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, stretch, MARGIN_VOXELS);
     let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
     let axis = stretch.max_position();

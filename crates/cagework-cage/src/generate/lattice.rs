@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::footprint::Footprint;
 use super::voxels::Voxels;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 
 /// Factor by which voxels are enlarged so that the model's ends lie inside voxels, not between two.
 const VOXEL_ENLARGEMENT: f64 = 1.002;
@@ -88,8 +88,8 @@ impl Lattice {
         &self,
         positions: &[Vec3],
         triangles: &[[u32; 3]],
-        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-    ) -> Result<usize, Cancelled> {
+        go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+    ) -> Result<usize, Cancellation> {
         let points: Vec<DVec3> = positions.iter().map(|&p| self.lattice(p)).collect();
         let mut rows = 0;
         self.for_each_footprint(&points, triangles, go_on, |footprint| rows += footprint.n_rows(self.dims))?;
@@ -104,8 +104,8 @@ impl Lattice {
         &self,
         positions: &[Vec3],
         triangles: &[[u32; 3]],
-        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-    ) -> Result<Voxels, Cancelled> {
+        go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+    ) -> Result<Voxels, Cancellation> {
         let points: Vec<DVec3> = positions.iter().map(|&p| self.lattice(p)).collect();
         let mut voxels = Voxels::new(self.dims);
         for &p in &points {
@@ -121,9 +121,9 @@ impl Lattice {
         &self,
         points: &[DVec3],
         triangles: &[[u32; 3]],
-        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+        go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
         mut each: impl FnMut(Footprint),
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Cancellation> {
         let mut large = HashSet::new();
         for (k, t) in triangles.iter().enumerate() {
             if k % TRIANGLES_PER_CHECK == 0 {

@@ -33,7 +33,7 @@ mod voxels;
 use glam::{DVec3, Vec3};
 
 use cagework_core::cage::Cage;
-use cagework_core::progress::{Cancelled, Progress, ProgressEvent, Stage};
+use cagework_core::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use gaps::NarrowGaps;
 use guarded::GuardedSurface;
@@ -125,7 +125,7 @@ fn generate_plain(
     let target = options.target as usize;
     let go_on = |_| {
         let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
-        if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
+        if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
     };
     let finest = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let affordable = affordable_voxels(finest.n_rows(positions, triangles, &go_on)?);
@@ -145,7 +145,7 @@ fn generate_plain(
         let go_on = |stage: Stage, share: f32| {
             let fraction = (attempt as f32 - 1.0 + share) / attempt as f32;
             let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
-            if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
+            if progress.report(event).is_break() { Err(Cancellation) } else { Ok(()) }
         };
         let mut shell = Shell::new(positions, triangles, bounds, (voxels, stretch), options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
@@ -222,7 +222,7 @@ fn simplify_hull(
     shell: &Shell,
     options: &CageOptions,
     may_coarsen: bool,
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<Simplification, CageGenError> {
     let n_hull = shell.hull.n_whole();
     let mut target = options.target as usize;
@@ -295,8 +295,8 @@ fn relax_and_verify(
     mut guarded: GuardedSurface<'_>,
     quadrics: &[quadric::Quadric],
     of_quads: bool,
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<Option<Cage>, Cancelled> {
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<Option<Cage>, Cancellation> {
     let collapsed = guarded.surface();
     unfold::unfold(&mut guarded, false);
     relax::relax(&mut guarded, quadrics, &|share| go_on(0.6 + 0.2 * share))?;

@@ -4,10 +4,10 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use cagework_core::cage::{Cage, MAX_DIAGONAL};
+use cagework_core::cage::{Cage, MAX_DIAGONAL, MIN_DIAGONAL};
 use cagework_core::choice;
-use cagework_core::options::{Number, OutOfRange, SMOOTH, Slider};
-use cagework_core::progress::Cancelled;
+use cagework_core::options::{Number, RangeError, SMOOTH_STEPS, Slider};
+use cagework_core::progress::Cancellation;
 
 /// Smallest allowed target number of vertices.
 pub const MIN_TARGET: u32 = 8;
@@ -179,12 +179,12 @@ impl CageOptions {
     /// Checks the range of every option.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first invalid option.
-    pub fn check(&self) -> Result<(), OutOfRange> {
+    /// [`RangeError`] for the first invalid option.
+    pub fn check(&self) -> Result<(), RangeError> {
         TARGET.check(self.target)?;
         DETAIL.check(self.detail)?;
         CLEARANCE.check(self.clearance)?;
-        SMOOTH.check(self.smooth)?;
+        SMOOTH_STEPS.check(self.smooth)?;
         VOXELS.check(self.voxels)
     }
 }
@@ -241,7 +241,7 @@ pub struct CageReport {
 pub enum CageGenError {
     /// An option is out of range.
     #[error(transparent)]
-    Option(#[from] OutOfRange),
+    Option(#[from] RangeError),
     /// The model has no vertices.
     #[error("the model has no vertices")]
     Empty,
@@ -261,6 +261,14 @@ pub enum CageGenError {
         /// Number of vertices of the model.
         n: usize,
     },
+    /// The model is smaller than [`MIN_DIAGONAL`].
+    #[error(
+        "the model's bounding box has a diagonal of {diagonal:e}; it must be at least {MIN_DIAGONAL:e}: scale it"
+    )]
+    Diagonal {
+        /// Diagonal of the bounding box, object units.
+        diagonal: f64,
+    },
     /// A coordinate of the model is larger than a tenth of [`MAX_DIAGONAL`].
     #[error("model has coordinates up to {largest:e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
     Size {
@@ -279,7 +287,7 @@ pub enum CageGenError {
     Unsmooth,
     /// Cancelled by the caller.
     #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Cancelled(#[from] Cancellation),
 }
 
 /// Checks input and options. Returns the corners of the model's box.
@@ -305,6 +313,10 @@ pub(super) fn check(
     let largest = min.abs().max(max.abs()).max_element();
     if largest > 0.1 * MAX_DIAGONAL {
         return Err(CageGenError::Size { largest });
+    }
+    let diagonal = (max - min).length();
+    if diagonal > 0.0 && diagonal < MIN_DIAGONAL {
+        return Err(CageGenError::Diagonal { diagonal });
     }
     Ok([min, max])
 }

@@ -11,7 +11,7 @@ use super::pairing::{
 use super::quadric::Quadric;
 use super::unfold::unfold;
 use cagework_core::contact::Corners;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 
 /// Number of rounds of vertex moves after each pairing.
 const ROUNDS: [usize; 3] = [2, 2, 3];
@@ -41,8 +41,8 @@ const MIN_MOVE_COSINE: f64 = 0.3;
 pub(super) fn quads(
     surface: &mut GuardedSurface<'_>,
     quadrics: &[Quadric],
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<Pairing, Cancelled> {
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<Pairing, Cancellation> {
     let mut pairing = Pairing::default();
     for (k, rounds) in ROUNDS.into_iter().enumerate() {
         pairing = pair(surface, &pairing, false);

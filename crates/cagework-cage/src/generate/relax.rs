@@ -7,7 +7,7 @@ use super::collapse::quality;
 use super::guarded::GuardedSurface;
 use super::quadric::Quadric;
 use cagework_core::contact::Corners;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 
 /// Number of rounds over all vertices and edges; more than six do not visibly change the result.
 const ROUNDS: usize = 6;
@@ -37,8 +37,8 @@ const MAX_VALENCE: usize = 9;
 pub(super) fn relax(
     surface: &mut GuardedSurface<'_>,
     quadrics: &[Quadric],
-    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<(), Cancelled> {
+    go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+) -> Result<(), Cancellation> {
     for round in 0..ROUNDS {
         go_on(round as f32 / ROUNDS as f32)?;
         for v in 0..surface.positions.len() as u32 {

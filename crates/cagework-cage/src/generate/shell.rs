@@ -14,7 +14,7 @@ use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
 use super::{CageOptions, Shape, Symmetry, first_voxels};
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 
 /// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
 const MIN_MIRROR_SHARE: f64 = 0.985;
@@ -25,7 +25,7 @@ const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
 
 /// Largest extent of a cluster of voxels without mirror image, as a fraction of the model's longest side. A larger
 /// cluster counts as an asymmetric part.
-const MAX_UNMATCHED: f64 = 0.08;
+const MAX_UNMATCHED_SHARE: f64 = 0.08;
 
 /// Half the width of the widest gaps that are detected, as a fraction of the model's longest side.
 const MAX_GAP_HALF: f64 = 0.12;
@@ -125,8 +125,8 @@ impl Shell {
         bounds: [DVec3; 2],
         (n, stretch): (usize, DVec3),
         options: &CageOptions,
-        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-    ) -> Result<Self, Cancelled> {
+        go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
+    ) -> Result<Self, Cancellation> {
         let asked = options.distance(bounds);
         // Number of layers of voxels, of edge `cell`, between solid and hull that give the requested clearance.
         let layers_for =
@@ -321,7 +321,7 @@ fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usi
                 && unmatched
                     .islands()
                     .iter()
-                    .all(|island| (extent(island) as f64) < MAX_UNMATCHED * longest as f64)
+                    .all(|island| (extent(island) as f64) < MAX_UNMATCHED_SHARE * longest as f64)
         }),
     }
 }

@@ -13,8 +13,8 @@ use cagework_core::contact::{Corners, meeting};
 use cagework_core::deform::displacements;
 use cagework_core::geometry::winding_number;
 use cagework_core::mesh::{Bounds, PolygonMesh};
-use cagework_core::options::{BindOptions, OutOfRange};
-use cagework_core::progress::{ProgressEvent, Silent};
+use cagework_core::options::{BindOptions, RangeError};
+use cagework_core::progress::{NoProgress, ProgressEvent};
 use cagework_core::smooth::subdivide;
 
 /// Tolerance for f32 rounding of positions of size 1 after mirroring.
@@ -63,7 +63,7 @@ fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
 }
 
 fn make(soup: &Soup, options: &CageOptions) -> GeneratedCage {
-    let made = generate(&soup.0, &soup.1, options, &Silent).unwrap();
+    let made = generate(&soup.0, &soup.1, options, &NoProgress).unwrap();
     assert_promise(soup, &made);
     made
 }
@@ -172,9 +172,9 @@ fn lower_cage_vertices_of_a_leg_move_only_its_foot() {
         [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80), (0.025, 0.07, 80)]
     {
         let (positions, triangles) = mannequin(gap, radius);
-        let cage = generate(&positions, &triangles, &options(target), &Silent).unwrap().cage;
+        let cage = generate(&positions, &triangles, &options(target), &NoProgress).unwrap().cage;
         let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
-        let bound = bind(&positions, &cage, &bind_options, &Silent).unwrap();
+        let bound = bind(&positions, &cage, &bind_options, &NoProgress).unwrap();
         for side in [-1.0, 1.0] {
             let is_lower = |c: &Vec3| {
                 let near = |p: &&Vec3| p.distance_squared(*c);
@@ -198,13 +198,13 @@ fn lower_cage_vertices_of_a_leg_move_only_its_foot() {
 #[test]
 fn a_gap_that_no_lattice_resolves_is_reported() {
     let (positions, triangles) = mannequin(0.004, 0.08);
-    let report = generate(&positions, &triangles, &options(80), &Silent).unwrap().report;
+    let report = generate(&positions, &triangles, &options(80), &NoProgress).unwrap().report;
     let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
     assert!(named, "{:?}", report.notices);
     // The gap is centred on x = 0, except for a rounding error, here below zero.
     assert!(!report.notices.concat().contains("-0.000"), "{:?}", report.notices);
     let open = mannequin(0.17, 0.06);
-    assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
+    assert_eq!(generate(&open.0, &open.1, &options(120), &NoProgress).unwrap().report.notices, [""; 0]);
 }
 
 /// A clearance closes narrow gaps on any lattice, so the lattice must not be refined for such gaps. Otherwise, the
@@ -362,7 +362,7 @@ fn a_cage_far_from_the_origin_is_coarser_but_valid() {
 #[test]
 fn invalid_input_is_an_error_with_a_message() {
     let (positions, triangles) = trousers();
-    let refused = |p: &[Vec3], t: &[[u32; 3]], o: &CageOptions| generate(p, t, o, &Silent).unwrap_err();
+    let refused = |p: &[Vec3], t: &[[u32; 3]], o: &CageOptions| generate(p, t, o, &NoProgress).unwrap_err();
     assert_eq!(refused(&[], &[], &options(80)), CageGenError::Empty);
     let mut broken = positions.clone();
     broken[7].y = f32::NAN;
@@ -371,15 +371,17 @@ fn invalid_input_is_an_error_with_a_message() {
     assert!(matches!(error, CageGenError::Index { triangle: 0, vertex: 9999, .. }));
     assert!(matches!(
         refused(&positions, &triangles, &options(5)),
-        CageGenError::Option(OutOfRange { option: "target", .. })
+        CageGenError::Option(RangeError { option: "target", .. })
     ));
     let wide = CageOptions { clearance: 0.5, ..options(80) };
     assert!(matches!(
         refused(&positions, &triangles, &wide),
-        CageGenError::Option(OutOfRange { option: "clearance", .. })
+        CageGenError::Option(RangeError { option: "clearance", .. })
     ));
     let huge: Vec<Vec3> = positions.iter().map(|&p| p * 1e30).collect();
     assert!(matches!(refused(&huge, &triangles, &options(80)), CageGenError::Size { .. }));
+    let tiny: Vec<Vec3> = positions.iter().map(|&p| p * 1e-20).collect();
+    assert!(matches!(refused(&tiny, &triangles, &options(80)), CageGenError::Diagonal { .. }));
 }
 
 #[test]
@@ -426,7 +428,7 @@ fn the_smooth_surface_of_a_cage_encloses_the_model() {
     for (soup, smooth) in [(trousers(), 1), (trousers(), 2), (ring(), 2)] {
         for symmetry in [Symmetry::Auto, Symmetry::None] {
             let options = CageOptions { smooth, symmetry, ..options(80) };
-            let made = generate(&soup.0, &soup.1, &options, &Silent).unwrap();
+            let made = generate(&soup.0, &soup.1, &options, &NoProgress).unwrap();
             let fine = subdivide(&made.cage.to_polygon_mesh(), smooth).mesh;
             let surface = Cage::new(&fine).unwrap();
             let outside = soup.0.iter().filter(|&&p| winding(&surface, p) < 0.5).count();
@@ -442,7 +444,7 @@ fn many_large_triangles_get_a_coarse_lattice() {
     let ring = (0..n).map(|i| vec3((i as f32).cos(), (i as f32).sin(), 1.0));
     let positions: Vec<Vec3> = [Vec3::ZERO].into_iter().chain(ring).collect();
     let triangles: Vec<[u32; 3]> = (1..n).map(|i| [0, i, i + 1]).collect();
-    let made = generate(&positions, &triangles, &options(400), &Silent).unwrap();
+    let made = generate(&positions, &triangles, &options(400), &NoProgress).unwrap();
     // 80 voxels would follow from the target. The bounding box of a triangle has about 4000 rows of 128 voxels.
     let most = 128.0 * (MAX_ROWS / (4000.0 * f64::from(n))).sqrt();
     assert!(f64::from(made.report.voxels) < 1.05 * most, "{} voxels, not {most}", made.report.voxels);

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::generate::{CageOptions, generate};
 use cagework_core::mesh::{PolygonMesh, TriMesh};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::skin::Rig;
 
 pub use knot::knot;
@@ -75,7 +75,7 @@ pub fn build(id: &str) -> Option<Sample> {
     let cage = match recipe.cage {
         CageRecipe::Mesh(cage) => cage,
         CageRecipe::Generate(options) => {
-            let made = generate(&mesh.positions, &mesh.triangles, &options, &Silent);
+            let made = generate(&mesh.positions, &mesh.triangles, &options, &NoProgress);
             made.expect("options and model are constants, and tests build every cage").cage.to_polygon_mesh()
         }
     };

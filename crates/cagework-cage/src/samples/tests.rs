@@ -7,7 +7,7 @@ use cagework_core::bind::bind;
 use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::splats::color_along;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 
@@ -33,7 +33,7 @@ fn every_sample_is_enclosed_by_its_cage_and_bound_exactly() {
             let winding = winding_number(p.as_dvec3(), triangles);
             assert!((winding - 1.0).abs() < 1e-6, "{}: {p} has winding number {winding}", info.id);
         }
-        let binding = bind(&sample.mesh.positions, &cage, &BindOptions::default(), &Silent).unwrap();
+        let binding = bind(&sample.mesh.positions, &cage, &BindOptions::default(), &NoProgress).unwrap();
         assert_eq!(binding.outside.len(), 0, "{}", info.id);
         let error = binding.report.rest_error.mean_rel;
         assert!(error <= REST_ERROR, "{}: {error:e}", info.id);
@@ -63,7 +63,7 @@ fn the_last_pose_of_each_sample_is_that_of_its_pull() {
         let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
         let cage = Cage::new(&cage).unwrap();
         let weights = |points: &[Vec3]| {
-            let bound = bind(points, &cage, &BindOptions::default(), &Silent).unwrap();
+            let bound = bind(points, &cage, &BindOptions::default(), &NoProgress).unwrap();
             bound.frames.folded(&bound.weights)
         };
         let probes = Probes::new(&mesh, &cage).unwrap();
@@ -178,6 +178,6 @@ fn knot_is_a_tube_whose_colours_depend_on_the_direction_of_view() {
         assert!(axes.z_axis.normalize().dot(normal) > 0.999 && axes.x_axis.dot(normal).abs() < 1e-3);
     }
     let (positions, triangles) = splats.shells();
-    let made = generate(&positions, &triangles, &CageOptions::default(), &Silent).unwrap();
+    let made = generate(&positions, &triangles, &CageOptions::default(), &NoProgress).unwrap();
     assert!(made.report.target_met && made.report.notices.is_empty(), "{:?}", made.report);
 }

@@ -9,7 +9,7 @@ use cagework_cage::generate::{
     TARGET, VOXELS,
 };
 use cagework_core::BindOptions;
-use cagework_core::options::{GRID, OutOfRange};
+use cagework_core::options::{GRID, RangeError};
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, positive};
@@ -134,9 +134,9 @@ pub(crate) enum CageSource {
 }
 
 impl FromStr for CageSource {
-    type Err = OutOfRange;
+    type Err = RangeError;
 
-    fn from_str(text: &str) -> Result<Self, OutOfRange> {
+    fn from_str(text: &str) -> Result<Self, RangeError> {
         let (kind, number) = text.split_once(':').map_or((text, None), |(kind, n)| (kind, Some(n)));
         let generated = |shape, default| {
             let target = number.map_or(Ok(default), |n| TARGET.parse(n))?;

@@ -8,7 +8,7 @@ use clap::Args;
 /// Argument for the subdivision of the cage.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct SmoothArgs {
-    #[arg(long, help = options::SMOOTH.about(), default_value_t = 0, value_name = "STEPS", value_parser = super::number::<u32>(options::SMOOTH))]
+    #[arg(long, help = options::SMOOTH_STEPS.about(), default_value_t = 0, value_name = "STEPS", value_parser = super::number::<u32>(options::SMOOTH_STEPS))]
     pub(crate) smooth: u32,
 }
 

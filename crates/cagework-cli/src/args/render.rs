@@ -122,7 +122,7 @@ fn finite(text: &str) -> Result<f32, String> {
 }
 
 /// Value of `--compare` that selects the harmonic coordinates of the cage, without `--smooth` and `--controls`.
-const PLAIN: &str = "plain";
+const PLAIN_CAGE: &str = "plain";
 
 /// Returns a parser of the word that selects the coordinates to compare with.
 fn compared() -> impl TypedValueParser<Value = Coordinates> {
@@ -132,10 +132,10 @@ fn compared() -> impl TypedValueParser<Value = Coordinates> {
             let help = format!("{}{} coordinates ({})", name[..1].to_uppercase(), &name[1..], kind.about());
             PossibleValue::new(word.replace('_', "-")).help(help)
         });
-    let plain =
-        PossibleValue::new(PLAIN).help("Harmonic coordinates of the cage without --smooth and --controls");
+    let plain = PossibleValue::new(PLAIN_CAGE)
+        .help("Harmonic coordinates of the cage without --smooth and --controls");
     PossibleValuesParser::new(forms.chain([plain]))
-        .try_map(|word| if word == PLAIN { Ok(Coordinates::Harmonic) } else { word.parse() })
+        .try_map(|word| if word == PLAIN_CAGE { Ok(Coordinates::Harmonic) } else { word.parse() })
 }
 
 /// What the picture shows.

@@ -7,7 +7,7 @@ use std::sync::PoisonError;
 use std::time::SystemTime;
 
 use cagework_core::bind::BindError;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 use cagework_io::Model;
 
 use super::whole::replace;
@@ -112,7 +112,7 @@ pub(crate) fn refuse_files_named(
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     // A signal may have arrived since the work last polled for cancellation.
     if signals::cancelled() {
-        return Err(BindError::Cancelled(Cancelled).into());
+        return Err(BindError::Cancelled(Cancellation).into());
     }
     refuse_files_read(&[path])?;
     let written = place(path).and_then(|place| match place {

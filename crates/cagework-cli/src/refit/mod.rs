@@ -12,7 +12,7 @@ use std::time::Instant;
 use cagework_core::bind::{BindError, SolvedCage};
 use cagework_core::deform::displacements;
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Cancelled;
+use cagework_core::progress::Cancellation;
 use cagework_core::{Binding, Controls};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Skeleton, shown};
 use glam::{DVec3, Vec3};
@@ -152,7 +152,7 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&summary) } else { text(&summary, jobs.len()) })?;
     let unnamed = binder.unnamed.borrow();
     match unnamed.first() {
-        _ if signals::cancelled() => Err(BindError::Cancelled(Cancelled).into()),
+        _ if signals::cancelled() => Err(BindError::Cancelled(Cancellation).into()),
         _ if summary.failed > 0 => Err(CliError::Mismatch {
             message: format!("{} of {} models failed", summary.failed, jobs.len()),
             hint: "repair them and run the command again with --resume, which skips finished models",

@@ -137,8 +137,8 @@ fn masked_parts_stay_and_rigid_parts_keep_their_shape() {
 #[test]
 fn dynamic_deform_bends_every_frame_of_a_clip() {
     let sandbox = bound();
-    const DYNAMIC: &str = "deform humanoid.glb --cage cage.obj --dynamic";
-    let done = sandbox.json(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.glb --json"));
+    const DYNAMIC_DEFORM: &str = "deform humanoid.glb --cage cage.obj --dynamic";
+    let done = sandbox.json(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj -o bent.glb --json"));
     // At 30 frames per second, the maximum, the clip of 2 s has 60 frames and one at its end.
     assert_eq!((&done["frames"], &done["clip"]), (&61.into(), &"Walk".into()));
     let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
@@ -154,15 +154,15 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
         assert!(wider.len() > 50 && (mean - 1.3).abs() < 0.05, "{mean} of {}", wider.len());
     }
     sandbox
-        .run(&format!("{DYNAMIC} Run --pose wide.obj -o bent.glb"))
+        .run(&format!("{DYNAMIC_DEFORM} Run --pose wide.obj -o bent.glb"))
         .failure()
         .stderr(contains("there is no clip 'Run'; the model has Walk"));
     sandbox
-        .run(&format!("{DYNAMIC} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
+        .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
         .failure()
         .stderr(contains("--dynamic takes one pose, but 2 were given"));
     sandbox
-        .run(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.obj"))
+        .run(&format!("{DYNAMIC_DEFORM} Walk --pose wide.obj -o bent.obj"))
         .failure()
         .stderr(contains("cannot store a clip"));
 }

@@ -113,7 +113,7 @@ mod tests {
     use crate::controls::{ControlSet, InnerControls, InnerElement};
     use crate::mesh::Bounds;
     use crate::options::Method;
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     /// 300 points of a spiral in the cube, a repetition of one of them, and a point outside.
     fn points(turns: f32) -> Vec<Vec3> {
@@ -145,11 +145,11 @@ mod tests {
             (Controls::from(&cage), of(Method::Embedded, Solver::Jacobi)),
             (Controls::from(&cage), of(Method::Classic, Solver::Jacobi)),
         ] {
-            let solved = SolvedCage::new(controls, &options, &Silent).unwrap();
+            let solved = SolvedCage::new(controls, &options, &NoProgress).unwrap();
             for turns in [3.0, 20.0] {
                 let points = points(turns);
-                let alone = bind(&points, controls, &options, &Silent).unwrap();
-                let together = solved.bind(&points, (0, 0), &Silent).unwrap();
+                let alone = bind(&points, controls, &options, &NoProgress).unwrap();
+                let together = solved.bind(&points, (0, 0), &NoProgress).unwrap();
                 assert!(together.weights == alone.weights && together.frames == alone.frames, "{options:?}");
                 let said =
                     |b: &Binding| (b.report.iterations, b.report.rest_error, b.report.outside_vertices);
@@ -164,7 +164,7 @@ mod tests {
         let cube = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let cage = Cage::new(&subdivided_box(cube, 0.0, [8, 8, 8])).unwrap();
         let options = BindOptions { grid: 64, memory_limit: 512 << 20, ..BindOptions::default() };
-        let refused = SolvedCage::new(&cage, &options, &Silent).err().unwrap();
+        let refused = SolvedCage::new(&cage, &options, &NoProgress).err().unwrap();
         // 386 columns are 49 batches of 64^3 rows of 32 bytes: 392 MiB, above half of the limit.
         let BindError::Memory { needed, limit } = refused else { panic!("{refused:?}") };
         assert!(needed > 392 << 20 && limit == 256 << 20, "{needed} {limit}");

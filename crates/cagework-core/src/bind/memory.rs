@@ -185,7 +185,7 @@ mod tests {
     use crate::bind::bind;
     use crate::bind::voxels::Voxelization;
     use crate::cage::subdivided_box;
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
     use glam::Vec3;
 
     #[test]
@@ -206,7 +206,7 @@ mod tests {
         for (solver, most) in [(Solver::Jacobi, 4.0), (Solver::ConjugateGradient, 12.0)] {
             let options = BindOptions { grid: 32, solver, method: Method::Classic, ..BindOptions::default() };
             let estimate = crate::bind::estimate_updates(&cage, &options).unwrap();
-            let report = bind(&[Vec3::splat(0.5)], &cage, &options, &Silent).unwrap().report;
+            let report = bind(&[Vec3::splat(0.5)], &cage, &options, &NoProgress).unwrap().report;
             let grid = Voxelization::grid(&cage, &options);
             let sweeps = estimate / (8.0 * unknowns((&cage).into(), &grid).0);
             let share = sweeps / f64::from(report.iterations);
@@ -223,10 +223,13 @@ mod tests {
         let points: Vec<Vec3> = (0..8000).map(at).collect();
         for threads in [1, 2] {
             let options = BindOptions { grid: 16, sparsify: 1e-9, threads, ..BindOptions::default() };
-            let memory = bind(&points, &cage, &options, &Silent).unwrap().report.memory_bytes;
+            let memory = bind(&points, &cage, &options, &NoProgress).unwrap().report.memory_bytes;
             assert!(memory.peak <= memory.estimated, "{memory:?}");
             let tight = BindOptions { memory_limit: memory.peak - 1, ..options };
-            assert!(matches!(bind(&points, &cage, &tight, &Silent), Err(BindError::WeightsMemory { .. })));
+            assert!(matches!(
+                bind(&points, &cage, &tight, &NoProgress),
+                Err(BindError::WeightsMemory { .. })
+            ));
         }
     }
 }

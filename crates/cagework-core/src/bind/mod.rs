@@ -21,8 +21,8 @@ use thiserror::Error;
 use crate::controls::Controls;
 use crate::deform::OutsideVertex;
 use crate::frames::Frames;
-use crate::options::{BindOptions, OutOfRange};
-use crate::progress::{Cancelled, Progress};
+use crate::options::{BindOptions, RangeError};
+use crate::progress::{Cancellation, Progress};
 use crate::report::BindReport;
 use crate::weights::Weights;
 use crate::words::{counted, grouped};
@@ -47,7 +47,7 @@ pub struct Binding {
 pub enum BindError {
     /// An option is out of range.
     #[error(transparent)]
-    Option(#[from] OutOfRange),
+    Option(#[from] RangeError),
     /// The mesh has no vertices.
     #[error("mesh has no vertices: nothing to bind")]
     EmptyMesh,
@@ -108,7 +108,7 @@ pub enum BindError {
     },
     /// Cancelled by the caller.
     #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Cancelled(#[from] Cancellation),
 }
 
 /// Binds mesh vertices to a cage, or other controls, by harmonic coordinates.

@@ -169,7 +169,7 @@ mod tests {
     use crate::cage::subdivided_box;
     use crate::mesh::PolygonMesh;
     use crate::options::BindOptions;
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     /// Error message of a bind of points of the unit square to a box.
     fn said(min: Vec3, size: f32) -> String {
@@ -177,7 +177,7 @@ mod tests {
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
         let points: Vec<Vec3> =
             (0..15_002).map(|k| Vec3::new((k % 2) as f32, (k / 2) as f32 / 7500.0, 0.0)).collect();
-        bind(&points, &cage, &BindOptions { grid: 8, ..BindOptions::default() }, &Silent)
+        bind(&points, &cage, &BindOptions { grid: 8, ..BindOptions::default() }, &NoProgress)
             .unwrap_err()
             .to_string()
     }
@@ -202,7 +202,7 @@ mod tests {
             let bounds = Bounds { min: Vec3::splat(-0.4 * size), max: Vec3::splat(0.6 * size) };
             let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
             let options = BindOptions { grid: 8, ..BindOptions::default() };
-            let binding = bind(&[Vec3::ZERO, Vec3::X, Vec3::Y], &cage, &options, &Silent).unwrap();
+            let binding = bind(&[Vec3::ZERO, Vec3::X, Vec3::Y], &cage, &options, &NoProgress).unwrap();
             binding.report.notices.into_iter().find(|said| said.starts_with("The cage is "))
         };
         let large = bound(100.0).unwrap();
@@ -238,7 +238,7 @@ mod tests {
             }
             let grid = if parts.len() > 1 { 64 } else { 24 };
             let options = BindOptions { grid, ..BindOptions::default() };
-            let binding = bind(points, &Cage::new(&mesh).unwrap(), &options, &Silent).unwrap();
+            let binding = bind(points, &Cage::new(&mesh).unwrap(), &options, &NoProgress).unwrap();
             binding.report.notices.into_iter().find(|said| said.starts_with("The cage is "))
         };
         let tiny = [Vec3::ZERO, 0.3 * Vec3::X, 0.3 * Vec3::Y];

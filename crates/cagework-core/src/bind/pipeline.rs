@@ -39,7 +39,7 @@ const STALL_NOTICE: &str = "Multigrid converged slowly, as it does around many s
 
 /// Where the fields of a solve are stored. Only fields in host memory count towards the memory limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FieldsOn {
+pub enum FieldStorage {
     /// In the memory of this process.
     Host,
     /// In GPU memory, whose use the GPU back end plans.
@@ -65,7 +65,7 @@ pub(super) fn run(
     progress: &dyn Progress,
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
-    let prepared = PreparedBind::new(positions, controls, options, FieldsOn::Host, &watch)?;
+    let prepared = PreparedBind::new(positions, controls, options, FieldStorage::Host, &watch)?;
     let solved = prepared.solve(&watch)?;
     prepared.finish(solved, &watch)
 }
@@ -79,7 +79,7 @@ impl<'a> PreparedBind<'a> {
         positions: &'a [Vec3],
         controls: Controls<'a>,
         options: &'a BindOptions,
-        fields: FieldsOn,
+        fields: FieldStorage,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
         options.check()?;
@@ -88,7 +88,7 @@ impl<'a> PreparedBind<'a> {
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxelization::grid(controls.surface(), options);
-        let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
+        let field_threads = if fields == FieldStorage::Host { team.n_threads() } else { 0 };
         let needed = estimate(controls, &grid, mesh.count(), field_threads, options);
         needed.check(mesh.count(), controls.n_controls(), options.memory_limit)?;
         let voxelized = Arc::new(VoxelizedCage::new(controls, grid, options, team, watch)?);

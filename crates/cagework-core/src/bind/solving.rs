@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::options::{BindOptions, Preconditioner, Solver};
-use crate::progress::{Cancelled, Stage};
+use crate::progress::{Cancellation, Stage};
 use crate::sample::Stencils;
 use crate::solve::BatchSolver;
 use crate::solve::conjugate_gradient::ConjugateGradient;
@@ -44,14 +44,14 @@ pub struct Solution {
 /// Solves all columns and samples them.
 ///
 /// # Errors
-/// [`Cancelled`] if the progress callback cancels the bind.
+/// [`Cancellation`] if the progress callback cancels the bind.
 pub(super) fn solve_and_sample(
     hierarchy: &Hierarchy,
     stencils: &Stencils,
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<Solution, Cancelled> {
+) -> Result<Solution, Cancellation> {
     if options.solver == Solver::Jacobi {
         let begin = watch.now_ms();
         let (fields, mut solved) = jacobi_fields(hierarchy, options, team, watch)?;
@@ -70,13 +70,13 @@ pub(super) fn solve_and_sample(
 /// Solves all columns and returns their fields, `[n_batches][n_rows]`, for [`sample_fields`].
 ///
 /// # Errors
-/// [`Cancelled`] if the progress callback cancels the bind.
+/// [`Cancellation`] if the progress callback cancels the bind.
 pub(super) fn solve_fields(
     hierarchy: &Hierarchy,
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<(Vec<Vec<Row>>, Solution), Cancelled> {
+) -> Result<(Vec<Vec<Row>>, Solution), Cancellation> {
     if options.solver == Solver::Jacobi {
         return jacobi_fields(hierarchy, options, team, watch);
     }
@@ -95,7 +95,7 @@ fn solve_batches<T: Send>(
     team: &Team,
     watch: &Watch<'_>,
     take: impl Fn(usize, &[Row]) -> T + Sync,
-) -> Result<(Vec<T>, Solution), Cancelled> {
+) -> Result<(Vec<T>, Solution), Cancellation> {
     let n_batches = hierarchy.n_batches();
     let rule = options.stop_rule().of_batch(n_batches);
     let (spent, bytes) = (SolveTimes::default(), AtomicU64::new(0));
@@ -121,7 +121,7 @@ fn solve_batches<T: Send>(
             Some((report, taken))
         },
     );
-    let solved: Vec<_> = solved.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
+    let solved: Vec<_> = solved.into_iter().collect::<Option<_>>().ok_or(Cancellation)?;
     let (reports, taken): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
     let report = SolveReport::together(&reports);
     let solved = Solution {
@@ -177,7 +177,7 @@ fn jacobi_fields(
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<(Vec<Vec<Row>>, Solution), Cancelled> {
+) -> Result<(Vec<Vec<Row>>, Solution), Cancellation> {
     let rule = options.stop_rule();
     let (fields, report) = jacobi::solve(hierarchy, team, rule, options.delta_norm, |sweeps, delta| {
         let to_go = (delta / rule.tolerance).max(1.0).log10() / JACOBI_DECADES;

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
+use crate::progress::{Cancellation, Progress, ProgressEvent, Stage};
 
 /// Returns the range of the whole bind's progress that a stage covers.
 fn span(stage: Stage) -> [f32; 2] {
@@ -40,21 +40,21 @@ impl<'a> Watch<'a> {
     /// Reports the `fraction` of a stage.
     ///
     /// # Errors
-    /// [`Cancelled`], if this or an earlier report was cancelled.
+    /// [`Cancellation`], if this or an earlier report was cancelled.
     pub fn report(
         &self,
         stage: Stage,
         fraction: f32,
         iteration: u32,
         delta: Option<f32>,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Cancellation> {
         let [begin, end] = span(stage);
         let mut latest = self.fraction.lock().unwrap_or_else(PoisonError::into_inner);
         *latest = latest.max(begin + (end - begin) * fraction.clamp(0.0, 1.0));
         let event = ProgressEvent { stage, fraction: *latest, iteration, delta };
         if self.is_cancelled() || self.progress.report(event).is_break() {
             self.cancelled.store(true, Ordering::Relaxed);
-            return Err(Cancelled);
+            return Err(Cancellation);
         }
         Ok(())
     }
@@ -68,8 +68,8 @@ impl<'a> Watch<'a> {
     /// Counts a finished piece of the stage's work, and reports the share of finished pieces of `total`.
     ///
     /// # Errors
-    /// [`Cancelled`], if this or an earlier report was cancelled.
-    pub fn piece_done(&self, stage: Stage, total: usize) -> Result<(), Cancelled> {
+    /// [`Cancellation`], if this or an earlier report was cancelled.
+    pub fn piece_done(&self, stage: Stage, total: usize) -> Result<(), Cancellation> {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         self.report(stage, done as f32 / total as f32, 0, None)
     }

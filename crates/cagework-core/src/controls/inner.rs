@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cage::{CageError, MAX_FACES};
-use crate::options::OutOfRange;
+use crate::options::RangeError;
 use crate::words::grouped;
 
 /// Largest allowed radius of balls and tubes, as a fraction of the cage's longest side.
@@ -73,7 +73,7 @@ pub struct InnerControls {
 pub enum ControlError {
     /// The number of subdivision steps is out of range.
     #[error(transparent)]
-    Option(#[from] OutOfRange),
+    Option(#[from] RangeError),
     /// The subdivided surface is not a valid cage.
     #[error("the smooth surface of the cage cannot be used: {0}; use fewer steps or a simpler cage")]
     Smooth(CageError),

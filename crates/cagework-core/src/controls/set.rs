@@ -13,7 +13,7 @@ use crate::contact::{Corners, each_meeting};
 use crate::deform::deform_vertices;
 use crate::enclosure::Enclosure;
 use crate::geometry::closest_point_on_triangle;
-use crate::options::SMOOTH;
+use crate::options::SMOOTH_STEPS;
 use crate::smooth::subdivide;
 use crate::weights::Weights;
 
@@ -68,7 +68,7 @@ impl ControlSet {
     /// [`ControlError`]: too many subdivision steps, or inner controls that are outside, overlap, have invalid indices,
     /// or are too many.
     pub fn new(cage: &Cage, smooth: u32, inner: InnerControls) -> Result<Self, ControlError> {
-        SMOOTH.check(smooth)?;
+        SMOOTH_STEPS.check(smooth)?;
         let mut set = Self::plain(cage);
         if smooth > 0 {
             let made = subdivide(&cage.to_polygon_mesh(), smooth);

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::cage::Cage;
-use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
+use crate::progress::{Cancellation, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
 
 /// Function that computes the vectors for the columns of the cage's triangles from posed vertices. `[n_triangles]`
@@ -63,7 +63,7 @@ pub enum ClosedFormError {
     },
     /// The work was cancelled.
     #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Cancelled(#[from] Cancellation),
     /// The weights exceed the range of row pointers.
     #[error("{rows} vertices times {columns} controls are more than {} weights: use fewer", u32::MAX)]
     TooMany {
@@ -104,7 +104,7 @@ pub(super) fn dense(
         let fraction = (run * RUN) as f32 / rows as f32;
         let event = ProgressEvent { stage: Stage::Sample, fraction, iteration: 0, delta: None };
         if progress.report(event).is_break() {
-            return Err(Cancelled.into());
+            return Err(Cancellation.into());
         }
         let found = crate::team::map_indices(of_run.len(), |v| {
             let mut row = vec![0.0; columns];

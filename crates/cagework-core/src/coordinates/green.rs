@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::cage::shapes;
     use crate::coordinates::{ClosedFormError, Coordinates};
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     /// Largest error of the midpoint rule below for points a tenth of the cage's size from its faces.
     const MIDPOINT_ERROR: f64 = 2e-5;
@@ -174,19 +174,19 @@ mod tests {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let inside = cage.bounds().center();
         let outside =
-            Coordinates::Green.weights(&[inside, inside + 9.0], &cage, u64::MAX, &Silent).unwrap_err();
+            Coordinates::Green.weights(&[inside, inside + 9.0], &cage, u64::MAX, &NoProgress).unwrap_err();
         assert_eq!(
             outside.to_string(),
             "Green coordinates are not defined at mesh vertex 1, which is outside the cage: enlarge the cage"
         );
         let memory =
-            Coordinates::Green.weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
+            Coordinates::Green.weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &NoProgress).unwrap_err();
         // 100 points have a weight of 8 bytes for each of 20 columns: the cube's 8 vertices and 12 triangles.
         assert_eq!(memory, ClosedFormError::Memory { needed: 16_000, limit: 15_999 });
         let cancel = |_: crate::progress::ProgressEvent| std::ops::ControlFlow::Break(());
         let cancelled = Coordinates::Green.weights(&[inside], &cage, u64::MAX, &cancel).unwrap_err();
         assert!(matches!(cancelled, ClosedFormError::Cancelled(_)));
-        let not_finite = Coordinates::Green.weights(&[Vec3::NAN], &cage, u64::MAX, &Silent).unwrap_err();
+        let not_finite = Coordinates::Green.weights(&[Vec3::NAN], &cage, u64::MAX, &NoProgress).unwrap_err();
         assert_eq!(not_finite, ClosedFormError::NotFinite { vertex: 0 });
     }
 

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::cage::shapes;
     use crate::coordinates::{ClosedFormError, Coordinates};
-    use crate::progress::Silent;
+    use crate::progress::NoProgress;
 
     /// Ten times the error of about 1e-8 that omitting a triangle's term causes at a sine of [`SURFACE_TOLERANCE`].
     const TOLERANCE: f64 = 1e-7;
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn vertex_has_weight_one_at_itself() {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
-        let weights = Coordinates::MeanValue.weights(cage.positions(), &cage, u64::MAX, &Silent).unwrap();
+        let weights = Coordinates::MeanValue.weights(cage.positions(), &cage, u64::MAX, &NoProgress).unwrap();
         for (v, (columns, row)) in weights.rows().enumerate() {
             assert_eq!(columns, (0..16).collect::<Vec<u32>>());
             assert!(row.iter().enumerate().all(|(i, &w)| w == if i == v { 1.0 } else { 0.0 }));
@@ -147,7 +147,7 @@ mod tests {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let points = [Vec3::ONE, Vec3::NAN];
         assert_eq!(
-            Coordinates::MeanValue.weights(&points, &cage, u64::MAX, &Silent),
+            Coordinates::MeanValue.weights(&points, &cage, u64::MAX, &NoProgress),
             Err(ClosedFormError::NotFinite { vertex: 1 })
         );
     }

@@ -20,12 +20,12 @@ use super::rows::{Changes, LANES, Rhs, Row, ZERO, jacobi_plane};
 use super::stop::{SolveReport, StopRule};
 use crate::levels::Level;
 use crate::options::DeltaNorm;
-use crate::progress::Cancelled;
+use crate::progress::Cancellation;
 use crate::simd::dispatch;
 use crate::team::Team;
 
 /// Largest number of sweeps of a batch per round: enough to amortise loading the batch into the cache.
-const MAX_ROUND: usize = 8;
+const MAX_ROUND_SWEEPS: usize = 8;
 
 /// Fraction of the predicted remaining sweeps that the next round runs.
 const PREDICTION_SHARE: f64 = 0.8;
@@ -54,7 +54,7 @@ struct ThreadBatches {
 pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) -> u64 {
     let row = size_of::<Row>() as u64;
     n_columns.div_ceil(LANES as u64) * (2 * (n_unknowns + 2) + n_cut) * row
-        + threads * MAX_ROUND as u64 * 4 * (n_unknowns + 2)
+        + threads * MAX_ROUND_SWEEPS as u64 * 4 * (n_unknowns + 2)
 }
 
 /// Stop after this many sweeps without a smaller delta: further changes are rounding noise.
@@ -65,14 +65,14 @@ pub const STALLED_SWEEPS: usize = 128;
 /// Calls `sweep_done(sweeps, delta)` after each round; returning false cancels.
 ///
 /// # Errors
-/// [`Cancelled`] if `sweep_done` returns false.
+/// [`Cancellation`] if `sweep_done` returns false.
 pub fn solve(
     hierarchy: &Hierarchy,
     team: &Team,
     rule: StopRule,
     norm: DeltaNorm,
     mut sweep_done: impl FnMut(u32, f64) -> bool,
-) -> Result<(Vec<Vec<Row>>, SolveReport), Cancelled> {
+) -> Result<(Vec<Vec<Row>>, SolveReport), Cancellation> {
     let level = &hierarchy.levels[0];
     let n_shares = team.n_threads().min(hierarchy.n_batches()).max(1);
     let mut shares: Vec<ThreadBatches> =
@@ -91,7 +91,7 @@ pub fn solve(
         }
         let (sweeps, delta) = report.latest();
         if !sweep_done(sweeps, delta) {
-            return Err(Cancelled);
+            return Err(Cancellation);
         }
         round = next_round(&report.deltas, rule.tolerance);
     }
@@ -112,7 +112,7 @@ fn next_round(history: &[f64], tau: f64) -> usize {
     let rate = history[n - 1].ln() - history[n - 2].ln();
     let remaining = (tau.ln() - history[n - 1].ln()) / rate;
     if remaining.is_finite() && remaining > 0.0 {
-        ((PREDICTION_SHARE * remaining) as usize).clamp(1, MAX_ROUND)
+        ((PREDICTION_SHARE * remaining) as usize).clamp(1, MAX_ROUND_SWEEPS)
     } else {
         1
     }
@@ -120,7 +120,7 @@ fn next_round(history: &[f64], tau: f64) -> usize {
 
 /// Delta (Eq. 2) averaged over cells for each sweep of a round, from the changes of all threads. Both norms take the
 /// root of the sums that the kernel accumulated: of squares or of absolute values.
-fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MAX_ROUND] {
+fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MAX_ROUND_SWEEPS] {
     let n_rows = level.n_rows();
     let pieces = team.share(
         n_rows.div_ceil(CELLS_PER_PIECE),
@@ -133,7 +133,7 @@ fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MA
             )
         },
     );
-    let sums = pieces.iter().fold([0.0f64; MAX_ROUND], |mut sums, piece: &[f64; MAX_ROUND]| {
+    let sums = pieces.iter().fold([0.0f64; MAX_ROUND_SWEEPS], |mut sums, piece: &[f64; MAX_ROUND_SWEEPS]| {
         for (sum, part) in sums.iter_mut().zip(piece) {
             *sum += part;
         }
@@ -175,7 +175,7 @@ impl ThreadBatches {
                 BatchFields { old: vec![ZERO; n_rows], new: vec![ZERO; n_rows], f, batch }
             })
             .collect();
-        Self { batches, changes: vec![vec![0.0; n_rows]; MAX_ROUND] }
+        Self { batches, changes: vec![vec![0.0; n_rows]; MAX_ROUND_SWEEPS] }
     }
 
     fn sweep(&mut self, level: &Level, round: usize, norm: DeltaNorm) {

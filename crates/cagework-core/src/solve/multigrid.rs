@@ -34,7 +34,10 @@ use super::{BatchSolver, Preconditioner};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-use stream::{BETWEEN, BETWEEN_SHORT, DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, stream};
+use stream::{
+    DOWN_PASSES, DOWN_PASSES_FROM_COARSE, DOWN_PASSES_FROM_ZERO, MIDDLE_PASSES, Pass, SHORT_MIDDLE_PASSES,
+    UP_PASSES, stream,
+};
 
 /// Over-relaxation of the first black half sweep: values from 1.1 to 1.3 all reduce the error by a further factor of
 /// 1.5 to 2 per cycle (Armadillo).
@@ -92,13 +95,13 @@ impl Workspace {
 
     /// Runs one V(2,1) cycle on the finest level, for benchmarks. Call after [`Self::solve`].
     pub fn v_cycle(&mut self, hierarchy: &Hierarchy) {
-        self.cycle(hierarchy, 0, DOWN);
+        self.cycle(hierarchy, 0, DOWN_PASSES);
     }
 
     /// Runs one V(2,1) cycle on level k and the coarser levels, with the pre-smoothing passes `start`.
     fn cycle(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) {
         self.down(hierarchy, k, start);
-        self.up(hierarchy, k, UP);
+        self.up(hierarchy, k, UP_PASSES);
     }
 
     fn rhs(f: &[Vec<Row>], k: usize, is_finest_dense: bool) -> Rhs<'_> {
@@ -111,7 +114,7 @@ impl Workspace {
     fn down(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) -> (f64, f64) {
         let level = &hierarchy.levels[k];
         if k + 1 == hierarchy.levels.len() {
-            if start == DOWN_FROM_ZERO {
+            if start == DOWN_PASSES_FROM_ZERO {
                 self.u[k].fill(ZERO);
             }
             let rhs = Self::rhs(&self.f, k, self.is_finest_dense);
@@ -134,7 +137,7 @@ impl Workspace {
                 squares / level.n_unknowns() as f64
             },
         );
-        self.cycle(hierarchy, k + 1, DOWN_FROM_ZERO);
+        self.cycle(hierarchy, k + 1, DOWN_PASSES_FROM_ZERO);
         let correction =
             if k == 0 { sum_squares(&self.u[1]) / coarse.n_unknowns().max(1) as f64 } else { 0.0 };
         (correction, mean_square)
@@ -157,7 +160,7 @@ impl Preconditioner for Workspace {
         self.is_finest_dense = true;
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
-        self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
+        self.cycle(hierarchy, 0, DOWN_PASSES_FROM_ZERO);
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
     }
@@ -180,9 +183,13 @@ impl BatchSolver for Workspace {
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
         for k in (1..=coarsest).rev() {
             hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);
-            self.cycle(hierarchy, k, if k == coarsest { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE });
+            self.cycle(
+                hierarchy,
+                k,
+                if k == coarsest { DOWN_PASSES_FROM_ZERO } else { DOWN_PASSES_FROM_COARSE },
+            );
         }
-        let mut start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
+        let mut start = if coarsest == 0 { DOWN_PASSES_FROM_ZERO } else { DOWN_PASSES_FROM_COARSE };
         let mut convergence = Convergence::new(rule);
         loop {
             let (correction_square, residual_square) = self.down(hierarchy, 0, start);
@@ -193,7 +200,7 @@ impl BatchSolver for Workspace {
             }
             let stalls = !done && convergence.stalls();
             if done || stalls {
-                self.up(hierarchy, 0, UP);
+                self.up(hierarchy, 0, UP_PASSES);
             }
             if stalls {
                 let mut rescue =
@@ -209,9 +216,9 @@ impl BatchSolver for Workspace {
                 return Some(convergence.into_report());
             }
             start = match coarsest {
-                0 => DOWN,
-                _ if convergence.is_nearly_done(SHORT_CYCLE_MARGIN) => BETWEEN_SHORT,
-                _ => BETWEEN,
+                0 => DOWN_PASSES,
+                _ if convergence.is_nearly_done(SHORT_CYCLE_MARGIN) => SHORT_MIDDLE_PASSES,
+                _ => MIDDLE_PASSES,
             };
         }
     }

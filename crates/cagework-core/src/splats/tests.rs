@@ -4,7 +4,7 @@ use glam::{Mat3, Quat, Vec3, Vec4};
 
 use super::*;
 use crate::field::{FieldWeights, Lattice};
-use crate::progress::Silent;
+use crate::progress::NoProgress;
 use crate::team::Team;
 use crate::{BindOptions, Bounds, Cage, subdivided_box};
 
@@ -21,7 +21,7 @@ fn cage() -> Cage {
 fn field_of(map: impl Fn(Vec3) -> Vec3) -> Field {
     let cage = cage();
     let options = BindOptions { grid: 32, ..BindOptions::default() };
-    let weights = FieldWeights::bind(&cage, 16, &options, &Silent).unwrap();
+    let weights = FieldWeights::bind(&cage, 16, &options, &NoProgress).unwrap();
     let posed: Vec<Vec3> = cage.positions().iter().map(|&p| map(p)).collect();
     weights.pose(cage.positions(), &posed)
 }

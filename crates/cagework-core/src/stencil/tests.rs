@@ -1,10 +1,10 @@
 use super::*;
 use crate::bind::Watch;
-use crate::bind::pipeline::{FieldsOn, PreparedBind};
+use crate::bind::pipeline::{FieldStorage, PreparedBind};
 use crate::cage::subdivided_box;
 use crate::mesh::Bounds;
 use crate::options::BindOptions;
-use crate::progress::Silent;
+use crate::progress::NoProgress;
 use crate::solve::BatchSolver as _;
 use crate::solve::jacobi;
 use crate::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, OMEGA, Workspace};
@@ -22,9 +22,10 @@ fn prepared<T>(use_it: impl FnOnce(&PreparedBind<'_>) -> T) -> T {
     let positions: Vec<Vec3> =
         (0..40).map(|k| 0.45 * Vec3::new((k as f32).sin(), (k as f32).cos(), 0.3)).collect();
     let options = BindOptions { grid: 15, ..BindOptions::default() };
-    let watch = Watch::new(&Silent);
+    let watch = Watch::new(&NoProgress);
     use_it(
-        &PreparedBind::new(&positions, (&cage).into(), &options, FieldsOn::Host, &watch).expect("good input"),
+        &PreparedBind::new(&positions, (&cage).into(), &options, FieldStorage::Host, &watch)
+            .expect("good input"),
     )
 }
 

@@ -167,13 +167,13 @@ fn mark_slice(
     triangles: &[u32],
 ) -> BoundaryValues {
     #[derive(Clone, Copy)]
-    struct Closest {
+    struct ClosestTriangle {
         distance_squared: f64,
         triangle: u32,
         barycentric: [f64; 3],
     }
     let cage = controls.surface();
-    let mut closest: Vec<Option<Closest>> = vec![None; (dims.x * dims.y) as usize];
+    let mut closest: Vec<Option<ClosestTriangle>> = vec![None; (dims.x * dims.y) as usize];
     let half = 0.5 * cell_size;
     let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
     for &t in triangles {
@@ -198,7 +198,7 @@ fn mark_slice(
                 let best = &mut closest[(x + dims.x * y) as usize];
                 if best.is_none_or(|b| distance_squared < b.distance_squared) {
                     let barycentric = found.barycentric;
-                    *best = Some(Closest { distance_squared, triangle: t, barycentric });
+                    *best = Some(ClosestTriangle { distance_squared, triangle: t, barycentric });
                 }
             }
         }

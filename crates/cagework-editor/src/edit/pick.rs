@@ -219,7 +219,7 @@ fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::edit::tests::{Flat, cube};
+    use crate::edit::tests::{FrontView, cube};
 
     fn pixel(x: f32, y: f32) -> Vec2 {
         Vec2::new(200.0 + 100.0 * x, 100.0 - 100.0 * y)
@@ -231,12 +231,13 @@ mod tests {
         let mut cube = cube();
         let topology = Topology::new(&cube.faces);
         cube.positions.push(Vec3::splat(0.5));
-        let pick = |at, with_hidden| pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, with_hidden);
+        let pick =
+            |at, with_hidden| pick_vertex(&cube.positions, &topology, &FrontView, at, 5.0, with_hidden);
         assert_eq!(pick(pixel(0.5, 0.5), false), Some(8));
         assert_eq!(pick(pixel(0.5, 0.5), true), Some(8));
         // Of a vertex of a front face and a control inside the cube, the click picks the one nearer to the pointer.
         cube.positions[8] = Vec3::new(0.97, 1.0, 0.5);
-        let pick = |x| pick_vertex(&cube.positions, &topology, &Flat, pixel(x, 1.0), 5.0, false);
+        let pick = |x| pick_vertex(&cube.positions, &topology, &FrontView, pixel(x, 1.0), 5.0, false);
         assert_eq!((pick(0.975), pick(0.995)), (Some(8), Some(7)));
     }
 
@@ -245,8 +246,9 @@ mod tests {
         let cube = cube();
         let triangles: Vec<[u32; 3]> =
             cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
-        let middle =
-            |x, y| pick_middle(&cube.positions, &triangles, &Flat, pixel(x, y), Vec3::new(0.5, 0.5, 0.25));
+        let middle = |x, y| {
+            pick_middle(&cube.positions, &triangles, &FrontView, pixel(x, y), Vec3::new(0.5, 0.5, 0.25))
+        };
         // The points are on a diagonal, where a ray hits two triangles at one place, and off the diagonal.
         for (x, y) in [(0.5, 0.5), (0.25, 0.75), (0.3, 0.8)] {
             assert!(middle(x, y).abs_diff_eq(Vec3::new(x, y, 0.5), 1e-5), "{}", middle(x, y));
@@ -260,12 +262,12 @@ mod tests {
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
-        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, true), Some(7));
-        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9, true), None);
+        assert_eq!(pick_vertex(&cube.positions, &topology, &FrontView, at, 5.0, true), Some(7));
+        assert_eq!(pick_vertex(&cube.positions, &topology, &FrontView, at, 4.9, true), None);
         // Of two vertices at the same depth, the click picks the one that is nearer on the screen.
         let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
         let none = Topology::default();
-        assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0, true), Some(1));
+        assert_eq!(pick_vertex(&two, &none, &FrontView, pixel(0.06, 0.0), 20.0, true), Some(1));
     }
 
     #[test]
@@ -282,9 +284,9 @@ mod tests {
         }
         let topology = Topology::new(&plate.faces);
         let at = pixel(plate.positions[3].x, plate.positions[3].y);
-        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, at, 24.0, true), Some(7));
+        assert_eq!(pick_vertex(&plate.positions, &topology, &FrontView, at, 24.0, true), Some(7));
         assert_eq!(
-            pick_vertex(&plate.positions, &topology, &Flat, at, 1.0, true),
+            pick_vertex(&plate.positions, &topology, &FrontView, at, 1.0, true),
             Some(3),
             "if no front vertex is near"
         );
@@ -295,13 +297,13 @@ mod tests {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::X + Vec3::Z, Vec3::Y + Vec3::Z];
         let triangles = [[0, 1, 2], [3, 4, 5]];
         let (triangle, barycentric) =
-            pick_surface(&positions, (0..).zip(triangles), &Flat, pixel(0.25, 0.5)).unwrap();
+            pick_surface(&positions, (0..).zip(triangles), &FrontView, pixel(0.25, 0.5)).unwrap();
         assert_eq!(triangle, 1, "in front of the other one");
         assert!(
             barycentric.iter().zip([0.25, 0.25, 0.5]).all(|(a, b)| (a - b).abs() < 1e-5),
             "{barycentric:?}"
         );
-        assert_eq!(pick_surface(&positions, (0..).zip(triangles), &Flat, pixel(0.6, 0.6)), None);
+        assert_eq!(pick_surface(&positions, (0..).zip(triangles), &FrontView, pixel(0.6, 0.6)), None);
     }
 
     #[test]
@@ -309,25 +311,25 @@ mod tests {
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         assert_eq!(topology.edges.len(), 12);
-        let edge = pick_edge(&cube.positions, &topology, &Flat, pixel(0.5, 1.03), 5.0);
+        let edge = pick_edge(&cube.positions, &topology, &FrontView, pixel(0.5, 1.03), 5.0);
         assert_eq!(edge.map(|e| topology.edges[e as usize]), Some([6, 7]));
-        assert_eq!(pick_edge(&cube.positions, &topology, &Flat, pixel(1.1, 1.1), 5.0), None);
+        assert_eq!(pick_edge(&cube.positions, &topology, &FrontView, pixel(1.1, 1.1), 5.0), None);
     }
 
     #[test]
     fn nearest_face_under_the_pointer_is_picked() {
         let cube = cube();
         let topology = Topology::new(&cube.faces);
-        let face = pick_face(&cube.positions, &topology, &Flat, pixel(0.25, 0.75));
+        let face = pick_face(&cube.positions, &topology, &FrontView, pixel(0.25, 0.75));
         assert_eq!(face.map(|f| topology.faces[f as usize].clone()), Some(vec![4, 5, 7, 6]), "z = 1");
-        assert_eq!(pick_face(&cube.positions, &topology, &Flat, pixel(1.25, 0.75)), None);
+        assert_eq!(pick_face(&cube.positions, &topology, &FrontView, pixel(1.25, 0.75)), None);
     }
 
     #[test]
     fn box_selection_is_independent_of_the_drag_direction() {
         let cube = cube();
         let corners = [pixel(0.5, 1.5), pixel(1.5, -0.5)];
-        assert_eq!(vertices_in_box(&cube.positions, &Flat, corners), [1, 3, 5, 7]);
-        assert_eq!(vertices_in_box(&cube.positions, &Flat, [corners[1], corners[0]]), [1, 3, 5, 7]);
+        assert_eq!(vertices_in_box(&cube.positions, &FrontView, corners), [1, 3, 5, 7]);
+        assert_eq!(vertices_in_box(&cube.positions, &FrontView, [corners[1], corners[0]]), [1, 3, 5, 7]);
     }
 }

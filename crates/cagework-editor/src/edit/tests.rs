@@ -22,9 +22,9 @@ pub(crate) fn cube() -> PolygonMesh {
 }
 
 /// A view along -z with 100 pixels per unit, and the origin at pixel (200, 100).
-pub(crate) struct Flat;
+pub(crate) struct FrontView;
 
-impl View for Flat {
+impl View for FrontView {
     fn project(&self, point: Vec3) -> Option<(Vec2, f32)> {
         Some((Vec2::new(200.0 + 100.0 * point.x, 100.0 - 100.0 * point.y), 10.0 - point.z))
     }
@@ -44,7 +44,7 @@ impl View for Flat {
 
 #[test]
 fn pointer_to_the_right_and_down_moves_in_the_view_plane() {
-    assert_eq!(Flat.backward(), Vec3::Z);
-    let moved = Flat.in_view_plane(Vec3::ZERO, Vec2::new(50.0, 20.0));
+    assert_eq!(FrontView.backward(), Vec3::Z);
+    let moved = FrontView.in_view_plane(Vec3::ZERO, Vec2::new(50.0, 20.0));
     assert!(moved.abs_diff_eq(Vec3::new(0.5, -0.2, 0.0), 1e-6));
 }

@@ -178,7 +178,7 @@ fn a_model_that_gets_a_skin_keeps_place_paint_and_pins() {
         editor.open(models, Contents { pins: pins.clone(), ..Contents::default() });
         let amount = |p: &Vec3| (100.0 + 50.0 * p.y + 20.0 * p.x) as u8;
         let amounts: Vec<u8> = shirt.positions.iter().map(amount).collect();
-        let options = PartOptions { shown: false, rigid: vec![WHOLE.to_owned()], stays: Vec::new() };
+        let options = PartOptions { shown: false, rigid: vec![WHOLE_MODEL.to_owned()], stays: Vec::new() };
         editor.apply(Command::SetPainted { id: 0, amounts }).unwrap();
         editor.apply(Command::SetParts { id: 0, options: options.clone() }).unwrap();
         editor.amend();

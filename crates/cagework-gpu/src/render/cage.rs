@@ -97,7 +97,7 @@ impl CageView {
         let inner = handles.split_off(self.n_vertices);
         self.inner.set_items(context, layouts, &inner);
         if is_faint {
-            handles.retain(|item| item[0] >> STATE_SHIFT != state::NORMAL);
+            handles.retain(|item| item[0] >> STATE_SHIFT != state::NORMAL_STATE);
         }
         self.handles.set_items(context, layouts, &handles);
         self.lines.set_items(context, layouts, &self.line_items(selection));
@@ -118,18 +118,18 @@ impl CageView {
     }
 
     fn handle_items(&self, selection: &Selection) -> Vec<Item> {
-        let mut states = vec![state::NORMAL; self.n_controls];
-        mark(&mut states, &selection.unmatched, state::UNMATCHED);
-        mark(&mut states, &selection.vertices, state::SELECTED);
+        let mut states = vec![state::NORMAL_STATE; self.n_controls];
+        mark(&mut states, &selection.unmatched, state::UNMATCHED_STATE);
+        mark(&mut states, &selection.vertices, state::SELECTED_STATE);
         hover(&mut states, selection.hovered_vertex.map(|v| v as usize));
         (0u32..).zip(states).map(|(i, state)| item(state, i, 0)).collect()
     }
 
     fn line_items(&self, selection: &Selection) -> Vec<Item> {
         let number = |[a, b]: [u32; 2]| self.edge_numbers.get(&[a.min(b), a.max(b)]).copied();
-        let mut states = vec![state::NORMAL; self.edges.len()];
+        let mut states = vec![state::NORMAL_STATE; self.edges.len()];
         for edge in selection.edges.iter().filter_map(|&e| number(e)) {
-            states[edge] = state::SELECTED;
+            states[edge] = state::SELECTED_STATE;
         }
         hover(&mut states, selection.hovered_edge.and_then(number));
         self.edges.iter().zip(states).map(|(&[a, b], state)| item(state, a, b)).collect()
@@ -137,14 +137,14 @@ impl CageView {
 
     fn face_items(&self, selection: &Selection) -> Vec<Item> {
         let n_faces = self.face_of_triangle.iter().max().map_or(0, |&f| f as usize + 1);
-        let mut states = vec![state::NORMAL; n_faces];
-        mark(&mut states, &selection.faces, state::SELECTED);
+        let mut states = vec![state::NORMAL_STATE; n_faces];
+        mark(&mut states, &selection.faces, state::SELECTED_STATE);
         hover(&mut states, selection.hovered_face.map(|f| f as usize));
         self.triangles
             .iter()
             .zip(&self.face_of_triangle)
             .flat_map(|(&[a, b, c], &face)| match states[face as usize] {
-                state::NORMAL => [HIDDEN_ITEM, HIDDEN_ITEM],
+                state::NORMAL_STATE => [HIDDEN_ITEM, HIDDEN_ITEM],
                 state => [item(state, a, b), [c, 0]],
             })
             .collect()
@@ -161,6 +161,6 @@ fn mark(states: &mut [u32], chosen: &[u32], state: u32) {
 
 fn hover(states: &mut [u32], hovered: Option<usize>) {
     if let Some(s) = hovered.and_then(|k| states.get_mut(k)) {
-        *s = if *s == state::SELECTED { state::BOTH } else { state::HOVERED };
+        *s = if *s == state::SELECTED_STATE { state::BOTH_STATE } else { state::HOVERED_STATE };
     }
 }

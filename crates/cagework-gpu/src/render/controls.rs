@@ -88,7 +88,7 @@ pub(super) fn bones(controls: Controls<'_>) -> Vec<[u32; 2]> {
 }
 
 pub(super) fn lines(edges: &[[u32; 2]]) -> Vec<Item> {
-    edges.iter().map(|&[a, b]| item(state::NORMAL, a, b)).collect()
+    edges.iter().map(|&[a, b]| item(state::NORMAL_STATE, a, b)).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::camera::Camera;
 use super::layout::GizmoView;
 use super::pipelines::{GIZMO_STRIDE, Layouts};
 use super::scene::{Gizmo, GizmoMode, GizmoPart};
-use super::theme::{ACTIVE, AXES, linear};
+use super::theme::{ACTIVE_COLOR, AXES, linear};
 use crate::device::GpuContext;
 
 /// Length of an axis in the picture, CSS pixels.
@@ -206,7 +206,7 @@ impl GizmoShape {
 
 /// Colour of a handle: highlighted if it is active.
 fn color(active: Option<GizmoPart>, part: GizmoPart, own: usize, alpha: f32) -> [f32; 4] {
-    let [r, g, b, _] = linear(if active == Some(part) { ACTIVE } else { AXES[own] });
+    let [r, g, b, _] = linear(if active == Some(part) { ACTIVE_COLOR } else { AXES[own] });
     [r, g, b, alpha]
 }
 

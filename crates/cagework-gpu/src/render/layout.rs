@@ -67,7 +67,7 @@ pub mod surface_mode {
     /// A single colour, without texture and vertex colours.
     pub const CLAY: u32 = 3;
     /// The material's colour, blended by its alpha.
-    pub const BLENDED: u32 = 4;
+    pub const ALPHA_BLENDING: u32 = 4;
 }
 
 /// Mirrors `Style` in `shaders/overlay.wgsl`.
@@ -97,7 +97,7 @@ pub(super) const RING_STATE: u32 = 1;
 pub const STATE_SHIFT: u32 = 28;
 
 /// State of hidden items. Same as in `shaders/overlay.wgsl`.
-pub const HIDDEN: u32 = 15;
+pub const HIDDEN_STATE: u32 = 15;
 
 /// Mirrors `SliceView` in `shaders/draw_slice.wgsl`.
 #[repr(C)]

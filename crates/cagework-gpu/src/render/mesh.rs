@@ -203,7 +203,11 @@ impl Group {
     ) -> Result<Self, GpuError> {
         let surface = Surface {
             base_color: group.base_color,
-            mode: if group.alpha == Alpha::Blend { surface_mode::BLENDED } else { surface_mode::MATERIAL },
+            mode: if group.alpha == Alpha::Blend {
+                surface_mode::ALPHA_BLENDING
+            } else {
+                surface_mode::MATERIAL
+            },
             alpha_cutoff: match group.alpha {
                 Alpha::Mask { cutoff } => cutoff,
                 Alpha::Opaque | Alpha::Blend => 0.0,

@@ -1,6 +1,6 @@
 //! Lines, points and faces over the model. Items index positions and have a state.
 
-use super::layout::{HIDDEN, STATE_SHIFT, Style};
+use super::layout::{HIDDEN_STATE, STATE_SHIFT, Style};
 use super::pipelines::Layouts;
 use super::theme::state;
 use crate::device::GpuContext;
@@ -18,7 +18,7 @@ pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
 }
 
 /// An item that is not drawn.
-pub(super) const HIDDEN_ITEM: Item = [HIDDEN << STATE_SHIFT, 0];
+pub(super) const HIDDEN_ITEM: Item = [HIDDEN_STATE << STATE_SHIFT, 0];
 
 /// Items of one kind with a table of positions.
 #[derive(Debug)]
@@ -119,7 +119,7 @@ impl Overlay {
 pub(super) fn with_behind(style: Style) -> [Style; 2] {
     let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
     // Selected items keep their full opacity behind surfaces.
-    for state in [state::SELECTED, state::BOTH] {
+    for state in [state::SELECTED_STATE, state::BOTH_STATE] {
         behind.colors[state as usize][3] /= BEHIND_OPACITY;
     }
     [style, behind]
@@ -177,6 +177,6 @@ mod tests {
     #[test]
     fn item_packs_state_and_indices() {
         assert_eq!(item(4, 0x0fff_ffff, 7), [0x4fff_ffff, 7]);
-        assert_eq!(HIDDEN_ITEM[0] >> STATE_SHIFT, HIDDEN);
+        assert_eq!(HIDDEN_ITEM[0] >> STATE_SHIFT, HIDDEN_STATE);
     }
 }

@@ -6,15 +6,15 @@ use super::scene::Theme;
 /// States of handles, edges and faces: indices into [`Style::colors`].
 pub(super) mod state {
     /// State of elements that are neither selected nor hovered.
-    pub(in crate::render) const NORMAL: u32 = 0;
+    pub(in crate::render) const NORMAL_STATE: u32 = 0;
     /// State of hovered elements.
-    pub(in crate::render) const HOVERED: u32 = 1;
+    pub(in crate::render) const HOVERED_STATE: u32 = 1;
     /// State of selected elements.
-    pub(in crate::render) const SELECTED: u32 = 2;
+    pub(in crate::render) const SELECTED_STATE: u32 = 2;
     /// State of elements that are selected and hovered.
-    pub(in crate::render) const BOTH: u32 = 3;
+    pub(in crate::render) const BOTH_STATE: u32 = 3;
     /// State of vertices without a mirror image, in symmetric editing.
-    pub(in crate::render) const UNMATCHED: u32 = 4;
+    pub(in crate::render) const UNMATCHED_STATE: u32 = 4;
 }
 
 /// Colours of a theme.
@@ -52,9 +52,9 @@ pub(super) const AXES: [Color; 5] =
     [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0), (0x8a94a6, 1.0)];
 
 /// Colour of the gizmo's handle that is hovered or dragged.
-pub(super) const ACTIVE: Color = (0xffc53d, 1.0);
+pub(super) const ACTIVE_COLOR: Color = (0xffc53d, 1.0);
 
-const DARK: Palette = Palette {
+const DARK_PALETTE: Palette = Palette {
     background_top: (0x3c424c, 1.0),
     background_bottom: (0x1b1d21, 1.0),
     floor: (0x9aa4b4, 0.24),
@@ -76,7 +76,7 @@ const DARK: Palette = Palette {
     cell_lines: (0x15181d, 0.55),
 };
 
-const LIGHT: Palette = Palette {
+const LIGHT_PALETTE: Palette = Palette {
     background_top: (0xfbfcfd, 1.0),
     background_bottom: (0xd4dae1, 1.0),
     floor: (0x5e6a7a, 0.30),
@@ -101,8 +101,8 @@ const LIGHT: Palette = Palette {
 impl Theme {
     pub(super) fn palette(self) -> &'static Palette {
         match self {
-            Self::Dark => &DARK,
-            Self::Light => &LIGHT,
+            Self::Dark => &DARK_PALETTE,
+            Self::Light => &LIGHT_PALETTE,
         }
     }
 }
@@ -138,10 +138,10 @@ impl Palette {
     /// Colours of all states. `normal`: colour of elements that are neither selected nor hovered.
     fn states(&self, normal: Color) -> [[f32; 4]; 8] {
         let mut colors = [linear(normal); 8];
-        colors[state::HOVERED as usize] = linear(self.hovered);
-        colors[state::SELECTED as usize] = linear(self.selected);
-        colors[state::BOTH as usize] = linear(self.both);
-        colors[state::UNMATCHED as usize] = linear(self.unmatched);
+        colors[state::HOVERED_STATE as usize] = linear(self.hovered);
+        colors[state::SELECTED_STATE as usize] = linear(self.selected);
+        colors[state::BOTH_STATE as usize] = linear(self.both);
+        colors[state::UNMATCHED_STATE as usize] = linear(self.unmatched);
         colors
     }
 
@@ -283,7 +283,7 @@ mod tests {
     /// WCAG 2.2, 1.4.11: graphics need a contrast of 3 : 1 to adjacent colours.
     #[test]
     fn cage_and_marks_contrast_with_the_background() {
-        for palette in [&DARK, &LIGHT] {
+        for palette in [&DARK_PALETTE, &LIGHT_PALETTE] {
             for color in [
                 palette.cage,
                 palette.selected,

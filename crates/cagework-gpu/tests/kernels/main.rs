@@ -9,7 +9,7 @@ mod support;
 use cagework_core::bind::Watch;
 use cagework_core::levels::Level;
 use cagework_core::options::{BindOptions, DeltaNorm};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::rows::Prolong;
@@ -62,7 +62,7 @@ async fn step(
     count: u32,
     inputs: &[&[u8]],
 ) -> Result<Vec<f32>, GpuError> {
-    let watch = Watch::new(&Silent);
+    let watch = Watch::new(&NoProgress);
     let mut stream = Stream::new(context, &watch).await?;
     let mut allocator = Allocator::new(context, "one step");
     let mut buffers = Vec::new();

@@ -47,7 +47,7 @@ fn deform_splats_matches_cpu() {
     let splats = random_splats(&mut rng, 131, |rng| origin + size * (1.2 * rng.point() - 0.1));
     let rest = splats.rest_pose();
     let (table, rows) = (field_table(&field), splat_rows(&rest, &[]));
-    let work = Work { mode: mode::WITH_TURNS, ..ROWS };
+    let work = Work { mode: mode::ROTATIONS, ..ROWS };
     let result = run(&kernels::DEFORM_SPLATS, work, 131, &[bytes(&table), bytes(&rows), bytes(&rows)]);
     let sorted = SortedSplats::new(&splats, &field.lattice);
     let (mut posed, mut expected) = (SplatPose::default(), rest);
@@ -76,7 +76,7 @@ fn set_turn(row: &mut [f32; 12], turn: Quat) {
 #[test]
 fn splats_turn_with_a_rotation() {
     let mut rng = Rng(29);
-    let work = Work { mode: mode::WITH_TURNS, ..ROWS };
+    let work = Work { mode: mode::ROTATIONS, ..ROWS };
     for axis in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_ONE.normalize(), Vec3::new(0.6, -0.64, 0.48)] {
         for angle in [0.0, 1.0, 2.2, 3.1] {
             let turn = Quat::from_axis_angle(axis, angle);

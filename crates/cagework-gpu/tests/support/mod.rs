@@ -2,9 +2,9 @@
 #![allow(dead_code, reason = "each test binary uses a subset")]
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};
+use cagework_core::bind::pipeline::{FieldStorage, PreparedBind};
 use cagework_core::options::BindOptions;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{Bounds, Cage, TriMesh, subdivided_box};
 use cagework_gpu::{ContextOptions, GpuContext};
 use glam::Vec3;
@@ -117,8 +117,8 @@ pub(crate) fn with_prepared<T>(
     options: &BindOptions,
     use_it: impl FnOnce(&PreparedBind<'_>) -> T,
 ) -> T {
-    let watch = Watch::new(&Silent);
-    let prepared = PreparedBind::new(positions, cage.into(), options, FieldsOn::Device, &watch)
+    let watch = Watch::new(&NoProgress);
+    let prepared = PreparedBind::new(positions, cage.into(), options, FieldStorage::Device, &watch)
         .expect("the input is valid");
     use_it(&prepared)
 }

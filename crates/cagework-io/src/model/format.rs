@@ -74,7 +74,7 @@ pub(crate) enum ModelProperty {
 }
 
 /// Defaults for the facts about a format: no companions, recognised by the extension only.
-const PLAIN: FormatFacts = FormatFacts {
+const DEFAULT_FACTS: FormatFacts = FormatFacts {
     endings: &[],
     read_only: &[],
     mime_types: &[],
@@ -163,7 +163,7 @@ formats! {
         // `shape` is an estimate for exports with normals. An OBJ without normals needs a third of it.
         bytes_to_write: |model, shape| shape / 3 + model.bytes,
         keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits, ModelProperty::Texcoords, ModelProperty::Names],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// Stanford PLY, text or binary.
     Ply = "ply": FormatFacts {
@@ -180,7 +180,7 @@ formats! {
             ModelProperty::Digits,
             ModelProperty::Colors,
         ],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// STL, text or binary.
     Stl = "stl": FormatFacts {
@@ -190,7 +190,7 @@ formats! {
         read: |source| source.polygons(ModelFormat::Stl, stl::read),
         write: |model, positions| model.shape(positions).and_then(|shape| stl::write(&shape)),
         keeps: &[ModelProperty::Faces],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// Geomview OFF, text: OFF, COFF, NOFF.
     Off = "off": FormatFacts {
@@ -202,7 +202,7 @@ formats! {
             model.shape(positions).map(|shape| off::write(&Shape { has_normals, ..shape }))
         },
         keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits, ModelProperty::Colors],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// 3MF, the format of slicers: a zip archive with a model in XML.
     ThreeMf = "3mf": FormatFacts {
@@ -223,7 +223,7 @@ formats! {
         // The model's bytes include the archive and its unpacked text.
         bytes_to_write: |model, shape| shape + 2 * model.bytes,
         keeps: &[ModelProperty::Faces, ModelProperty::Order, ModelProperty::Digits],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// `.splat`: Gaussian splats in uncompressed records of 32 bytes.
     Splat = "splat": FormatFacts {
@@ -231,7 +231,7 @@ formats! {
         read: |source| source.splats(ModelFormat::Splat, records::read),
         keeps: &[ModelProperty::Splats],
         is_unmarked: true,
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
     /// SPZ: Niantic Labs' compressed format for Gaussian splats.
     Spz = "spz": FormatFacts {
@@ -240,7 +240,7 @@ formats! {
         marked: &[["spz", "not an SPZ", "neither it nor its gzip stream begins with 'NGSP'"]],
         read: |source| source.splats(ModelFormat::Spz, spz::read),
         keeps: &[ModelProperty::Splats, ModelProperty::Harmonics],
-        ..PLAIN
+        ..DEFAULT_FACTS
     };
 }
 
@@ -342,6 +342,9 @@ impl ModelFormat {
         }
         match bytes {
             [] => return fault("empty", "the file has no bytes"),
+            [b'P', b'K', 3, 4, ..] if ending == "npz" => {
+                return fault("weights or arrays, not a model", &export);
+            }
             [b'P', b'K', 3, 4, ..] if ending != "3mf" => return fault("a zip archive", "unpack it first"),
             [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", &export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", &export),

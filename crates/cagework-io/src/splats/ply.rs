@@ -381,11 +381,13 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, table: Option<&Table>) -> Vec<
     let n_harmonics = cagework_core::splats::n_harmonics(splats.degree);
     let is_far = to_write.origin != DVec3::ZERO;
     let mut table = table.cloned().unwrap_or_else(|| Table::of_splats(splats.len(), n_harmonics, is_far));
-    const KNOWN: &str = "the table has the columns of splats";
+    const COLUMNS_RULE: &str = "the table has the columns of splats";
     let all = (table.columns(POSITION), table.columns(COLOR), table.columns([OPACITY]));
-    let (position, color, opacity) = (all.0.expect(KNOWN), all.1.expect(KNOWN), all.2.expect(KNOWN));
-    let (scale, rotation) = (table.columns(SCALE).expect(KNOWN), table.columns(ROTATION).expect(KNOWN));
-    let harmonics = table.harmonics().expect(KNOWN);
+    let (position, color, opacity) =
+        (all.0.expect(COLUMNS_RULE), all.1.expect(COLUMNS_RULE), all.2.expect(COLUMNS_RULE));
+    let (scale, rotation) =
+        (table.columns(SCALE).expect(COLUMNS_RULE), table.columns(ROTATION).expect(COLUMNS_RULE));
+    let harmonics = table.harmonics().expect(COLUMNS_RULE);
     for splat in (0..splats.len()).filter(|&splat| to_write.writes(splat)) {
         let mut put = |columns: &[usize], numbers: &[f32]| {
             columns.iter().zip(numbers).for_each(|(&column, &x)| table.put(splat, column, x.into()));

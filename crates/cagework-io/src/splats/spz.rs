@@ -41,7 +41,7 @@ const COLOR_SCALE: f32 = 0.15;
 /// Largest number of fractional bits of a position.
 const MAX_FRACTION: u8 = 20;
 /// Largest integer that can store a coordinate: positions have 24 bits per axis, with sign.
-const MAX_FIXED: f64 = 8_388_607.0;
+const MAX_FIXED_POINT: f64 = 8_388_607.0;
 /// Integer that stores sqrt(1/2), the upper bound of the three smaller components of a rotation.
 const ROTATION_STEPS: f32 = 511.0;
 
@@ -253,14 +253,14 @@ fn word(bytes: &[u8], at: usize) -> u32 {
 /// [`WriteError::Splat`] if a position does not fit into 24 bits.
 pub(crate) fn write(to_write: &SplatsToWrite<'_>, body: Option<&Body>) -> Result<Vec<u8>, WriteError> {
     let splats = to_write.splats;
-    let is_far = |&s: &usize| to_write.position(s).abs().max_element() > MAX_FIXED;
+    let is_far = |&s: &usize| to_write.position(s).abs().max_element() > MAX_FIXED_POINT;
     if let Some(splat) = (0..splats.len()).find(is_far) {
         let value = to_write.position(splat).to_string();
         return Err(WriteError::Splat { splat, what: "the position", value, limit: "8,388,607" });
     }
     let farthest =
         (0..splats.len()).map(|s| to_write.position(s).abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
-    let fits = |fraction: u8| farthest * f64::from(fraction).exp2() <= MAX_FIXED;
+    let fits = |fraction: u8| farthest * f64::from(fraction).exp2() <= MAX_FIXED_POINT;
     let finest = (0..=MAX_FRACTION).rev().find(|&fraction| fits(fraction)).unwrap_or(0);
     let kept = body.filter(|body| body.layout.version == VERSION && fits(body.layout.fraction));
     let fraction = kept.map_or(finest, |body| body.layout.fraction);
@@ -281,7 +281,7 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, body: Option<&Body>) -> Result
             bytes[starts[array] + splat * sizes[array]..][..from.len()].copy_from_slice(from);
         };
         let fixed = (to_write.position(splat) * f64::from(fraction).exp2()).to_array().map(|x| {
-            let [a, b, c, _] = (x.round().clamp(-MAX_FIXED, MAX_FIXED) as i32).to_le_bytes();
+            let [a, b, c, _] = (x.round().clamp(-MAX_FIXED_POINT, MAX_FIXED_POINT) as i32).to_le_bytes();
             [a, b, c]
         });
         put(0, fixed.as_flattened());

@@ -8,7 +8,7 @@ use cagework_core::deform::deform_bound;
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::mesh::Bounds;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_io::{
@@ -41,9 +41,9 @@ static REST: LazyLock<Rest> = LazyLock::new(|| {
     let closed = Cage::new(&cage.cage_mesh()).expect("the cage is closed");
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
     let points = lattice(bounds);
-    let binding = bind(&points, &closed, &options, &Silent).expect("points are inside");
+    let binding = bind(&points, &closed, &options, &NoProgress).expect("points are inside");
     let posed: Vec<Vec3> = closed.positions().iter().map(|&p| twist(p)).collect();
-    let weights = FieldWeights::bind(&closed, GRID, &options, &Silent).expect("the cage is closed");
+    let weights = FieldWeights::bind(&closed, GRID, &options, &NoProgress).expect("the cage is closed");
     let field = weights.pose(closed.positions(), &posed);
     Rest { samples: inputs::samples(), cage, closed, points, binding, field }
 });
@@ -99,7 +99,7 @@ pub(crate) fn survive(bytes: &[u8]) {
 fn as_controls(inner: InnerControls, choice: u32) {
     let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
     let options = BindOptions { grid: GRID, tau: 1e-3, ..BindOptions::default() };
-    let Ok(binding) = bind(&REST.points, &set, &options, &Silent) else { return };
+    let Ok(binding) = bind(&REST.points, &set, &options, &NoProgress) else { return };
     let rest = deform_bound(&binding.weights, &binding.frames, Controls::from(&set).rest());
     for (p, at) in REST.points.iter().zip(rest) {
         assert!(p.distance(at) < 1e-4, "{p} moves to {at}");
@@ -194,13 +194,13 @@ fn as_model(model: &Model, choice: u32) {
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
         smooth: choice >> 9 & 1,
     };
-    if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
+    if let Ok(made) = generate(&model.positions, &model.triangles, &options, &NoProgress) {
         assert_eq!(made.cage.notices(), []);
         let (smooth, options) = (options.smooth, bind_options(choice));
         // If `smooth` is set, the generated cage encloses the model by its subdivided surface, so bind to this surface.
         let smooth =
             ControlSet::new(&made.cage, smooth, InnerControls::default()).expect("the cage is valid");
-        match bind(&model.positions, &smooth, &options, &Silent) {
+        match bind(&model.positions, &smooth, &options, &NoProgress) {
             Ok(binding) => {
                 assert_eq!(binding.weights.n_rows(), model.positions.len());
                 assert!(binding.weights.data().iter().all(|w| w.is_finite()));
@@ -230,7 +230,7 @@ fn as_cage(mesh: &PolygonMesh, choice: u32) {
 
 fn bind_to(mesh: &PolygonMesh, points: &[Vec3], choice: u32) {
     let Ok(cage) = Cage::new(mesh) else { return };
-    if let Ok(binding) = bind(points, &cage, &bind_options(choice), &Silent) {
+    if let Ok(binding) = bind(points, &cage, &bind_options(choice), &NoProgress) {
         assert!(binding.weights.data().iter().all(|w| w.is_finite()));
         let _ = deform_bound(&binding.weights, &binding.frames, cage.positions());
     }

@@ -4,7 +4,7 @@ use cagework_io::{Joints, Player, WriteError};
 use glam::Vec3;
 
 use super::common::{self, json_of, rigged};
-use super::{ROUNDED, assert_near, f, player, read, reshaped, shown};
+use super::{ROUNDING_TOLERANCE, assert_near, f, player, read, reshaped, shown};
 
 #[test]
 fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_with_bones() {
@@ -23,7 +23,7 @@ fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_
         let [a, b] = [&old, &new].map(|player| player.at(Some(0), seconds, &[]));
         let linear = |m: &glam::Mat4| glam::Mat3::from_mat4(*m);
         for (a, b) in a.palette.iter().zip(&b.palette) {
-            assert!(linear(a).abs_diff_eq(linear(b), ROUNDED), "at {seconds} s");
+            assert!(linear(a).abs_diff_eq(linear(b), ROUNDING_TOLERANCE), "at {seconds} s");
         }
         assert_eq!(a.targets, b.targets);
     }
@@ -75,7 +75,10 @@ fn splines_follow_the_rule_between_their_keys() {
     for seconds in [0.0, 0.3, 0.7, 1.0] {
         let [old, new] = [&before, &after].map(|player| root(player, seconds));
         let expected = f(Vec3::ZERO) + 1.2 * old;
-        assert!(new.distance(expected) <= 4.0 * ROUNDED, "{new} instead of {expected} at {seconds} s");
+        assert!(
+            new.distance(expected) <= 4.0 * ROUNDING_TOLERANCE,
+            "{new} instead of {expected} at {seconds} s"
+        );
     }
 }
 
@@ -89,18 +92,18 @@ fn baked_clip_shows_its_frames() {
     let last = frames.len() - 1;
     for (k, frame) in frames.iter().enumerate() {
         let at = seconds * k as f32 / last as f32;
-        assert_near(frame, &shown(&player(&model), Some(0), at, &[]), ROUNDED, "as it plays");
+        assert_near(frame, &shown(&player(&model), Some(0), at, &[]), ROUNDING_TOLERANCE, "as it plays");
     }
     let bent: Vec<Vec<Vec3>> = frames.iter().map(|frame| frame.iter().map(|&p| f(p)).collect()).collect();
     let rest: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
     let bytes = model.write_baked(0, &rest, bent.clone()).unwrap();
     let baked = read(&bytes);
-    assert_near(&baked.positions, &rest, ROUNDED, "at rest");
+    assert_near(&baked.positions, &rest, ROUNDING_TOLERANCE, "at rest");
     let baked_player = player(&baked);
     assert_eq!((baked.clips().len(), baked.clips()[0].name.as_deref()), (1, Some("walk")));
     for (k, frame) in bent.iter().enumerate() {
         let at = shown(&baked_player, Some(0), seconds * k as f32 / last as f32, &[]);
-        assert_near(&at, frame, 4.0 * ROUNDED, &format!("frame {k}"));
+        assert_near(&at, frame, 4.0 * ROUNDING_TOLERANCE, &format!("frame {k}"));
     }
     assert_eq!(model.frames(7).unwrap_err(), WriteError::NoClip(7));
 }
@@ -117,7 +120,7 @@ fn channels_with_a_missing_sampler_stay_unchanged() {
     assert_eq!((report.tracks, report.tracks_unread), (0, 2));
     assert_eq!(json_of(&bytes)["animations"], rig.json["animations"]);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&read(&bytes).positions, &moved, ROUNDED, "at rest");
+    assert_near(&read(&bytes).positions, &moved, ROUNDING_TOLERANCE, "at rest");
 }
 
 /// Channels that share samplers or accessors get separate values; the last one reuses the shared accessor.
@@ -144,7 +147,7 @@ fn shared_samplers_and_accessors_are_separated() {
     let way = |of: &[Vec<Vec3>; 2], node: usize| of[1][node] - of[0][node];
     for node in [1, 2] {
         let (found, expected) = (way(&new, node), 1.2 * way(&old, node));
-        assert!(found.distance(expected) <= 4.0 * ROUNDED, "{found} instead of {expected}");
+        assert!(found.distance(expected) <= 4.0 * ROUNDING_TOLERANCE, "{found} instead of {expected}");
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DVec3, Mat4, Vec3, vec3};
 use serde_json::json;
 
 use super::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
-use super::{ROUNDED, assert_near, assert_targets, by, f, player, read, reshaped, shown};
+use super::{ROUNDING_TOLERANCE, assert_near, assert_targets, by, f, player, read, reshaped, shown};
 
 /// The column of [`rigged`] with a cube attached to the column's tip by a matrix.
 fn with_hat() -> Builder {
@@ -28,17 +28,17 @@ fn props_on_bones_bend_or_stay_rigid() {
     assert_eq!(model.props().unwrap(), ["hat"]);
     let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
     let bent = read(&reshaped(&model, Joints::Follow).0);
-    assert_near(&last(&bent, 8), &moved, ROUNDED, "it bends");
+    assert_near(&last(&bent, 8), &moved, ROUNDING_TOLERANCE, "it bends");
 
     let options = ReshapeOptions { rigid: vec!["hat".into()], ..ReshapeOptions::default() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
     let rigid = last(&read(&bytes), 8);
     // The least-squares rigid motion maps the centroid to the centroid of the bent shape (Kabsch 1976).
     let middle = |at: &[Vec3]| at.iter().sum::<Vec3>() / at.len() as f32;
-    assert!(middle(&rigid).distance(middle(&moved)) <= ROUNDED, "{rigid:?} {moved:?}");
+    assert!(middle(&rigid).distance(middle(&moved)) <= ROUNDING_TOLERANCE, "{rigid:?} {moved:?}");
     for (a, b) in [(0, 7), (1, 6), (2, 4)] {
         let [before, after] = [&last(&model, 8), &rigid].map(|at| at[a].distance(at[b]));
-        assert!((before - after).abs() <= ROUNDED, "{before} {after}");
+        assert!((before - after).abs() <= ROUNDING_TOLERANCE, "{before} {after}");
         assert!((before - moved[a].distance(moved[b])).abs() > 1e-3, "otherwise it is stretched");
     }
 
@@ -46,7 +46,7 @@ fn props_on_bones_bend_or_stay_rigid() {
     // mirrored.
     let stays = ReshapeOptions { joints: Joints::Stay, ..options.clone() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &stays).unwrap();
-    assert_near(&last(&read(&bytes), 8), &rigid, ROUNDED, "the skeleton stays");
+    assert_near(&last(&read(&bytes), 8), &rigid, ROUNDING_TOLERANCE, "the skeleton stays");
     let still = vec![DVec3::ZERO; by(&model).len()];
     let poses = ["once", "twice"].map(|name| (name.to_owned(), by(&model)));
     let (bytes, _) = model.write_reshaped(&still, &[], &poses, &options).unwrap();
@@ -54,7 +54,7 @@ fn props_on_bones_bend_or_stay_rigid() {
     let mut targets = posed.targets().1.to_vec();
     *targets.last_mut().unwrap() = 1.0;
     let all = shown(&posed, None, 0.0, &targets);
-    assert_near(&all[all.len() - 8..], &rigid, ROUNDED, "in a pose");
+    assert_near(&all[all.len() - 8..], &rigid, ROUNDING_TOLERANCE, "in a pose");
     let mut baked = with_hat();
     let away = vec3(0.4, -3.0, 0.2);
     let corners = common::CUBE.map(|c| (Vec3::from_array(c) * 0.1 - away).to_array());
@@ -71,7 +71,7 @@ fn props_on_bones_bend_or_stay_rigid() {
         let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
         for p in last(&read(&bytes), 8) {
             let near = rigid.iter().map(|q| p.distance(*q)).fold(f32::INFINITY, f32::min);
-            assert!(near <= 4.0 * ROUNDED, "{what}: {near:e}");
+            assert!(near <= 4.0 * ROUNDING_TOLERANCE, "{what}: {near:e}");
         }
     }
     // Joints and skinned meshes with the same name are not props.
@@ -84,7 +84,7 @@ fn props_on_bones_bend_or_stay_rigid() {
     assert_near(
         &read(&bytes).positions[..20],
         &read(&reshaped(&model, Joints::Follow).0).positions[..20],
-        ROUNDED,
+        ROUNDING_TOLERANCE,
         "bends",
     );
 
@@ -107,7 +107,7 @@ fn vertices_shared_between_primitives_stay_shared() {
     let model = read(&rig.glb());
     let (bytes, _) = reshaped(&model, Joints::Follow);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&read(&bytes).positions, &moved, ROUNDED, "each is where it goes");
+    assert_near(&read(&bytes).positions, &moved, ROUNDING_TOLERANCE, "each is where it goes");
     let document = json_of(&bytes);
     for attribute in ["POSITION", "NORMAL"] {
         let primitives = document["meshes"][0]["primitives"].as_array().unwrap();
@@ -140,7 +140,7 @@ fn a_rigid_piece_of_a_skin_keeps_its_lengths_with_every_target() {
         let [from, to] = [&before, &after].map(|player| shown(player, None, 0.0, &targets));
         for (a, b) in [(0, 19), (3, 12), (7, 8)] {
             let change = to[a].distance(to[b]) - from[a].distance(from[b]);
-            assert!(change.abs() <= ROUNDED, "{targets:?}, {a} to {b}: {change:e}");
+            assert!(change.abs() <= ROUNDING_TOLERANCE, "{targets:?}, {a} to {b}: {change:e}");
         }
         assert!(to[19].distance(from[19]) > 0.3, "it has moved");
     }
@@ -173,7 +173,7 @@ fn several_sets_of_joints_add_up() {
         let after = player(&read(&reshaped(&model, Joints::Follow).0));
         shown(&after, Some(0), 0.6, &[])
     });
-    assert_near(&split, &plain, ROUNDED, "at 0.6 s");
+    assert_near(&split, &plain, ROUNDING_TOLERANCE, "at 0.6 s");
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn gpu_instances_stay_unchanged_with_a_notice() {
     assert!(model.notices.iter().any(|notice| notice.contains(expected)), "{:?}", model.notices);
     let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
     let (bytes, _) = reshaped(&model, Joints::Follow);
-    assert_near(&last(&read(&bytes), 8), &moved, ROUNDED, "the one at the node");
+    assert_near(&last(&read(&bytes), 8), &moved, ROUNDING_TOLERANCE, "the one at the node");
     assert_eq!(json_of(&bytes)["nodes"][5]["extensions"], instancing);
 }
 
@@ -207,7 +207,7 @@ fn meshes_outside_the_scene_are_deformed() {
     let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     let shown = read(&common::glb(&json, Some(&bytes[28 + length..])));
     let moved: Vec<Vec3> = common::cube().iter().map(|&p| f(p)).collect();
-    assert_near(&shown.positions, &moved, ROUNDED, "the level of detail");
+    assert_near(&shown.positions, &moved, ROUNDING_TOLERANCE, "the level of detail");
 }
 
 /// The end of a chain is a joint without vertices, here outside the cage.
@@ -230,7 +230,7 @@ fn joints_without_vertices_outside_the_cage_follow_their_parents() {
         vec3(0.0, 0.5, 0.3).distance(Vec3::from_array([0, 1, 2].map(|k| at[k].as_f64().unwrap() as f32)))
     });
     assert!(
-        loose <= ROUNDED && inside > 0.05,
+        loose <= ROUNDING_TOLERANCE && inside > 0.05,
         "{loose} and {inside} away from the original offset to its parent"
     );
 }
@@ -281,10 +281,10 @@ fn a_rest_pose_far_from_the_bind_pose_survives() {
     for joints in [Joints::Follow, Joints::Stay] {
         let bytes = reshaped(&model, joints).0;
         // Compare the states of the target with default weight 0, at weights 0 and 1.
-        assert_targets(&model, &bytes, &[1], 2.0 * ROUNDED);
+        assert_targets(&model, &bytes, &[1], 2.0 * ROUNDING_TOLERANCE);
         let [before, after] = [&model, &read(&bytes)].map(|m| player(m).at(None, 0.0, &[]).palette);
         for (a, b) in before.iter().zip(&after) {
-            assert!(a.abs_diff_eq(*b, 2.0 * ROUNDED), "{a} {b}");
+            assert!(a.abs_diff_eq(*b, 2.0 * ROUNDING_TOLERANCE), "{a} {b}");
         }
     }
 }
@@ -321,7 +321,7 @@ fn colliders_without_offset_are_scaled() {
     }
     let tail = (f(vec3(0.0, 1.8, 0.0)) - f(vec3(0.0, 1.0, 0.0))) / 2.0;
     let found = Vec3::from_array([0, 1, 2].map(|k| shape(1, "capsule")["tail"][k].as_f64().unwrap() as f32));
-    assert!(found.distance(tail) <= ROUNDED, "{found} instead of {tail}");
+    assert!(found.distance(tail) <= ROUNDING_TOLERANCE, "{found} instead of {tail}");
 }
 
 /// Vertices without weights follow the mesh's node, with a notice.
@@ -340,7 +340,7 @@ fn vertices_without_weights_follow_the_node_with_a_notice() {
         // The vertex without weights is moved by the mesh's node, whose translation is (7, 7, 7), and is bound there.
         let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
         let bytes = reshaped(&model, Joints::Follow).0;
-        assert_near(&read(&bytes).positions, &moved, 16.0 * ROUNDED, "with a loose vertex");
+        assert_near(&read(&bytes).positions, &moved, 16.0 * ROUNDING_TOLERANCE, "with a loose vertex");
     }
     assert!(!read(&rigged().glb()).notices.iter().any(|notice| notice.contains("no positive weight")));
 }
@@ -363,7 +363,7 @@ fn primitives_with_fewer_targets_are_padded() {
     assert_eq!((n_targets, json["meshes"][0]["weights"].as_array().unwrap().len()), ([3, 3], 3));
     let posed = shown(&player(&read(&bytes)), None, 0.0, &[0.25, 0.0, 1.0]);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&posed, &moved, 4.0 * ROUNDED, "the pose");
+    assert_near(&posed, &moved, 4.0 * ROUNDING_TOLERANCE, "the pose");
 }
 
 /// Poses become the keyframes of one extra clip, "poses", beside the model's own clips.
@@ -389,7 +389,7 @@ fn poses_are_played_at_their_times() {
     let at = shown(&player(&written), Some(clip), 0.875, &[]);
     let [from, to] = [0.0, 2.0].map(|seconds| shown(&player(&written), Some(clip), seconds, &[]));
     let expected: Vec<Vec3> = from.iter().zip(&to).map(|(a, b)| a.lerp(*b, share)).collect();
-    assert_near(&at, &expected, 4.0 * ROUNDED, "cubic");
+    assert_near(&at, &expected, 4.0 * ROUNDING_TOLERANCE, "cubic");
     let wrong = timed(Timeline::every_second(3)).unwrap_err();
     assert_eq!(wrong, WriteError::Poses { given: 2, expected: 3 });
     let written = read(&timed(Timeline::at_keys(&[0.25, 0.75])).unwrap().0);
@@ -400,7 +400,7 @@ fn poses_are_played_at_their_times() {
     let (before, bent) = (at(0.1), at(0.75));
     let half: Vec<Vec3> = before.iter().zip(&bent).map(|(a, b)| a.midpoint(*b)).collect();
     assert!(before.iter().zip(&bent).any(|(a, b)| a.distance(*b) > 0.1));
-    assert_near(&at(0.5), &half, 4.0 * ROUNDED, "half-way");
+    assert_near(&at(0.5), &half, 4.0 * ROUNDING_TOLERANCE, "half-way");
 }
 
 #[test]
@@ -425,5 +425,5 @@ fn positions_that_overlap_indices_are_not_overwritten() {
     let again = read(&reshaped(&model, Joints::Follow).0);
     assert_eq!(again.triangles, model.triangles);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&again.positions, &moved, ROUNDED, "deformed positions");
+    assert_near(&again.positions, &moved, ROUNDING_TOLERANCE, "deformed positions");
 }

@@ -206,7 +206,7 @@ fn model_stands_where_it_stood() {
     assert!((report.lift - 0.5).abs() < 1e-6, "{report:?}");
     // The skeleton is lifted with the mesh: the player's rest pose equals the positions in the file.
     let shown = super::shown(&player(&read(&glb)), None, 0.0, &[]);
-    super::assert_near(&shown, &read(&glb).positions, super::ROUNDED, "rest");
+    super::assert_near(&shown, &read(&glb).positions, super::ROUNDING_TOLERANCE, "rest");
 }
 
 /// Height of the lowest vertex during the clip.

@@ -19,7 +19,7 @@ use common::{json_of, rigged};
 use glam::{DVec3, Vec3, vec3};
 
 /// Tolerance for positions of up to 2 that are transformed back and forth in f32.
-const ROUNDED: f32 = 2e-6;
+const ROUNDING_TOLERANCE: f32 = 2e-6;
 
 fn read(bytes: &[u8]) -> Model {
     Model::read("rigged.glb", bytes, &mut |_| None).unwrap()
@@ -59,7 +59,7 @@ fn assert_near(found: &[Vec3], expected: &[Vec3], within: f32, what: &str) {
 #[test]
 fn player_at_rest_matches_the_model() {
     let model = read(&rigged().glb());
-    assert_near(&shown(&player(&model), None, 0.0, &[]), &model.positions, ROUNDED, "rest");
+    assert_near(&shown(&player(&model), None, 0.0, &[]), &model.positions, ROUNDING_TOLERANCE, "rest");
 }
 
 #[test]
@@ -88,10 +88,15 @@ fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
     b.json["scenes"][0]["nodes"] = serde_json::json!([5]);
     let far = at_place(&b.glb());
     assert_eq!(far.notices, near.notices);
-    assert_near(&far.positions, &near.positions, ROUNDED, "read");
-    assert_near(&far.extra_points().unwrap(), &near.extra_points().unwrap(), ROUNDED, "points of the rig");
+    assert_near(&far.positions, &near.positions, ROUNDING_TOLERANCE, "read");
+    assert_near(
+        &far.extra_points().unwrap(),
+        &near.extra_points().unwrap(),
+        ROUNDING_TOLERANCE,
+        "points of the rig",
+    );
     let states = |model: &Model| model.states(Some("walk")).unwrap().0;
-    assert_near(&states(&far), &states(&near), ROUNDED, "what a cage should enclose");
+    assert_near(&states(&far), &states(&near), ROUNDING_TOLERANCE, "what a cage should enclose");
     let still = vec![DVec3::ZERO; far.positions.len() + far.extra_points().unwrap().len()];
     let unmoved = far.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0;
     assert!(unmoved == b.glb(), "unmoved export is the input");
@@ -109,12 +114,17 @@ fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
         let [far, near] = [at_place(&far), read(&near)].map(|model| player(&model));
         for (clip, targets) in [(None, &[1.0, 0.5]), (Some(0), &[0.25, 0.0])] {
             let [far, near] = [&far, &near].map(|player| shown(player, clip, 0.7, targets));
-            assert_near(&far, &near, 2.0 * ROUNDED, "reshaped");
+            assert_near(&far, &near, 2.0 * ROUNDING_TOLERANCE, "reshaped");
         }
     }
     let baked = |model: &Model| model.write_baked(0, &near.positions, near.frames(0).unwrap()).unwrap();
     let [far, near] = [at_place(&baked(&far)), read(&baked(&near))].map(|model| player(&model));
-    assert_near(&shown(&far, Some(0), 0.7, &[]), &shown(&near, Some(0), 0.7, &[]), ROUNDED, "baked");
+    assert_near(
+        &shown(&far, Some(0), 0.7, &[]),
+        &shown(&near, Some(0), 0.7, &[]),
+        ROUNDING_TOLERANCE,
+        "baked",
+    );
 }
 
 #[test]
@@ -126,7 +136,7 @@ fn rest_and_single_targets_follow_the_cage() {
         let after = player(&read(&bytes));
         let moved = |at: &[Vec3]| at.iter().map(|&p| f(p)).collect::<Vec<_>>();
         let rest = shown(&before, None, 0.0, &[]);
-        assert_near(&shown(&after, None, 0.0, &[]), &moved(&rest), ROUNDED, "at rest");
+        assert_near(&shown(&after, None, 0.0, &[]), &moved(&rest), ROUNDING_TOLERANCE, "at rest");
         let (names, defaults) = before.targets();
         assert_eq!((names.len(), after.targets()), (2, (names, defaults)));
         for k in 0..names.len() {
@@ -134,7 +144,12 @@ fn rest_and_single_targets_follow_the_cage() {
                 let mut targets = defaults.to_vec();
                 targets[k] = share;
                 let state = moved(&shown(&before, None, 0.0, &targets));
-                assert_near(&shown(&after, None, 0.0, &targets), &state, ROUNDED, &format!("{k} at {share}"));
+                assert_near(
+                    &shown(&after, None, 0.0, &targets),
+                    &state,
+                    ROUNDING_TOLERANCE,
+                    &format!("{k} at {share}"),
+                );
             }
         }
         assert_eq!(report.joints_moved, if joints == Joints::Stay { 0 } else { 3 });
@@ -150,7 +165,7 @@ fn joints_follow_the_cage_and_keep_skinning_matrices() {
     // The palettes contain the skinning matrix `G B` of each joint.
     let [old, new] = [&before, &after].map(|player| player.at(None, 0.0, &[]).palette);
     for (a, b) in old.iter().zip(&new) {
-        assert!(a.abs_diff_eq(*b, ROUNDED), "{a} {b}");
+        assert!(a.abs_diff_eq(*b, ROUNDING_TOLERANCE), "{a} {b}");
     }
     let json = json_of(&bytes);
     let world = |node: usize| {
@@ -161,7 +176,11 @@ fn joints_follow_the_cage_and_keep_skinning_matrices() {
         at(0) + 2.0 * (1..=node).map(at).sum::<Vec3>()
     };
     for (node, y) in [(1, 0.0), (2, 1.0), (3, 2.0)] {
-        assert!(world(node).distance(f(vec3(0.0, y, 0.0))) <= ROUNDED, "joint {node} at {}", world(node));
+        assert!(
+            world(node).distance(f(vec3(0.0, y, 0.0))) <= ROUNDING_TOLERANCE,
+            "joint {node} at {}",
+            world(node)
+        );
     }
 }
 
@@ -175,16 +194,21 @@ fn poses_are_appended_to_the_targets() {
     let after = player(&read(&bytes));
     assert_eq!(after.targets().0, ["wide", "tall", "bent"]);
     let rest = shown(&after, None, 0.0, &[]);
-    assert_near(&rest, &model.positions, ROUNDED, "rest");
+    assert_near(&rest, &model.positions, ROUNDING_TOLERANCE, "rest");
     let mut targets = after.targets().1.to_vec();
     assert_eq!(targets, [0.25, 0.0, 0.0]);
     targets[2] = 1.0;
     let bent: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
-    assert_near(&shown(&after, None, 0.0, &targets), &bent, ROUNDED, "bent");
+    assert_near(&shown(&after, None, 0.0, &targets), &bent, ROUNDING_TOLERANCE, "bent");
     // Existing clips have weights for all three targets; the new clip plays the pose.
-    assert_near(&shown(&after, Some(1), 1.0, &[]), &bent, ROUNDED, "played");
+    assert_near(&shown(&after, Some(1), 1.0, &[]), &bent, ROUNDING_TOLERANCE, "played");
     let old = player(&model);
-    assert_near(&shown(&after, Some(0), 0.7, &[]), &shown(&old, Some(0), 0.7, &[]), ROUNDED, "the old clip");
+    assert_near(
+        &shown(&after, Some(0), 0.7, &[]),
+        &shown(&old, Some(0), 0.7, &[]),
+        ROUNDING_TOLERANCE,
+        "the old clip",
+    );
 }
 
 /// A mesh with two skins has two deformations, so it is duplicated with its targets.
@@ -201,7 +225,7 @@ fn mesh_with_two_skins_is_duplicated() {
     let (bytes, _) = reshaped(&model, Joints::Follow);
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
     let again = model.player_of(&bytes).unwrap();
-    assert_near(&shown(&again, None, 0.0, &[]), &moved, 4.0 * ROUNDED, "both");
+    assert_near(&shown(&again, None, 0.0, &[]), &moved, 4.0 * ROUNDING_TOLERANCE, "both");
     let by = by(&model);
     let still = vec![DVec3::ZERO; by.len()];
     let poses = [("bent".to_owned(), by)];
@@ -210,7 +234,7 @@ fn mesh_with_two_skins_is_duplicated() {
     assert_eq!(again.targets().0, ["wide", "tall", "bent", "wide", "tall", "bent"]);
     let mut targets = again.targets().1.to_vec();
     (targets[2], targets[5]) = (1.0, 1.0);
-    assert_near(&shown(&again, None, 0.0, &targets), &moved, 4.0 * ROUNDED, "as a pose");
+    assert_near(&shown(&again, None, 0.0, &targets), &moved, 4.0 * ROUNDING_TOLERANCE, "as a pose");
 }
 
 #[test]
@@ -329,7 +353,7 @@ fn offsets_of_a_vrm_move_with_the_shape() {
         ("plane", array(&extended["plane"]["offset"]), expected(1.0, offset)),
         ("instead of a plane", array(&colliders[1]["shape"]["sphere"]["offset"]), vec3(0.0, -1e4, 0.0)),
     ] {
-        assert!(found.distance(expected) <= ROUNDED, "{what}: {found} instead of {expected}");
+        assert!(found.distance(expected) <= ROUNDING_TOLERANCE, "{what}: {found} instead of {expected}");
     }
     // `f` scales y by 1.2; its other first-order terms are shears, which preserve volume.
     for radius in [&springs["radius"], &capsule["radius"], &extended["sphere"]["radius"]] {
@@ -394,7 +418,7 @@ fn ninety_three_targets_are_exported() {
     assert_eq!(model.extra_points().unwrap().len(), n, "each moved vertex once");
     let (bytes, report) = reshaped(&model, Joints::Follow);
     assert_eq!((report.morph_ends, report.lattice_points), (n, 0));
-    assert_targets(&model, &bytes, &[0, 46, 92], ROUNDED);
+    assert_targets(&model, &bytes, &[0, 46, 92], ROUNDING_TOLERANCE);
 }
 
 /// The 54 targets move all 4,000 vertices and so have 216,000 ends, as in a baked clip.
@@ -414,7 +438,7 @@ fn many_morph_ends_are_interpolated_in_a_lattice() {
 
     let [before, after] = [&bytes, &out].map(|b| shown(&player(&read(b)), None, 0.0, &[]));
     let rest: Vec<Vec3> = before.into_iter().map(f).collect();
-    assert_near(&after, &rest, 4.0 * ROUNDED, "the rest shape is exact");
+    assert_near(&after, &rest, 4.0 * ROUNDING_TOLERANCE, "the rest shape is exact");
     // Linear interpolation of `f` errs by at most 1/8 of its second derivative (0.2, along y) times the
     // squared cell size.
     let diagonal = {
@@ -425,7 +449,12 @@ fn many_morph_ends_are_interpolated_in_a_lattice() {
     let cell = report.lattice_cell * diagonal;
     // 60,000 nodes, the limit, in a box of 1 x 1.2 x 0.7 give cells of size 0.0241.
     assert!(cell < 0.026, "{cell}");
-    assert_targets(&model, &out, &[0, 7, 30, 53], 4.0 * ROUNDED + (0.2 / 8.0 * cell * cell) as f32);
+    assert_targets(
+        &model,
+        &out,
+        &[0, 7, 30, 53],
+        4.0 * ROUNDING_TOLERANCE + (0.2 / 8.0 * cell * cell) as f32,
+    );
 
     let still = vec![DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()];
     assert!(model.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0 == bytes);
@@ -506,6 +535,6 @@ fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
     let before = player(&model);
     for targets in [[0.25, 0.0], [1.0, 0.0], [0.25, 1.0]] {
         let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();
-        assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDED, &format!("{targets:?}"));
+        assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDING_TOLERANCE, &format!("{targets:?}"));
     }
 }

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3, vec3};
 use serde_json::{Value, json};
 
 use super::common::{self, Builder, CUBE, F32, U8, floats, json_of, rigged};
-use super::{ROUNDED, assert_near, by, f, player, read, reshaped, shown};
+use super::{ROUNDING_TOLERANCE, assert_near, by, f, player, read, reshaped, shown};
 
 /// A mesh of a cube with edges of 0.5, centred at its origin.
 fn centred_cube(b: &mut Builder) -> usize {
@@ -64,10 +64,10 @@ fn wheels_rotate_about_their_moved_axles() {
     for seconds in [0.0, 0.5, 1.0] {
         let at = shown(&after, Some(0), seconds, &[]);
         let middle = at[8..].iter().sum::<Vec3>() / 8.0;
-        assert!(middle.distance(vec3(3.35, 0.0, 0.0)) <= ROUNDED, "{middle} at {seconds} s");
+        assert!(middle.distance(vec3(3.35, 0.0, 0.0)) <= ROUNDING_TOLERANCE, "{middle} at {seconds} s");
     }
     let rest: Vec<Vec3> = model.positions.iter().map(|&p| wider(p)).collect();
-    assert_near(&read(&bytes).positions, &rest, ROUNDED, "at rest");
+    assert_near(&read(&bytes).positions, &rest, ROUNDING_TOLERANCE, "at rest");
     let (_, report) = reshaped(&model, Joints::Follow);
     assert_eq!(report.notices()[0], "moved 2 of 2 joints and other nodes and adapted 0 animation tracks");
 
@@ -77,7 +77,7 @@ fn wheels_rotate_about_their_moved_axles() {
     let json = json_of(&model.write_reshaped(&by, &[], &[], &rigid).unwrap().0);
     let corners = model.positions[8..].iter().map(|&p| f(p)).sum::<Vec3>() / 8.0;
     assert!(
-        translation(&json, 1).distance(corners) <= ROUNDED,
+        translation(&json, 1).distance(corners) <= ROUNDING_TOLERANCE,
         "the axle is at the centre of the rigid wheel"
     );
 
@@ -93,7 +93,7 @@ fn pivots_follow_the_cage_unless_they_are_at_the_origin() {
     let model = read(&still.glb());
     let json = json_of(&reshaped(&model, Joints::Follow).0);
     for (node, at) in [(0, vec3(0.0, 1.0, 0.0)), (1, vec3(3.0, 0.0, 0.0))] {
-        assert!(translation(&json, node).distance(f(at)) <= ROUNDED);
+        assert!(translation(&json, node).distance(f(at)) <= ROUNDING_TOLERANCE);
     }
     assert_eq!(model.props().unwrap(), Vec::<String>::new(), "there is no skeleton");
     let plain = read(&common::plain_cube().glb());
@@ -124,9 +124,9 @@ fn vrm_bones_follow_the_cage_with_their_meshes() {
         assert_eq!((report.joints, report.joints_moved), (6, 6));
         let json = json_of(&bytes);
         let [head, hair, chest] = [5, 6, 7].map(|node| translation(&json, node));
-        assert!(head.distance(f(vec3(0.1, 1.0, 0.0))) <= ROUNDED, "{extension}: {head}");
-        assert!((head + hair).distance(f(vec3(0.1, 1.5, 0.0))) <= ROUNDED, "{extension}: {hair}");
-        assert!(chest.distance(f(vec3(0.0, 1.5, 0.1))) <= ROUNDED, "{extension}: {chest}");
+        assert!(head.distance(f(vec3(0.1, 1.0, 0.0))) <= ROUNDING_TOLERANCE, "{extension}: {head}");
+        assert!((head + hair).distance(f(vec3(0.1, 1.5, 0.0))) <= ROUNDING_TOLERANCE, "{extension}: {hair}");
+        assert!(chest.distance(f(vec3(0.0, 1.5, 0.1))) <= ROUNDING_TOLERANCE, "{extension}: {chest}");
     }
 }
 
@@ -169,17 +169,17 @@ fn feet_stay_attached_to_legs_in_clips() {
     let [before, after] = [player(&model), player(&read(&bytes))];
     for (clip, seconds) in [(0, 0.0), (0, 0.5), (0, 1.0), (1, 0.0)] {
         let [old, new] = [&before, &after].map(|player| player.at(Some(clip), seconds, &[]).origins);
-        assert!(old[2].distance(old[3]) <= ROUNDED);
+        assert!(old[2].distance(old[3]) <= ROUNDING_TOLERANCE);
         let gap = new[2].distance(new[3]);
-        assert!(gap <= ROUNDED, "clip {clip} at {seconds} s: {gap} between shin and foot");
+        assert!(gap <= ROUNDING_TOLERANCE, "clip {clip} at {seconds} s: {gap} between shin and foot");
         // Translations scale with the height of the hips.
         let way = |origins: &[Vec3], start: Vec3| origins[1] - start;
         let [old, new] = [way(&old, vec3(0.0, 1.0, 0.0)), way(&new, vec3(0.0, 1.35, 0.0))];
-        assert!(new.distance(1.35 * old) <= ROUNDED, "{new} instead of 1.35 times {old}");
+        assert!(new.distance(1.35 * old) <= ROUNDING_TOLERANCE, "{new} instead of 1.35 times {old}");
     }
     let options = ReshapeOptions { keep_travel: true, ..ReshapeOptions::default() };
     let by: Vec<DVec3> = by(&model);
     let kept = player(&read(&model.write_reshaped(&by, &[], &[], &options).unwrap().0));
     let way = |seconds| kept.at(Some(0), seconds, &[]).origins[1];
-    assert!((way(1.0) - way(0.0)).distance(vec3(0.0, 0.2, 0.4)) <= ROUNDED);
+    assert!((way(1.0) - way(0.0)).distance(vec3(0.0, 0.2, 0.4)) <= ROUNDING_TOLERANCE);
 }

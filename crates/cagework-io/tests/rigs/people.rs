@@ -4,7 +4,7 @@ use cagework_cage::generate::{CageOptions, generate};
 use cagework_cage::samples;
 use cagework_core::bind::bind;
 use cagework_core::deform::displacements;
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Cage};
 use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport, write_mesh_glb};
 use glam::{Mat3, Mat4, Vec3, vec3};
@@ -32,7 +32,7 @@ fn by_cage(
 ) -> (Model, ReshapeReport) {
     let mut points = model.positions.clone();
     points.extend(model.extra_points().unwrap());
-    let binding = bind(&points, cage, &BindOptions::default(), &Silent).unwrap();
+    let binding = bind(&points, cage, &BindOptions::default(), &NoProgress).unwrap();
     let posed: Vec<Vec3> = cage.positions().iter().map(|&p| moved(p)).collect();
     let by = displacements(&binding.weights, &binding.frames, cage.positions(), &posed);
     let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
@@ -154,7 +154,7 @@ fn targets_inside_the_cage_flip_no_triangles() {
     rig.json["nodes"] = json!([{ "mesh": 0 }]);
     let model = read(&rig.glb());
     let (states, of_states) = model.states(None).unwrap();
-    let made = generate(&states, &of_states, &CageOptions::default(), &Silent).unwrap();
+    let made = generate(&states, &of_states, &CageOptions::default(), &NoProgress).unwrap();
     let bent = |p: Vec3| p + vec3(0.0, 0.4 * p.x * p.x, 0.1 * p.x * p.z);
     let (shaped, report) = by_cage(&model, &made.cage, bent, Joints::Follow);
     assert!(report.morph_ends > 1000 && report.morph_ends_outside == 0, "{report:?}");

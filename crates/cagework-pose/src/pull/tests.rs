@@ -13,7 +13,7 @@ use crate::symmetry::Symmetry;
 use cagework_cage::samples;
 use cagework_core::cage::Cage;
 use cagework_core::mesh::{Bounds, TriMesh};
-use cagework_core::progress::Silent;
+use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Weights, bind, subdivided_box};
 
 struct BoundSample {
@@ -29,7 +29,7 @@ fn bound(id: &str) -> BoundSample {
     let (mesh, cage) = (sample.mesh, Cage::new(&sample.cage).unwrap());
     let options = BindOptions { grid: 32, ..BindOptions::default() };
     let weights = |points: &[Vec3]| {
-        let bound = bind(points, &cage, &options, &Silent).unwrap();
+        let bound = bind(points, &cage, &options, &NoProgress).unwrap();
         bound.frames.folded(&bound.weights)
     };
     let probes = Probes::new(&mesh, &cage).unwrap();
@@ -41,8 +41,8 @@ fn bound(id: &str) -> BoundSample {
 
 /// The humanoid sample, bound once for all tests.
 fn humanoid() -> &'static BoundSample {
-    static BOUND: OnceLock<BoundSample> = OnceLock::new();
-    BOUND.get_or_init(|| bound("humanoid"))
+    static HUMANOID: OnceLock<BoundSample> = OnceLock::new();
+    HUMANOID.get_or_init(|| bound("humanoid"))
 }
 
 impl BoundSample {
@@ -341,7 +341,7 @@ fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
     ] {
         let mesh = TriMesh { positions, triangles };
         let weights = |points: &[Vec3]| {
-            let bound = bind(points, &cage, &options, &Silent).unwrap();
+            let bound = bind(points, &cage, &options, &NoProgress).unwrap();
             bound.frames.folded(&bound.weights)
         };
         let probes = Probes::new(&mesh, &cage).unwrap();

@@ -25,7 +25,7 @@ pub(crate) struct Offsets {
 }
 
 impl Offsets {
-    /// Rebuilds weights and frames from the arrays of a [`Bound`] with `n_controls` controls.
+    /// Rebuilds weights and frames from the arrays of a [`BindResult`] with `n_controls` controls.
     ///
     /// # Errors
     /// If the arrays do not match each other or `n_controls`.
@@ -49,7 +49,7 @@ impl Offsets {
 
 /// Weights as compressed sparse rows, and the frames that the columns after the controls refer to.
 #[wasm_bindgen]
-pub struct Bound {
+pub struct BindResult {
     pub(super) weights: Weights,
     pub(super) offsets: Offsets,
     pub(super) report: JsValue,
@@ -84,7 +84,7 @@ pub struct BuiltSample {
 }
 
 #[wasm_bindgen]
-impl Bound {
+impl BindResult {
     /// Row pointers of the sparse rows. `[n_vertices + 1]`
     #[wasm_bindgen(getter)]
     #[must_use]

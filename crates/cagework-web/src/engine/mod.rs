@@ -36,7 +36,7 @@ use crate::error::{Answer, ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu, upload};
 use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
-use crate::loaded::Loaded;
+use crate::loaded::LoadedModel;
 use crate::opening::OpenContents;
 use crate::options::decode;
 use crate::state::{BoundModels, State, joined};
@@ -88,7 +88,7 @@ impl Engine {
     /// then remain open.
     pub async fn open(
         &self,
-        models: Vec<Loaded>,
+        models: Vec<LoadedModel>,
         #[wasm_bindgen(unchecked_param_type = "OpenContents")] contents: JsValue,
     ) -> Result<Vec<String>, JsValue> {
         let contents: OpenContents = decode(contents)?;

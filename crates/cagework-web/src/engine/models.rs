@@ -14,7 +14,7 @@ use super::{Engine, lost, one_capture};
 use crate::error::Answer;
 use crate::gpu::upload;
 use crate::incoming::page_turn;
-use crate::loaded::Loaded;
+use crate::loaded::LoadedModel;
 use crate::state::State;
 use crate::views::{ModelInfo, object};
 
@@ -31,7 +31,7 @@ impl Engine {
     ///
     /// # Errors
     /// The errors of `open`. The document is then unchanged.
-    pub async fn add(&self, models: Vec<Loaded>, label: Option<String>) -> Result<(), JsValue> {
+    pub async fn add(&self, models: Vec<LoadedModel>, label: Option<String>) -> Result<(), JsValue> {
         let is_capture = self.read(|state| state.models().splats().is_some());
         if is_capture || models.iter().any(|loaded| loaded.model.n_faces() == 0) {
             return Err(one_capture().into());
@@ -59,7 +59,7 @@ impl Engine {
     ///
     /// # Errors
     /// If there is no such model, and the errors of `open`. The document is then unchanged.
-    pub async fn replace(&self, id: u32, mut loaded: Loaded, label: String) -> Result<(), JsValue> {
+    pub async fn replace(&self, id: u32, mut loaded: LoadedModel, label: String) -> Result<(), JsValue> {
         let draw = Arc::new(loaded.draw_model());
         let replaced = self.change_models(Some(label), |state| {
             let own = state.editor.replace_model(id, loaded.model)?;
@@ -69,14 +69,14 @@ impl Engine {
         Ok(replaced.await?)
     }
 
-    /// Converts a model to arrays, from which `Loaded.restore` recreates it in a worker.
+    /// Converts a model to arrays, from which `LoadedModel.restore` recreates it in a worker.
     ///
     /// # Errors
     /// If no open model has this id.
     #[wasm_bindgen(js_name = storedModel)]
     pub fn stored_model(&self, id: u32) -> Result<Vec<Uint8Array>, JsValue> {
         let model = self.read(|state| Answer::Ok(Model::clone(&state.models().get(id)?.model)))?;
-        Ok(Loaded::new(model).store())
+        Ok(LoadedModel::new(model).store())
     }
 
     /// Total number of pixels of the models' textures, at the sizes at which they are drawn, without those of one model.

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::error::Fault;
 use crate::options::{JsSceneOptions, SliceShown, decode};
-use crate::views::{ColorMap, Largest, Legend, optional};
+use crate::views::{ColorMap, LargestWeight, Legend, optional};
 
 #[wasm_bindgen]
 impl Engine {
@@ -64,11 +64,12 @@ impl Engine {
 impl Engine {
     /// Finds the largest weight in a column. `None` while the GPU uploads weights; the page calls `legend` again
     /// afterwards.
-    fn largest_weight(&self, column: u32) -> Option<Largest> {
+    fn largest_weight(&self, column: u32) -> Option<LargestWeight> {
         self.with_session(|session| {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            let numbered = weights.column(column).zip(0..).map(|(value, vertex)| Largest { value, vertex });
+            let numbered =
+                weights.column(column).zip(0..).map(|(value, vertex)| LargestWeight { value, vertex });
             Ok(numbered.max_by(|a, b| a.value.total_cmp(&b.value)))
         })
         .ok()

@@ -975,7 +975,7 @@ sample: string | null,
  */
 settings: string | null, cage: CageContents | null,
 /**
- * Poses of a sample. The poses of a project are in its `Loaded`.
+ * Poses of a sample. The poses of a project are in its `LoadedModel`.
  */
 poses: Array<PoseContents>, };
 /**
@@ -1170,7 +1170,7 @@ export type ColorMap = "viridis" | "error" | "kinds";
 /**
  * The largest weight, and the index of the model vertex that has it.
  */
-export type Largest = { value: number, vertex: number, };
+export type LargestWeight = { value: number, vertex: number, };
 /**
  * Legend of the colours of the slice or the model.
  */
@@ -1178,7 +1178,7 @@ export type Legend = { low: number, high: number, logarithmic: boolean, map: Col
 /**
  * Largest of the displayed weights; null for other quantities.
  */
-largest: Largest | null, };
+largest: LargestWeight | null, };
 /**
  * Element type that a click selects.
  */

@@ -37,7 +37,7 @@ export interface PullFrame {
 }
 
 /** Why WebGPU cannot be used: the browser lacks it or found no graphics card, or the device did not start. */
-export type Lack = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
+export type WebGpuFault = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
 
 export interface Job<T> {
   readonly done: Promise<T>;

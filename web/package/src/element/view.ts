@@ -8,8 +8,8 @@ import { startBind } from "../session/bind";
 import { type Client, createClient, named } from "../session/client";
 import { createFrames, type Frames } from "../session/frames";
 import { type Canvases, type OpenedOn, openOn } from "../session/open";
-import { createApart, load } from "../session/reader";
-import type { Bound, Cage } from "../types";
+import { createSeparateWorkers, load } from "../session/reader";
+import type { BindResult, Cage } from "../types";
 
 /** A model to open, and how to bind it. */
 export interface ModelRequest {
@@ -22,16 +22,16 @@ export interface ModelRequest {
   /** The cage to use, instead of the cage of a project or a generated one. */
   readonly cage?: Cage | undefined;
   /** Result of a bind of the model to `cage`. */
-  readonly bound?: Bound | undefined;
+  readonly bound?: BindResult | undefined;
 }
 
-export interface Ready {
+export interface OpenedModel {
   readonly model: ModelInfo;
   readonly report: BindReport;
 }
 
 /** Callback for the current stage and the finished fraction of the stage, 0 to 1. */
-export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: number) => void;
+export type StageListener = (what: "Opening" | "Making a cage" | "Binding", fraction: number) => void;
 
 export interface View {
   readonly engine: Engine;
@@ -39,7 +39,7 @@ export interface View {
    * Opens a model, generates a cage unless the request or the project has one, and binds the model unless the request
    * has the result of a bind. Cancels a previous `open`.
    */
-  open(wanted: ModelRequest, hear: Hear): Promise<Ready>;
+  open(wanted: ModelRequest, hear: StageListener): Promise<OpenedModel>;
   close(): Promise<void>;
 }
 
@@ -67,7 +67,7 @@ interface Parts extends OpenedOn {
 
 function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void): View {
   const { artifact, module, adapter, lack, pkg, client, frames, engine } = parts;
-  const reading = createApart(() => createClient(module, artifact.openWorker));
+  const reading = createSeparateWorkers(() => createClient(module, artifact.openWorker));
   const backend = lack || isSoftware(adapter) ? "cpu" : "gpu";
   let current: Job<unknown> | undefined;
   let work: Promise<unknown> = Promise.resolve();
@@ -93,7 +93,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     return job.done;
   };
 
-  async function openModel(wanted: ModelRequest, hear: Hear): Promise<Ready> {
+  async function openModel(wanted: ModelRequest, hear: StageListener): Promise<OpenedModel> {
     const { name, file, vertices, grid, bound } = wanted;
     hear("Opening", 0);
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined, used: 0 }));

@@ -1,6 +1,6 @@
 /** Finds the GPU that the browser offers, without loading the wasm module. */
 
-import type { Lack } from "../contract";
+import type { WebGpuFault } from "../contract";
 import { named } from "./client";
 
 /**
@@ -23,7 +23,7 @@ function tidy(words: string): string {
 }
 
 /** Why WebGPU is missing, according to an error's name; undefined for other errors. */
-export function lackOf(error: unknown): Lack | undefined {
+export function lackOf(error: unknown): WebGpuFault | undefined {
   const name = error instanceof Error ? error.name : "";
   return name === "NoWebGPU" || name === "NoAdapter" || name === "NoDevice" ? name : undefined;
 }

@@ -1,6 +1,6 @@
 /**
- * Runs a bind. If the model is not bound yet and the requested grid is finer than `COARSE`, a coarse pass runs first,
- * so that the model can soon be dragged. There is no coarse pass above the limit `MOST_COARSE`.
+ * Runs a bind. If the model is not bound yet and the requested grid is finer than `COARSE_GRID`, a coarse pass runs first,
+ * so that the model can soon be dragged. There is no coarse pass above the limit `MAX_COARSE_CELLS`.
  */
 
 import type {
@@ -18,16 +18,16 @@ import { type Client, named } from "./client";
 import type { KeptRows } from "./messages";
 
 /** Value of the option `grid` in the coarse pass. */
-const COARSE = 32;
+const COARSE_GRID = 32;
 
 /**
  * Number of bound points times number of controls above which there is no coarse pass: assembling the weights then
  * takes most of the time on any grid.
  */
-const MOST_COARSE = 1 << 23;
+const MAX_COARSE_CELLS = 1 << 23;
 
 /** Number of weights above which the worker ends after a bind to free its memory, 64 MiB at 8 bytes per weight. */
-const MOST_KEPT = 1 << 23;
+const MAX_KEPT_WEIGHTS = 1 << 23;
 
 /** Names of errors after which a bind on the GPU is repeated on the CPU. */
 const GPU_ERRORS: readonly string[] = ["NoAdapter", "NoDevice", "DeviceLost", "Gpu"] satisfies ErrorName[];
@@ -73,7 +73,7 @@ export function startBind(start: BindStart): Job<BindReport> {
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
     const rows = (start: number, end: number) => client.run("rows", { key, start, end }).done;
     await engine.adopt(indptr, rows, offsets, whole, pass === "fine");
-    if ((indptr.at(-1) ?? 0) > MOST_KEPT) client.rest();
+    if ((indptr.at(-1) ?? 0) > MAX_KEPT_WEIGHTS) client.rest();
     if (isCancelled) throw named("Cancelled", "cancelled");
     listener({ kind: "adopted", pass, report: whole });
     return whole;
@@ -94,8 +94,8 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    const isLarge = (points * cage().positions.length) / 3 > MOST_COARSE;
-    if (!engine.bound && !isLarge && options.grid > COARSE) await run("coarse");
+    const isLarge = (points * cage().positions.length) / 3 > MAX_COARSE_CELLS;
+    if (!engine.bound && !isLarge && options.grid > COARSE_GRID) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }
@@ -111,5 +111,5 @@ export function startBind(start: BindStart): Job<BindReport> {
 
 /** The options of the coarse pass. */
 function coarse(options: BindOptions): BindOptions {
-  return { ...options, grid: COARSE, solver: "multigrid" };
+  return { ...options, grid: COARSE_GRID, solver: "multigrid" };
 }

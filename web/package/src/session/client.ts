@@ -9,7 +9,7 @@ import { buffers, type FromWorker, type JobKind, type Jobs, type ToWorker } from
  */
 const PATIENCE = 400;
 
-interface Waiting {
+interface PendingJob {
   /** Sends the job to a worker. Called again if the worker is replaced. */
   readonly ask: (to: Worker) => void;
   readonly done: (output: never) => void;
@@ -56,7 +56,7 @@ const closing = () => named("Cancelled", "the page is closing");
  * job needs one.
  */
 export function createClient(module: WebAssembly.Module, open: () => Worker): Client {
-  const waiting = new Map<number, Waiting>();
+  const waiting = new Map<number, PendingJob>();
   let next = 0;
   let worker: Worker | undefined = start();
   let isClosed = false;

@@ -8,7 +8,7 @@ import type { Package } from "./artifact";
 import { named } from "./client";
 
 /** Maximum size of a file, bytes. Opening a file takes several times its size in memory. */
-const LARGEST = 1 << 30;
+const MAX_FILE_BYTES = 1 << 30;
 
 /** Number of bytes that are read at a time. */
 const CHUNK = 1 << 23;
@@ -45,8 +45,8 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
 
 /** Creates an error for the first file above the size limit; undefined if there is none. */
 export function tooLarge(files: readonly NamedFile[]): Error | undefined {
-  const large = files.find(({ file }) => file.size > LARGEST);
-  const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);
+  const large = files.find(({ file }) => file.size > MAX_FILE_BYTES);
+  const size = ((large?.file.size ?? 0) / MAX_FILE_BYTES).toFixed(1);
   const message = `${large?.name} has ${size} GiB; the limit is 1 GiB: make it smaller first`;
   return large && named("TooLarge", message);
 }

@@ -4,7 +4,7 @@
 const BUSY_PAUSE = 12;
 
 /** Idle time after which a frame drawn at low resolution is drawn again at full resolution, ms. */
-const QUIET = 250;
+const SHARP_DELAY_MS = 250;
 
 export function createFrames() {
   const listeners = new Set<(ms: number) => void>();
@@ -23,7 +23,7 @@ export function createFrames() {
   };
   const sharpen = () => {
     if (calm()) request("sharp");
-    else quiet = setTimeout(sharpen, QUIET);
+    else quiet = setTimeout(sharpen, SHARP_DELAY_MS);
   };
   const frame = () => {
     const how = asked ?? "soon";
@@ -42,7 +42,7 @@ export function createFrames() {
       setTimeout(() => request(how), BUSY_PAUSE);
       return;
     }
-    if (!isSharp) quiet = setTimeout(sharpen, QUIET);
+    if (!isSharp) quiet = setTimeout(sharpen, SHARP_DELAY_MS);
     const ms = performance.now() - began;
     for (const listener of listeners) listener(ms);
   };

@@ -29,7 +29,7 @@ export interface Texture {
 
 /** A file that a worker has read successfully. */
 export interface ReadModel {
-  /** Arrays of each model, for `Loaded.restore`. */
+  /** Arrays of each model, for `LoadedModel.restore`. */
   readonly models: Uint8Array[][];
   /** Total number of pixels of all textures. */
   readonly pixels: number;

@@ -1,6 +1,6 @@
 /** Chooses between WebGPU and WebGL2, and loads the build of the module for it. */
 
-import type { Lack } from "../contract";
+import type { WebGpuFault } from "../contract";
 import { findAdapter, hasWebGl2, lackOf } from "./adapter";
 import { type Artifact, compile } from "./artifact";
 import { loadPart } from "./parts";
@@ -20,7 +20,7 @@ export interface OpenedOn {
   /** Name of the GPU; "WebGL2" without WebGPU. */
   readonly adapter: string;
   /** Why WebGL2 is used; null with WebGPU. */
-  readonly lack: Lack | null;
+  readonly lack: WebGpuFault | null;
 }
 
 /**

@@ -1,22 +1,22 @@
 /** The page's part of opening a file: a worker reads it, and the page restores the model from the worker's arrays. */
 
 import type { Job, Reading } from "../contract";
-import type { Loaded } from "../pkg/cagework";
+import type { LoadedModel } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Client, named } from "./client";
 import { tooLarge } from "./files";
 import type { Jobs, ReadModel } from "./messages";
 
-export type Hear = ((progress: Reading) => void) | undefined;
+export type ReadListener = ((progress: Reading) => void) | undefined;
 
-type RunApart = <K extends "read" | "readCage" | "check" | "repair" | "dress">(
+type SeparateRun = <K extends "read" | "readCage" | "check" | "repair" | "dress">(
   job: K,
   input: Jobs[K]["input"],
-  hear?: Hear,
+  hear?: ReadListener,
 ) => Job<Jobs[K]["output"]>;
 
 /** Function that runs one job at a time, each in a new worker that is closed afterwards. */
-export type Apart = RunApart & {
+export type SeparateWorkers = SeparateRun & {
   /**
    * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for
    * many small files.
@@ -28,11 +28,11 @@ export type Apart = RunApart & {
  * Runs jobs on untrusted files in workers of their own, so that a crash affects only that worker, and closing the
  * worker frees its memory. A new job cancels the previous one.
  */
-export function createApart(open: () => Client): Apart {
+export function createSeparateWorkers(open: () => Client): SeparateWorkers {
   let isShared = false;
   let running: Client | undefined;
   let idle: Client | undefined;
-  const apart: RunApart = (job, input, hear) => {
+  const apart: SeparateRun = (job, input, hear) => {
     running?.close();
     const refused = "files" in input ? tooLarge(input.files) : undefined;
     if (refused) return { done: Promise.reject(refused), cancel: () => {} };
@@ -80,9 +80,9 @@ export function createApart(open: () => Client): Apart {
  * Restores the models that a worker has read: the first, then the others of a project. Removes the models' arrays from
  * `read`, so that their memory can be freed.
  */
-export function load(pkg: Package, read: ReadModel): [Loaded, ...Loaded[]] {
+export function load(pkg: Package, read: ReadModel): [LoadedModel, ...LoadedModel[]] {
   const [first, ...others] = read.models.splice(0).map((arrays, number) => {
-    const loaded = pkg.Loaded.restore(arrays);
+    const loaded = pkg.LoadedModel.restore(arrays);
     read.textures[number]?.forEach((texture, k) => {
       if (texture) loaded.setTexture(k, texture.width, texture.height, texture.rgba);
     });

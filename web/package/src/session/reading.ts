@@ -1,22 +1,22 @@
 /** The worker's part of opening a file. A file that makes the reader crash or hang does not affect the page. */
 
 import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
-import type { BuiltSample, Loaded, Polygons } from "../pkg/cagework";
+import type { BuiltSample, LoadedModel, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { read as readBytes, readFiles, siblingOf, toWasm } from "./files";
 import type { Jobs, ReadModel } from "./messages";
 import { loadPart } from "./parts";
 import { decodeTextures } from "./textures";
 
-type Tell = (step: Reading) => void;
+type ReadListener = (step: Reading) => void;
 
-const say = (tell: Tell, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
+const say = (tell: ReadListener, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
 /** Reads a model: decompresses it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
   { files, up, used }: Jobs["read"]["input"],
-  tell: Tell,
+  tell: ReadListener,
 ): Promise<ReadModel> {
   const loaded = await read(pkg, files, tell);
   if (up) loaded.setUp(up);
@@ -27,16 +27,21 @@ export async function readModel(
 export async function dress(
   pkg: Package,
   { clothes, body, used }: Jobs["dress"]["input"],
-  tell: Tell,
+  tell: ReadListener,
 ): Promise<Jobs["dress"]["output"]> {
-  const [loaded, from] = [pkg.Loaded.restore(clothes), pkg.Loaded.restore(body)];
+  const [loaded, from] = [pkg.LoadedModel.restore(clothes), pkg.LoadedModel.restore(body)];
   const report = loaded.takeSkinOf(from);
   from.free();
   return { ...(await packed(pkg, loaded, used, tell)), report };
 }
 
 /** Prepares all models of a file for drawing, copies them to arrays, and checks the cage of a project. */
-async function packed(pkg: Package, loaded: Loaded, used: number, tell: Tell): Promise<ReadModel> {
+async function packed(
+  pkg: Package,
+  loaded: LoadedModel,
+  used: number,
+  tell: ReadListener,
+): Promise<ReadModel> {
   loaded.prepare(used);
   const all = [loaded, ...furtherOf(loaded)];
   const decoded = [];
@@ -66,13 +71,13 @@ async function packed(pkg: Package, loaded: Loaded, used: number, tell: Tell): P
 export async function readSample(pkg: Package, name: string, sample: BuiltSample): Promise<ReadModel> {
   const bytes = new pkg.FileBytes(0);
   bytes.push(sample.glb);
-  const loaded = pkg.Loaded.read(name, bytes, () => undefined);
+  const loaded = pkg.LoadedModel.read(name, bytes, () => undefined);
   const cage = checked(pkg, sample.cage, sample.positions);
   return { ...(await packed(pkg, loaded, 0, () => undefined)), cage };
 }
 
 /** Takes all models after `loaded`, the first one, out of an opened project. */
-function furtherOf(loaded: Loaded): Loaded[] {
+function furtherOf(loaded: LoadedModel): LoadedModel[] {
   const next = loaded.takeNext();
   return next ? [next, ...furtherOf(loaded)] : [];
 }
@@ -92,7 +97,7 @@ function flat(arrays: readonly Float32Array[]): Float32Array {
 export async function readCage(
   pkg: Package,
   { files, up, origin, model, smooth }: Jobs["readCage"]["input"],
-  tell: Tell,
+  tell: ReadListener,
 ): Promise<CheckedCage> {
   const loaded = await read(pkg, files, tell);
   loaded.seeFrom(origin);
@@ -129,14 +134,18 @@ export function polygons(mesh: Polygons): CageArrays {
   return { positions, corners, controls };
 }
 
-export async function read(pkg: Package, files: Jobs["read"]["input"]["files"], tell: Tell): Promise<Loaded> {
+export async function read(
+  pkg: Package,
+  files: Jobs["read"]["input"]["files"],
+  tell: ReadListener,
+): Promise<LoadedModel> {
   say(tell, "bytes");
   const { name, content, siblings } = await readFiles(files);
   const sibling = siblingOf(siblings);
   const load = async (content: Blob) => {
     const bytes = await toWasm(pkg, name, content, (share) => say(tell, "bytes", share));
     say(tell, "geometry");
-    return pkg.Loaded.read(name, bytes, sibling);
+    return pkg.LoadedModel.read(name, bytes, sibling);
   };
   try {
     return await load(content);

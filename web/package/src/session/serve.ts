@@ -1,7 +1,7 @@
 /** Code of the workers. A worker runs the page's jobs one after the other. */
 
 import type { Progress } from "../contract";
-import type { Binder, Bound, Puller } from "../pkg/cagework";
+import type { Binder, BindResult, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { named } from "./client";
 import {
@@ -18,8 +18,8 @@ import { check, checked, dress, read, readCage, readModel, readSample } from "./
 /** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
 
-type Send = (message: FromWorker, transfer?: Transferable[]) => void;
-const send: Send = (message, transfer = []) => postMessage(message, { transfer });
+type Sender = (message: FromWorker, transfer?: Transferable[]) => void;
+const send: Sender = (message, transfer = []) => postMessage(message, { transfer });
 
 const cancelled = new Set<number>();
 let ready: Promise<unknown> = Promise.resolve();
@@ -88,7 +88,7 @@ type Work = {
 function createWork(pkg: Package): Work {
   let shared: Binder | undefined;
   /** Weights of the last `bindKept`, until the job `rows` has fetched all of them. */
-  let kept: Bound | undefined;
+  let kept: BindResult | undefined;
   let keptKey = 0;
   let puller: Puller | undefined;
   const opened = (): Puller => {
@@ -102,7 +102,7 @@ function createWork(pkg: Package): Work {
   const bind = async (
     { positions, extra, cage, options }: Jobs["bind"]["input"],
     step: (step: Progress) => boolean,
-  ): Promise<Bound> => {
+  ): Promise<BindResult> => {
     return binder().bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step);
   };
   return {
@@ -202,7 +202,7 @@ function createWork(pkg: Package): Work {
 }
 
 /** Copies the arrays of a bind and frees its wasm memory. */
-function taken(bound: Bound): BoundArrays {
+function taken(bound: BindResult): BoundArrays {
   const { indptr, indices, data, offsets, report } = bound;
   bound.free();
   return { indptr, indices, data, offsets, report };

@@ -1,11 +1,11 @@
 /** Decodes textures with the browser, so that the module contains no image decoders. */
 
-import type { Loaded } from "../pkg/cagework";
+import type { LoadedModel } from "../pkg/cagework";
 import type { Texture } from "./messages";
 
 /** Decodes all textures of a model and counts those that fail. Calls `tell` with the fraction done. */
 export async function decodeTextures(
-  loaded: Loaded,
+  loaded: LoadedModel,
   tell: (share: number) => void,
 ): Promise<{ textures: (Texture | null)[]; failed: number }> {
   const textures: (Texture | null)[] = [];

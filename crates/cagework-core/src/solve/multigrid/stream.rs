@@ -36,19 +36,20 @@ pub(super) enum Pass {
 use Pass::{Black, BlackFurther, BlackFurtherFromZero, Red, RedFromZero, Residual};
 
 /// Pre-smoothing and residual, starting from the stored values.
-pub(super) const DOWN: &[Pass] = &[Red, BlackFurther, Red, Black, Residual];
+pub(super) const DOWN_PASSES: &[Pass] = &[Red, BlackFurther, Red, Black, Residual];
 /// Pre-smoothing and residual, starting from zero.
-pub(super) const DOWN_FROM_ZERO: &[Pass] = &[RedFromZero, BlackFurtherFromZero, Red, Black, Residual];
+pub(super) const DOWN_PASSES_FROM_ZERO: &[Pass] = &[RedFromZero, BlackFurtherFromZero, Red, Black, Residual];
 /// Pre-smoothing and residual, starting from the coarser level's solution.
-pub(super) const DOWN_FROM_COARSE: &[Pass] =
+pub(super) const DOWN_PASSES_FROM_COARSE: &[Pass] =
     &[Pass::Prolong(Prolong::Replace), Red, BlackFurther, Red, Black, Residual];
 /// Coarse correction and post-smoothing.
-pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
+pub(super) const UP_PASSES: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
 /// Passes on the finest level between two coarse corrections. The residual after the last pass is injected.
-pub(super) const BETWEEN: &[Pass] =
+pub(super) const MIDDLE_PASSES: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
-/// [`BETWEEN`] with one sweep fewer, before a short last cycle.
-pub(super) const BETWEEN_SHORT: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
+/// [`MIDDLE_PASSES`] with one sweep fewer, before a short last cycle.
+pub(super) const SHORT_MIDDLE_PASSES: &[Pass] =
+    &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
 /// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of squared residuals.

@@ -40,11 +40,11 @@ type Numbers = Arc<[f32]>;
 
 /// Cache of decoded accessors by index and element width, with a flag for ascending values. `None` if
 /// decoding failed or a value is not finite.
-type Decoded = HashMap<(u32, usize), Option<(Numbers, bool)>>;
+type AccessorCache = HashMap<(u32, usize), Option<(Numbers, bool)>>;
 
 /// The clips of a document. Unreadable channels are left out.
 pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
-    let mut decoded = Decoded::new();
+    let mut decoded = AccessorCache::new();
     let animations = document.json["animations"].as_array().into_iter().flatten();
     animations
         .map(|animation| {
@@ -94,7 +94,7 @@ impl Track {
         document: &GltfDocument,
         sampler: &Value,
         driven: ChannelTarget,
-        decoded: &mut Decoded,
+        decoded: &mut AccessorCache,
     ) -> Option<Self> {
         let mut numbers = |key: &str, width: usize| {
             let accessor = sampler[key].as_u64()? as u32;

@@ -162,7 +162,7 @@ impl Crate {
     }
 
     /// Records a path if it begins at the crate's root or is relative to a module.
-    fn mention(&mut self, path: &Found, place: &Place) {
+    fn mention(&mut self, path: &SourcePath, place: &Place) {
         let Some(first) = path.segments.first() else { return };
         let ups = path.segments.iter().take_while(|s| *s == "super").count();
         let rest = path.segments.iter().skip_while(|s| is_relative(s)).cloned();
@@ -182,7 +182,7 @@ impl Crate {
 }
 
 /// A path as the source writes it.
-struct Found {
+struct SourcePath {
     segments: Vec<String>,
     /// Name that the path brings into scope in a `use`: the name after `as`, or else the last segment.
     name: String,
@@ -190,13 +190,13 @@ struct Found {
 }
 
 /// Reads the paths that begin at the first token (several if there are braces). Also returns their number of tokens.
-fn paths(tokens: &[TokenTree]) -> (Vec<Found>, usize) {
+fn paths(tokens: &[TokenTree]) -> (Vec<SourcePath>, usize) {
     let mut found = Vec::new();
     let length = add_paths(tokens, &[], &mut found);
     (found, length)
 }
 
-fn add_paths(tokens: &[TokenTree], prefix: &[String], found: &mut Vec<Found>) -> usize {
+fn add_paths(tokens: &[TokenTree], prefix: &[String], found: &mut Vec<SourcePath>) -> usize {
     let mut segments = prefix.to_vec();
     let mut at = 0;
     let mut line = 0;
@@ -238,7 +238,7 @@ fn add_paths(tokens: &[TokenTree], prefix: &[String], found: &mut Vec<Found>) ->
     {
         name = alias.to_string();
     }
-    found.push(Found { segments, name, line });
+    found.push(SourcePath { segments, name, line });
     at
 }
 
