@@ -11,7 +11,8 @@ mod selection;
 
 pub use gesture::{Constraint, Gesture, GestureKind, GestureView};
 pub use pick::{
-    Element, Topology, pick_edge, pick_face, pick_middle, pick_surface, pick_vertex, vertices_in_box,
+    Element, Topology, is_covered, pick_edge, pick_face, pick_middle, pick_surface, pick_vertex,
+    vertices_in_box,
 };
 pub use pull::{Pull, SharedPull};
 pub use selection::{Pivot, SelectMode, Selection};

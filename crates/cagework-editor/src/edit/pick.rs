@@ -81,6 +81,24 @@ pub fn pick_vertex(
     }
 }
 
+/// Whether the model covers a vertex that [`pick_vertex`] has picked: its frontmost point under the pointer, `surface`, is
+/// in front of the vertex by more than twice the radius. Interior controls are drawn on top, so nothing covers them.
+#[must_use]
+pub fn is_covered(
+    vertex: u32,
+    positions: &[Vec3],
+    topology: &Topology,
+    view: &dyn View,
+    radius: f32,
+    surface: Vec3,
+) -> bool {
+    let position = positions[vertex as usize];
+    let depth = |p: Vec3| view.project(p).map(|(_, depth)| depth);
+    let reach = 2.0 * radius * view.units_per_pixel(position);
+    topology.faces.iter().any(|face| face.contains(&vertex))
+        && depth(surface).zip(depth(position)).is_some_and(|(near, far)| near + reach < far)
+}
+
 /// Whether a face at the vertex is front-facing.
 fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View) -> bool {
     topology.faces.iter().filter(|face| face.contains(&vertex)).any(|face| {
@@ -290,6 +308,20 @@ mod tests {
             Some(3),
             "if no front vertex is near"
         );
+    }
+
+    #[test]
+    fn the_model_covers_vertices_behind_it_but_no_interior_controls() {
+        let mut cube = cube();
+        let topology = Topology::new(&cube.faces);
+        cube.positions.push(Vec3::new(1.0, 1.0, 0.0));
+        let covered = |vertex, z| {
+            let surface = Vec3::new(1.0, 1.0, z);
+            is_covered(vertex, &cube.positions, &topology, &FrontView, 5.0, surface)
+        };
+        // Vertex 3 is at z = 0, and twice the radius is 0.1.
+        assert!(covered(3, 0.5) && covered(3, 0.11) && !covered(3, 0.09) && !covered(3, -0.5));
+        assert!(!covered(8, 0.5), "an interior control at the same place");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Methods that pick and select vertices, edges and faces of the cage.
 
-use cagework_editor::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
+use cagework_editor::edit::{Element, is_covered, pick_edge, pick_face, pick_vertex, vertices_in_box};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -29,27 +29,16 @@ impl Engine {
     }
 
     /// Returns the vertices of the picked cage element, whose type the tools select: a vertex or an edge within
-    /// `radius` CSS pixels of the pointer, or the face under the pointer. Empty if there is none.
+    /// `radius` CSS pixels of the pointer, or the face under the pointer. Empty if there is none. Vertices that the model
+    /// covers are not picked.
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
-        self.read(|state| {
-            if !state.has_cage_in_view() {
-                return Vec::new();
-            }
-            let (at, positions, topology, view) =
-                (state.pointer(x, y), state.pose(), state.editor.topology(), &state.camera);
-            match state.element() {
-                Element::Vertex => {
-                    pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
-                }
-                Element::Edge => pick_edge(positions, topology, view, at, radius)
-                    .map(|e| topology.edges[e as usize].to_vec())
-                    .unwrap_or_default(),
-                Element::Face => pick_face(positions, topology, view, at)
-                    .map(|f| topology.faces[f as usize].clone())
-                    .unwrap_or_default(),
-            }
-        })
+        let picked = self.pick_on_cage(x, y, radius);
+        if matches!(picked[..], [vertex] if self.is_covered(vertex, [x, y], radius)) {
+            Vec::new()
+        } else {
+            picked
+        }
     }
 
     /// Highlights the cage element with these vertices.
@@ -121,6 +110,39 @@ impl Engine {
     #[must_use]
     pub fn selection_center(&self) -> Vec<f32> {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
+    }
+
+    /// The cage element under the pointer, drawn in front of the model or behind it.
+    fn pick_on_cage(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
+        self.read(|state| {
+            if !state.has_cage_in_view() {
+                return Vec::new();
+            }
+            let (at, positions, topology, view) =
+                (state.pointer(x, y), state.pose(), state.editor.topology(), &state.camera);
+            match state.element() {
+                Element::Vertex => {
+                    pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
+                }
+                Element::Edge => pick_edge(positions, topology, view, at, radius)
+                    .map(|e| topology.edges[e as usize].to_vec())
+                    .unwrap_or_default(),
+                Element::Face => pick_face(positions, topology, view, at)
+                    .map(|f| topology.faces[f as usize].clone())
+                    .unwrap_or_default(),
+            }
+        })
+    }
+
+    /// Whether the posed model covers the vertex; false if the models are not bound.
+    fn is_covered(&self, vertex: u32, [x, y]: [f32; 2], radius: f32) -> bool {
+        let covered = self.posed(|state, _| {
+            let surface = state.surface_at(state.pointer(x, y)).and_then(|point| state.place_of(point));
+            let topology = state.editor.topology();
+            let covers = |surface| is_covered(vertex, state.pose(), topology, &state.camera, radius, surface);
+            Ok(surface.is_some_and(covers))
+        });
+        covered.unwrap_or(false)
     }
 
     fn change_selection(&self, change: impl FnOnce(&mut State)) {
