@@ -1,11 +1,8 @@
 //! OFF reader and writer.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Model, ModelFormat};
-use common::{CUBE_OBJ, cube, read, twist};
+
+use crate::common::{CUBE_OBJ, cube, read, twist};
 
 /// An OFF file of a cube whose faces are quads. `after`: text at the end of each vertex line and of each face line.
 fn off(header: &str, after: [&str; 2]) -> String {

@@ -1,12 +1,9 @@
 //! Selection of parts by name.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::SelectError;
-use common::{instanced, read, rigged};
 use serde_json::json;
+
+use crate::common::{instanced, read, rigged};
 
 /// Five triangles. The fourth belongs to the first object but to no group, the fifth to another object.
 const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\n\

@@ -1,16 +1,13 @@
 //! 3MF reader and writer.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_io::{Model, ModelFormat};
-use common::{CUBE, CUBE_OBJ, cube, cube_mesh, model_part, package, plate, read, twist, volume};
 use glam::Vec3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use crate::common::{CUBE, CUBE_OBJ, cube, cube_mesh, model_part, package, plate, read, twist, volume};
 
 fn files(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
     let mut zip = ZipArchive::new(Cursor::new(bytes)).unwrap();

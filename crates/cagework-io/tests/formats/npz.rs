@@ -1,7 +1,5 @@
 //! NPZ reader and writer.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
 use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_core::deform::OutsideVertex;

@@ -1,12 +1,9 @@
 //! Models passed as arrays of bytes from a web worker to the page.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Look, Model, ModelFormat, Store, StoredArrays, UpAxis};
-use common::{PNG, instanced, plate, quantized, rigged, skinned, textured_square};
 use glam::Vec3;
+
+use crate::common::{PNG, instanced, plate, quantized, rigged, skinned, textured_square};
 
 const OBJ: &str = "mtllib a.mtl\nmtllib b.mtl\no body\nv 0 0 0 1 0.5 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\ns 1\n\
     usemtl skin\nf 1/1/1 2/2/1 3/1/1\ng arm\nusemtl cloth\nf 1 3 4\n";

@@ -1,12 +1,9 @@
 //! Damaged glTF files: reading each of them returns an error that names the cause and the location.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{GltfError, Model, ReadError};
-use common::{Builder, F32, U32, floats, glb, plain_cube, read, skinned};
 use serde_json::json;
+
+use crate::common::{Builder, F32, U32, floats, glb, plain_cube, read, skinned};
 
 fn fault(bytes: &[u8]) -> String {
     read("x.glb", bytes).unwrap_err().to_string()

@@ -2,20 +2,16 @@
 //!
 //! Expected positions follow from the definition of skinning: `sum_j w_j G_j B_j (p + sum_k t_k d_k)`.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
 mod clips;
-#[path = "../common/mod.rs"]
-mod common;
 mod features;
 mod feet;
 mod nodes;
 mod people;
 mod surfaces;
 
+use crate::common::{self, json_of, rigged};
 use cagework_core::skin::skin_vertices;
 use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport};
-use common::{json_of, rigged};
 use glam::{DVec3, Vec3, vec3};
 
 /// Tolerance for positions of up to 2 that are transformed back and forth in f32.

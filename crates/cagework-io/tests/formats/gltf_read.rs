@@ -1,16 +1,13 @@
 //! glTF reader: all ways to store a mesh.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Model, ModelFormat};
-use common::{
-    Builder, CUBE, CUBE_TRIANGLES, I16, U8, U32, cube, floats, glb, instanced, plain_cube, quantized, read,
-    relative_error, skinned, volume,
-};
 use glam::Vec3;
 use serde_json::json;
+
+use crate::common::{
+    self, Builder, CUBE, CUBE_TRIANGLES, I16, U8, U32, cube, floats, glb, instanced, plain_cube, quantized,
+    read, relative_error, skinned, volume,
+};
 
 /// Tolerance for coordinates near 1 that are rounded to f32 once or twice.
 const ROUNDING: f32 = 1e-6;

@@ -4,8 +4,8 @@ use cagework_io::Joints;
 use glam::{Mat3, Vec3, vec3};
 use serde_json::json;
 
-use super::common::{Builder, json_of};
 use super::{f, read, reshaped};
+use crate::common::{Builder, json_of};
 
 /// Number of cells along a side of the sheet.
 const N: u32 = 24;

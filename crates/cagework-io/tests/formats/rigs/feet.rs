@@ -4,8 +4,8 @@ use cagework_io::{Feet, Model, ReshapeOptions};
 use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::json;
 
-use super::common::{Builder, F32, U8, floats};
 use super::{player, read};
+use crate::common::{Builder, F32, U8, floats};
 
 /// Lengths of thigh and shin, and height of the hips during the walk.
 const LENGTHS: [f32; 2] = [1.0, 1.0];

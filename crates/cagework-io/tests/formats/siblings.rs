@@ -1,14 +1,11 @@
 //! External files of a model.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use std::collections::HashMap;
 
 use cagework_io::Model;
-use common::{PNG, json_of, read, textured_square};
 use serde_json::json;
+
+use crate::common::{self, PNG, json_of, read, textured_square};
 
 #[test]
 fn file_with_many_references_is_requested_and_stored_once() {

@@ -4,8 +4,8 @@ use cagework_io::{Interpolation, Joints, Model, ReshapeOptions, Timeline, WriteE
 use glam::{DVec3, Mat4, Vec3, vec3};
 use serde_json::json;
 
-use super::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
 use super::{ROUNDING_TOLERANCE, assert_near, assert_targets, by, f, player, read, reshaped, shown};
+use crate::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
 
 /// The column of [`rigged`] with a cube attached to the column's tip by a matrix.
 fn with_hat() -> Builder {

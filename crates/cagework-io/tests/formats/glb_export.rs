@@ -1,16 +1,13 @@
 //! GLB export: the deformed shape in the original document.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Model, ModelFormat, Timeline};
-use common::{
-    Builder, CUBE_OBJ, PNG, cube, instanced, json_of, plain_cube, quantized, read, relative_error, skinned,
-    textured_square, twist, volume,
-};
 use glam::Vec3;
 use serde_json::{Value, json};
+
+use crate::common::{
+    self, Builder, CUBE_OBJ, PNG, cube, instanced, json_of, plain_cube, quantized, read, relative_error,
+    skinned, textured_square, twist, volume,
+};
 
 /// Tolerance of f32 positions that are transformed back and forth.
 const ROUND_TRIP: f32 = 1e-6;

@@ -4,8 +4,8 @@ use cagework_io::{Joints, Model, ReshapeOptions};
 use glam::{DVec3, Vec3, vec3};
 use serde_json::{Value, json};
 
-use super::common::{self, Builder, CUBE, F32, U8, floats, json_of, rigged};
 use super::{ROUNDING_TOLERANCE, assert_near, by, f, player, read, reshaped, shown};
+use crate::common::{self, Builder, CUBE, F32, U8, floats, json_of, rigged};
 
 /// A mesh of a cube with edges of 0.5, centred at its origin.
 fn centred_cube(b: &mut Builder) -> usize {

@@ -1,7 +1,5 @@
 //! Files of Gaussian splats.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
-
 use std::io::{Read as _, Write as _};
 
 use cagework_core::splats::{Splats, n_harmonics, splat_covariance};
@@ -202,7 +200,7 @@ fn spz_versions_decode_by_their_documentation() {
 /// below. All its streams are compressed.
 #[test]
 fn spz_4_of_another_program_has_the_numbers_of_its_source() {
-    let file = include_bytes!("splats/helix-4.spz");
+    let file = include_bytes!("../splats/helix-4.spz");
     let model = read("helix.spz", file).unwrap();
     let splats = model.splats().unwrap();
     assert_eq!((splats.len(), splats.degree), (240, 1));

@@ -1,18 +1,15 @@
 //! Clothes get the skeleton, the joint weights and the morph targets of a body: `Model::transfer_from`.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_core::TriMesh;
 use cagework_core::inpaint::Origins;
 use cagework_core::skin::{Joint, Rig, skin_vertices};
 use cagework_io::{
     Model, Penetration, ReshapeOptions, TransferError, TransferOptions, TransferReport, write_mesh_glb,
 };
-use common::{glb, json_of, read, rigged};
 use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::{Value, json};
+
+use crate::common::{glb, json_of, read, rigged};
 
 /// A tube around the y axis, open at both ends, facing outwards.
 fn tube(radius: f32, low: f32, high: f32, rings: u32) -> TriMesh {

@@ -1,12 +1,9 @@
 //! PLY and STL readers and writers.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Model, ModelFormat};
-use common::{CUBE_OBJ, cube, read, twist, volume};
 use glam::Vec3;
+
+use crate::common::{CUBE_OBJ, cube, read, twist, volume};
 
 fn fault(name: &str, bytes: &[u8]) -> String {
     read(name, bytes).unwrap_err().to_string()

@@ -11,8 +11,8 @@ use glam::{Mat3, Mat4, Vec3, vec3};
 
 use serde_json::json;
 
-use super::common::{Builder, json_of};
 use super::{player, read};
+use crate::common::{Builder, json_of};
 
 /// The walking sample, and its export with displaced cage vertices.
 fn shaped(moved: impl Fn(Vec3) -> Vec3, joints: Joints) -> (Model, Model, ReshapeReport) {

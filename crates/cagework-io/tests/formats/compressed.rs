@@ -1,12 +1,7 @@
 //! glTF files compressed with Draco or meshopt.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_cage::samples;
 use cagework_io::{CompactOptions, Compression, Model, ReshapeOptions, compact, write_mesh_glb};
-use common::{Builder, CUBE, CUBE_TRIANGLES, json_of, plain_cube, read, volume};
 use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder,
     PointAttribute, PointIndex,
@@ -15,6 +10,8 @@ use glam::{DVec3, Vec3};
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer};
 use serde_json::json;
+
+use crate::common::{self, Builder, CUBE, CUBE_TRIANGLES, json_of, plain_cube, read, volume};
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 

@@ -1,16 +1,15 @@
 //! Projects can be read again, and are plain GLBs for other programs.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_core::{PolygonMesh, subdivided_box};
 use cagework_io::{
     Look, Model, ModelFormat, Project, ProjectError, UpAxis, read_project, write_cage_obj, write_project,
 };
-use common::{CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square};
 use glam::{DVec3, Vec3};
 use serde_json::json;
+
+use crate::common::{
+    self, CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square,
+};
 
 const SETTINGS: &str = r#"{"grid":128,"name":"Überpose"}"#;
 

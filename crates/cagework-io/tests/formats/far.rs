@@ -1,12 +1,9 @@
 //! Models far from the world origin.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Model, ModelFormat};
-use common::{Builder, CUBE, cube, json_of, plain_cube, read};
 use glam::{DVec3, Vec3};
+
+use crate::common::{self, Builder, CUBE, cube, json_of, plain_cube, read};
 
 /// Position of a unit cube in map coordinates, where f32 has steps of 0.5.
 const PLACE: DVec3 = DVec3::new(500_000.25, 0.125, 4_500_000.5);

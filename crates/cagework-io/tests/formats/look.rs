@@ -1,12 +1,9 @@
 //! Appearance of models: texture coordinates, colours and materials.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{Look, LookAlpha, LookWrap, Model, TexturePlan};
-use common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 use serde_json::json;
+
+use crate::common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 
 /// Tolerance of colours after conversion from sRGB. The expected values have four decimals.
 const COLOUR_TOLERANCE: f32 = 1e-4;

@@ -1,13 +1,10 @@
 //! OBJ reader and writer.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
-
-mod common;
-
 use cagework_io::{ModelFormat, UpAxis, write_cage_obj};
-use common::{CUBE_OBJ, cube, plain_cube, read, twist, volume};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
+
+use crate::common::{CUBE_OBJ, cube, plain_cube, read, twist, volume};
 
 /// Message of a failed read.
 fn fault(text: &str) -> String {
