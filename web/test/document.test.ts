@@ -72,8 +72,8 @@ it("a single model keeps its displayed name; repeated notices are listed once", 
 
 it("equal values keep their identity, so that panels are not drawn again", () => {
   const { show, store } = createFake();
-  show({ poses: [{ name: "a", fits: true, seconds: 1, hash: 7 }], shares: [1] });
+  show({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [1] });
   const { poses, shares } = store.get();
-  show({ poses: [{ name: "a", fits: true, seconds: 1, hash: 7 }], shares: [0.5] });
+  show({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [0.5] });
   expect([store.get().poses === poses, store.get().shares === shares]).toEqual([true, false]);
 });

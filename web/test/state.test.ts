@@ -19,7 +19,7 @@ describe("store", () => {
     const store = createStore(INITIAL);
     const heard: string[] = [];
     effect(() => void heard.push(`${store.get().poses.length} ${store.get().shares.length}`));
-    store.set({ poses: [{ name: "a", fits: true, seconds: 1, hash: 7 }], shares: [0] });
+    store.set({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [0] });
     expect(heard).toEqual(["0 0", "1 1"]);
   });
 });

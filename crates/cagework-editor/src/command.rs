@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::{InnerElement, PolygonMesh};
-use cagework_io::{SECONDS_PER_POSE, check_times};
+use cagework_io::{Interpolation, SECONDS_PER_POSE, check_times};
 use cagework_pose::blend::{PoseError, reblend};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -102,6 +102,13 @@ pub enum Command {
         index: usize,
         /// Seconds since the start of the animation.
         seconds: f32,
+    },
+    /// Sets the interpolation of the animation from the previous pose to a saved pose.
+    SetPoseInterpolation {
+        /// Index of the pose in the list of saved poses.
+        index: usize,
+        /// The interpolation; null uses that of the whole animation.
+        interpolation: Option<Interpolation>,
     },
     /// Sets how the animation of the saved poses goes from one to the next, and how it ends.
     SetTransition {
@@ -226,6 +233,7 @@ impl Editor {
                     positions: pose,
                     pins,
                     lead: SECONDS_PER_POSE,
+                    interpolation: None,
                 });
             }
             Command::ApplyPose { index } => {
@@ -275,6 +283,10 @@ impl Editor {
                 self.arrange(&order, &leads);
             }
             Command::SetPoseTime { index, seconds } => self.set_pose_time(index, seconds)?,
+            Command::SetPoseInterpolation { index, interpolation } => {
+                self.pose(index)?;
+                Arc::make_mut(&mut self.document_mut().poses)[index].interpolation = interpolation;
+            }
             Command::SetTransition { transition } => {
                 if !transition.back.is_finite() {
                     return Err(EditError::NotFinite { what: "seconds" });

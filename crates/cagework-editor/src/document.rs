@@ -21,13 +21,15 @@ pub struct NamedPose {
     pub pins: Option<Arc<[SurfacePoint]>>,
     /// Time from the previous pose, or from the start of the animation, to this pose, seconds.
     pub lead: f32,
+    /// Interpolation of the animation from the previous pose to this one; `None` uses that of [`Transition`].
+    pub interpolation: Option<Interpolation>,
 }
 
 /// How the animation of the saved poses goes from one to the next, and how it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Transition {
-    /// Interpolation between two poses.
+    /// Interpolation towards poses that have none of their own, and of the return to the start.
     pub interpolation: Interpolation,
     /// Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
     pub loops: bool,
@@ -139,7 +141,8 @@ impl Document {
         let seconds = self.pose_seconds();
         // With very many poses, even one per second exceeds `MAX_SECONDS`, and `Timeline::new` rejects the times.
         let timeline = Timeline::new(&seconds, loops.then_some(back));
-        timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation)
+        let own: Vec<_> = self.fitting_poses().map(|pose| pose.interpolation).collect();
+        timeline.unwrap_or_else(|_| Timeline::every_second(seconds.len())).with(interpolation).with_own(&own)
     }
 
     /// Whether a document and a later or earlier clone of it are equal. Compares meshes, cages and models by their

@@ -492,7 +492,13 @@ impl Editor {
         let pose_view = |pose: &NamedPose| {
             let fits = self.document.fits(pose);
             let seconds = if fits { seconds.next().unwrap_or_default() } else { 0.0 };
-            PoseView { name: pose.name.to_string(), fits, seconds, hash: hash_of(&pose.positions) }
+            PoseView {
+                name: pose.name.to_string(),
+                fits,
+                seconds,
+                interpolation: pose.interpolation,
+                hash: hash_of(&pose.positions),
+            }
         };
         let center = || self.selection.center(&self.document.pose).map(|c| c.to_array());
         DocumentView {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use cagework_core::PolygonMesh;
-use cagework_io::{MAX_SECONDS, SECONDS_PER_POSE, decode_pose, position_bytes, positions_of};
+use cagework_io::{Interpolation, MAX_SECONDS, SECONDS_PER_POSE, decode_pose, position_bytes, positions_of};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -41,6 +41,9 @@ pub struct DocumentSettings {
     /// Time from the previous pose to each saved pose, seconds. If empty, one second each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_leads: Vec<f32>,
+    /// Interpolation towards each saved pose; null uses that of `transition`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pose_interpolations: Vec<Option<Interpolation>>,
     /// How the animation of the saved poses goes from one to the next, and how it ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<Transition>,
@@ -60,6 +63,7 @@ impl DocumentSettings {
         let has_pins = poses.iter().any(|pose| pose.pins.as_ref().is_some_and(|pins| !pins.is_empty()));
         let pins_of = |pose: &NamedPose| pose.pins.as_ref().map_or_else(Vec::new, |pins| pins.to_vec());
         let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
+        let has_own = poses.iter().any(|pose| pose.interpolation.is_some());
         let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
         Self {
             sample: sample.as_deref().filter(|_| *has_sample_cage).map(str::to_owned),
@@ -69,6 +73,11 @@ impl DocumentSettings {
             pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
             pose_shares: if is_blended { shares.to_vec() } else { Vec::new() },
             pose_leads: if is_timed { poses.iter().map(|pose| pose.lead).collect() } else { Vec::new() },
+            pose_interpolations: if has_own {
+                poses.iter().map(|pose| pose.interpolation).collect()
+            } else {
+                Vec::new()
+            },
             transition: (*transition != Transition::default()).then_some(*transition),
             models: models.settings(),
         }
@@ -127,6 +136,7 @@ impl DocumentSettings {
             positions: Arc::from(positions),
             pins: pins(k),
             lead: self.pose_leads.get(k).copied().unwrap_or(SECONDS_PER_POSE),
+            interpolation: self.pose_interpolations.get(k).copied().flatten(),
         };
         poses.into_iter().enumerate().map(named).collect()
     }

@@ -1,5 +1,6 @@
 //! The part of a document that panels show.
 
+use cagework_io::Interpolation;
 use serde::Serialize;
 
 use crate::document::Transition;
@@ -61,6 +62,8 @@ pub struct PoseView {
     pub fits: bool,
     /// Time in the animation, seconds; 0 if `fits` is false.
     pub seconds: f32,
+    /// Interpolation from the previous pose to this one; null uses that of the transition.
+    pub interpolation: Option<Interpolation>,
     /// Hash of the positions, by which the page finds the pose's picture.
     pub hash: u32,
 }

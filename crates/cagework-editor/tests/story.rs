@@ -126,6 +126,9 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let transition = Transition { interpolation: Interpolation::Cubic, loops: true, back: 0.5 };
     step(&mut editor, &mut documents, Command::SetTransition { transition });
     assert_eq!(editor.view().animation_seconds, 2.5);
+    let interpolation = Some(Interpolation::Step);
+    step(&mut editor, &mut documents, Command::SetPoseInterpolation { index: 2, interpolation });
+    assert_eq!(editor.view().poses[2].interpolation, interpolation);
     assert!(editor.apply(Command::SetPoseTime { index: 2, seconds: 1.25 }).is_err(), "two poses at one time");
     step(&mut editor, &mut documents, Command::RemovePose { index: 1 });
     assert_eq!(times(&editor), [("left".into(), 0.25), ("up".into(), 1.0)]);
@@ -196,9 +199,12 @@ fn exported_animation_is_the_one_that_plays() {
         .fitting_poses()
         .map(|pose| (pose.name.to_string(), deformed(&pose.positions)))
         .collect();
-    for interpolation in [Interpolation::Step, Interpolation::Linear, Interpolation::Cubic] {
+    let kinds = [Interpolation::Step, Interpolation::Linear, Interpolation::Cubic];
+    let own_kinds = [None, Some(Interpolation::Step), Some(Interpolation::Cubic)];
+    for (interpolation, own) in kinds.into_iter().flat_map(|kind| own_kinds.map(|own| (kind, own))) {
         let transition = Transition { interpolation, ..Transition::default() };
         editor.apply(Command::SetTransition { transition }).unwrap();
+        editor.apply(Command::SetPoseInterpolation { index: 1, interpolation: own }).unwrap();
         let timeline = editor.document().timeline();
         let glb = model.write_glb_poses_at(&model.positions, &poses, &timeline).unwrap();
         let written = Model::read("poses.glb", &glb, &mut |_| None).unwrap();

@@ -36,7 +36,7 @@ fn command() -> impl Strategy<Value = Command> {
     let index = || 0..4_usize;
     let share = prop_oneof![9 => 0.0..1.0_f32, 1 => Just(f32::NAN)];
     let time = || prop_oneof![8 => 0.0..5.0_f32, 1 => Just(0.0), 1 => Just(f32::NAN), 1 => Just(3600.0)];
-    let interpolation =
+    let interpolation = ||
         prop::sample::select(vec![Interpolation::Step, Interpolation::Linear, Interpolation::Cubic]);
     let pin = (0..40_u32, 0.0..1.0_f32)
         .prop_map(|(triangle, a)| SurfacePoint { triangle, bary: [a, 1.0 - a, 0.0] });
@@ -60,7 +60,9 @@ fn command() -> impl Strategy<Value = Command> {
         index().prop_map(|index| Command::DuplicatePose { index, name: "copy".to_owned() }),
         (index(), index()).prop_map(|(index, to)| Command::MovePose { index, to }),
         (index(), time()).prop_map(|(index, seconds)| Command::SetPoseTime { index, seconds }),
-        (interpolation, any::<bool>(), time()).prop_map(|(interpolation, loops, back)| {
+        (index(), prop::option::of(interpolation()))
+            .prop_map(|(index, interpolation)| { Command::SetPoseInterpolation { index, interpolation } }),
+        (interpolation(), any::<bool>(), time()).prop_map(|(interpolation, loops, back)| {
             Command::SetTransition { transition: Transition { interpolation, loops, back } }
         }),
         (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
@@ -208,7 +210,7 @@ fn two_thousand_random_acts_can_be_undone_and_redone() {
         })
         .unwrap();
     // Enough commands must succeed, or the walk tests nothing.
-    assert!(done.get() > 300 && steps.get() > 100, "{} commands, {} steps", done.get(), steps.get());
+    assert!(done.get() > 250 && steps.get() > 100, "{} commands, {} steps", done.get(), steps.get());
 }
 
 /// Values that are invalid for many fields.

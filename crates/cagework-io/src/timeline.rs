@@ -73,11 +73,33 @@ pub enum TimelineError {
 /// Times at which a clip shows each pose, and the interpolation in between.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    /// Interpolation between two keys.
-    pub interpolation: Interpolation,
-    /// Time of each key in seconds, and the pose that it shows; `None` is the shape at rest. Times are ascending.
-    keys: Vec<(f32, Option<usize>)>,
+    /// Times are ascending.
+    keys: Vec<Key>,
     n_poses: usize,
+}
+
+/// A time of a timeline and the shape that it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    seconds: f32,
+    /// Index of the pose; `None` is the shape at rest.
+    pose: Option<usize>,
+    /// Interpolation from the previous key to this one.
+    interpolation: Interpolation,
+}
+
+impl Key {
+    fn new(seconds: f32, pose: Option<usize>) -> Self {
+        Self { seconds, pose, interpolation: Interpolation::Linear }
+    }
+}
+
+/// A key of a glTF sampler, which shows the shape of the [`Key`] with index `key`.
+struct SamplerKey {
+    seconds: f32,
+    key: usize,
+    /// Indices of the keys at which the segments before and after this sampler key end; `None` if the slope is zero.
+    segments: [Option<usize>; 2],
 }
 
 impl Timeline {
@@ -85,8 +107,8 @@ impl Timeline {
     #[must_use]
     pub fn every_second(n_poses: usize) -> Self {
         let pose = |k: usize| k.checked_sub(1).filter(|&pose| pose < n_poses);
-        let keys = (0..n_poses + 2).map(|k| (k as f32 * SECONDS_PER_POSE, pose(k))).collect();
-        Self { interpolation: Interpolation::Linear, keys, n_poses }
+        let keys = (0..n_poses + 2).map(|k| Key::new(k as f32 * SECONDS_PER_POSE, pose(k))).collect();
+        Self { keys, n_poses }
     }
 
     /// Creates a timeline that shows each pose at its time. The clip starts at 0 s, at rest unless the first pose is at
@@ -96,27 +118,52 @@ impl Timeline {
     /// If a time is outside the limits, or not later than the previous time.
     pub fn new(seconds: &[f32], seconds_back: Option<f32>) -> Result<Self, TimelineError> {
         check_times(seconds)?;
-        let mut keys: Vec<_> = seconds.iter().enumerate().map(|(k, &at)| (at + 0.0, Some(k))).collect();
+        let mut keys: Vec<_> =
+            seconds.iter().enumerate().map(|(k, &at)| Key::new(at + 0.0, Some(k))).collect();
         if seconds.first().is_none_or(|&first| first >= 0.5 * MIN_GAP) {
-            keys.insert(0, (0.0, None));
+            keys.insert(0, Key::new(0.0, None));
         }
-        if let (Some(back), Some(&(last, _))) = (seconds_back, keys.last()) {
-            keys.push((last + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].1));
+        if let (Some(back), Some(last)) = (seconds_back, keys.last()) {
+            keys.push(Key::new(last.seconds + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].pose));
         }
-        Ok(Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() })
+        Ok(Self { keys, n_poses: seconds.len() })
     }
 
     /// Creates a timeline with one pose at each key time of a clip. `seconds`: ascending, not checked.
     #[must_use]
     pub fn at_keys(seconds: &[f32]) -> Self {
-        let keys = seconds.iter().enumerate().map(|(k, &at)| (at, Some(k))).collect();
-        Self { interpolation: Interpolation::Linear, keys, n_poses: seconds.len() }
+        let keys = seconds.iter().enumerate().map(|(k, &at)| Key::new(at, Some(k))).collect();
+        Self { keys, n_poses: seconds.len() }
     }
 
-    /// Replaces the interpolation.
+    /// Replaces the interpolation between all keys.
     #[must_use]
-    pub fn with(self, interpolation: Interpolation) -> Self {
-        Self { interpolation, ..self }
+    pub fn with(mut self, interpolation: Interpolation) -> Self {
+        self.keys.iter_mut().for_each(|key| key.interpolation = interpolation);
+        self
+    }
+
+    /// Replaces the interpolation towards each pose that has one of its own. `[n_poses]`
+    #[must_use]
+    pub fn with_own(mut self, own: &[Option<Interpolation>]) -> Self {
+        for key in &mut self.keys {
+            if let Some(own) = key.pose.and_then(|pose| own.get(pose).copied().flatten()) {
+                key.interpolation = own;
+            }
+        }
+        self
+    }
+
+    /// Interpolation of the glTF samplers: that of all keys if it is the same, or else a cubic spline, whose slopes can
+    /// express the others.
+    pub(crate) fn interpolation(&self) -> Interpolation {
+        match self.keys.get(1..) {
+            Some([first, rest @ ..]) if rest.iter().all(|key| key.interpolation == first.interpolation) => {
+                first.interpolation
+            }
+            Some([_, ..]) => Interpolation::Cubic,
+            _ => Interpolation::Linear,
+        }
     }
 
     /// Checks that `given`, a number of poses, equals the number of poses in the timeline.
@@ -134,22 +181,22 @@ impl Timeline {
     /// Time of the last key, seconds; 0 without keys.
     #[must_use]
     pub fn seconds(&self) -> f32 {
-        self.keys.last().map_or(0.0, |key| key.0)
+        self.keys.last().map_or(0.0, |key| key.seconds)
     }
 
     /// Computes the share of each pose in the shape at a time: `rest + sum_k share_k (pose_k - rest)`. `[n_poses]`
     #[must_use]
     pub fn shares(&self, seconds: f32) -> Vec<f32> {
         let Some(last) = self.keys.len().checked_sub(1) else { return vec![0.0; self.n_poses] };
-        let next = self.keys.partition_point(|key| key.0 <= seconds);
+        let next = self.keys.partition_point(|key| key.seconds <= seconds);
         if next == 0 || next > last {
             return (0..self.n_poses).map(|pose| self.share(next.min(last), pose) as f32).collect();
         }
         let before = next - 1;
-        let start = f64::from(self.keys[before].0);
-        let gap = f64::from(self.keys[next].0) - start;
+        let start = f64::from(self.keys[before].seconds);
+        let gap = f64::from(self.keys[next].seconds) - start;
         let u = (f64::from(seconds) - start) / gap;
-        let [a, b, c, d] = match self.interpolation {
+        let [a, b, c, d] = match self.keys[next].interpolation {
             Interpolation::Step => [1.0, 0.0, 0.0, 0.0],
             Interpolation::Linear => [1.0 - u, 0.0, u, 0.0],
             Interpolation::Cubic => hermite(u, gap),
@@ -163,38 +210,65 @@ impl Timeline {
         (0..self.n_poses).map(|pose| at(pose) as f32).collect()
     }
 
+    /// The keys of the clip's samplers. A spline has two keys at the end of a step: the earlier shape just before the
+    /// time of the later one.
+    fn sampler_keys(&self) -> Vec<SamplerKey> {
+        let is_spline = self.interpolation() == Interpolation::Cubic;
+        let slope_of = |end: usize| {
+            (end < self.keys.len() && self.keys[end].interpolation != Interpolation::Step).then_some(end)
+        };
+        let mut keys = Vec::new();
+        for (k, key) in self.keys.iter().enumerate() {
+            let before = (k > 0).then(|| slope_of(k)).flatten();
+            if k > 0 && is_spline && before.is_none() {
+                keys.push(SamplerKey { seconds: key.seconds.next_down(), key: k - 1, segments: [None; 2] });
+            }
+            keys.push(SamplerKey { seconds: key.seconds, key: k, segments: [before, slope_of(k + 1)] });
+        }
+        keys
+    }
+
     /// Times of the keys, the input of the clip's samplers.
     pub(crate) fn times(&self) -> Vec<f32> {
-        self.keys.iter().map(|key| key.0).collect()
+        self.sampler_keys().iter().map(|key| key.seconds).collect()
     }
 
     /// Computes the output of a sampler of morph weights. `before`: constant weights of the targets that precede the
     /// poses.
     pub(crate) fn weights(&self, before: &[f32]) -> Vec<f32> {
         let mut weights = Vec::new();
-        for key in 0..self.keys.len() {
-            let slopes = || {
-                let of_poses = (0..self.n_poses).map(|pose| self.slope(key, pose) as f32);
-                std::iter::repeat_n(0.0, before.len()).chain(of_poses)
+        let is_spline = self.interpolation() == Interpolation::Cubic;
+        for SamplerKey { key, segments: [earlier, later], .. } in self.sampler_keys() {
+            let slopes = |segment: Option<usize>| {
+                let slope = move |pose| segment.map_or(0.0, |end| self.slope_in(end, key, pose)) as f32;
+                std::iter::repeat_n(0.0, before.len()).chain((0..self.n_poses).map(slope))
             };
-            let is_cubic = self.interpolation == Interpolation::Cubic;
-            weights.extend(slopes().filter(|_| is_cubic));
+            weights.extend(slopes(earlier).filter(|_| is_spline));
             weights.extend(before);
             weights.extend((0..self.n_poses).map(|pose| self.share(key, pose) as f32));
-            weights.extend(slopes().filter(|_| is_cubic));
+            weights.extend(slopes(later).filter(|_| is_spline));
         }
         weights
     }
 
     fn share(&self, key: usize, pose: usize) -> f64 {
-        f64::from(u8::from(self.keys[key].1 == Some(pose)))
+        f64::from(u8::from(self.keys[key].pose == Some(pose)))
+    }
+
+    /// Slope at a key of the segment that ends at the key `end`.
+    fn slope_in(&self, end: usize, key: usize, pose: usize) -> f64 {
+        if self.keys[end].interpolation == Interpolation::Cubic {
+            return self.slope(key, pose);
+        }
+        let time = f64::from(self.keys[end].seconds) - f64::from(self.keys[end - 1].seconds);
+        (self.share(end, pose) - self.share(end - 1, pose)) / time.max(f64::from(MIN_GAP))
     }
 
     fn slope(&self, key: usize, pose: usize) -> f64 {
         if key == 0 || key + 1 == self.keys.len() {
             return 0.0;
         }
-        let time = f64::from(self.keys[key + 1].0) - f64::from(self.keys[key - 1].0);
+        let time = f64::from(self.keys[key + 1].seconds) - f64::from(self.keys[key - 1].seconds);
         // Times of keys that were read from a clip can be equal, so the divisor has a lower limit.
         (self.share(key + 1, pose) - self.share(key - 1, pose)) / time.max(f64::from(MIN_GAP))
     }
@@ -280,6 +354,37 @@ mod tests {
         assert_eq!(timeline.weights(&[]), [outer([1.0, 0.0, 0.0]), inner, outer([0.0, 0.0, 1.0])].concat());
         // Targets before the poses keep their weights, with slopes of zero.
         assert_eq!(timeline.weights(&[0.5])[..8], [0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0]);
+    }
+
+    /// Played by the formula of glTF 2.0, appendix C, the sampler of a timeline with three interpolations gives the shares
+    /// that the page shows: u for linear, none until the end for step.
+    #[test]
+    fn each_pose_has_its_own_interpolation() {
+        let own = [None, Some(Interpolation::Step), Some(Interpolation::Cubic)];
+        let timeline = Timeline::new(&[1.0, 2.0, 3.0], Some(1.0)).unwrap().with_own(&own);
+        near(&timeline.shares(0.25), &[0.25, 0.0, 0.0]);
+        near(&timeline.shares(1.99), &[1.0, 0.0, 0.0]);
+        near(&timeline.shares(2.0), &[0.0, 1.0, 0.0]);
+        near(&timeline.shares(3.75), &[0.0, 0.0, 0.25]);
+        assert_eq!(timeline.interpolation(), Interpolation::Cubic);
+        let (times, weights) = (timeline.times(), timeline.weights(&[]));
+        assert_eq!(times, [0.0, 1.0, 2.0_f32.next_down(), 2.0, 3.0, 4.0]);
+        let played = |seconds: f32| -> Vec<f32> {
+            let k = times.partition_point(|&time| time <= seconds) - 1;
+            let (gap, t) = (times[k + 1] - times[k], (seconds - times[k]) / (times[k + 1] - times[k]));
+            let of = |key: usize, part: usize, pose: usize| weights[9 * key + 3 * part + pose];
+            let at = |pose| {
+                (2.0 * t.powi(3) - 3.0 * t.powi(2) + 1.0) * of(k, 1, pose)
+                    + gap * (t.powi(3) - 2.0 * t.powi(2) + t) * of(k, 2, pose)
+                    + (3.0 * t.powi(2) - 2.0 * t.powi(3)) * of(k + 1, 1, pose)
+                    + gap * (t.powi(3) - t.powi(2)) * of(k + 1, 0, pose)
+            };
+            (0..3).map(at).collect()
+        };
+        for step in 0..80 {
+            let seconds = step as f32 * 0.05;
+            near(&timeline.shares(seconds), &played(seconds));
+        }
     }
 
     #[test]

@@ -162,7 +162,7 @@ const full = (): Record<AppState["step"], Patch> => ({
     pins: [{ triangle: 0, bary: [1, 0, 0] }],
     tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
     unmatched: 3,
-    poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }],
+    poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }],
     shares: [0.5],
     clip: { ...INITIAL.clip, clip: 0 },
     scene: { ...INITIAL.scene, slice: "value", colour: "weight" },
@@ -172,7 +172,7 @@ const full = (): Record<AppState["step"], Patch> => ({
   export: {
     model: TWO_MODELS,
     cage: CAGE_WITH_CONTROLS,
-    poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }],
+    poses: [{ name: "01", fits: true, seconds: 1, interpolation: "step", hash: 7 }],
   },
 });
 
@@ -261,7 +261,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { boxArmed: true, ortho: true },
     { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
     {
-      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k, hash: 7 })),
+      poses: [1, 2, 3].map((k) => ({ name: `0${k}`, fits: k < 3, seconds: k, interpolation: null, hash: 7 })),
       shares: [0.5, 1, 0],
       playing: true,
       playingPose: null,
@@ -310,7 +310,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { model: null, cage: null, bound: false },
     { bound: false, report: null },
     { cage: CAGE_WITH_CONTROLS },
-    { model: TWO_MODELS, poses: [{ name: "01", fits: true, seconds: 1, hash: 7 }] },
+    { model: TWO_MODELS, poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }] },
     { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
     { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true } },
     { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true, compress: "meshopt" } },

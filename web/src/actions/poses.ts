@@ -1,6 +1,6 @@
 /** Saves, renames, blends and plays poses. */
 
-import type { CageArrays, PoseView, Transition } from "../contract";
+import type { CageArrays, Interpolation, PoseView, Transition } from "../contract";
 import { fittingPoses } from "../derived";
 import { triples } from "../points";
 import { follow } from "../queue";
@@ -124,6 +124,9 @@ export function createPoses(ctx: Context, edit: Edit) {
     /** Sets the time of a pose in the animation. Returns false if the time is not allowed. */
     time: (index: number, seconds: number): boolean =>
       edit.apply({ do: "set_pose_time", index, seconds }, T.did.time),
+    /** Sets the interpolation of the animation towards a pose; null uses that between all poses. */
+    interpolation: (index: number, interpolation: Interpolation | null) =>
+      void edit.apply({ do: "set_pose_interpolation", index, interpolation }, T.did.interpolation),
     transition: (transition: Transition) =>
       void edit.apply({ do: "set_transition", transition }, T.did.transition),
     /** Sets a pose's share of the blend. `done`: the slider was released, which adds one undo step. */

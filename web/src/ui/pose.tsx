@@ -273,7 +273,12 @@ interface PoseRowProps {
 
 function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowProps) {
   const { poses, playingPose, pictures } = app.store.get();
-  const { name, seconds, hash } = poses[index] ?? { name: "", seconds: 0, hash: 0 };
+  const { name, seconds, interpolation, hash } = poses[index] ?? {
+    name: "",
+    seconds: 0,
+    interpolation: null,
+    hash: 0,
+  };
   const picture = pictures[hash];
   /**
    * Number of rejected inputs in the time field. It is the key of the field, so that a new field with the pose's time
@@ -363,6 +368,23 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
           kind="small"
         />
       </div>
+      <label class="row">
+        <span class="legend-text">{T.pose.motion}</span>
+        <select
+          aria-label={T.pose.motionOf(name)}
+          value={interpolation ?? ""}
+          onChange={({ currentTarget: { value } }) =>
+            app.poses.interpolation(index, INTERPOLATIONS.find((known) => known === value) ?? null)
+          }
+        >
+          <option value="">{T.pose.motionOfAll}</option>
+          {INTERPOLATIONS.map((known) => (
+            <option key={known} value={known}>
+              {T.pose.interpolations[known]}
+            </option>
+          ))}
+        </select>
+      </label>
       <Slider
         label={T.pose.blend}
         name={T.pose.blendOf(name)}

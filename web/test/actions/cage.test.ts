@@ -42,7 +42,7 @@ it("a generated cage replaces the previous cage as one undo step; the first cage
 it("poses of the previous cage do not fit a new cage: the page offers to carry them over", async () => {
   const { cage, asked, said, show, showCage, carried, teach, offers } = page();
   showCage(cageOf(8, 1));
-  show({ poses: [{ name: "a", fits: true, seconds: 1, hash: 7 }], shares: [0.5] });
+  show({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [0.5] });
   teach({ carriable: () => Float32Array.of(7) });
   const made = cage.make();
   await settled();

@@ -20,7 +20,11 @@ function page() {
   fake.showCage(cageOf(2));
   fake.engine.setCagePositions(new Float32Array(6).fill(1));
   fake.engine.commit("Move");
-  fake.show({ poses: [{ name: "Pose 1", fits: true, seconds: 1, hash: 7 }], shares: [1], posed: true });
+  fake.show({
+    poses: [{ name: "Pose 1", fits: true, seconds: 1, interpolation: null, hash: 7 }],
+    shares: [1],
+    posed: true,
+  });
   return { ...fake, poses };
 }
 
@@ -35,6 +39,7 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   poses.duplicate(0);
   poses.move(1, 0);
   expect(poses.time(0, 0.4)).toBe(true);
+  poses.interpolation(0, "step");
   const transition = { interpolation: "cubic", loops: false, back: 1 } as const;
   poses.transition(transition);
   expect(commands).toEqual([
@@ -46,9 +51,10 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
     { do: "duplicate_pose", index: 0, name: "Pose 1 copy" },
     { do: "move_pose", index: 1, to: 0 },
     { do: "set_pose_time", index: 0, seconds: 0.4 },
+    { do: "set_pose_interpolation", index: 0, interpolation: "step" },
     { do: "set_transition", transition },
   ]);
-  expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 10]);
+  expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 11]);
 });
 
 it("saved, updated and shown poses get a picture, unless the pose changes before it is drawn", async () => {
@@ -150,7 +156,10 @@ it("saving while poses are playing saves the pose on screen", () => {
 it("reset returns to rest; playing without poses is reported", () => {
   const { poses, commands, said, show, store } = page();
   poses.reset();
-  show({ posed: false, poses: [{ name: "of another cage", fits: false, seconds: 1, hash: 7 }] });
+  show({
+    posed: false,
+    poses: [{ name: "of another cage", fits: false, seconds: 1, interpolation: null, hash: 7 }],
+  });
   poses.reset();
   expect(commands).toEqual([{ do: "reset_pose" }]);
   poses.togglePlay();

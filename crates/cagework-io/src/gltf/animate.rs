@@ -102,6 +102,6 @@ pub(crate) fn play_poses(
         .map(|place| json!({ "sampler": 0, "target": { "node": place.node, "path": "weights" } }))
         .collect();
     let sampler =
-        json!({ "input": input, "output": output, "interpolation": timeline.interpolation.in_gltf() });
+        json!({ "input": input, "output": output, "interpolation": timeline.interpolation().in_gltf() });
     push(json, "animations", json!({ "name": name, "samplers": [sampler], "channels": channels }));
 }

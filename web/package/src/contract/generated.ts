@@ -627,7 +627,7 @@ export type Interpolation = "step" | "linear" | "cubic";
  */
 export type Transition = {
 /**
- * Interpolation between two poses.
+ * Interpolation towards poses that have none of their own, and of the return to the start.
  */
 interpolation: Interpolation,
 /**
@@ -693,7 +693,15 @@ index: number,
 /**
  * Seconds since the start of the animation.
  */
-seconds: number, } | { "do": "set_transition",
+seconds: number, } | { "do": "set_pose_interpolation",
+/**
+ * Index of the pose in the list of saved poses.
+ */
+index: number,
+/**
+ * The interpolation; null uses that of the whole animation.
+ */
+interpolation: Interpolation | null, } | { "do": "set_transition",
 /**
  * Interpolation between the poses, and how the animation ends.
  */
@@ -806,6 +814,10 @@ fits: boolean,
  * Time in the animation, seconds; 0 if `fits` is false.
  */
 seconds: number,
+/**
+ * Interpolation from the previous pose to this one; null uses that of the transition.
+ */
+interpolation: Interpolation | null,
 /**
  * Hash of the positions, by which the page finds the pose's picture.
  */

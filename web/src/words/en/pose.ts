@@ -48,6 +48,9 @@ export const pose = {
   move: (name: string) => `Move ${name}`,
   moveTip: "Drag, or press Alt with an arrow key, to change the order",
   timeOf: (name: string) => `Time of ${name}, seconds`,
+  motion: "Motion to it",
+  motionOf: (name: string) => `Motion to ${name}`,
+  motionOfAll: "As between poses",
   between: "Between poses",
   interpolations: { step: "Jump", linear: "Straight", cubic: "Smooth" },
   interpolationTips: {
@@ -129,6 +132,7 @@ export const did = {
   copyName: (name: string) => `${name} copy`,
   movePose: "Change the order of poses",
   time: "Change the time of a pose",
+  interpolation: "Change the motion to a pose",
   transition: "Change the animation of the poses",
   blend: "Blend poses",
   makeCage: "Make a cage",

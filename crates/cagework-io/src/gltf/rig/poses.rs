@@ -193,7 +193,7 @@ fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, tim
         let weights: Vec<[f32; 1]> = timeline.weights(&before).into_iter().map(|weight| [weight]).collect();
         let output = edit.write(None, &weights, false, false);
         channels.push(json!({ "sampler": samplers.len(), "target": { "node": node, "path": "weights" } }));
-        let interpolation = timeline.interpolation.in_gltf();
+        let interpolation = timeline.interpolation().in_gltf();
         samplers.push(json!({ "input": input, "output": output, "interpolation": interpolation }));
     }
     push(
