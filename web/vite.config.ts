@@ -114,8 +114,8 @@ export default defineConfig({
     license: { fileName: LICENCES.page },
     modulePreload: { polyfill: false },
     rolldownOptions: {
-      onwarn(warning, print) {
-        if (!NODE_MODULE_WARNING.test(warning.message)) print(warning);
+      onwarn(warning) {
+        if (!NODE_MODULE_WARNING.test(warning.message)) throw new Error(warning.message);
       },
       checks: { pluginTimings: false },
     },

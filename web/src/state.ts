@@ -154,6 +154,8 @@ export const PERSON_STATE = {
   busy: null as string | null,
   /** Progress of the operation that blocks the page, in words. */
   busyStep: "",
+  /** Finished fraction of the current step, 0 to 1; 0 if it is unknown. */
+  busyFraction: 0,
   /** Cancels the operation that blocks the page; null if it cannot be cancelled. */
   cancelBusy: null as (() => void) | null,
   /** Confirms the operation that blocks the page while it waits for confirmation; otherwise null. */

@@ -1,7 +1,8 @@
 import { effect } from "@preact/signals";
 import { describe, expect, it } from "vitest";
+import { asksToPull } from "../src/derived";
 import { createStore } from "../src/signals";
-import { INITIAL } from "../src/state";
+import { type AppState, INITIAL } from "../src/state";
 
 describe("store", () => {
   it("notifies only readers of the changed key", () => {
@@ -22,4 +23,17 @@ describe("store", () => {
     store.set({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [0] });
     expect(heard).toEqual(["0 0", "1 1"]);
   });
+});
+
+it("the cue at the sample goes away at the first pull and comes back when it is undone", () => {
+  const opened = { ...INITIAL, grip: new Float32Array([0, 1, 0]), bound: true };
+  const pulled = { ...opened, posed: true, undo: "Pull" };
+  const states: AppState[] = [
+    INITIAL,
+    opened,
+    { ...opened, gesture: "Pull" },
+    pulled,
+    { ...pulled, posed: false, undo: null },
+  ];
+  expect(states.map(asksToPull)).toEqual([false, true, false, false, true]);
 });

@@ -188,6 +188,11 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     ]),
     {
       busy: T.opening.fileOf("01", 0, 2),
+      busyStep: T.opening.far(T.opening.stages.geometry, 0.4),
+      busyFraction: 0.4,
+    },
+    {
+      busy: T.opening.fileOf("01", 0, 2),
       busyStep: T.opening.large(12_345_678),
       goOn: () => {},
       cancelBusy: () => {},

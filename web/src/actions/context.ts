@@ -63,11 +63,11 @@ export async function waitFor<T extends object>(
 ): Promise<T> {
   const { store } = ctx;
   const job = work(({ stage, fraction }) =>
-    store.set({ busyStep: T.opening.far(T.opening.stages[stage], fraction) }),
+    store.set({ busyStep: T.opening.far(T.opening.stages[stage], fraction), busyFraction: fraction }),
   );
   let cancelBusy = job.cancel;
   onAbort(signal, () => cancelBusy());
-  store.set({ busy: what, busyStep: "", cancelBusy });
+  store.set({ busy: what, busyStep: "", busyFraction: 0, cancelBusy });
   try {
     const read = await job.done;
     const { vertices = 0 } = read as Partial<ReadFile>;
@@ -80,7 +80,7 @@ export async function waitFor<T extends object>(
     }
     return read;
   } finally {
-    store.set({ busy: null, busyStep: "", cancelBusy: null, goOn: null });
+    store.set({ busy: null, busyStep: "", busyFraction: 0, cancelBusy: null, goOn: null });
   }
 }
 

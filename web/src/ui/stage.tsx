@@ -239,12 +239,13 @@ function Cue({ app }: { app: App }) {
 
 /** Progress of opening a file, with a button to cancel. For a large model, also asks whether to continue. */
 function Busy({ app }: { app: App }) {
-  const { busy, busyStep, cancelBusy, goOn } = app.store.get();
+  const { busy, busyStep, busyFraction, cancelBusy, goOn } = app.store.get();
   return (
     <div class="busy" hidden={busy === null}>
       {!goOn && <span class="spinner" />}
       <p>{busy && `${busy}…`}</p>
       <p class="hint">{busyStep}</p>
+      {busyFraction > 0 && !goOn && <progress max="1" value={busyFraction} aria-label={busyStep} />}
       <div class="row">
         {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" kind="small" />}
         {goOn && <Button label={T.opening.anyway} onClick={goOn} kind="small primary" />}
