@@ -537,6 +537,19 @@ fn damaged_captures_are_refused_with_value_and_limit() {
 
     assert!(fault("a.sog", b"PK\x03\x04").contains("convert it with `splat-transform IN.sog OUT.ply`"));
     let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
+    // A GLB stores opacities as 32-bit floats, without a logarithm.
+    let mut beyond = glb.clone();
+    for (splat, opacity) in [(1, -0.25_f32), (4, 1.5)] {
+        let stored = capture().splats().unwrap().opacities[splat].to_le_bytes();
+        let mut places = (0..glb.len() - 3).filter(|&at| glb[at..at + 4] == stored);
+        let at = places.next().unwrap();
+        assert_eq!(places.next(), None, "no other number of the file has these bytes");
+        beyond[at..at + 4].copy_from_slice(&opacity.to_le_bytes());
+    }
+    let clamped = read("a.glb", &beyond).unwrap();
+    let opacities = &clamped.splats().unwrap().opacities;
+    assert_eq!((opacities[1], opacities[4]), (0.0, 1.0));
+    assert_eq!(clamped.notices, ["2 splats have an opacity outside 0 to 1: it is clamped"]);
     let renamed = |from: &str, to: &str| {
         let text: String = glb.iter().map(|&b| char::from(b)).collect();
         let bytes: Vec<u8> = text.replace(from, to).chars().map(|c| c as u8).collect();
