@@ -25,10 +25,14 @@ pub const BINS: u32 = 4096;
 /// splats share one, so the picture of a capture equals that of its export, although their bounds and steps differ.
 const STEPS: u32 = BINS * BINS;
 /// Smallest number of splats per block; the last block may have fewer. A block is a range of splats with one counter
-/// per bin. With this size, the counters take at most 16 bytes per splat.
-const MIN_BLOCK: u32 = 1024;
+/// per bin. With this size, the counters of a full block take 8 bytes per splat.
+const MIN_BLOCK: u32 = 2048;
 /// Largest number of blocks. The kernels that count and scatter splats run one invocation per block.
 const MAX_BLOCKS: u32 = 256;
+/// Size of a row of [`splat_rows`], bytes.
+const ROW_BYTES: u64 = 48;
+/// Size of the index and the colour of a splat in a drawing order, bytes.
+const ENTRY_BYTES: u64 = 8;
 /// Fraction of the centres that is ignored at each end of each world axis when the captured object is measured, because
 /// these centres can be floaters far away from the object.
 const FAR_SHARE: f32 = 0.01;
@@ -151,6 +155,11 @@ pub fn splat_harmonics(splats: &Splats, degree: u8) -> (Vec<u32>, f32) {
         words.extend(halves.chunks(2).map(|pair| pair[0] | pair.get(1).map_or(0, |high| high << 16)));
     }
     (words, unit)
+}
+
+/// Size of the counters of all blocks, bytes.
+fn count_bytes(n_blocks: u32) -> u64 {
+    4 * u64::from(BINS) * u64::from(n_blocks)
 }
 
 /// Number of u32 that contain the coefficients of a splat.
@@ -388,13 +397,13 @@ impl SplatKernels {
         let harmonics = allocator.table("spherical harmonics of splats", &words)?;
         let Depths { n_blocks, .. } =
             Depths::new(n, Bounds { min: Vec3::ZERO, max: Vec3::ONE }, Vec3::X, false);
-        let rest = allocator.storage("splats at rest", 48 * n as u64)?;
+        let rest = allocator.storage("splats at rest", ROW_BYTES * n as u64)?;
         let colors = allocator.table("colours of splats", colors)?;
-        let counts = allocator.storage("counts of splats", 4 * u64::from(BINS) * u64::from(n_blocks))?;
+        let counts = allocator.storage("counts of splats", count_bytes(n_blocks))?;
         let depths = allocator.storage("bins of depth", size_of::<Depths>() as u64)?;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let works = allocator.zeros("work parameters", 3 * WORK_STRIDE, usage)?;
-        let half_sorted = allocator.storage("splats sorted by the lower digit", 8 * n as u64)?;
+        let half_sorted = allocator.storage("splats sorted by the lower digit", ENTRY_BYTES * n as u64)?;
         let launch = |kernel, buffers: &[&wgpu::Buffer]| {
             context.pipelines.launch(&context.device, kernel, &works, buffers)
         };
@@ -451,7 +460,13 @@ impl SplatKernels {
         let depths = Depths { degree: self.degree, unit: self.unit, ..depths };
         context.queue.write_buffer(&self.depths, 0, bytemuck::bytes_of(&depths));
         if is_moved && self.deform.is_none() {
-            encoder.copy_buffer_to_buffer(&self.rest, 0, &self.splats, 0, 48 * u64::from(depths.n_splats));
+            encoder.copy_buffer_to_buffer(
+                &self.rest,
+                0,
+                &self.splats,
+                0,
+                ROW_BYTES * u64::from(depths.n_splats),
+            );
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("splats"),
@@ -530,6 +545,17 @@ mod tests {
         let mut all = order;
         all.sort_unstable();
         assert_eq!(all, (0..5000).collect::<Vec<u32>>());
+    }
+
+    /// What the file holds is on the device as rows at rest, colours and harmonics. Beyond that there are the posed rows,
+    /// the drawing order, the order after the first digit, and the counters.
+    #[test]
+    fn ten_thousand_splats_take_at_most_80_bytes_each_beyond_the_file() {
+        for n in [10_000, 100_000, 1_000_000] {
+            let depths = Depths::new(n, Bounds { min: Vec3::ZERO, max: Vec3::ONE }, Vec3::Z, false);
+            let bytes = n as u64 * (ROW_BYTES + 2 * ENTRY_BYTES) + count_bytes(depths.n_blocks);
+            assert!(bytes <= 80 * n as u64, "{n}: {}", bytes as f64 / n as f64);
+        }
     }
 
     #[test]

@@ -156,7 +156,7 @@ fn sorting_kernels_match_cpu() {
     let within = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     for backward in [Vec3::Z, Vec3::NEG_X] {
         let depths = Depths::new(n, within, backward, true);
-        assert_eq!(depths.n_blocks, 5, "the last block is not full");
+        assert_eq!(depths.n_blocks, 3, "the last block is not full");
         let hidden: Vec<f32> = (0..n).map(|k| if k % 3 > 0 { FLOATER } else { 0.0 }).collect();
         let rows = splat_rows(&splats.rest_pose(), &hidden);
         let (colors, none) = (vec![7_u32; n], vec![9_u32; (BINS * depths.n_blocks) as usize]);
