@@ -247,7 +247,8 @@ pub(crate) struct DeformArgs {
     after_help = "JOB.json:\n  {\"grabs\": [{\"vertex\": 12, \"to\": [0.1, 2.0, 0.3]}],\n   \"pins\": [{\"vertex\": 5}, \
     {\"triangle\": 7, \"bary\": [0.2, 0.3, 0.5]}, {\"cage\": 4}],\n   \"reach\": null, \"start\": \"pose.obj\", \
     \"relax\": 0.5, \"frames\": 30}\n\n\
-    A grab or pin is a vertex of the model, a point of a triangle, or a vertex of the cage. Only \"grabs\" is \
+    A grab or pin is a vertex of the model (for splats and points, the number of one of them, from 0), a point of a \
+    triangle, or a vertex of the cage. Only \"grabs\" is \
     required.\n\"reach\": how far along the surface the model follows: null for automatic, a fraction of the model's diagonal, or \
     \"all\".\n\"start\": the initial pose; the default is the cage at rest. \"relax\": 0 keeps the details of the initial pose, \
     1 restores those of the rest shape.\n\n\

@@ -63,9 +63,9 @@ struct Goals {
 pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     let args = &given.pose;
     let inputs = given.target.iter().chain(&given.landmarks).map(std::path::PathBuf::as_path);
-    let bound = BoundModel::load(args, inputs)?;
+    let bound = BoundModel::load(args, inputs, None)?;
     let begun = Instant::now();
-    let pull = pull(&bound.model, bound.cage.controls(), args)?;
+    let pull = pull(&bound.mesh, bound.cage.controls(), args)?;
     let precompute_ms = begun.elapsed().as_secs_f64() * 1e3;
     let Goals { weights, importance, to, notices } = match (&given.target, &given.landmarks) {
         (Some(path), _) => {

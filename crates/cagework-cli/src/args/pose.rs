@@ -18,9 +18,9 @@ pub(crate) struct PoseArgs {
     /// Cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// Weights that `cagework bind --weights` wrote.
+    /// Weights that `cagework bind --weights` wrote; not for splats and points.
     #[arg(long, value_name = "FILE")]
-    pub(crate) weights: PathBuf,
+    pub(crate) weights: Option<PathBuf>,
     /// File for the pose of the cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,

@@ -1,6 +1,6 @@
 //! Measures the quality of a pull: stretch of the edges, and motion of vertices far from the grabs.
 
-use cagework_io::Model;
+use cagework_core::TriMesh;
 use cagework_pose::pull::Drag;
 use glam::Vec3;
 use serde::Serialize;
@@ -21,8 +21,8 @@ pub(super) struct Stretches {
     pub(super) stretch_1: f64,
 }
 
-/// Measures the stretch of all edges of a model. An edge of several triangles counts once.
-pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
+/// Measures the stretch of all edges of a mesh. An edge of several triangles counts once.
+pub(super) fn stretches(mesh: &TriMesh, posed: &[Vec3]) -> Stretches {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
         .iter()

@@ -9,7 +9,7 @@ use std::time::Instant;
 use cagework_core::deform::{deform_bound, deform_finite};
 use cagework_core::{Bounds, words::decimals};
 use cagework_io::shown;
-use cagework_pose::pull::{Drag, DragOptions, Grip, Handle};
+use cagework_pose::pull::{Drag, DragOptions, Handle};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -55,11 +55,16 @@ struct PullSummary {
 /// # Errors
 /// If a file cannot be read or written, files do not match, or the job is invalid.
 pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
-    let job = Job::read(&given.job)?;
-    let inputs = [Some(given.job.as_path()), job.start.as_deref()];
+    let mut job = Job::read(&given.job)?;
     let args = &given.pose;
-    let BoundModel { model, cage, weights, frames, .. } =
-        BoundModel::load(args, inputs.into_iter().flatten())?;
+    let bound = {
+        let inputs = [Some(given.job.as_path()), job.start.as_deref()];
+        let vertex = |handle: &Handle| if let Handle::Vertex(v) = handle { Some(*v) } else { None };
+        let vertices: Vec<u32> = job.grabs.iter().chain(&job.pins).filter_map(vertex).collect();
+        BoundModel::load(args, inputs.into_iter().flatten(), Some(&vertices))?
+    };
+    bound.number_handles(job.grabs.iter_mut().chain(&mut job.pins));
+    let BoundModel { model, mesh, cage, weights, frames, .. } = &bound;
     let (controls, output) = (cage.controls(), &args.output.path);
     let inner = &controls.rest()[cage.cage.n_vertices()..];
     let start = match &job.start {
@@ -69,23 +74,23 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let wrong = |e| CliError::file(&given.job, e);
 
     let begun = Instant::now();
-    let pull = pull(&model, controls, args)?;
+    let pull = pull(mesh, controls, args)?;
     let precompute_ms = since(begun);
 
     let begun = Instant::now();
     let from: Vec<DVec3> = start.iter().copied().map(Vec3::as_dvec3).collect();
     let drag_options = DragOptions { reach: job.reach, relax: job.relax, ..DragOptions::default() };
-    let rows = frames.folded(&weights);
+    let rows = bound.rows();
     let grips = |handles: &[Handle]| {
-        let grips = handles.iter().map(|&h| Grip::new(h, &pull, &model.triangles, &rows));
-        grips.collect::<Result<Vec<_>, _>>().map_err(wrong)
+        let grips = handles.iter().map(|&h| bound.grip(h, &pull, &rows, &given.job));
+        grips.collect::<Result<Vec<_>, _>>()
     };
     let mut drag =
         Drag::new(&pull, &from, &grips(&job.grabs)?, &grips(&job.pins)?, drag_options).map_err(wrong)?;
     let grab_ms = since(begun);
 
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
-    let deformed = |cage: &[Vec3]| deform_bound(&weights, &frames, cage);
+    let deformed = |cage: &[Vec3]| deform_bound(weights, frames, cage);
     let before = deformed(&start);
     let to = drag.targets(&job.grabs, &model.up().turned(&job.to(model.origin())), &before);
     let grabbed = drag.start().to_vec();
@@ -96,10 +101,10 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let settle_frames = drag.settle(&to);
     let cage_pose = pose(&drag);
     check_precision(&cage_pose, &given.job)?;
-    let after = deform_finite(&weights, &frames, &cage_pose).map_err(|e| CliError::file(&given.job, e))?;
+    let after = deform_finite(weights, frames, &cage_pose).map_err(|e| CliError::file(&given.job, e))?;
     let drag_length = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
     let apart = |(a, b): (&Vec3, &Vec3)| a.as_dvec3().distance(b.as_dvec3());
-    write_pose(&model, &cage, &cage_pose, args)?;
+    write_pose(model, cage, &cage_pose, args)?;
     let summary = PullSummary {
         output: output.display().to_string(),
         samples: pull.n_samples(),
@@ -112,9 +117,9 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
         error: drag.error(),
         lag: after.iter().zip(&at_stop).map(apart).fold(0.0, f64::max) / drag_length,
         settle_frames,
-        stretches: stretches(&model, &after),
+        stretches: stretches(mesh, &after),
         far_mean: far_mean(&drag, &before, &after).map(|mean| mean / drag_length),
-        notices: model.notices,
+        notices: model.notices.clone(),
     };
     print(&if as_json { json(&summary) } else { text(&summary, output) })
 }

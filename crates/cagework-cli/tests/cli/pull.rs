@@ -73,6 +73,12 @@ fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
 #[test]
 fn invalid_jobs_are_rejected_and_write_nothing() {
     let sandbox = bound();
+    sandbox.write("job.json", r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}]}"#);
+    sandbox
+        .run(&PULL.replace("--weights w.npz", ""))
+        .failure()
+        .code(1)
+        .stderr(contains("can only be posed with its weights").and(contains("give --weights")));
     for (job, message) in [
         ("grab it", "job.json: not a job: the JSON is damaged, at line 1, column 1, after 'g'"),
         ("[]", "job.json: not a job: a value has the wrong type"),

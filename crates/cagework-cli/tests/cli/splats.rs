@@ -65,17 +65,23 @@ fn splats_turn_with_the_cage_and_stay_far_outside() {
     refused("bind a.splat --cage box.obj --weights a.npz", "no faces");
 }
 
-#[test]
-fn cages_of_captures_and_clouds_enclose_them() {
-    let sandbox = sandbox();
-    let cloud: String = (0..3000)
-        .map(|k| [0, 4, 8].map(|at| float(&capture(), 32 * k + at)))
+/// The centres of [`capture`] that are not far outside, as a PLY without faces.
+pub(crate) fn cloud() -> String {
+    let capture = capture();
+    let points: String = (0..3000)
+        .map(|k| [0, 4, 8].map(|at| float(&capture, 32 * k + at)))
         .filter(|[x, ..]| *x < 1.0)
         .map(|[x, y, z]| format!("{x} {y} {z} 5\n"))
         .collect();
     let header = "ply\nformat ascii 1.0\nelement vertex 2999\nproperty float x\nproperty float y\nproperty float z\n\
         property uchar intensity\nend_header\n";
-    sandbox.write("cloud.ply", format!("{header}{cloud}"));
+    format!("{header}{points}")
+}
+
+#[test]
+fn cages_of_captures_and_clouds_enclose_them() {
+    let sandbox = sandbox();
+    sandbox.write("cloud.ply", cloud());
     let info = sandbox.json("info a.splat --json");
     assert_eq!((&info["splats"]["degree"], &info["vertices"]), (&0.into(), &3000.into()));
     sandbox.run("info cloud.ply").success().stdout(contains("none: points"));
@@ -88,4 +94,60 @@ fn cages_of_captures_and_clouds_enclose_them() {
     }
     sandbox.run("deform cloud.ply --cage box.obj --pose pose.obj -o turned.ply").success();
     sandbox.run("info turned.ply").success().stdout(contains("2999"));
+}
+
+/// Tolerance of a pull by 0.4, 1 %: its handles are springs that are 1000 times as stiff as the model.
+const PULL_TOLERANCE: f32 = 4e-3;
+
+#[test]
+fn a_pulled_splat_reaches_its_target_and_a_pinned_one_stays() {
+    let sandbox = sandbox();
+    sandbox.write("cloud.ply", cloud());
+    let capture = capture();
+    let splat = |k: usize| [0, 4, 8].map(|at| float(&capture, 32 * k + at));
+    // Splat 7 is far outside. The cloud lacks it, so indices from 8 on are one lower.
+    for (file, n_missing) in [("a.splat", 0), ("cloud.ply", 1)] {
+        let highest = |sign: f32| {
+            let near = (8..3000).max_by(|&a, &b| (sign * splat(a)[1]).total_cmp(&(sign * splat(b)[1])));
+            near.unwrap()
+        };
+        let (top, bottom) = (highest(1.0), highest(-1.0));
+        let [x, y, z] = splat(top);
+        let (grab, pin, to) = (top - n_missing, bottom - n_missing, y + 0.4);
+        sandbox.write(
+            "job.json",
+            format!(
+                r#"{{"grabs": [{{"vertex": {grab}, "to": [{x}, {to}, {z}]}}], "pins": [{{"vertex": {pin}}}], "reach": "all"}}"#
+            ),
+        );
+        let pull = format!("pull {file} --cage box.obj --job job.json -o pulled.obj");
+        sandbox.run(&pull).success().stdout(contains("wrote pulled.obj"));
+        sandbox.run(&format!("deform {file} --cage box.obj --pose pulled.obj -o posed.obj")).success();
+        let posed = crate::support::obj_positions(&sandbox.read("posed.obj"));
+        for (index, expected) in [(grab, [x, to, z]), (pin, splat(bottom))] {
+            let off = posed[index].iter().zip(expected).map(|(&a, b)| (a as f32 - b).abs());
+            assert!(off.fold(0.0, f32::max) < PULL_TOLERANCE, "{file}: {:?}, not {expected:?}", posed[index]);
+        }
+        sandbox
+            .run(&format!("{pull} --weights w.npz"))
+            .failure()
+            .stderr(contains("is pulled without weights"));
+    }
+    for (handle, message) in [
+        (r#""vertex": 7"#, "splat or point 7 is outside the cage"),
+        (r#""vertex": 3000"#, "no splat or point 3000: indices run from 0 to 2999"),
+        (r#""triangle": 0"#, "splats and points have no triangles"),
+        (r#""cage": 8"#, "no vertex of the cage 8: indices run from 0 to 7"),
+    ] {
+        sandbox.write("job.json", format!(r#"{{"grabs": [{{{handle}, "to": [0, 0, 0]}}]}}"#));
+        sandbox
+            .run("pull a.splat --cage box.obj --job job.json -o none.obj")
+            .failure()
+            .stderr(contains(message));
+    }
+    sandbox
+        .run("fit a.splat --cage box.obj --target a.splat -o none.obj")
+        .failure()
+        .stderr(contains("no faces"));
+    assert!(!sandbox.path("none.obj").exists());
 }
