@@ -151,3 +151,35 @@ fn a_pulled_splat_reaches_its_target_and_a_pinned_one_stays() {
         .stderr(contains("no faces"));
     assert!(!sandbox.path("none.obj").exists());
 }
+
+#[test]
+fn a_cage_around_half_of_a_capture_moves_that_half() {
+    let sandbox = sandbox();
+    // The lattice has a margin of a quarter of the longest side, which is 1.8.
+    const MARGIN: f32 = 0.25 * 1.8;
+    let half = CORNERS.map(|[x, y, z]| [0.9 * x, 0.5 + 0.5 * y, 0.9 * z]);
+    let shift = [0.3, 0.2, -0.1];
+    sandbox.write("half.obj", box_obj(&half));
+    sandbox.write("moved.obj", box_obj(&half.map(|p| [0, 1, 2].map(|k| p[k] + f64::from(shift[k])))));
+    sandbox.run("deform a.splat --cage half.obj --pose moved.obj -o moved.splat").success();
+    let (given, moved) = (capture(), sandbox.read("moved.splat"));
+    let mut counts = [0; 3];
+    for splat in (0..3000).filter(|splat| *splat != 7) {
+        let at = |of: &[u8]| [0, 4, 8].map(|k| float(of, 32 * splat + k));
+        let (before, after) = (at(&given), at(&moved));
+        let share = (0..3).map(|k| (after[k] - before[k]) / shift[k]);
+        // A cell of the lattice is 1.8 / 64 wide, and the margin is rounded up to whole cells.
+        if before[1] > 0.03 {
+            assert!(share.into_iter().all(|share| (share - 1.0).abs() < 1e-4), "{before:?} {after:?}");
+            counts[0] += 1;
+        } else if before[1] < -MARGIN - 0.03 {
+            assert_eq!(given[32 * splat..][..32], moved[32 * splat..][..32], "{before:?}");
+            counts[1] += 1;
+        } else {
+            assert!(share.into_iter().all(|share| (-1e-3..1.001).contains(&share)), "{before:?} {after:?}");
+            counts[2] += 1;
+        }
+    }
+    // Points on a sphere are spread evenly along y (Archimedes): 0.67 / 1.4 of 3,000, and 0.22 / 1.4.
+    assert!(counts[0] > 1400 && counts[1] > 450 && counts[2] > 800, "{counts:?}");
+}
