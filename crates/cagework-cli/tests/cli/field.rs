@@ -116,3 +116,81 @@ fn invalid_points_and_outputs_of_map_are_refused() {
         .stderr(contains("binding needs about").and(contains("limit of 500 MiB")));
     assert!(!sandbox.names().iter().any(|name| name.starts_with("out")));
 }
+
+/// Triangles of an OBJ whose faces are convex.
+fn obj_triangles(bytes: &[u8]) -> Vec<[[f64; 3]; 3]> {
+    let positions = obj_positions(bytes);
+    let text = std::str::from_utf8(bytes).unwrap();
+    let corners = text.lines().filter_map(|line| line.strip_prefix("f ")).map(|line| {
+        line.split_whitespace().map(|word| positions[word.parse::<usize>().unwrap() - 1]).collect::<Vec<_>>()
+    });
+    corners.flat_map(|c| (2..c.len()).map(|k| [c[0], c[k - 1], c[k]]).collect::<Vec<_>>()).collect()
+}
+
+/// A binary STL without normals.
+fn stl(triangles: &[[[f64; 3]; 3]]) -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        bytes.extend([0; 12]);
+        bytes.extend(triangle.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+fn stl_triangles(bytes: &[u8]) -> Vec<[[f64; 3]; 3]> {
+    let float = |at: usize| f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()));
+    let corner = |at: usize| [float(at), float(at + 4), float(at + 8)];
+    let triangles = (84..bytes.len()).step_by(50);
+    triangles.map(|at| [corner(at + 12), corner(at + 24), corner(at + 36)]).collect()
+}
+
+/// The points at which the edges of triangles cross the plane with this y.
+fn slice(triangles: &[[[f64; 3]; 3]], y: f64) -> Vec<[f64; 3]> {
+    let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let crossing = edges.filter(|[a, b]| (a[1] < y) != (b[1] < y));
+    crossing
+        .map(|[a, b]| {
+            let t = (y - a[1]) / (b[1] - a[1]);
+            [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]))
+        })
+        .collect()
+}
+
+#[test]
+fn slices_of_a_bent_stl_are_mapped_back_and_forth() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let rest = obj_triangles(&sandbox.read("mesh.obj"));
+    sandbox.write("mesh.stl", stl(&rest));
+    // The higher a corner is, the more it turns about z and moves along x.
+    let bend = |[x, y, z]: [f64; 3]| {
+        let (sin, cos) = (0.2 * (y + 1.0)).sin_cos();
+        [x * cos - y * sin + 0.1 * y, x * sin + y * cos, z + 0.1 * x * y]
+    };
+    sandbox.write("bent.obj", box_obj(&CORNERS.map(bend)));
+    sandbox.run("bind mesh.stl --cage cage.obj --weights w.npz").success();
+    sandbox.run("deform mesh.stl --cage cage.obj --weights w.npz --pose bent.obj -o bent.stl").success();
+    let bent = stl_triangles(&sandbox.read("bent.stl"));
+    let points = [-0.4, 0.013, 0.35].map(|y| slice(&bent, y)).concat();
+    assert!(points.len() > 150, "{}", points.len());
+    let lines = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n"));
+    sandbox.write("sliced.csv", lines.fold("x,y,z\n".to_owned(), |all, line| all + &line));
+    let map = "--cage cage.obj --pose bent.obj";
+    let back = sandbox.json(&format!("map sliced.csv {map} --inverse -o back.csv --json"));
+    assert_eq!(back["not_found"], serde_json::json!([]));
+    sandbox.run(&format!("map back.csv {map} -o again.csv")).success();
+    let numbers = |name: &str| -> Vec<[f64; 3]> {
+        let text = String::from_utf8(sandbox.read(name)).unwrap();
+        let numbers = |line: &str| line.split(',').map(|word| word.parse().unwrap()).collect::<Vec<f64>>();
+        text.lines().skip(1).map(|line| <[f64; 3]>::try_from(numbers(line)).unwrap()).collect()
+    };
+    let radius = rest.as_flattened().iter().map(|[x, y, z]| x.hypot(*y).hypot(*z)).fold(0.0, f64::max);
+    assert_close(&numbers("again.csv"), &points, TOLERANCE * 2.0 * radius);
+    // A triangle of the mesh spans at most pi / 12 by pi / 8 of the sphere, so its points are at most the radius times
+    // 1 - cos(pi / 24) cos(pi / 16) = 0.028 below the sphere. The bent edges are straight, which adds a little.
+    for [x, y, z] in numbers("back.csv") {
+        let height = x.hypot(y).hypot(z) / radius;
+        assert!((0.96..1.01).contains(&height), "{x} {y} {z} is at {height} of the radius");
+    }
+}
