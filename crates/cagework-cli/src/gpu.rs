@@ -72,7 +72,7 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let positions = model.positions.clone();
     let (copies, triangles) = (look.copies, look.triangles);
     let textures = textures.into_iter().map(Arc::new).collect();
-    let splats = model.splats().cloned().map(Arc::new);
+    let splats = model.drawn_splats().map(|splats| Arc::new(splats.into_owned()));
     (DrawModel { positions, copies, vertices, triangles, groups, textures, splats }, notices)
 }
 

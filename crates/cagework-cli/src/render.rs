@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let mut scene = scene_of(args);
     let mut other = None;
     // Stray splats of a capture can be far away, so frame the cage instead.
-    let is_framed_by_cage = model.splats().is_some() && cage.is_some();
+    let is_framed_by_cage = model.n_faces() == 0 && cage.is_some();
     let mut points = match (is_framed_by_cage, frames.is_empty()) {
         (true, _) => Vec::new(),
         (false, true) => model.positions.clone(),
@@ -214,16 +214,13 @@ fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Rejects files that have neither faces nor splats, and values of `--show` that a capture of splats does not support.
+/// Rejects arguments that a file without faces, which has splats or points, does not support.
 fn check_capture(args: &RenderArgs, model: &Model) -> Result<(), CliError> {
     let is_drawn = matches!(args.show, ShowArg::Solid | ShowArg::Cells | ShowArg::Slice);
-    if model.splats().is_none() {
-        return Ok(model.require_faces()?);
-    }
-    if is_drawn && args.compare.is_none() && args.weights.is_none() {
+    if model.n_faces() > 0 || is_drawn && args.compare.is_none() && args.weights.is_none() {
         return Ok(());
     }
-    let message = "a capture of splats is drawn as it is, and follows the cage by a field".to_owned();
+    let message = "splats and points are drawn as they are, and follow the cage by a field".to_owned();
     Err(CliError::Mismatch { message, hint: "leave out --compare, --weights and other values of --show" })
 }
 
@@ -314,7 +311,7 @@ fn prepare(
     let needs_weights = args.compare.is_some()
         || args.pose.is_some()
         || matches!(args.show, ShowArg::Wireframe | ShowArg::Weights | ShowArg::Error);
-    let is_capture = model.splats().is_some();
+    let is_capture = model.n_faces() == 0;
     if needs_weights && !is_capture {
         let (weights, frames) = match &args.weights {
             Some(path) => {

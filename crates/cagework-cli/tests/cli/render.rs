@@ -1,6 +1,7 @@
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 
+use crate::splats::cloud;
 use crate::support::{CORNERS, Sandbox, box_obj};
 
 /// Width and height that the IHDR chunk of a PNG contains (PNG specification, 11.2.2).
@@ -43,6 +44,35 @@ fn saved_weights_draw_the_same_picture_as_a_bind() {
     sandbox.run(&format!("{base} b.png --pose pose.obj -g 12")).success();
     assert_ne!(sandbox.read("rest.png"), sandbox.read("a.png"));
     assert_eq!(sandbox.read("a.png"), sandbox.read("b.png"), "weights from a file and from a bind");
+}
+
+/// The cloud is a sphere, and splats that show points stretch with the space around them.
+#[test]
+fn a_point_cloud_is_drawn_and_follows_its_cage() {
+    /// Tolerance of the drawn width divided by the height, which is at least 80 pixels: two pixels on each side.
+    const PIXELS: f64 = 0.05;
+    let sandbox = Sandbox::new();
+    sandbox.write("cloud.ply", cloud());
+    sandbox.write("cage.obj", box_obj(&CORNERS));
+    sandbox.write("wide.obj", box_obj(&CORNERS.map(|[x, y, z]| [1.5 * x, y, z])));
+    let base = "render cloud.ply --size 300x200 --view front --orthographic --no-floor --no-cage -o p.png";
+    for (pose, expected) in [("", 1.0), (" --pose wide.obj", 1.5)] {
+        sandbox.run(&format!("{base} --cage cage.obj{pose}")).success();
+        let picture = image::load_from_memory(&sandbox.read("p.png")).unwrap().into_rgb8();
+        // The background is grey, unlike the points, whose colours depend on their positions.
+        let is_colored =
+            |pixel: &image::Rgb<u8>| pixel.0.iter().max().unwrap() - pixel.0.iter().min().unwrap() > 40;
+        let drawn: Vec<(u32, u32)> =
+            picture.enumerate_pixels().filter(|p| is_colored(p.2)).map(|p| (p.0, p.1)).collect();
+        let extent = |of: fn(&(u32, u32)) -> u32| {
+            f64::from(drawn.iter().map(of).max().unwrap() - drawn.iter().map(of).min().unwrap() + 1)
+        };
+        let (width, height) = (extent(|p| p.0), extent(|p| p.1));
+        assert!(height > 80.0 && (width / height - expected).abs() < PIXELS, "{pose}: {width} x {height}");
+    }
+    sandbox.run(base).success();
+    let refused = format!("{base} --cage cage.obj --show weights");
+    sandbox.run(&refused).failure().stderr(contains("splats and points are drawn as they are"));
 }
 
 #[test]
