@@ -6,6 +6,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use cagework_core::deform::displacements;
+use cagework_core::field::{CELLS, FieldWeights};
 use cagework_core::progress::Progress;
 use cagework_core::{BindOptions, Binding, Controls, bind};
 use cagework_io::{
@@ -44,7 +45,7 @@ struct Request {
 ///
 /// model: path of a file in any format of docs/formats.md, or its bytes; posed: [n_cage, 3] float32 or float64, object
 /// units; options: those of bind. glTF is written as GLB and keeps skin, joints, morph targets, clips, materials and
-/// textures; other formats are kept. The bytes are identical to those that `cagework bind` and `cagework deform` write.
+/// textures; other formats are kept. Gaussian splats and point clouds follow the field of the cage. The bytes are identical to those that `cagework bind` and `cagework deform` write.
 ///
 /// posed may be a dict from names to poses: the model then stays at rest, and each pose becomes a morph target of a GLB
 /// with an animation that plays them, one per second or at times (seconds, ascending) with an interpolation ("step",
@@ -208,7 +209,14 @@ impl Request {
             let by = vec![DVec3::ZERO; model.extra_points().map_err(error::model)?.len()];
             return Ok(model.write_reshaped(&by, &[], &[], &of_rig).map_err(error::model)?.0);
         }
-        model.require_faces().map_err(error::model)?;
+        if model.n_faces() == 0 {
+            let Poses::One(posed) = poses else {
+                return Err(error::option("splats and points take one pose, but posed is a dict of poses"));
+            };
+            let options = BindOptions { held: model.bytes() + model.bytes_to_write(format), ..options };
+            let weights = FieldWeights::bind(controls, CELLS, &options, progress).map_err(error::bind)?;
+            return model.write_in_field(format, &weights.pose(controls.rest(), posed)).map_err(error::model);
+        }
         let bound = bound(&model, controls, options, keeps_rig, progress)?;
         let (weights, rest) = ((&bound.weights, &bound.frames), controls.rest());
         if keeps_rig {

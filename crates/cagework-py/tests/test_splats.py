@@ -56,6 +56,26 @@ def test_rest_pose_is_the_same_file_and_a_cage_encloses_the_shells(capture, cage
     assert len(cw.generate_cage(vertices, triangles).vertices) >= 8
 
 
+def test_reshape_writes_captures_and_clouds_as_the_command_does(capture, cage, tmp_path):
+    points = capture[1]["p"].astype(float)
+    header = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n" + "".join(f"property double {x}\n" for x in "xyz")
+    lines = "\n".join(" ".join(map(repr, point.tolist())) for point in points)
+    (tmp_path / "cloud.ply").write_text(f"{header}end_header\n{lines}\n")
+    turned = cage.vertices @ QUARTER.T
+    cage.save(tmp_path / "cage.obj")
+    cage.save(tmp_path / "pose.obj", turned)
+    for name in ["a.splat", "cloud.ply"]:
+        data = cw.reshape(tmp_path / name, cage, turned)
+        command(tmp_path, f"deform {name} --cage cage.obj --pose pose.obj -o out-{name}")
+        assert data == (tmp_path / f"out-{name}").read_bytes(), name
+    body = (tmp_path / "out-cloud.ply").read_text().split("end_header\n")[1]
+    vertices = np.loadtxt(body.splitlines())
+    assert np.allclose(vertices, points @ QUARTER.T, atol=1e-5)
+    assert np.allclose(cw.Splats(tmp_path / "out-a.splat").positions, points @ QUARTER.T, atol=1e-5)
+    with pytest.raises(cw.OptionError, match="take one pose"):
+        cw.reshape(tmp_path / "a.splat", cage, {"a": turned})
+
+
 def test_wrong_files_are_refused(tmp_path):
     (tmp_path / "a.splat").write_bytes(bytes(33))
     with pytest.raises(cw.ModelError, match="not a multiple of the 32 bytes"):

@@ -1,7 +1,9 @@
 //! Methods for the npm package that deform model files and apply weights without a GPU.
 
 use cagework_core::deform::{deform_finite, displacements};
-use cagework_core::{Controls, Frames, Weights};
+use cagework_core::field::{CELLS, FieldWeights, Lattice};
+use cagework_core::options::OutsidePolicy;
+use cagework_core::{Binding, Controls, Frames, Weights};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, compact};
 use cagework_pose::Parts;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
@@ -43,8 +45,8 @@ impl LoadedModel {
 #[wasm_bindgen]
 impl Binder {
     /// Binds the model and deforms its file by a posed cage, `[n_controls, 3]`, like `cagework bind` and `cagework
-    /// deform`. A glTF model keeps its rig according to `rig` (`RigOptions`; `dynamic` is ignored). Other arguments as
-    /// for `bind`.
+    /// deform`. A glTF model keeps its rig according to `rig` (`RigOptions`; `dynamic` is ignored). Splats and points
+    /// follow the field of the cage. Other arguments as for `bind`.
     ///
     /// # Errors
     /// If the bind fails, the pose does not have `n_controls` points, or the deformed file cannot be written.
@@ -74,6 +76,15 @@ impl Binder {
         // Count the memory for writing the file against the limit, so that a lack of memory is reported before the
         // bind.
         request.options.held = model.bytes() + model.bytes_to_write(model.format());
+        if model.n_faces() == 0 {
+            let lattice = Lattice::new(Controls::from(&set).surface(), CELLS);
+            request.options.outside = OutsidePolicy::Extend;
+            let Binding { weights, frames, .. } =
+                self.run(&lattice.points(), &set, request, progress).await?;
+            let field = FieldWeights::new(lattice, weights, frames).pose(&rest, &posed);
+            let written = model.write_in_field(model.format(), &field).map_err(Fault::from)?;
+            return Ok(compact(written, rig.size).map_err(Fault::from)?);
+        }
         let bound = self.run(&at, &set, request, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
             let by = displacements(&bound.weights, &bound.frames, &rest, &posed);

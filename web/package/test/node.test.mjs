@@ -185,6 +185,38 @@ test("reshaping with the rest pose returns the same file, byte for byte", async 
   );
 });
 
+test("splats and points are reshaped without faces", async () => {
+  // Splats on a helix in a box that makes a quarter turn about z.
+  const at = Array.from({ length: 90 }, (_, k) => [Math.cos(k / 9) / 2, k / 100 - 0.45, Math.sin(k / 9) / 2]);
+  const capture = Buffer.alloc(32 * at.length);
+  for (const [k, point] of at.entries()) {
+    for (const [j, x] of [...point, 0.03, 0.02, 0.01].entries()) capture.writeFloatLE(x, 32 * k + 4 * j);
+    capture.set([200, 100, 50, 255, 255, 128, 128, 128], 32 * k + 24);
+  }
+  const corners = [0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6];
+  const box = {
+    positions: Array.from({ length: 24 }, (_, k) => (((k / 3) >> (k % 3)) % 2 === 0 ? -1 : 1)),
+    corners: corners.flatMap((i, k) => (k % 4 === 0 ? [4, i] : [i])),
+  };
+  const turn = (points) => points.map((_, k) => [-points[k + 1], points[k - 1], points[k]][k % 3]);
+  const posed = turn(box.positions);
+  const turned = Buffer.from(await reshape(capture, box, posed, { name: "a.splat" }));
+  const close = (a, b) => assert.ok(Math.abs(a - b) < 1e-5, `${a} instead of ${b}`);
+  for (const [k, point] of at.entries()) {
+    for (const [j, x] of turn(point).entries()) close(turned.readFloatLE(32 * k + 4 * j), x);
+    // sqrt(1/2), 0, 0, sqrt(1/2), times 128 plus 128
+    assert.deepEqual([...turned.subarray(32 * k + 28, 32 * k + 32)], [219, 128, 128, 219]);
+  }
+  assert.ok(Buffer.from(await reshape(capture, box, box.positions, { name: "a.splat" })).equals(capture));
+  const header = `ply\nformat ascii 1.0\nelement vertex ${at.length}\n`;
+  const cloud = `${header}property float x\nproperty float y\nproperty float z\nend_header\n`;
+  const lines = at.map((point) => `${point.join(" ")}\n`).join("");
+  const moved = await reshape(new Blob([cloud + lines]), box, posed, { name: "cloud.ply" });
+  const [, body] = Buffer.from(moved).toString().split("end_header\n");
+  const points = body.trim().split(/\s+/).map(Number);
+  for (const [k, x] of turn(at.flat()).entries()) close(points[k], x);
+});
+
 test("a model far from the origin deforms like one near it", async () => {
   const [x, z] = [500000.25, 4500000.5];
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [x + (k & 1), (k >> 1) & 1, z + (k >> 2) / 8]);
