@@ -1,7 +1,7 @@
 /** The first visit: the page opens with a sample that can be dragged at once. */
 
 import { box } from "./models";
-import { followsAHandle } from "./stories";
+import { drawsNothing, followsAHandle } from "./stories";
 import { cagePositions, drag, drop, expect, largestMove, open, shoot, test } from "./support";
 
 test("opens below any path with a bound sample, draws nothing when idle, and shares its pose by a link", async ({
@@ -17,22 +17,7 @@ test("opens below any path with a bound sample, draws nothing when idle, and sha
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
   await open(page, "~student/some%20where/cagework/");
   await shoot(page, "opens");
-  await test.step("an idle page draws nothing", async () => {
-    const frames = () =>
-      page.evaluate(async () => {
-        let frames = 0;
-        const stop = globalThis.cagework?.onFrame(() => {
-          frames += 1;
-        });
-        // Wait for 60 frames of the browser, about a second.
-        for (let k = 0; k < 60; k++) await new Promise(requestAnimationFrame);
-        stop?.();
-        return frames;
-      });
-    // What loads after the model may still change the picture.
-    await expect.poll(frames).toBe(0);
-    expect(await frames()).toBe(0);
-  });
+  await test.step("an idle page draws nothing", () => drawsNothing(page));
   await followsAHandle(page, "posed");
   await test.step("a link carries the pose", async () => {
     await drag(page, -50, -30);

@@ -1,42 +1,14 @@
 /** A capture of Gaussian splats is pulled, exported, posed, saved and opened again. */
 
-import type { Page } from "@playwright/test";
 import { savedSince } from "./kept";
 import { splats } from "./models";
+import { difference, drawsNothing, pullsACapture, squares } from "./stories";
 import { bound, download, drop, expect, grip, openWith, pull, rested, shoot, test } from "./support";
-
-/**
- * Computes the mean colours of 16 x 16 squares of a picture of the model alone, from the front. Splats are drawn
- * without cage and floor.
- */
-async function squares(page: Page): Promise<number[]> {
-  return page.evaluate(async () => {
-    const session = globalThis.cagework;
-    session?.engine.setCamera({ target: [0, 1, 0], yaw: 0, pitch: 0, distance: 6, parallel: false });
-    const blob = await session?.picture(160, 160, true);
-    if (!blob) throw new Error("no session");
-    const small = new OffscreenCanvas(16, 16).getContext("2d");
-    small?.drawImage(await createImageBitmap(blob), 0, 0, 16, 16);
-    return Array.from(small?.getImageData(0, 0, 16, 16).data ?? []);
-  });
-}
-
-const difference = (a: number[], b: number[]) =>
-  Math.max(...a.map((value, k) => Math.abs(value - (b[k] ?? 0))));
 
 test("a capture is pulled, exported and opened again", async ({ page }) => {
   await openWith(page, [{ name: "vase.splat", bytes: splats() }]);
-  await expect(page).toHaveTitle(/vase/);
-  await bound(page);
-  await page.waitForFunction(() => globalThis.cagework?.engine.hasLattice);
-  const rest = await squares(page);
-  await pull(page, await grip(page, [0.5, 0.3]), 90, 10);
-  await rested(page);
-  await shoot(page, "splats");
-  const pulled = await squares(page);
-  expect(difference(rest, pulled), "the pull is visible").toBeGreaterThan(40);
-  await page.keyboard.press("Control+z");
-  expect(difference(rest, await squares(page)), "undo").toBeLessThan(2);
+  const pulled = await pullsACapture(page, "splats");
+  await test.step("an idle page with a capture draws nothing", () => drawsNothing(page));
   await page.keyboard.press("Control+y");
   await page.getByRole("button", { name: "Export" }).first().click();
   await page.getByRole("radio", { name: "PLY" }).check({ force: true });

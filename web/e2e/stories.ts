@@ -64,6 +64,63 @@ export async function pullsTheModel(page: Page): Promise<void> {
   expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
 }
 
+/** Checks that the page draws no frame as long as nothing changes. */
+export async function drawsNothing(page: Page): Promise<void> {
+  const frames = () =>
+    page.evaluate(async () => {
+      let frames = 0;
+      const stop = globalThis.cagework?.onFrame(() => {
+        frames += 1;
+      });
+      // Wait for 60 frames of the browser, about a second.
+      for (let k = 0; k < 60; k++) await new Promise(requestAnimationFrame);
+      stop?.();
+      return frames;
+    });
+  // What loads after the model may still change the picture.
+  await expect.poll(frames).toBe(0);
+  expect(await frames()).toBe(0);
+}
+
+/**
+ * Computes the mean colours of 16 x 16 squares of a picture of the model alone, from the front. Splats are drawn
+ * without cage and floor.
+ */
+export async function squares(page: Page): Promise<number[]> {
+  return page.evaluate(async () => {
+    const session = globalThis.cagework;
+    session?.engine.setCamera({ target: [0, 1, 0], yaw: 0, pitch: 0, distance: 6, parallel: false });
+    const blob = await session?.picture(160, 160, true);
+    if (!blob) throw new Error("no session");
+    const small = new OffscreenCanvas(16, 16).getContext("2d");
+    small?.drawImage(await createImageBitmap(blob), 0, 0, 16, 16);
+    return Array.from(small?.getImageData(0, 0, 16, 16).data ?? []);
+  });
+}
+
+/** Returns the largest difference between two results of `squares`. */
+export const difference = (a: number[], b: number[]) =>
+  Math.max(...a.map((value, k) => Math.abs(value - (b[k] ?? 0))));
+
+/**
+ * Waits for the capture `vase.splat`, which was dropped, pulls it, and undoes the pull. Returns the squares of its
+ * picture while it was pulled.
+ */
+export async function pullsACapture(page: Page, picture: string): Promise<number[]> {
+  await expect(page).toHaveTitle(/vase/);
+  await bound(page);
+  await page.waitForFunction(() => globalThis.cagework?.engine.hasLattice);
+  const rest = await squares(page);
+  await pull(page, await grip(page, [0.5, 0.3]), 90, 10);
+  await rested(page);
+  await shoot(page, picture);
+  const pulled = await squares(page);
+  expect(difference(rest, pulled), "the pull is visible").toBeGreaterThan(40);
+  await page.keyboard.press("Control+z");
+  expect(difference(rest, await squares(page)), "undo").toBeLessThan(2);
+  return pulled;
+}
+
 /** Checks the heat map of a vertex's weights, the slice through the grid, and the side-by-side comparison. */
 export async function showsColours(page: Page, picture: string): Promise<void> {
   const pixels = () => drawing(page);

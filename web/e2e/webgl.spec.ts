@@ -4,16 +4,18 @@ import type { Page } from "@playwright/test";
 import { RIG_DEFAULTS } from "../src/defaults";
 import { PSEUDO } from "../src/words/pseudo";
 import { WEBGL_LAUNCH } from "./browser";
+import { splats } from "./models";
 import {
   complaintsOfAxe,
   exportsAPicture,
   exportsWhatIsShown,
   followsAHandle,
+  pullsACapture,
   pullsTheModel,
   showsColours,
   survives,
 } from "./stories";
-import { bound, expect, grip, open, shoot, test } from "./support";
+import { bound, drop, expect, grip, open, shoot, test } from "./support";
 
 test.use({ launchOptions: WEBGL_LAUNCH });
 
@@ -57,6 +59,10 @@ test("without WebGPU the page opens, poses and draws", async ({ page }) => {
   await followsAHandle(page, "webgl-posed");
   await test.step("the model is pulled", () => pullsTheModel(page));
   await test.step("colours, slice and comparison are shown", () => showsColours(page, "webgl"));
+  await test.step("a dropped capture is pulled", async () => {
+    await drop(page, [{ name: "vase.splat", bytes: splats() }]);
+    await pullsACapture(page, "webgl-splats");
+  });
   await test.step("a closed notice stays closed", async () => {
     await page.getByRole("button", { name: "Close this notice" }).click();
     await expect(notice).toHaveCount(0);

@@ -113,6 +113,53 @@ for (const [how, address] of [
   });
 }
 
+test("the vertex shader of bend.js moves and turns a surface as its cage does", async ({ visit }) => {
+  const page = await visit("webgl", "three.html");
+  await page.waitForFunction(() => "weights" in globalThis);
+  const pixels = await page.evaluate(async () => {
+    // TypeScript does not look for modules that variables name.
+    const [three, core, example] = [
+      "three",
+      "@cagework/core",
+      "/node_modules/@cagework/core/examples/bend.js",
+    ];
+    const THREE = await import(three);
+    const { field }: typeof import("../src/index") = await import(core);
+    const { bend } = await import(example);
+    const corners = [0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6];
+    const box = {
+      positions: Float32Array.from({ length: 24 }, (_, k) => ((k / 3) >> (k % 3)) % 2 || -1),
+      corners: corners.flatMap((i, k) => (k % 4 === 0 ? [4, i] : [i])),
+    };
+    // The cage turns about y by 30 degrees and moves by 0.5 along x.
+    const [sin, cos] = [0.5, Math.sqrt(0.75)];
+    const posed = box.positions.map((_, k) => {
+      const [x = 0, y = 0, z = 0] = box.positions.slice(k - (k % 3));
+      return [cos * x + sin * z + 0.5, y, cos * z - sin * x][k % 3] ?? 0;
+    });
+    const material = new THREE.MeshNormalMaterial();
+    bend(material, (await field(box, posed, { cells: 16 })).texture());
+    const scene = new THREE.Scene().add(new THREE.Mesh(new THREE.PlaneGeometry(0.4, 0.4, 8, 8), material));
+    const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
+    camera.position.z = 3;
+    const renderer = new THREE.WebGLRenderer();
+    renderer.setSize(100, 100);
+    const target = new THREE.WebGLRenderTarget(100, 100);
+    renderer.setRenderTarget(target);
+    renderer.render(scene, camera);
+    const pixel = (x: number) => {
+      const rgba = new Uint8Array(4);
+      renderer.readRenderTargetPixels(target, x, 50, 1, 1, rgba);
+      return [...rgba];
+    };
+    return { before: pixel(50), after: pixel(75) };
+  });
+  expect(pixels.before, "the surface has left the middle").toEqual([0, 0, 0, 255]);
+  // The material draws the normal n as the colour (n + 1) / 2. The normal is now (sin 30, 0, cos 30).
+  const colour = [0.5, 0, Math.sqrt(0.75)].map((n) => (255 * (n + 1)) / 2);
+  for (const [k, value] of colour.entries()) expect(Math.abs((pixels.after[k] ?? 0) - value)).toBeLessThan(2);
+});
+
 test("the StackBlitz example moves a geometry with its cage", async ({ visit }) => {
   const page = await visit("webgl", "bundled/stackblitz/index.html");
   await page.waitForFunction(() => "deformer" in globalThis);
