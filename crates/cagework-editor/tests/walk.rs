@@ -36,8 +36,8 @@ fn command() -> impl Strategy<Value = Command> {
     let index = || 0..4_usize;
     let share = prop_oneof![9 => 0.0..1.0_f32, 1 => Just(f32::NAN)];
     let time = || prop_oneof![8 => 0.0..5.0_f32, 1 => Just(0.0), 1 => Just(f32::NAN), 1 => Just(3600.0)];
-    let interpolation = ||
-        prop::sample::select(vec![Interpolation::Step, Interpolation::Linear, Interpolation::Cubic]);
+    let interpolation =
+        || prop::sample::select(vec![Interpolation::Step, Interpolation::Linear, Interpolation::Cubic]);
     let pin = (0..40_u32, 0.0..1.0_f32)
         .prop_map(|(triangle, a)| SurfacePoint { triangle, bary: [a, 1.0 - a, 0.0] });
     let edit = prop::sample::select(vec![
