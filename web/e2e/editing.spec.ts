@@ -137,4 +137,47 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
     await page.keyboard.press("Enter");
     expect((await download).suggestedFilename()).toBe("cube-posed.glb");
   });
+
+  await test.step("poses are saved in view, ordered by keyboard and pointer, and have their own motion", async () => {
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    const cards = page.locator("li.pose");
+    const names = () =>
+      cards.locator("textarea").evaluateAll((all: HTMLTextAreaElement[]) => all.map((one) => one.value));
+    for (let count = 1; count <= 5; count++) {
+      await page.getByRole("button", { name: "Save this pose" }).first().click();
+      await expect(cards).toHaveCount(count);
+    }
+    await expect(cards.last()).toBeInViewport({ ratio: 0.9 });
+    const [a = "", b = "", c = "", d = "", e = ""] = await names();
+    await cards
+      .last()
+      .getByRole("button", { name: /^Move / })
+      .press("Alt+ArrowUp");
+    await expect.poll(names).toEqual([a, b, c, e, d]);
+    const [from, to] = await Promise.all(
+      [cards.nth(3).getByRole("button", { name: /^Move / }), cards.nth(2)].map((place) =>
+        place.boundingBox(),
+      ),
+    );
+    await page.mouse.move((from?.x ?? 0) + 8, (from?.y ?? 0) + 8);
+    await page.mouse.down();
+    await page.mouse.move((from?.x ?? 0) + 8, (to?.y ?? 0) + 12, { steps: 4 });
+    await page.mouse.up();
+    await expect.poll(names).toEqual([a, b, e, c, d]);
+    const motion = cards.nth(2).getByRole("combobox", { name: `Motion to ${e}` });
+    await motion.selectOption("Jump");
+    await shoot(page, "poses");
+    await page.keyboard.press("Control+z");
+    await expect(motion).toHaveValue("");
+  });
+
+  await test.step("a higher closeness lets the cage follow the model more closely", async () => {
+    await page.getByRole("button", { name: "Cage", exact: false }).first().click();
+    const closeness = page.getByRole("slider", { name: "Closeness" });
+    const within = async () =>
+      Number.parseFloat(/[\d.]+/.exec((await closeness.getAttribute("aria-valuetext")) ?? "")?.[0] ?? "");
+    const before = await within();
+    await closeness.press("End");
+    expect(await within()).toBeLessThan(before);
+  });
 });

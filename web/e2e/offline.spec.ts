@@ -65,6 +65,11 @@ test("after the first visit everything works without a network", async ({ page, 
   page.context().on("request", (request) => requests.push(request.url()));
   await open(page, `${site.address}`);
   await kept(page);
+  const devtools = await page.context().newCDPSession(page);
+  const { installabilityErrors } = await devtools.send("Page.getInstallabilityErrors");
+  // Each test has a private window, in which nothing can be installed.
+  const faults = installabilityErrors.map(({ errorId }) => errorId).filter((id) => id !== "in-incognito");
+  expect(faults, "reasons why the page cannot be installed").toEqual([]);
   expect(requests.filter((url) => !url.startsWith(site.address) && !url.startsWith("blob:"))).toEqual([]);
   await site.stop();
   await dropBox(page, "offline");

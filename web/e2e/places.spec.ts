@@ -81,6 +81,13 @@ async function fits(page: Page): Promise<void> {
   expect(await cagePositions(page), "arrow keys move nothing else").toEqual(before);
   expect(await tools.evaluateAll((all) => all.filter(({ tabIndex }) => tabIndex === 0).length)).toBe(1);
 
+  await page.setViewportSize({ width: 1024, height: 768 });
+  await page.keyboard.press("n");
+  await expect.poll(() => hiddenHandles(page), "See covers the panel of the step, not the view").toBe(0);
+  const [see, panel] = [await boxOf(page.locator(".see")), await boxOf(page.locator("#panel"))];
+  expect(see).toMatchObject({ x: panel.x, width: panel.width });
+  await page.keyboard.press("n");
+
   await page.setViewportSize({ width: 844, height: 390 });
   const bar = page.getByRole("toolbar", { name: "Tools" });
   const room = async () => {

@@ -94,12 +94,13 @@ test("the cage at rest is edited, checked during the drag and bound again", asyn
   await test.step("an edge is split in its middle, and collapsed", async () => {
     await page.keyboard.press("v");
     const [a = 0, b = 0] = await choose(page, 2);
-    await page.keyboard.press("Shift+S");
+    const tools = page.getByRole("toolbar", { name: "Reshape the cage" });
+    await tools.getByRole("button", { name: "Split edge" }).click();
     const split = await settled(page, 9);
     const between = [0, 1, 2].map((axis) => ((rest[3 * a + axis] ?? 0) + (rest[3 * b + axis] ?? 0)) / 2);
     expect(largestMove(between, split.slice(24))).toBeLessThan(1e-6);
     await choose(page, 2);
-    await page.keyboard.press("Shift+C");
+    await tools.getByRole("button", { name: "Collapse edge" }).click();
     await settled(page, 8);
     await page.keyboard.press("Control+z");
     await settled(page, 9);

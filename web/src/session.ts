@@ -400,10 +400,11 @@ async function start(opened: OpenedOn & Needs) {
     onFrame: frames.listen,
     /** Draws the scene as a PNG, up to 8192 pixels per side. `alone`: only the model, on a transparent background. */
     async picture(width: number, height: number, alone = false) {
-      const pixels = new Uint8ClampedArray(await engine.picture(width, height, alone));
-      const canvas = new OffscreenCanvas(width, height);
-      canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
-      return canvas.convertToBlob({ type: "image/png" });
+      return pngOf(await engine.picture(width, height, alone), width, height);
+    },
+    /** Draws the model in a saved pose as a PNG, on a transparent background. */
+    async posePicture(width: number, height: number, index: number) {
+      return pngOf(await engine.posePicture(width, height, index), width, height);
     },
     /** For tests: reads the posed positions as drawn, by default with harmonic coordinates. */
     readPositions: (kind: Coordinates = "harmonic") => engine.readPositions(kind),
@@ -438,4 +439,12 @@ async function start(opened: OpenedOn & Needs) {
   };
   globalThis.cagework = session;
   return session;
+}
+
+/** Encodes RGBA pixels. */
+function pngOf(pixels: Uint8Array, width: number, height: number): Promise<Blob> {
+  const canvas = new OffscreenCanvas(width, height);
+  const image = new ImageData(new Uint8ClampedArray(pixels), width, height);
+  canvas.getContext("2d")?.putImageData(image, 0, 0);
+  return canvas.convertToBlob({ type: "image/png" });
 }

@@ -314,6 +314,7 @@ export function createFake(): Fake {
     pullGrab: (grab) => job("pullGrab", grab),
     pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
+    posePicture: (_width, _height, index) => job<Blob>("posePicture", index).done,
     onFrame: () => () => undefined,
     readSettings(text, memory_limit) {
       const given = JSON.parse(text);

@@ -412,6 +412,25 @@ impl State {
         self.is_changed = false;
     }
 
+    /// Writes a saved pose to the GPU. The next frame writes the current pose and the frame of the clip again.
+    pub(crate) fn write_saved_pose(&mut self, index: usize, main: &mut Session) -> Answer<()> {
+        let document = self.editor.document();
+        let pose = document.poses.get(index).filter(|pose| document.fits(pose) && self.is_on_gpu());
+        let positions = pose
+            .map(|pose| Arc::clone(&pose.positions))
+            .ok_or_else(|| Fault::missing("such pose", "wait until the cage of the pose is ready"))?;
+        if let Some(playing) = &mut self.playing {
+            playing.is_new = true;
+            main.stop_playing();
+        }
+        main.pose(&positions[..main.cage_positions().len()]);
+        if let Some(lattice) = self.lattice.as_ref().filter(|_| self.models().splats().is_some()) {
+            main.set_field(Some(lattice.pose(&self.rest().positions, &positions)), &positions);
+        }
+        self.is_moved = true;
+        Ok(())
+    }
+
     /// Writes to the GPU which splats are outside the cage, and the field that deforms the splats.
     fn write_splats(&mut self, main: &mut Session) {
         if !self.is_moved || !self.is_on_gpu() || self.models().splats().is_none() {

@@ -73,19 +73,26 @@ export function createPoses(ctx: Context, edit: Edit) {
     frame = requestAnimationFrame(step(start));
   };
 
-  /** Makes the picture of a saved pose, which must be the current one. */
-  const portray = async (index: number) => {
-    const { poses, pictures, steps, clip } = store.get();
-    const hash = poses[index]?.hash;
-    // While a clip is shown, the picture would show a frame of the clip instead of the pose.
-    if (hash === undefined || pictures[hash] || clip.clip !== null || clip.targets.length > 0) return;
+  let isPortraying = false;
+  /** Makes the missing pictures of the saved poses, one after the other, while nothing moves. */
+  const portray = async () => {
+    if (isPortraying) return;
+    isPortraying = true;
     try {
-      const picture = await ctx.session().picture(...PICTURE, true);
-      // A change of the document before the picture was drawn may have changed the pose in it.
-      if (store.get().steps !== steps || store.get().gesture !== null) return;
-      store.set({ pictures: { ...store.get().pictures, [hash]: URL.createObjectURL(picture) } });
+      for (;;) {
+        const { poses, pictures, bound, gesture, playing } = store.get();
+        const index = poses.findIndex(({ fits, hash }) => fits && pictures[hash] === undefined);
+        const hash = poses[index]?.hash;
+        if (hash === undefined || !bound || gesture !== null || playing) return;
+        const picture = await ctx.session().posePicture(...PICTURE, index);
+        // The list may have changed before the picture was drawn.
+        if (store.get().poses[index]?.hash !== hash) continue;
+        store.set({ pictures: { ...store.get().pictures, [hash]: URL.createObjectURL(picture) } });
+      }
     } catch {
-      // The card stays without a picture. The next frame reports a lost device.
+      // The cards stay without pictures. The next frame reports a lost device.
+    } finally {
+      isPortraying = false;
     }
   };
 
@@ -97,13 +104,11 @@ export function createPoses(ctx: Context, edit: Edit) {
       if (moment) engine().apply({ do: "set_pose", positions: moment });
       const name = freshName(store.get().poses);
       if (!edit.apply({ do: "save_pose", name }, T.did.save)) return;
-      void portray(store.get().poses.length - 1);
       ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(name));
     },
     apply(index: number) {
       edit.setEditingRest(false);
       edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
-      void portray(index);
     },
     rename(index: number, text: string) {
       const name = text.trim().replace(/\s+/g, " ");
@@ -113,8 +118,9 @@ export function createPoses(ctx: Context, edit: Edit) {
     remove: (index: number) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
     /** Replaces a pose by the current one. */
     update(index: number) {
-      if (edit.apply({ do: "update_pose", index }, T.did.update)) void portray(index);
+      edit.apply({ do: "update_pose", index }, T.did.update);
     },
+    portray,
     /** Inserts a copy after the pose. */
     duplicate(index: number) {
       const name = T.did.copyName(store.get().poses[index]?.name ?? "");

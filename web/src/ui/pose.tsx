@@ -1,6 +1,6 @@
 /** Step 4: position of the selection, move options, and saved poses. */
 
-import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { Interpolation, Pivot } from "../contract";
 import { SLIDERS } from "../defaults";
@@ -155,7 +155,8 @@ function Help({ app }: { app: App }) {
 
 function Poses({ app }: { app: App }) {
   const state = app.store.get();
-  const { poses, shares, playing, posed } = state;
+  const { poses, shares, playing, posed, bound, gesture } = state;
+  useEffect(() => void app.poses.portray(), [app, poses, bound, gesture, playing]);
   const places = poses.flatMap(({ fits }, index) => (fits ? [index] : []));
   const others = poses.length - places.length;
   const list = useRef<HTMLUListElement>(null);

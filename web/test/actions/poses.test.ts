@@ -57,21 +57,31 @@ it("saving, showing, renaming and deleting a pose are undo steps", () => {
   expect([said, did.length]).toEqual([['Saved as "Pose 2".'], 11]);
 });
 
-it("saved, updated and shown poses get a picture, unless the pose changes before it is drawn", async () => {
+it("every pose that fits the cage gets a picture, once, unless the list changes while it is drawn", async () => {
   const { poses, asked, store, show } = page();
-  const ofCard = async (act: () => void, meanwhile = () => {}) => {
-    act();
-    meanwhile();
+  const pose = (hash: number, fits = true) =>
+    ({ name: `Pose ${hash}`, fits, seconds: 1, interpolation: null, hash }) as const;
+  show({ bound: true, poses: [pose(7), pose(8, false), pose(9)] });
+  const wanted = () => asked.filter(({ kind }) => kind === "posePicture").map(({ input }) => input);
+  const drawn = async () => {
     asked.at(-1)?.resolve(new Blob());
     await new Promise((done) => setTimeout(done));
-    return store.get().pictures[7];
   };
-  const change = () => show({ steps: store.get().steps + 1 });
-  expect(await ofCard(() => poses.update(0), change)).toBeUndefined();
-  expect(await ofCard(() => poses.apply(0))).toMatch(/^blob:/);
-  const before = asked.length;
-  await ofCard(() => poses.save());
-  expect(asked.length, "the picture of this pose exists").toBe(before);
+  const all = poses.portray();
+  void poses.portray();
+  expect(wanted(), "one at a time").toEqual([0]);
+  show({ poses: [pose(9), pose(7)] });
+  await drawn();
+  expect(Object.keys(store.get().pictures), "another pose has taken its place").toEqual([]);
+  await drawn();
+  await drawn();
+  await all;
+  expect([wanted(), Object.keys(store.get().pictures)]).toEqual([
+    [0, 0, 1],
+    ["7", "9"],
+  ]);
+  await poses.portray();
+  expect(wanted().length).toBe(3);
 });
 
 it("an animation that does not loop ends with the pose before it", () => {

@@ -84,19 +84,18 @@ impl Engine {
     /// # Errors
     /// If the GPU device is lost, or the picture is too large.
     pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Result<Vec<u8>, JsValue> {
-        let mut gpu = self.gpu.lock().await;
-        let gpu = gpu.as_mut().ok_or_else(lost)?;
-        let scale = {
-            let mut state = self.state.borrow_mut();
-            gpu.take(&mut state);
-            let scene = state.picture_scene(alone, gpu.main.weights());
-            gpu.main.set_scene(scene);
-            height as f32 / state.size.y
-        };
-        let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
-        // The picture has replaced the scene on the GPU, so the next frame must write the scene of the view again.
-        self.change(|state| state.is_changed = true);
-        Ok(picture?)
+        Ok(self.render_picture([width, height], alone, None).await?)
+    }
+
+    /// Renders the model in a saved pose, without the frame of a clip, on a transparent background. RGBA pixels, rows
+    /// from the top. `[height, width, 4]`
+    ///
+    /// # Errors
+    /// If the GPU device is lost, or the picture is too large. `Missing` if the pose does not exist or fits another cage,
+    /// or while the cage is uploaded.
+    #[wasm_bindgen(js_name = posePicture)]
+    pub async fn pose_picture(&self, width: u32, height: u32, index: u32) -> Result<Vec<u8>, JsValue> {
+        Ok(self.render_picture([width, height], true, Some(index as usize)).await?)
     }
 
     /// Reads from the GPU the vertices deformed with one kind of coordinates. `[n_vertices, 3]`
@@ -121,6 +120,25 @@ impl Engine {
 }
 
 impl Engine {
+    async fn render_picture(&self, size: [u32; 2], alone: bool, pose: Option<usize>) -> Answer<Vec<u8>> {
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        let scale = {
+            let mut state = self.state.borrow_mut();
+            gpu.take(&mut state);
+            if let Some(index) = pose {
+                state.write_saved_pose(index, &mut gpu.main)?;
+            }
+            let scene = state.picture_scene(alone, gpu.main.weights());
+            gpu.main.set_scene(scene);
+            size[1] as f32 / state.size.y
+        };
+        let picture = gpu.main.picture(size, scale).await.map_err(Fault::from);
+        // The picture has replaced the scene on the GPU, so the next frame must write the scene of the view again.
+        self.change(|state| state.is_changed = true);
+        picture
+    }
+
     fn try_frame(&self, wanted: FrameQuality) -> Answer<FrameOutcome> {
         let Some(mut gpu) = self.gpu.try_lock() else { return Ok(FrameOutcome::NotNow) };
         let Some(gpu) = gpu.as_mut() else { return Ok(FrameOutcome::NotNow) };
