@@ -238,6 +238,7 @@ fn clips_and_turns_are_drawn_side_by_side() {
         image::load_from_memory(&sandbox.read("p.png")).unwrap().into_rgb8()
     };
     let picture = strip("--clip slide --at 0,0.5,1", 3);
+    assert!(strip("--clip slide --at 0 --at 0.5 --at 1", 3) == picture, "a repeated --at is a list as well");
     let columns = drawn_columns(&picture, 60, 3);
     let middles: Vec<f32> = columns.iter().map(|all| 0.5 * (all[0] + all[all.len() - 1]) as f32).collect();
     // The cube moves by two equal steps, in total by three times its own width.
