@@ -242,7 +242,15 @@ fn text(info: &Info) -> String {
         row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
     }
     if let Some(vrm) = &info.vrm {
-        row("VRM", format!("{}, {} springs, {} colliders", shown(&vrm.version), vrm.springs, vrm.colliders));
+        row(
+            "VRM",
+            [
+                shown(&vrm.version),
+                counted(vrm.springs, "spring", "springs"),
+                counted(vrm.colliders, "collider", "colliders"),
+            ]
+            .join(", "),
+        );
         if !vrm.expressions.is_empty() {
             row("expressions", escaped(&vrm.expressions.join(", ")));
         }

@@ -7,12 +7,18 @@ use serde_json::{Value, json};
 
 use crate::support::{Sandbox, glb_json};
 
-/// A folder with the humanoid bound to a cage, and `wide.obj`: the cage scaled by 1.3 in x above the hips.
-pub(crate) fn bound() -> Sandbox {
+/// A folder with the humanoid.
+fn humanoid() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
     let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
     sandbox.write("humanoid.glb", &glb);
+    sandbox
+}
+
+/// A folder with the humanoid bound to a cage, and `wide.obj`: the cage scaled by 1.3 in x above the hips.
+pub(crate) fn bound() -> Sandbox {
+    let sandbox = humanoid();
     sandbox.run("cage humanoid.glb -o cage.obj").success();
     sandbox.run("bind humanoid.glb --cage cage.obj -g 24 --weights w.npz").success();
     let wider = |line: &str| {
@@ -167,12 +173,12 @@ fn dynamic_deform_bends_every_frame_of_a_clip() {
         .stderr(contains("cannot store a clip"));
 }
 
-/// The humanoid with an extension in its document, such as VRM data.
-fn with_extension(sandbox: &Sandbox, name: &str, extension: &Value) -> Vec<u8> {
+/// The humanoid with extensions in its document, such as VRM data. `extensions`: by their names.
+fn with_extensions(sandbox: &Sandbox, extensions: &Value) -> Vec<u8> {
     let glb = sandbox.read("humanoid.glb");
     let mut json = glb_json(&glb);
-    json["extensionsUsed"] = json!([name]);
-    json["extensions"] = json!({ name: extension });
+    json["extensionsUsed"] = extensions.as_object().unwrap().keys().cloned().collect();
+    json["extensions"] = extensions.clone();
     let mut text = serde_json::to_vec(&json).unwrap();
     text.resize(text.len().next_multiple_of(4), b' ');
     let old = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
@@ -204,9 +210,9 @@ fn poses_are_morph_targets_with_the_given_names() {
 fn poses_become_expressions_of_a_vrm() {
     let sandbox = bound();
     let vrm_1 = json!({ "specVersion": "1.0", "expressions": { "preset": { "aa": {} }, "custom": 3 } });
-    sandbox.write("one.vrm", with_extension(&sandbox, "VRMC_vrm", &vrm_1));
+    sandbox.write("one.vrm", with_extensions(&sandbox, &json!({ "VRMC_vrm": vrm_1 })));
     let vrm_0 = json!({ "blendShapeMaster": { "blendShapeGroups": [{ "name": "A", "presetName": "a" }] } });
-    sandbox.write("zero.vrm", with_extension(&sandbox, "VRM", &vrm_0));
+    sandbox.write("zero.vrm", with_extensions(&sandbox, &json!({ "VRM": vrm_0 })));
     let node = glb_json(&sandbox.read("humanoid.glb"))["nodes"]
         .as_array()
         .unwrap()
@@ -250,6 +256,43 @@ fn poses_become_expressions_of_a_vrm() {
         .run(&format!("{} --times 0.5", deform("one.vrm", one)))
         .success()
         .stdout(contains("1 pose as VRM expressions (Joy) and an animation of 0.5 s"));
+}
+
+#[test]
+fn springs_and_colliders_of_a_vrm_are_counted() {
+    let sandbox = humanoid();
+    let sphere = json!({ "node": 1, "shape": { "sphere": { "radius": 0.1 } } });
+    let vrm_1 = json!({
+        "VRMC_vrm": { "specVersion": "1.0" },
+        "VRMC_springBone": {
+            "specVersion": "1.0",
+            "colliders": [sphere, sphere, sphere],
+            "springs": [{ "joints": [{ "node": 2 }, { "node": 3 }] }, { "joints": [{ "node": 4 }] }],
+        },
+    });
+    // In VRM 0, a group contains the colliders of a node, and another one the chains of springs with the same settings.
+    let collider = json!({ "offset": { "x": 0.0, "y": 0.0, "z": 0.0 }, "radius": 0.1 });
+    let vrm_0 = json!({ "VRM": { "secondaryAnimation": {
+        "colliderGroups": [{ "node": 1, "colliders": [collider, collider] }, { "node": 2, "colliders": [collider] }],
+        "boneGroups": [{ "bones": [3, 4], "colliderGroups": [0, 1] }, { "bones": [5] }],
+    } } });
+    let bare = json!({ "VRMC_vrm": { "specVersion": "1.0" } });
+    let one = json!({
+        "VRMC_vrm": { "specVersion": "1.0" },
+        "VRMC_springBone": { "colliders": [sphere], "springs": [{ "joints": [{ "node": 2 }] }] },
+    });
+    for (extensions, version, springs, colliders, row) in [
+        (vrm_1, "1.0", 2, 3, "VRM         1.0, 2 springs, 3 colliders\n"),
+        (vrm_0, "0.0", 2, 3, "VRM         0.0, 2 springs, 3 colliders\n"),
+        (bare, "1.0", 0, 0, "VRM         1.0, 0 springs, 0 colliders\n"),
+        (one, "1.0", 1, 1, "VRM         1.0, 1 spring, 1 collider\n"),
+    ] {
+        sandbox.write("person.vrm", with_extensions(&sandbox, &extensions));
+        sandbox.run("info person.vrm").success().stdout(contains(row));
+        let expected =
+            json!({ "version": version, "expressions": [], "springs": springs, "colliders": colliders });
+        assert_eq!(sandbox.json("info person.vrm --json")["vrm"], expected);
+    }
 }
 
 #[test]
