@@ -7,6 +7,7 @@ from pathlib import Path
 import cagework as cw
 import numpy as np
 import pytest
+from cagework.distributed import reshape_files
 from support import rigged_glb, splat_records
 
 PACKAGE = Path(__file__).parents[1]
@@ -22,6 +23,7 @@ def documented():
         for part in vars(public) if isinstance(public, type) else []:
             if not part.startswith("_") and callable(getattr(public, part)):
                 yield f"{name}.{part}", getattr(public, part).__doc__
+    yield "reshape_files", reshape_files.__doc__
 
 
 @pytest.mark.parametrize(("name", "text"), list(documented()))

@@ -44,6 +44,15 @@ def reshape_files(
     Returns a dict per file, in input order: file, output, state ("written", "kept" for an output that is newer than its input, or
     "failed") and error. Duplicate inputs are processed once. A failure does not stop the other files; if the workers of a task die
     repeatedly, all its files count as failed. Raises ValueError if two files have the same output, or `out` is a folder of the inputs.
+
+    >>> from dask.distributed import Client
+    >>> from cagework.distributed import reshape_files
+    >>> cage = cw.generate_cage(*cw.read_model("fox.glb", states=True), target=40)
+    >>> posed = cage.vertices * [1.3, 1.0, 1.0]
+    >>> with Client(processes=False, dashboard_address=None) as client:
+    ...     done = reshape_files(["fox.glb"], "out", cage, posed, client=client, grid=24)
+    >>> done[0]["state"]
+    'written'
     """
     if files_per_task < 1:
         raise ValueError(f"files_per_task is {files_per_task}; it must be at least 1")
