@@ -6,14 +6,19 @@ mod common;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use cagework_core::TriMesh;
 use cagework_core::options::Choice;
 use cagework_core::skin::skin_vertices;
 use cagework_core::splats::{Splats, n_harmonics};
-use cagework_io::{CompactOptions, Compression, Interpolation, Model, ModelFormat, Timeline, compact};
+use cagework_io::{
+    CompactOptions, Compression, Interpolation, Model, ModelFormat, Player, ReshapeOptions, Timeline,
+    TransferOptions, compact, write_mesh_glb,
+};
 use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::{DVec3, Quat, Vec3};
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let directory = PathBuf::from(std::env::args().nth(1).ok_or("usage: export_samples DIRECTORY")?);
@@ -88,11 +93,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         if model.is_rigged() {
-            let extra = model.extra_points()?;
-            let by = model.positions.iter().chain(&extra).map(|&p| twist(p).as_dvec3() - p.as_dvec3());
-            let by: Vec<_> = by.collect();
+            let by = twisted(&model)?;
             let still = vec![DVec3::ZERO; by.len()];
-            let options = cagework_io::ReshapeOptions::default();
+            let options = ReshapeOptions::default();
             let (reshaped, _) = model.write_reshaped(&by, &[], &[], &options)?;
             let played = |glb: &[u8], name: &str| -> Result<(), Box<dyn Error>> {
                 let Some(player) = model.player_of(glb).ok().filter(|p| !p.clips().is_empty()) else {
@@ -113,7 +116,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 )?)
             };
             played(&reshaped, &format!("{stem}-reshaped"))?;
-            let grounded = cagework_io::ReshapeOptions { ground: true, ..options.clone() };
+            let grounded = ReshapeOptions { ground: true, ..options.clone() };
             let (stands, _) = model.write_reshaped(&by, &[], &[], &grounded)?;
             played(&stands, &format!("{stem}-stands"))?;
             std::fs::write(directory.join(format!("{stem}-stands.glb")), stands)?;
@@ -134,7 +137,127 @@ fn main() -> Result<(), Box<dyn Error>> {
         let project = cagework_io::write_project(&[&model], &cage, &cage_poses, "{}")?;
         std::fs::write(directory.join(format!("{stem}-project.glb")), project)?;
     }
+    write_clips_without_mesh(&directory)?;
+    write_expressions(&directory)?;
+    write_clothes(&directory)?;
     write_captures(&directory.join("captures"))
+}
+
+/// Displacements of all points of a rigged model by [`twist`].
+fn twisted(model: &Model) -> Result<Vec<DVec3>, Box<dyn Error>> {
+    let extra = model.extra_points()?;
+    Ok(model.positions.iter().chain(&extra).map(|&p| twist(p).as_dvec3() - p.as_dvec3()).collect())
+}
+
+/// The clip of [`rigged`] and the nodes that it moves, without the mesh, its skin and the track of its targets.
+fn clips_alone() -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut clips = rigged();
+    let document = clips.json.as_object_mut().ok_or("the document is an object")?;
+    for key in ["meshes", "skins"] {
+        document.shift_remove(key);
+    }
+    for list in ["/nodes", "/animations/0/channels", "/animations/0/samplers"] {
+        clips.json.pointer_mut(list).and_then(Value::as_array_mut).ok_or("the list exists")?.pop();
+    }
+    clips.json["scenes"] = json!([{ "nodes": [0] }]);
+    Ok(clips.glb())
+}
+
+/// Ten moments of the first clip of another file, which moves the nodes of `model` with the same names. `clips`: its name
+/// without `.glb`, and the file with the expected motion. `weights`: of the model's morph targets.
+fn moments(
+    model: &Model,
+    player: &Player,
+    (name, clips): (&str, &Player),
+    weights: &[f32],
+) -> Result<Vec<u8>, serde_json::Error> {
+    let moment = |k: u32| {
+        let seconds = 0.099 * k as f32;
+        let posed = player.at_clip_of(clips, 0, seconds, weights);
+        let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
+        let positions: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
+        let origin = model.origin().to_array();
+        json!({ "seconds": seconds, "positions": positions, "origin": origin, "clips": name, "weights": weights })
+    };
+    serde_json::to_vec(&(0..10).map(moment).collect::<Vec<_>>())
+}
+
+/// Writes a deformed body, and a file of clips without a mesh that follows its skeleton, as `refit --skeleton` does. The
+/// expected motion is that of the clip in the body's file.
+fn write_clips_without_mesh(directory: &Path) -> Result<(), Box<dyn Error>> {
+    let body = Model::read("body.glb", &rigged().glb(), &mut |_| None)?;
+    let (by, options) = (twisted(&body)?, ReshapeOptions::default());
+    let skeleton = Some(Arc::new(body.skeleton(&by, &[], &options)?));
+    let (reshaped, _) = body.write_reshaped(&by, &[], &[], &options)?;
+    let clips = Model::read_with_clips("clips.glb", clips_alone()?, &mut |_| None, u64::MAX)?;
+    // The joints of the clips are not bound, so nothing but the skeleton moves them.
+    let still = vec![DVec3::ZERO; clips.extra_points()?.len()];
+    let (moved, report) =
+        clips.write_reshaped(&still, &[], &[], &ReshapeOptions { skeleton, ..ReshapeOptions::default() })?;
+    if report.tracks == 0 {
+        return Err("the clip does not follow the skeleton".into());
+    }
+    let player = body.player_of(&reshaped)?;
+    let weights = player.targets().1.to_vec();
+    let played = moments(&body, &player, ("clips-alone", &player), &weights)?;
+    std::fs::write(directory.join("clips-body.played.json"), played)?;
+    std::fs::write(directory.join("clips-body.glb"), reshaped)?;
+    Ok(std::fs::write(directory.join("clips-alone.glb"), moved)?)
+}
+
+/// Writes a VRM 0 and a VRM 1 with a pose as an expression. The expected shape is the pose.
+fn write_expressions(directory: &Path) -> Result<(), Box<dyn Error>> {
+    for (name, extension) in [("VRM", json!({})), ("VRMC_vrm", json!({ "specVersion": "1.0" }))] {
+        let mut rig = rigged();
+        rig.json["extensionsUsed"] = json!([name]);
+        rig.json["extensions"] = json!({ name: extension });
+        let model = Model::read("person.vrm", &rig.glb(), &mut |_| None)?;
+        let pose = ("happy".to_owned(), twisted(&model)?);
+        let still = vec![DVec3::ZERO; pose.1.len()];
+        let options = ReshapeOptions { expressions: true, ..ReshapeOptions::default() };
+        let (vrm, _) = model.write_reshaped(&still, &[], &[pose], &options)?;
+        let positions: Vec<f32> = model.positions.iter().flat_map(|&p| twist(p).to_array()).collect();
+        let shown =
+            json!({ "expression": "happy", "positions": positions, "origin": model.origin().to_array() });
+        let stem = format!("expression-{name}");
+        std::fs::write(directory.join(format!("{stem}.played.json")), serde_json::to_vec(&[shown])?)?;
+        std::fs::write(directory.join(format!("{stem}.glb")), vrm)?;
+    }
+    Ok(())
+}
+
+/// Writes clothes with the skin and the morph targets of a body, and the body's clip.
+fn write_clothes(directory: &Path) -> Result<(), Box<dyn Error>> {
+    let body = Model::read("body.glb", &rigged().glb(), &mut |_| None)?;
+    // The middle part of the body, without its ends, 0.01 units away from it in x and z.
+    let inside = |v: u32| (4..16).contains(&v);
+    let sleeve = TriMesh {
+        positions: body.positions[4..16]
+            .iter()
+            .map(|p| *p + 0.01 * Vec3::new(p.x.signum(), 0.0, p.z.signum()))
+            .collect(),
+        triangles: body
+            .triangles
+            .iter()
+            .filter(|t| t.iter().all(|&v| inside(v)))
+            .map(|t| t.map(|v| v - 4))
+            .collect(),
+    };
+    let sleeve = write_mesh_glb("sleeve", &sleeve, &[], None)?;
+    let clothes = Model::read("sleeve.glb", &sleeve, &mut |_| None)?;
+    let options = TransferOptions { push_out: Some(0.002), memory_limit: u64::MAX };
+    let (dressed, report) = clothes.transfer_from(&body, &options)?;
+    if (report.joints, report.targets.len()) != (3, 2) {
+        return Err(format!("{} joints and {} targets", report.joints, report.targets.len()).into());
+    }
+    let clips = Model::read_with_clips("clips.glb", clips_alone()?, &mut |_| None, u64::MAX)?;
+    let clips = clips.player()?.ok_or("the clips are a glTF")?;
+    let model = Model::read("clothes.glb", &dressed, &mut |_| None)?;
+    let player = model.player()?.ok_or("the clothes are a glTF")?;
+    let played = moments(&model, &player, ("clothes-clips", &clips), &[0.75, 0.5])?;
+    std::fs::write(directory.join("clothes.played.json"), played)?;
+    std::fs::write(directory.join("clothes.glb"), dressed)?;
+    Ok(std::fs::write(directory.join("clothes-clips.glb"), clips_alone()?)?)
 }
 
 /// Writes a capture in each format, and the splats as they are read back.

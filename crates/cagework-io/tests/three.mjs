@@ -3,7 +3,8 @@
 // usage: node three.mjs DIRECTORY
 //
 // NAME.played.json: array of `seconds` and `positions` in the first clip, three numbers per vertex of the only
-// primitive, relative to `origin`.
+// primitive, relative to `origin`. Optional: `clips`, the name of another file whose first clip moves the nodes with the
+// same names; `weights` of the morph targets; `expression`, shown at rest instead of a clip.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -21,21 +22,48 @@ if (directory === undefined) {
   console.error("usage: node three.mjs DIRECTORY");
   process.exit(2);
 }
+
+async function load(name) {
+  const glb = readFileSync(join(directory, `${name}.glb`));
+  const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength);
+  return await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
+}
+
+/** Pairs of a morph target and its weight, 0 to 1, that an expression of a VRM binds. */
+function bindsOf(extensions, expression) {
+  if (extensions.VRMC_vrm !== undefined) {
+    const { preset, custom } = extensions.VRMC_vrm.expressions;
+    const { morphTargetBinds } = preset?.[expression] ?? custom[expression];
+    return morphTargetBinds.map(({ index, weight }) => [index, weight]);
+  }
+  const groups = extensions.VRM.blendShapeMaster.blendShapeGroups;
+  const { binds } = groups.find(({ name }) => name === expression);
+  return binds.map(({ index, weight }) => [index, weight / 100]);
+}
+
 const names = readdirSync(directory).filter((name) => name.endsWith(".played.json"));
 let worst = 0;
 let compared = 0;
 for (const name of names) {
-  const glb = readFileSync(join(directory, name.replace(/\.played\.json$/, ".glb")));
-  const bytes = glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength);
-  const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
+  const gltf = await load(name.replace(/\.played\.json$/, ""));
+  const frames = JSON.parse(readFileSync(join(directory, name), "utf8"));
+  const { clips } = frames[0];
+  const { animations } = clips === undefined ? gltf : await load(clips);
   let mesh;
   gltf.scene.traverse((object) => {
     if (object.isMesh) mesh = object;
   });
   const mixer = new AnimationMixer(gltf.scene);
-  mixer.clipAction(gltf.animations[0]).play();
-  for (const { seconds, positions, origin } of JSON.parse(readFileSync(join(directory, name), "utf8"))) {
-    mixer.setTime(seconds);
+  mixer.clipAction(animations[0]).play();
+  for (const { seconds, weights, expression, positions, origin } of frames) {
+    if (weights !== undefined) mesh.morphTargetInfluences = weights;
+    if (expression !== undefined) {
+      for (const [target, weight] of bindsOf(gltf.parser.json.extensions, expression)) {
+        mesh.morphTargetInfluences[target] = weight;
+      }
+    } else {
+      mixer.setTime(seconds);
+    }
     gltf.scene.updateMatrixWorld(true);
     const size = Math.max(...positions) - Math.min(...positions);
     for (let v = 0; v < positions.length / 3; v += 1) {
