@@ -74,13 +74,13 @@ pub enum TimelineError {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
     /// Times are ascending.
-    keys: Vec<Key>,
+    keys: Vec<TimelineKey>,
     n_poses: usize,
 }
 
 /// A time of a timeline and the shape that it shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Key {
+struct TimelineKey {
     seconds: f32,
     /// Index of the pose; `None` is the shape at rest.
     pose: Option<usize>,
@@ -88,13 +88,13 @@ struct Key {
     interpolation: Interpolation,
 }
 
-impl Key {
+impl TimelineKey {
     fn new(seconds: f32, pose: Option<usize>) -> Self {
         Self { seconds, pose, interpolation: Interpolation::Linear }
     }
 }
 
-/// A key of a glTF sampler, which shows the shape of the [`Key`] with index `key`.
+/// A key of a glTF sampler, which shows the shape of the [`TimelineKey`] with index `key`.
 struct SamplerKey {
     seconds: f32,
     key: usize,
@@ -107,7 +107,7 @@ impl Timeline {
     #[must_use]
     pub fn every_second(n_poses: usize) -> Self {
         let pose = |k: usize| k.checked_sub(1).filter(|&pose| pose < n_poses);
-        let keys = (0..n_poses + 2).map(|k| Key::new(k as f32 * SECONDS_PER_POSE, pose(k))).collect();
+        let keys = (0..n_poses + 2).map(|k| TimelineKey::new(k as f32 * SECONDS_PER_POSE, pose(k))).collect();
         Self { keys, n_poses }
     }
 
@@ -119,12 +119,12 @@ impl Timeline {
     pub fn new(seconds: &[f32], seconds_back: Option<f32>) -> Result<Self, TimelineError> {
         check_times(seconds)?;
         let mut keys: Vec<_> =
-            seconds.iter().enumerate().map(|(k, &at)| Key::new(at + 0.0, Some(k))).collect();
+            seconds.iter().enumerate().map(|(k, &at)| TimelineKey::new(at + 0.0, Some(k))).collect();
         if seconds.first().is_none_or(|&first| first >= 0.5 * MIN_GAP) {
-            keys.insert(0, Key::new(0.0, None));
+            keys.insert(0, TimelineKey::new(0.0, None));
         }
         if let (Some(back), Some(last)) = (seconds_back, keys.last()) {
-            keys.push(Key::new(last.seconds + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].pose));
+            keys.push(TimelineKey::new(last.seconds + back.clamp(MIN_GAP, MAX_SECONDS), keys[0].pose));
         }
         Ok(Self { keys, n_poses: seconds.len() })
     }
@@ -132,7 +132,7 @@ impl Timeline {
     /// Creates a timeline with one pose at each key time of a clip. `seconds`: ascending, not checked.
     #[must_use]
     pub fn at_keys(seconds: &[f32]) -> Self {
-        let keys = seconds.iter().enumerate().map(|(k, &at)| Key::new(at, Some(k))).collect();
+        let keys = seconds.iter().enumerate().map(|(k, &at)| TimelineKey::new(at, Some(k))).collect();
         Self { keys, n_poses: seconds.len() }
     }
 

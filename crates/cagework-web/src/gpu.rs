@@ -12,7 +12,7 @@ use cagework_gpu::Session;
 
 use crate::error::Answer;
 use crate::state::{GpuKeys, State, Upload};
-use crate::surface::Surface;
+use crate::surface::CanvasSurface;
 
 /// GPU sessions, and the canvas that they draw into.
 pub(crate) struct Gpu {
@@ -20,7 +20,7 @@ pub(crate) struct Gpu {
     pub(crate) main: Session,
     /// The sessions that draw it deformed by other kinds of coordinates, at most one per kind.
     pub(crate) others: Vec<(Coordinates, Session)>,
-    pub(crate) surface: Surface,
+    pub(crate) surface: CanvasSurface,
 }
 
 impl Gpu {
@@ -30,7 +30,7 @@ impl Gpu {
     }
 
     /// The canvas, and the available sessions of `kinds` in the order of `kinds`.
-    pub(crate) fn shown(&mut self, kinds: &[Coordinates]) -> (&mut Surface, Vec<&mut Session>) {
+    pub(crate) fn shown(&mut self, kinds: &[Coordinates]) -> (&mut CanvasSurface, Vec<&mut Session>) {
         let Self { main, others, surface } = self;
         let others = others.iter_mut().map(|(kind, session)| (*kind, session));
         let all = std::iter::once((Coordinates::Harmonic, main)).chain(others);

@@ -29,7 +29,7 @@ const SHARP_COST_RATIO: f64 = 2.0;
 pub(crate) const SMALL_SIDE: u32 = 16;
 
 /// A canvas, and the textures that sessions draw into before they are copied to the canvas.
-pub(crate) struct Surface {
+pub(crate) struct CanvasSurface {
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     /// Render format: the canvas's format with sRGB encoding.
@@ -67,7 +67,7 @@ pub(crate) enum FrameOutcome {
     Sharply,
 }
 
-impl Surface {
+impl CanvasSurface {
     /// Opens a GPU that can draw into the canvas.
     ///
     /// # Errors

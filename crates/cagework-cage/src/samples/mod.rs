@@ -79,7 +79,7 @@ pub fn build(id: &str) -> Option<Sample> {
             made.expect("options and model are constants, and tests build every cage").cage.to_polygon_mesh()
         }
     };
-    let posed = |(name, pose): &(&str, Pose)| ((*name).to_owned(), pose(&cage.positions));
+    let posed = |(name, pose): &(&str, PoseFunction)| ((*name).to_owned(), pose(&cage.positions));
     let mut poses: Vec<_> = recipe.poses.iter().map(posed).collect();
     poses.push((recipe.pulled.name.to_owned(), recipe.pulled.pose(&cage.positions)));
     let rig = recipe.rig.map(|rig| rig(&mesh.positions));
@@ -100,7 +100,7 @@ struct Recipe {
     /// Edge of a meshing cell, object units.
     cell: f32,
     cage: CageRecipe,
-    poses: Vec<(&'static str, Pose)>,
+    poses: Vec<(&'static str, PoseFunction)>,
     pulled: PulledPose,
     rig: Option<fn(&[Vec3]) -> Rig>,
 }
@@ -130,7 +130,7 @@ impl PulledPose {
 }
 
 /// Function that maps the rest positions of a cage to posed positions.
-type Pose = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
+type PoseFunction = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
 
 #[cfg(test)]
 mod tests;

@@ -40,7 +40,7 @@ use crate::loaded::LoadedModel;
 use crate::opening::OpenContents;
 use crate::options::decode;
 use crate::state::{BoundModels, State, joined};
-use crate::surface::Surface;
+use crate::surface::CanvasSurface;
 use crate::views::{View, object};
 
 /// Models, cage, camera and rendering of one page.
@@ -69,7 +69,7 @@ impl Engine {
         invalidate: Function,
         #[wasm_bindgen(unchecked_param_type = "(view: View) => void")] changed: Function,
     ) -> Result<Engine, JsValue> {
-        let (surface, context) = Surface::open(canvas).await?;
+        let (surface, context) = CanvasSurface::open(canvas).await?;
         let gpu = Gpu { main: Session::new(context), others: Vec::new(), surface };
         Ok(Self {
             state: Rc::default(),
@@ -308,7 +308,7 @@ impl Engine {
     /// `NoAdapter` or `NoDevice` if no GPU can be opened yet; `Canvas` if the GPU cannot draw into the canvas. Also if
     /// the GPU runs out of memory.
     pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
-        let (surface, context) = Surface::open(canvas).await?;
+        let (surface, context) = CanvasSurface::open(canvas).await?;
         {
             let mut shared = self.gpu.lock().await;
             let gpu = shared.as_mut().ok_or_else(lost)?;
