@@ -144,7 +144,7 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
     const names = () =>
       cards.locator("textarea").evaluateAll((all: HTMLTextAreaElement[]) => all.map((one) => one.value));
     for (let count = 1; count <= 5; count++) {
-      await page.getByRole("button", { name: "Save this pose" }).first().click();
+      await page.getByRole("button", { name: "Save pose" }).first().click();
       await expect(cards).toHaveCount(count);
     }
     await expect(cards.last()).toBeInViewport({ ratio: 0.9 });

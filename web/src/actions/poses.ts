@@ -74,14 +74,19 @@ export function createPoses(ctx: Context, edit: Edit) {
   };
 
   let isPortraying = false;
-  /** Makes the missing pictures of the saved poses, one after the other, while nothing moves. */
-  const portray = async () => {
+  /**
+   * Makes the missing pictures of saved poses, one after the other: that of one pose, or of all. While a picture is
+   * drawn, the view cannot be picked.
+   */
+  const portray = async (only?: number) => {
     if (isPortraying) return;
     isPortraying = true;
     try {
       for (;;) {
         const { poses, pictures, bound, gesture, playing } = store.get();
-        const index = poses.findIndex(({ fits, hash }) => fits && pictures[hash] === undefined);
+        const index = poses.findIndex(
+          ({ fits, hash }, k) => fits && pictures[hash] === undefined && (only === undefined || k === only),
+        );
         const hash = poses[index]?.hash;
         if (hash === undefined || !bound || gesture !== null || playing) return;
         const picture = await ctx.session().posePicture(...PICTURE, index);
@@ -104,11 +109,13 @@ export function createPoses(ctx: Context, edit: Edit) {
       if (moment) engine().apply({ do: "set_pose", positions: moment });
       const name = freshName(store.get().poses);
       if (!edit.apply({ do: "save_pose", name }, T.did.save)) return;
+      void portray(store.get().poses.length - 1);
       ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(name));
     },
     apply(index: number) {
       edit.setEditingRest(false);
       edit.apply({ do: "apply_pose", index }, T.did.pose(store.get().poses[index]?.name ?? ""));
+      void portray(index);
     },
     rename(index: number, text: string) {
       const name = text.trim().replace(/\s+/g, " ");
@@ -118,7 +125,7 @@ export function createPoses(ctx: Context, edit: Edit) {
     remove: (index: number) => void edit.apply({ do: "remove_pose", index }, T.did.delete),
     /** Replaces a pose by the current one. */
     update(index: number) {
-      edit.apply({ do: "update_pose", index }, T.did.update);
+      if (edit.apply({ do: "update_pose", index }, T.did.update)) void portray(index);
     },
     portray,
     /** Inserts a copy after the pose. */

@@ -1,6 +1,6 @@
 /** Step 4: position of the selection, move options, and saved poses. */
 
-import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { Interpolation, Pivot } from "../contract";
 import { SLIDERS } from "../defaults";
@@ -155,8 +155,7 @@ function Help({ app }: { app: App }) {
 
 function Poses({ app }: { app: App }) {
   const state = app.store.get();
-  const { poses, shares, playing, posed, bound, gesture } = state;
-  useEffect(() => void app.poses.portray(), [app, poses, bound, gesture, playing]);
+  const { poses, shares, playing, posed } = state;
   const places = poses.flatMap(({ fits }, index) => (fits ? [index] : []));
   const others = poses.length - places.length;
   const list = useRef<HTMLUListElement>(null);
@@ -206,7 +205,13 @@ function Poses({ app }: { app: App }) {
           <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" kind="small" />
         </div>
       )}
-      <ul class="poses" ref={list}>
+      {/* Pictures are drawn while the pointer is here, because they delay picking in the view. */}
+      <ul
+        class="poses"
+        ref={list}
+        onPointerEnter={() => void app.poses.portray()}
+        onFocusIn={() => void app.poses.portray()}
+      >
         {places.map((index, place) => (
           <PoseRow
             key={index}
