@@ -48,7 +48,7 @@ export const pose = {
   move: (name: string) => `Move ${name}`,
   moveTip: "Drag, or press Alt with an arrow key, to change the order",
   timeOf: (name: string) => `Time of ${name}, seconds`,
-  motion: "Motion to it",
+  motion: "Motion",
   motionOf: (name: string) => `Motion to ${name}`,
   motionOfAll: "As between poses",
   between: "Between poses",
