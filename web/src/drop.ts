@@ -1,6 +1,7 @@
 /** Decides from file names what a drop contains: a model, a cage, a project, or nothing that can be opened. */
 
 import { extension, isModel, rankOf } from "@cagework/core/names";
+import { COMPANION_ENDINGS } from "./defaults";
 import { T } from "./words";
 
 export { extension, isModel };
@@ -19,7 +20,6 @@ export interface DropPlan {
   sentence: string;
 }
 
-const COMPANIONS = ["bin", "png", "jpg", "jpeg", "webp", "avif", "ktx2", "mtl"] as const;
 const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
 const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;
 const PROJECT_NAME = /\.cagework\.glb$/i;
@@ -41,7 +41,9 @@ export function planDrop(names: readonly string[]): DropPlan {
   const models = oneFormatEach(plain.length > 0 ? plain : all);
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
   if (!model) {
-    const companions = names.every((name) => (COMPANIONS as readonly string[]).includes(extension(name)));
+    const companions = names.every((name) =>
+      (COMPANION_ENDINGS as readonly string[]).includes(extension(name)),
+    );
     return companions
       ? {
           kind: "textures",
