@@ -263,14 +263,14 @@ pub enum CageGenError {
     },
     /// The model is smaller than [`MIN_DIAGONAL`].
     #[error(
-        "the model's bounding box has a diagonal of {diagonal:e}; it must be at least {MIN_DIAGONAL:e}: scale it"
+        "the model's bounding box has a diagonal of {diagonal:.2e}; it must be at least {MIN_DIAGONAL:e}: scale it"
     )]
     Diagonal {
         /// Diagonal of the bounding box, object units.
         diagonal: f64,
     },
     /// A coordinate of the model is larger than a tenth of [`MAX_DIAGONAL`].
-    #[error("model has coordinates up to {largest:e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
+    #[error("model has coordinates up to {largest:.2e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
     Size {
         /// Largest coordinate, object units.
         largest: f64,
