@@ -2,7 +2,7 @@
 
 import type { Page } from "@playwright/test";
 import { RIG_DEFAULTS } from "../src/defaults";
-import { PSEUDO } from "../src/words/pseudo";
+import { PSEUDO_LANGUAGE } from "../src/words/pseudo";
 import { WEBGL_LAUNCH } from "./browser";
 import { splats } from "./models";
 import {
@@ -145,5 +145,5 @@ test("without WebGPU and WebGL2 the page explains what to do", async ({ page }) 
   expect(await complaintsOfAxe(page)).toEqual([]);
   // The built page must also contain languages other than English. words.spec.ts checks their texts.
   await page.goto("./?lang=pseudo");
-  await expect(page.getByRole("heading", { name: PSEUDO.words.without.needs })).toBeVisible();
+  await expect(page.getByRole("heading", { name: PSEUDO_LANGUAGE.words.without.needs })).toBeVisible();
 });

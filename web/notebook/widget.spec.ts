@@ -10,7 +10,7 @@ const POSE_FILE = join(TARGET, "notebook-lab/pose.json");
 const ROUNDING = 4 * 2 ** -24;
 
 /** Time until the element has drawn a frame at full resolution, which it does when nothing moves for 250 ms. */
-const SHARP_MS = 1500;
+const SHARPENING_MS = 1500;
 
 type Points = number[][];
 
@@ -61,7 +61,7 @@ test("a cell draws the widget, and its pose is one array in the notebook and in 
   // Zoom out until the longer model fits, and wait for the frame at full resolution.
   await element.hover();
   await page.mouse.wheel(0, 300);
-  await page.waitForTimeout(SHARP_MS);
+  await page.waitForTimeout(SHARPENING_MS);
   await page.screenshot({ path: join(TARGET, "screens/notebook-slider.png") });
 
   // Drag a vertex of the cage, at the first position where the cursor is a pointer.
@@ -86,7 +86,7 @@ test("a cell draws the widget, and its pose is one array in the notebook and in 
   const moved = dragged.filter((point, k) => difference([point], [longer[k] ?? []]) > ROUNDING);
   expect(moved).toHaveLength(1);
   await expect.poll(() => difference(written().pose, dragged)).toBe(0);
-  await page.waitForTimeout(SHARP_MS);
+  await page.waitForTimeout(SHARPENING_MS);
   await page.screenshot({ path: join(TARGET, "screens/notebook-drag.png") });
   expect(outside, "the widget needs no network").toEqual([]);
 });

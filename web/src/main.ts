@@ -13,7 +13,7 @@ import { keepOffline } from "./offline/keep";
 import { openSession } from "./session";
 import { createStore } from "./signals";
 import { isFresh, startUp } from "./start";
-import { INITIAL } from "./state";
+import { INITIAL_STATE } from "./state";
 import { forgetCrash } from "./store";
 import { explain, messageOf, textOf } from "./strings";
 import { askAfterCrash } from "./ui/crashed";
@@ -52,7 +52,7 @@ async function main(): Promise<void> {
   // gallery.html has the content of index.html. Some servers omit the ending in the address.
   if (/\/gallery(\.html)?$/.test(location.pathname)) return gallery();
   const stage = createStage(byId("stage"));
-  const store = createStore({ ...INITIAL, busy: T.opening.starting });
+  const store = createStore({ ...INITIAL_STATE, busy: T.opening.starting });
   const { Toasts, tell, offer } = createToasts();
   let session: Session | undefined;
   const app = createApp({

@@ -178,9 +178,9 @@ export const PERSON_STATE = {
   hovering: null as { readonly files: number; readonly to: DropPlace } | null,
 };
 
-export const INITIAL = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
+export const INITIAL_STATE = { ...PERSON_STATE, ...MODEL_STATE, ...DOCUMENT_STATE };
 
-export type AppState = typeof INITIAL;
+export type AppState = typeof INITIAL_STATE;
 
 /**
  * Returns the values of the `MODEL_STATE` keys when another model is opened. Keeps the backend and the memory limit,

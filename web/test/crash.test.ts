@@ -2,7 +2,7 @@ import { createClient, named } from "@cagework/core/session/client";
 import { afterEach, expect, it, vi } from "vitest";
 import { isFatal, sayDuring, watchCrashes } from "../src/crash";
 import { createStore } from "../src/signals";
-import { INITIAL } from "../src/state";
+import { INITIAL_STATE } from "../src/state";
 
 /** The parts of a browser window that crash handling uses, with session storage. */
 function browser() {
@@ -21,7 +21,7 @@ function browser() {
     return {
       restart,
       ask,
-      ...watchCrashes(createStore({ ...INITIAL, busy: "Opening a.glb" }), restart, ask),
+      ...watchCrashes(createStore({ ...INITIAL_STATE, busy: "Opening a.glb" }), restart, ask),
     };
   };
   return { begin, crash };
@@ -82,7 +82,7 @@ it("without session storage, the first crash asks the user", () => {
 });
 
 it("the report names the open model", () => {
-  const model = { name: "horse.glb" } as unknown as typeof INITIAL.model;
+  const model = { name: "horse.glb" } as unknown as typeof INITIAL_STATE.model;
   expect(sayDuring({ busy: null, model })).toBe("It happened with horse.glb open.");
 });
 

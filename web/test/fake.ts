@@ -23,7 +23,7 @@ import { VIEW_DEFAULTS } from "../src/defaults";
 import { type DocumentMirror, followDocument } from "../src/document";
 import { createQueue } from "../src/queue";
 import { createStore, type Store } from "../src/signals";
-import { INITIAL } from "../src/state";
+import { INITIAL_STATE } from "../src/state";
 import { type Explanation, textOf } from "../src/strings";
 
 /** A job that the tested code has requested. The test resolves or rejects it. */
@@ -169,7 +169,7 @@ export function createFake(): Fake {
   const said: string[] = [];
   const problems: Fake["problems"] = [];
   const calls: string[] = [];
-  const store = createStore(INITIAL);
+  const store = createStore(INITIAL_STATE);
   const commands: Command[] = [];
   const did: string[] = [];
 

@@ -7,7 +7,7 @@ import { nextAmount } from "../src/amount";
 import type { BindReport, CageState } from "../src/contract";
 import { drawn } from "../src/derived";
 import { rectangle } from "../src/input/pointer";
-import { type AppState, INITIAL, type StepName } from "../src/state";
+import { type AppState, INITIAL_STATE, type StepName } from "../src/state";
 import { explain, isCancelled, sentence, textOf } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, type Place, placeLabel, scaleOf } from "../src/ui/plot";
@@ -73,7 +73,10 @@ describe("tool tips", () => {
 describe("hints", () => {
   const cage = {} as CageState;
   const hint = (patch: Partial<AppState>, scene: Partial<AppState["scene"]>, isTouch = false) =>
-    hintOf({ ...INITIAL, cage, bound: true, ...patch, scene: { ...INITIAL.scene, ...scene } }, isTouch);
+    hintOf(
+      { ...INITIAL_STATE, cage, bound: true, ...patch, scene: { ...INITIAL_STATE.scene, ...scene } },
+      isTouch,
+    );
   it("name only what the tool can do with what is visible", () => {
     expect(hint({}, {})).toMatch(/^Pull the model or a handle/);
     expect(hint({}, { cage: false })).toMatch(/^Pull the model \(arrow keys too\) ·/);
@@ -87,7 +90,7 @@ describe("hints", () => {
     const states: Partial<AppState>[] = [
       {},
       { editingRest: true },
-      { clip: { ...INITIAL.clip, clip: 0 } },
+      { clip: { ...INITIAL_STATE.clip, clip: 0 } },
       { painting: { id: 0, radius: 1, erase: false } },
       { bound: false },
     ];
@@ -191,7 +194,7 @@ it("faults are marked in step Cage, and elsewhere if they prevent a bind", () =>
   const at = (step: StepName, usable: boolean) => {
     const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
     const cage = { usable, info, controls: PLAIN_CONTROLS, radius: 0 };
-    return drawn({ ...INITIAL, step, cage }).problems;
+    return drawn({ ...INITIAL_STATE, step, cage }).problems;
   };
   expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);
 });

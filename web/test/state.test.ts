@@ -2,11 +2,11 @@ import { effect } from "@preact/signals";
 import { describe, expect, it } from "vitest";
 import { asksToPull } from "../src/derived";
 import { createStore } from "../src/signals";
-import { type AppState, INITIAL } from "../src/state";
+import { type AppState, INITIAL_STATE } from "../src/state";
 
 describe("store", () => {
   it("notifies only readers of the changed key", () => {
-    const store = createStore(INITIAL);
+    const store = createStore(INITIAL_STATE);
     const heard: string[] = [];
     effect(() => void heard.push(store.get().step));
     effect(() => void heard.push(`busy ${store.get().busy}`));
@@ -17,7 +17,7 @@ describe("store", () => {
   });
 
   it("changes several keys at once", () => {
-    const store = createStore(INITIAL);
+    const store = createStore(INITIAL_STATE);
     const heard: string[] = [];
     effect(() => void heard.push(`${store.get().poses.length} ${store.get().shares.length}`));
     store.set({ poses: [{ name: "a", fits: true, seconds: 1, interpolation: null, hash: 7 }], shares: [0] });
@@ -26,10 +26,10 @@ describe("store", () => {
 });
 
 it("the cue at the sample goes away at the first pull and comes back when it is undone", () => {
-  const opened = { ...INITIAL, grip: new Float32Array([0, 1, 0]), bound: true };
+  const opened = { ...INITIAL_STATE, grip: new Float32Array([0, 1, 0]), bound: true };
   const pulled = { ...opened, posed: true, undo: "Pull" };
   const states: AppState[] = [
-    INITIAL,
+    INITIAL_STATE,
     opened,
     { ...opened, gesture: "Pull" },
     pulled,

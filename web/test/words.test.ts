@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, it } from "vitest";
 import { sayGesture } from "../src/actions/edit";
 import { decimals, duration, scientific, setLocale } from "../src/format";
-import { PSEUDO, pseudo } from "../src/words/pseudo";
+import { PSEUDO_LANGUAGE, pseudo } from "../src/words/pseudo";
 
 describe("the pseudo-locale", () => {
   it("accents each letter and lengthens by two fifths", () => {
@@ -22,7 +22,7 @@ describe("the pseudo-locale", () => {
       if (typeof value === "string") return /[a-z]/i.test(value.replaceAll("Cagework", "")) ? [value] : [];
       return typeof value === "object" && value !== null ? Object.values(value).flatMap(plain) : [];
     };
-    expect(plain(PSEUDO.words)).toEqual([]);
+    expect(plain(PSEUDO_LANGUAGE.words)).toEqual([]);
   });
 });
 

@@ -16,7 +16,7 @@ import type {
   Session,
 } from "../../src/contract";
 import type { AppState } from "../../src/state";
-import { INITIAL, STEPS } from "../../src/state";
+import { INITIAL_STATE, STEPS } from "../../src/state";
 import { STOPS, solvers, stopsOf } from "../../src/tour/stops";
 import { askAfterCrash, showReport } from "../../src/ui/crashed";
 import { createLost } from "../../src/ui/lost";
@@ -124,7 +124,7 @@ const BOUND_STATE: Patch = {
   report: REPORT,
   steps: 1,
 };
-const RUN = { ...INITIAL.bindOptions, solver: "cg" } as const;
+const RUN = { ...INITIAL_STATE.bindOptions, solver: "cg" } as const;
 const selected = (count: number, last: number | null): AppState["selected"] => ({
   count,
   last,
@@ -147,25 +147,25 @@ const full = (): Record<AppState["step"], Patch> => ({
     check: checkOf(MENDS, "error", 2),
     cage: { ...CAGE_WITH_CONTROLS, usable: false },
     editingRest: true,
-    tools: { ...INITIAL.tools, element: "face" },
+    tools: { ...INITIAL_STATE.tools, element: "face" },
     placing: "line",
     cageProgress: 0.5,
   },
   bind: {
     earlier: EARLIER_REPORTS,
-    appliedOptions: { ...INITIAL.bindOptions, grid: 32 },
+    appliedOptions: { ...INITIAL_STATE.bindOptions, grid: 32 },
     bindOptions: { ...RUN, method: "classic", preconditioner: "v_cycle" },
     lack: "NoAdapter",
   },
   pose: {
     selected: selected(3, 1),
     pins: [{ triangle: 0, bary: [1, 0, 0] }],
-    tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
+    tools: { ...INITIAL_STATE.tools, symmetry: true, proportionalOn: true },
     unmatched: 3,
     poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }],
     shares: [0.5],
-    clip: { ...INITIAL.clip, clip: 0 },
-    scene: { ...INITIAL.scene, slice: "value", colour: "weight" },
+    clip: { ...INITIAL_STATE.clip, clip: 0 },
+    scene: { ...INITIAL_STATE.scene, slice: "value", colour: "weight" },
     seeOpen: true,
     legend: { low: 0, high: 1, logarithmic: false, map: "viridis", largest: null },
   },
@@ -214,21 +214,21 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { cage: CAGE_WITH_CONTROLS, selected: selected(1, 81) },
     ...of("placing", ["point", "line", "face"], { cage: CAGE_WITH_CONTROLS }),
     ...(["vertex", "edge", "face"] as const).map((element) => ({
-      tools: { ...INITIAL.tools, element },
+      tools: { ...INITIAL_STATE.tools, element },
       editingRest: true,
       selected: selected(2, 1),
     })),
     { editingRest: true, strays: 3 },
     { editingRest: true, check: null },
-    { editingRest: true, scene: { ...INITIAL.scene, cage: false } },
+    { editingRest: true, scene: { ...INITIAL_STATE.scene, cage: false } },
     { model: { ...RIG, notices: ["1."] }, cageClip: "1" },
   ],
   bind: [
     { bound: false, report: null },
-    { earlier: EARLIER_REPORTS, appliedOptions: { ...INITIAL.bindOptions, grid: 32 } },
-    { bindOptions: { ...INITIAL.bindOptions, method: "classic", solver: "jacobi", backend: "gpu" } },
-    { bindOptions: { ...INITIAL.bindOptions, method: "classic" } },
-    { bindOptions: { ...INITIAL.bindOptions, solver: "jacobi" } },
+    { earlier: EARLIER_REPORTS, appliedOptions: { ...INITIAL_STATE.bindOptions, grid: 32 } },
+    { bindOptions: { ...INITIAL_STATE.bindOptions, method: "classic", solver: "jacobi", backend: "gpu" } },
+    { bindOptions: { ...INITIAL_STATE.bindOptions, method: "classic" } },
+    { bindOptions: { ...INITIAL_STATE.bindOptions, solver: "jacobi" } },
     { bindOptions: RUN, lack: "NoAdapter" },
     { bindOptions: { ...RUN, preconditioner: "v_cycle" } },
     { report: { ...REPORT, converged: false } },
@@ -254,15 +254,19 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     { selected: selected(1, 81), cage: CAGE_WITH_CONTROLS },
     {
       selected: selected(3, 1),
-      tools: { ...INITIAL.tools, symmetry: true, proportionalOn: true },
+      tools: { ...INITIAL_STATE.tools, symmetry: true, proportionalOn: true },
       unmatched: 3,
-      scene: { ...INITIAL.scene, pull: false },
+      scene: { ...INITIAL_STATE.scene, pull: false },
     },
-    { selected: selected(1, 1), editingRest: true, scene: { ...INITIAL.scene, gizmo: "move", pull: false } },
-    { scene: { ...INITIAL.scene, cage: false } },
-    { scene: { ...INITIAL.scene, cage: false, pull: false } },
-    { scene: { ...INITIAL.scene, pull: false } },
-    { scene: { ...INITIAL.scene, original: true } },
+    {
+      selected: selected(1, 1),
+      editingRest: true,
+      scene: { ...INITIAL_STATE.scene, gizmo: "move", pull: false },
+    },
+    { scene: { ...INITIAL_STATE.scene, cage: false } },
+    { scene: { ...INITIAL_STATE.scene, cage: false, pull: false } },
+    { scene: { ...INITIAL_STATE.scene, pull: false } },
+    { scene: { ...INITIAL_STATE.scene, original: true } },
     { boxArmed: true, ortho: true },
     { gesture: sayGesture({ kind: "grab", amounts: [0.123, 0.456, 0.789], axis: 0, plane: true }) },
     {
@@ -273,15 +277,15 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
       posed: true,
     },
     {
-      clip: { ...INITIAL.clip, clip: 0, playing: true },
-      rigOptions: { ...INITIAL.rigOptions, rigid: ["1"] },
+      clip: { ...INITIAL_STATE.clip, clip: 0, playing: true },
+      rigOptions: { ...INITIAL_STATE.rigOptions, rigid: ["1"] },
     },
-    { clip: { ...INITIAL.clip, clip: 0 }, rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
-    { rigOptions: { ...INITIAL.rigOptions, joints: "turn" } },
-    { rigOptions: { ...INITIAL.rigOptions, joints: "stay" } },
+    { clip: { ...INITIAL_STATE.clip, clip: 0 }, rigOptions: { ...INITIAL_STATE.rigOptions, dynamic: true } },
+    { rigOptions: { ...INITIAL_STATE.rigOptions, joints: "turn" } },
+    { rigOptions: { ...INITIAL_STATE.rigOptions, joints: "stay" } },
     ...(["material", "clay", "weight", "error"] as const).map(
       (colour): Patch => ({
-        scene: { ...INITIAL.scene, colour },
+        scene: { ...INITIAL_STATE.scene, colour },
         seeOpen: true,
         selected: selected(1, 1),
         legend: {
@@ -296,7 +300,7 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
     ...(["kinds", "value"] as const).flatMap((slice) =>
       [null, 1].map(
         (last): Patch => ({
-          scene: { ...INITIAL.scene, slice, colour: "weight" },
+          scene: { ...INITIAL_STATE.scene, slice, colour: "weight" },
           seeOpen: true,
           selected: selected(last === null ? 0 : 1, last),
           legend: {
@@ -309,16 +313,19 @@ const states = (): Record<AppState["step"], readonly Patch[]> => ({
         }),
       ),
     ),
-    { scene: { ...INITIAL.scene, compare: ["harmonic", "mean_value", "green"] }, cage: CAGE_WITH_CONTROLS },
+    {
+      scene: { ...INITIAL_STATE.scene, compare: ["harmonic", "mean_value", "green"] },
+      cage: CAGE_WITH_CONTROLS,
+    },
   ],
   export: [
     { model: null, cage: null, bound: false },
     { bound: false, report: null },
     { cage: CAGE_WITH_CONTROLS },
     { model: TWO_MODELS, poses: [{ name: "01", fits: true, seconds: 1, interpolation: null, hash: 7 }] },
-    { rigOptions: { ...INITIAL.rigOptions, dynamic: true } },
-    { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true } },
-    { model: RIG, rigOptions: { ...INITIAL.rigOptions, quantize: true, compress: "meshopt" } },
+    { rigOptions: { ...INITIAL_STATE.rigOptions, dynamic: true } },
+    { model: RIG, rigOptions: { ...INITIAL_STATE.rigOptions, quantize: true } },
+    { model: RIG, rigOptions: { ...INITIAL_STATE.rigOptions, quantize: true, compress: "meshopt" } },
   ],
 });
 
@@ -368,7 +375,7 @@ async function start(): Promise<void> {
   const show = (patch: Patch) => {
     legend = patch.legend ?? null;
     const samples = Object.keys(T.samples);
-    store.set({ ...INITIAL, ...BOUND_STATE, adapter: "1", samples, ...patch, legend });
+    store.set({ ...INITIAL_STATE, ...BOUND_STATE, adapter: "1", samples, ...patch, legend });
   };
 
   /** Waits until components are rendered (in microtasks) and effects have run (in a task). */

@@ -3,9 +3,9 @@
 /** Weight of a new measurement in the exponential moving average of the speed, which varies between stages. */
 const SMOOTHING = 0.25;
 /** Fraction done below which no time is estimated, because the speed varies too much at first. */
-const FIRST_SHARE = 0.04;
+const MIN_DONE_SHARE = 0.04;
 /** Duration after the start during which the time left is not estimated, ms. */
-const FIRST_MS = 250;
+const MIN_ELAPSED_MS = 250;
 
 export interface Eta {
   /** Records a fraction done, 0 to 1. Returns the time left in ms, or undefined before the first estimate. */
@@ -26,7 +26,7 @@ export function createEta(start: number): Eta {
         lastShare = share;
         lastTime = now;
       }
-      if (speed === undefined || share < FIRST_SHARE || now - start < FIRST_MS) return undefined;
+      if (speed === undefined || share < MIN_DONE_SHARE || now - start < MIN_ELAPSED_MS) return undefined;
       return Math.max(0, (1 - share) / speed - (now - lastTime));
     },
   };

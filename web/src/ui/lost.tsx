@@ -8,7 +8,7 @@ import { Button, Say } from "./controls";
 import { Icon } from "./icons";
 
 /** If a device is lost again within this time, ms, the page asks before it recovers: the device may be broken. */
-const AGAIN_MS = 10_000;
+const REPEATED_LOSS_MS = 10_000;
 
 interface Loss {
   readonly title: string;
@@ -36,7 +36,7 @@ export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () =
     };
     session.onLost((reason) => {
       const now = performance.now();
-      const isAgain = now - last < AGAIN_MS;
+      const isAgain = now - last < REPEATED_LOSS_MS;
       last = now;
       if (isAgain)
         message.value = { title: T.lost.again, reason: sentence(reason), text: T.lost.others, retry: true };

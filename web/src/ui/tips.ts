@@ -3,7 +3,7 @@
 /** Hover time before a tip appears, ms. */
 const REST_MS = 500;
 /** Time for which a tip stays visible after the finger is lifted, ms. */
-const READ_MS = 2500;
+const LINGER_MS = 2500;
 /** Distance of a tip from its element, and minimum distance from the window's edge, CSS pixels. */
 const GAP = 6;
 
@@ -85,7 +85,7 @@ export function attachTips(): void {
   document.addEventListener("pointerup", (event) => {
     if (event.pointerType === "mouse") return;
     clearTimeout(timer);
-    timer = setTimeout(hide, READ_MS);
+    timer = setTimeout(hide, LINGER_MS);
   });
   document.addEventListener("keydown", hide);
   document.addEventListener("scroll", hide, { capture: true, passive: true });

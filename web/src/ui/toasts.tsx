@@ -12,14 +12,14 @@ import { Button, IconButton, Say } from "./controls";
 import { Icon } from "./icons";
 
 /** Time for which a message is shown, ms. */
-const SHOWN_MS = 5000;
+const TOAST_MS = 5000;
 /** Time for which a message with a button is shown, ms. */
-const SHOWN_WITH_BUTTON_MS = 12_000;
+const TOAST_WITH_BUTTON_MS = 12_000;
 /**
  * Time for which a message is shown before a touch beside it can close it, ms. An earlier touch is not a reaction to
  * the message.
  */
-const READ_MS = 1000;
+const LINGER_MS = 1000;
 /** Maximum number of visible messages of a kind, so that they do not hide the model. */
 const MAX_TOASTS = 3;
 
@@ -101,7 +101,7 @@ function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
     // A touch beside the messages closes them, because they cover much of the model on a small screen.
     const press = ({ pointerType, target, timeStamp }: PointerEvent) => {
       if (pointerType !== "touch" || element.current?.contains(target as Node)) return;
-      for (const { id, stays, since } of said) if (!stays && timeStamp - since > READ_MS) closeSaid(id);
+      for (const { id, stays, since } of said) if (!stays && timeStamp - since > LINGER_MS) closeSaid(id);
     };
     document.addEventListener("pointerdown", press, true);
     return () => document.removeEventListener("pointerdown", press, true);
@@ -150,11 +150,11 @@ function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: (
   // Do not close a message that is hovered or focused.
   const stay = () => clearTimeout(timer.current);
   useEffect(() => {
-    leaveIn(fixes.length > 0 ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
+    leaveIn(fixes.length > 0 ? TOAST_WITH_BUTTON_MS : TOAST_MS);
     return stay;
   }, []);
   return (
-    <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(SHOWN_MS)} onFocusIn={stay}>
+    <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(TOAST_MS)} onFocusIn={stay}>
       <Icon name="info" />
       <Say text={text} />
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />

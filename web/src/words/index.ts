@@ -8,7 +8,7 @@ export type Language = typeof EN;
 
 const LANGUAGES = new Map<string, () => Promise<Language>>([
   ["en", async () => EN],
-  ["pseudo", async () => (await import("./pseudo")).PSEUDO],
+  ["pseudo", async () => (await import("./pseudo")).PSEUDO_LANGUAGE],
 ]);
 
 let language = EN;

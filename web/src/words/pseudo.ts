@@ -50,7 +50,7 @@ export function pseudo<T>(words: T): T {
   return change(words) as T;
 }
 
-export const PSEUDO: Language = {
+export const PSEUDO_LANGUAGE: Language = {
   // Greek, because its numbers, units and lists differ from English ones.
   locale: "el",
   words: pseudo(EN.words),
