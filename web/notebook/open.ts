@@ -4,7 +4,7 @@
  */
 
 import type { Artifact } from "../package/src/session/artifact";
-import type { Canvases, OpenedOn } from "../package/src/session/open";
+import type { Canvases, OpenResult } from "../package/src/session/open";
 import { WEBGL as BASE } from "../package/src/session/webgl";
 import PackageWorker from "../package/src/worker-webgl.ts?worker&inline";
 
@@ -21,7 +21,7 @@ export function compile(gzip: ArrayBuffer): void {
     .then((bytes) => WebAssembly.compile(bytes));
 }
 
-export async function openOn<T>(canvases: Canvases, start: (opened: OpenedOn) => Promise<T>): Promise<T> {
+export async function openOn<T>(canvases: Canvases, start: (opened: OpenResult) => Promise<T>): Promise<T> {
   if (!shared.cageworkModule) throw new Error("the widget has not received the wasm file");
   const module = await shared.cageworkModule;
   const canvas = canvases.freshCanvas();

@@ -5,7 +5,7 @@ import { type Client, createClient, named } from "@cagework/core/session/client"
 import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
-import { type Canvases, type OpenedOn, openOn } from "@cagework/core/session/open";
+import { type Canvases, type OpenResult, openOn } from "@cagework/core/session/open";
 import { createSeparateWorkers, load, type ReadListener } from "@cagework/core/session/reader";
 import { polygons } from "@cagework/core/session/reading";
 import type {
@@ -90,7 +90,7 @@ interface Needs {
   changed(view: View): void;
 }
 
-async function start(opened: OpenedOn & Needs) {
+async function start(opened: OpenResult & Needs) {
   const { artifact, module, canvas, adapter, lack, fresh, changed } = opened;
   const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });

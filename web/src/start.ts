@@ -9,7 +9,7 @@ import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
 import { COORDINATES } from "./defaults";
 import { percent } from "./format";
-import type { Offline } from "./offline/keep";
+import type { OfflineCopy } from "./offline/keep";
 import { decodeShare } from "./share";
 import { loadTheme } from "./store";
 import { PageError } from "./strings";
@@ -26,7 +26,7 @@ export interface Start {
   app: App;
   stage: Stage;
   crashes: Crashes;
-  offline: Offline;
+  offline: OfflineCopy;
 }
 
 export function startUp({ app, stage, crashes, offline }: Start): void {

@@ -1,5 +1,5 @@
 import { createClient } from "@cagework/core/session/client";
-import type { FromWorker, ToWorker } from "@cagework/core/session/messages";
+import type { WorkerReply, WorkerRequest } from "@cagework/core/session/messages";
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 
 beforeEach(() => {
@@ -22,7 +22,7 @@ function workers() {
     const made = { target: new EventTarget(), jobs: [] as number[], isOver: false };
     all.push(made);
     return Object.assign(made.target, {
-      postMessage(message: ToWorker, transfer: ArrayBuffer[] = []) {
+      postMessage(message: WorkerRequest, transfer: ArrayBuffer[] = []) {
         moved.push(...transfer);
         if (message.kind === "job" && message.input === undefined) throw new TypeError("cannot be sent");
         if (message.kind === "job") made.jobs.push(message.id);
@@ -32,7 +32,7 @@ function workers() {
       },
     }) as unknown as Worker;
   });
-  const answer = (of: number, data: FromWorker) =>
+  const answer = (of: number, data: WorkerReply) =>
     all[of]?.target.dispatchEvent(new MessageEvent("message", { data }));
   const stop = (of: number) =>
     all[of]?.target.dispatchEvent(Object.assign(new Event("error"), { message: "out of memory" }));

@@ -6,7 +6,7 @@ import { Worker as Thread } from "node:worker_threads";
 import { createApi } from "./api";
 import * as pkg from "./pkg/cagework";
 import { createClient } from "./session/client";
-import type { FromWorker, ToWorker } from "./session/messages";
+import type { WorkerReply, WorkerRequest } from "./session/messages";
 
 const api = /* @__PURE__ */ createApi(async () => {
   const bytes = await readFile(new URL("./pkg/cagework_bg.wasm", import.meta.url));
@@ -25,7 +25,7 @@ function openThread(): Worker {
   const target = new EventTarget();
   let jobs = 0;
   thread.unref();
-  thread.on("message", (data: FromWorker) => {
+  thread.on("message", (data: WorkerReply) => {
     if (data.kind !== "step") jobs -= 1;
     if (jobs === 0) thread.unref();
     target.dispatchEvent(new MessageEvent("message", { data }));
@@ -34,7 +34,7 @@ function openThread(): Worker {
     target.dispatchEvent(Object.assign(new Event("error"), { message }));
   });
   return Object.assign(target, {
-    postMessage(message: ToWorker) {
+    postMessage(message: WorkerRequest) {
       thread.postMessage(message);
       if (message.kind === "job") jobs += 1;
       if (jobs > 0) thread.ref();

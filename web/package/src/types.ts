@@ -24,12 +24,12 @@ export interface CallOptions {
  * origin, such as those in map coordinates. A model, its cage, poses and points must have the same origin. Default `[0,
  * 0, 0]`.
  */
-export interface WithOrigin {
+export interface OriginOption {
   readonly origin?: ArrayLike<number> | undefined;
 }
 
 /** Vertices `[n, 3]` in object units, and triangles `[n, 3]`, flattened. */
-export interface Mesh extends WithOrigin {
+export interface Mesh extends OriginOption {
   readonly positions: ArrayLike<number>;
   readonly triangles: ArrayLike<number>;
 }
@@ -42,7 +42,7 @@ export interface ModelMesh extends Mesh {
 }
 
 /** A cage: a closed mesh of polygons around a model, and optional controls inside. */
-export interface Cage extends WithOrigin {
+export interface Cage extends OriginOption {
   /** Vertices `[n_cage, 3]`, object units. A pose is another array of this length. */
   readonly positions: ArrayLike<number>;
   /** For each face, the number of its corners and then its vertices, counter-clockwise seen from outside. */

@@ -13,7 +13,7 @@ import type { Edit } from "./edit";
 import { type PoseActions, snapshotCage } from "./poses";
 
 /** Maximum number of vertices of a model for which cages are previewed, because each preview generates a cage. */
-const MAX_PREVIEWED = 200_000;
+const MAX_PREVIEW_VERTICES = 200_000;
 
 export interface CageNeeds {
   readonly edit: Pick<Edit, "settle" | "step">;
@@ -72,7 +72,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
   const toPreview = (): CageSettings | undefined => {
     const state = ctx.store.get();
     const { step, model, cageSource, cageProgress, editingRest } = state;
-    const isSmall = (model?.vertices ?? 0) <= MAX_PREVIEWED;
+    const isSmall = (model?.vertices ?? 0) <= MAX_PREVIEW_VERTICES;
     const isShown = step === "cage" && !editingRest && cageProgress === null && cageSource !== "file";
     return isShown && isSmall && hasUnmadeCage(state) ? cageSettings(state) : undefined;
   };

@@ -32,7 +32,7 @@ interface ExportedFile {
 }
 
 /** Pause between two downloads, ms. Browsers drop downloads that start at the same time. */
-const BETWEEN_MS = 250;
+const DOWNLOAD_PAUSE_MS = 250;
 
 /** Media type for formats that have no registered type. */
 const OCTETS = "application/octet-stream";
@@ -98,7 +98,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
   /** Downloads files, then shows their names, their total size and the notices. */
   const deliver = async (files: readonly ExportedFile[], notices: ReadonlySet<string>) => {
     for (const [k, { name, bytes }] of files.entries()) {
-      if (k > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
+      if (k > 0) await new Promise((resolve) => setTimeout(resolve, DOWNLOAD_PAUSE_MS));
       download(blobOf(name, bytes), name);
     }
     const size = files.reduce((sum, { bytes }) => sum + bytes.length, 0);

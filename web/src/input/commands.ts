@@ -9,7 +9,7 @@ import type { Command } from "./shortcuts";
 /** Movement of the selection by an arrow key, CSS pixels. */
 const NUDGE = 2;
 /** Movement of the selection by an arrow key with Shift, CSS pixels. */
-const NUDGE_FAR = 20;
+const FAR_NUDGE = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 
 export function createCommands(app: App): Record<Command, () => void> {
@@ -94,10 +94,10 @@ export function createCommands(app: App): Record<Command, () => void> {
     nudgeRight: nudge(NUDGE, 0),
     nudgeUp: nudge(0, NUDGE),
     nudgeDown: nudge(0, -NUDGE),
-    nudgeLeftFar: nudge(-NUDGE_FAR, 0),
-    nudgeRightFar: nudge(NUDGE_FAR, 0),
-    nudgeUpFar: nudge(0, NUDGE_FAR),
-    nudgeDownFar: nudge(0, -NUDGE_FAR),
+    nudgeLeftFar: nudge(-FAR_NUDGE, 0),
+    nudgeRightFar: nudge(FAR_NUDGE, 0),
+    nudgeUpFar: nudge(0, FAR_NUDGE),
+    nudgeDownFar: nudge(0, -FAR_NUDGE),
     undo: turn("undo"),
     redo: turn("redo"),
 

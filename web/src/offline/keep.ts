@@ -43,7 +43,7 @@ export function keepOffline(offer: (adopt: () => Promise<void>) => void) {
   };
 }
 
-export type Offline = ReturnType<typeof keepOffline>;
+export type OfflineCopy = ReturnType<typeof keepOffline>;
 
 /** Activates the service worker of the new version. Tabs with the previous version still get their files. */
 async function adopt({ waiting }: ServiceWorkerRegistration): Promise<void> {

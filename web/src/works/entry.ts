@@ -27,7 +27,7 @@ export const KEPT_DAYS = 30;
 /** Magic number of a GLB (glTF 2.0, section 4.4.1). */
 const GLB = 0x46546c67;
 /** Position of the file's length in the header, and length of the header, bytes. */
-const GLB_LENGTH_AT = 8;
+const GLB_LENGTH_OFFSET = 8;
 const GLB_HEAD = 12;
 
 export function isEntry(value: unknown): value is Entry {
@@ -46,7 +46,7 @@ export function isEntry(value: unknown): value is Entry {
 export async function isWhole(file: Blob): Promise<boolean> {
   if (file.size < GLB_HEAD) return false;
   const head = new DataView(await file.slice(0, GLB_HEAD).arrayBuffer());
-  return head.getUint32(0, true) === GLB && head.getUint32(GLB_LENGTH_AT, true) === file.size;
+  return head.getUint32(0, true) === GLB && head.getUint32(GLB_LENGTH_OFFSET, true) === file.size;
 }
 
 export function isExpired({ when }: Entry, now: number): boolean {

@@ -7,7 +7,7 @@ import type { Package } from "../session/artifact";
 import { startBind } from "../session/bind";
 import { type Client, createClient, named } from "../session/client";
 import { createFrames, type Frames } from "../session/frames";
-import { type Canvases, type OpenedOn, openOn } from "../session/open";
+import { type Canvases, type OpenResult, openOn } from "../session/open";
 import { createSeparateWorkers, load } from "../session/reader";
 import type { BindResult, Cage } from "../types";
 
@@ -58,7 +58,7 @@ export function openView(canvases: Canvases, lost: (error: unknown) => void): Pr
   });
 }
 
-interface Parts extends OpenedOn {
+interface Parts extends OpenResult {
   readonly pkg: Package;
   readonly client: Client;
   readonly frames: Frames;

@@ -1,7 +1,7 @@
 /** Sends jobs to a worker, and returns their results as promises. */
 
 import type { Job } from "../contract";
-import { buffers, type FromWorker, type JobKind, type Jobs, type ToWorker } from "./messages";
+import { buffers, type JobKind, type Jobs, type WorkerReply, type WorkerRequest } from "./messages";
 
 /**
  * Time after which the worker of a cancelled job is terminated if the job has not stopped, ms. A job on the CPU blocks
@@ -63,7 +63,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
 
   function start(): Worker {
     const started = open();
-    started.addEventListener("message", ({ data }: MessageEvent<FromWorker>) => hear(data));
+    started.addEventListener("message", ({ data }: MessageEvent<WorkerReply>) => hear(data));
     started.addEventListener("error", (event) => {
       event.preventDefault();
       // Ignore errors of a worker that was replaced.
@@ -76,11 +76,11 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     return started;
   }
 
-  function say(to: Worker, message: ToWorker): void {
+  function say(to: Worker, message: WorkerRequest): void {
     to.postMessage(message);
   }
 
-  function hear(message: FromWorker): void {
+  function hear(message: WorkerReply): void {
     const job = waiting.get(message.id);
     if (!job) return;
     if (message.kind === "step") {
@@ -134,7 +134,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       // postMessage throws for input that cannot be cloned; the job is then not registered.
       const ask = (to: Worker) => {
         const isMoved = typeof input === "function";
-        const message: ToWorker = { kind: "job", id, job, input: isMoved ? input() : input };
+        const message: WorkerRequest = { kind: "job", id, job, input: isMoved ? input() : input };
         to.postMessage(message, isMoved ? buffers(message.input) : []);
       };
       ask(worker);

@@ -186,12 +186,12 @@ export type JobKind = keyof Jobs;
 /** Progress of a job. */
 export type Step = Progress | Reading;
 
-export type ToWorker =
+export type WorkerRequest =
   | { readonly kind: "start"; readonly module: WebAssembly.Module }
   | { readonly kind: "job"; readonly id: number; readonly job: JobKind; readonly input: unknown }
   | { readonly kind: "cancel"; readonly id: number };
 
-export type FromWorker =
+export type WorkerReply =
   | { readonly kind: "step"; readonly id: number; readonly step: Step }
   | { readonly kind: "done"; readonly id: number; readonly output: unknown }
   | { readonly kind: "failed"; readonly id: number; readonly name: string; readonly message: string };

@@ -13,7 +13,7 @@ export interface Canvases {
 }
 
 /** The build, canvas and GPU that were opened. */
-export interface OpenedOn {
+export interface OpenResult {
   readonly artifact: Artifact;
   readonly module: WebAssembly.Module;
   readonly canvas: HTMLCanvasElement;
@@ -27,7 +27,7 @@ export interface OpenedOn {
  * Calls `start` with WebGPU, or if that is missing, with WebGL2 and the processor. Throws an error named NoWebGPU,
  * NoAdapter or NoDevice if both are missing.
  */
-export async function openOn<T>(canvases: Canvases, start: (opened: OpenedOn) => Promise<T>): Promise<T> {
+export async function openOn<T>(canvases: Canvases, start: (opened: OpenResult) => Promise<T>): Promise<T> {
   try {
     const adapter = findAdapter();
     // Compile while the adapter is requested, unless the browser has no WebGPU.

@@ -7,18 +7,18 @@ import { named } from "./client";
 import {
   type BoundArrays,
   buffers,
-  type FromWorker,
   type JobKind,
   type Jobs,
   type Step,
-  type ToWorker,
+  type WorkerReply,
+  type WorkerRequest,
 } from "./messages";
 import { check, checked, dress, read, readCage, readModel, readSample } from "./reading";
 
 /** Minimum time between two progress messages of a stage, ms: two frames at 60 frames per second. */
 const STEP_PAUSE = 33;
 
-type Sender = (message: FromWorker, transfer?: Transferable[]) => void;
+type Sender = (message: WorkerReply, transfer?: Transferable[]) => void;
 const send: Sender = (message, transfer = []) => postMessage(message, { transfer });
 
 const cancelled = new Set<number>();
@@ -28,7 +28,7 @@ let queue: Promise<unknown> = Promise.resolve();
 /** Starts to run the jobs that the page sends, with one build of the wasm module. */
 export function serve(pkg: Package): void {
   const work = createWork(pkg);
-  addEventListener("message", ({ data }: MessageEvent<ToWorker>) => {
+  addEventListener("message", ({ data }: MessageEvent<WorkerRequest>) => {
     switch (data.kind) {
       case "start":
         ready = pkg.default({ module_or_path: data.module });

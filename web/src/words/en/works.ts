@@ -2,7 +2,7 @@
 
 import { bytes } from "../../format";
 
-const SAVE_A_FILE = "Save a project file (step Export) before you close the page.";
+const SAVE_ADVICE = "Save a project file (step Export) before you close the page.";
 
 export const works = {
   title: "Work kept in this browser",
@@ -17,10 +17,10 @@ export const works = {
   reallyDelete: "Confirm delete",
   stopped: "Cagework stopped the last time this was open.",
   show: "Show kept work",
-  full: (name: string) => `This browser has no room left to keep your work on ${name}. ${SAVE_A_FILE}`,
-  forbidden: `This browser does not let the page keep your work. ${SAVE_A_FILE}`,
+  full: (name: string) => `This browser has no room left to keep your work on ${name}. ${SAVE_ADVICE}`,
+  forbidden: `This browser does not let the page keep your work. ${SAVE_ADVICE}`,
   large: (name: string, size: number, most: number) =>
-    `Your work on ${name} is too large to keep automatically (${bytes(size)}; the limit is ${bytes(most)}). ${SAVE_A_FILE}`,
+    `Your work on ${name} is too large to keep automatically (${bytes(size)}; the limit is ${bytes(most)}). ${SAVE_ADVICE}`,
   damaged: "Some of the work kept in this browser was damaged and has been deleted.",
   damagedOf: (name: string) =>
     `Your work on ${name}, kept in this browser, was damaged and has been deleted.`,
