@@ -21,7 +21,7 @@ use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::NoProgress;
 use cagework_core::{Bounds, Cage, PolygonMesh, TriMesh};
-use cagework_tests::Random;
+use cagework_tests::RandomGenerator;
 use glam::{Quat, Vec3, Vec3Swizzles as _, vec3};
 
 /// Target numbers of cage vertices.
@@ -132,12 +132,12 @@ fn each(n: u32, add: impl Fn(Patches, f32) -> Patches) -> Patches {
 }
 
 /// Calls `add` `n` times, each time with the patches so far and the same sequence of random numbers.
-fn random(n: u32, add: impl Fn(Patches, &mut Random) -> Patches) -> Patches {
-    let mut random = Random::new(38);
+fn random(n: u32, add: impl Fn(Patches, &mut RandomGenerator) -> Patches) -> Patches {
+    let mut random = RandomGenerator::new(38);
     (0..n).fold(Patches::default(), |parts, _| add(parts, &mut random))
 }
 
-fn point(random: &mut Random) -> Vec3 {
+fn point(random: &mut RandomGenerator) -> Vec3 {
     random.point(Vec3::splat(-1.0), Vec3::ONE)
 }
 

@@ -33,7 +33,7 @@ struct Camera {
 @group(0) @binding(0) var<uniform> camera: Camera;
 
 /// A position outside the clip volume, for hidden primitives.
-const OUTSIDE_CLIP_VOLUME = vec4f(0.0, 0.0, 2.0, 1.0);
+const HIDDEN_POSITION = vec4f(0.0, 0.0, 2.0, 1.0);
 
 /// Converts a linear colour to sRGB (IEC 61966-2-1).
 fn srgb_from_linear(linear: vec3f) -> vec3f {

@@ -7,7 +7,7 @@
 const CHANGE_ABSOLUTE = 1u;
 const CHANGE_FIRST = 2u;
 /// Smaller changes of a weight are counted as 0, because their squares would be denormal numbers.
-const CHANGE_NEGLIGIBLE = 1e-18f;
+const MIN_CHANGE = 1e-18f;
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<storage, read> u_old: array<vec4f>;
@@ -24,7 +24,7 @@ fn change_norms(@builtin(global_invocation_id) id: vec3u) {
     for (var quad = 0u; quad < work.n_quads; quad++) {
         let i = row * work.n_quads + quad;
         var d = abs(u_new[i] - u_old[i]);
-        d = select(vec4f(0.0), d, d > vec4f(CHANGE_NEGLIGIBLE));
+        d = select(vec4f(0.0), d, d > vec4f(MIN_CHANGE));
         if (work.mode & CHANGE_ABSOLUTE) == 0u { d *= d; }
         sum += (d.x + d.y) + (d.z + d.w);
     }

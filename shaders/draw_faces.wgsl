@@ -10,7 +10,7 @@ struct Varying {
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
     let first = item_at(2u * instance);
     let state = first.x >> STATE_SHIFT;
-    if state == HIDDEN_STATE { return Varying(OUTSIDE_CLIP_VOLUME, vec4f(0.0)); }
+    if state == HIDDEN_STATE { return Varying(HIDDEN_POSITION, vec4f(0.0)); }
     var corner = first.x;
     if index == 1u { corner = first.y; }
     if index == 2u { corner = item_at(2u * instance + 1u).x; }

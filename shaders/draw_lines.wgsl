@@ -16,7 +16,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     var a = clip_of(item.x & INDEX_MASK);
     var b = clip_of(item.y & INDEX_MASK);
     if state == HIDDEN_STATE || (a.z < 0.0 && b.z < 0.0) {
-        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), 0.0, 0.0, vec4f(0.0));
+        return Varying(HIDDEN_POSITION, vec2f(0.0), 0.0, 0.0, vec4f(0.0));
     }
     // Clip the segment at the near plane.
     if a.z < 0.0 { a = mix(a, b, a.z / (a.z - b.z)); }

@@ -14,7 +14,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let state = item.x >> STATE_SHIFT;
     let clip = clip_of(item.x & INDEX_MASK);
     if state == HIDDEN_STATE || clip.z < 0.0 {
-        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), 0.0, vec4f(0.0));
+        return Varying(HIDDEN_POSITION, vec2f(0.0), 0.0, vec4f(0.0));
     }
     let radius = 0.5 * state_width(state);
     let corner = vec2f(

@@ -10,7 +10,7 @@ const MIN_ALPHA = 1.0 / 255.0;
 const MAX_REACH = 1024.0;
 /// Limit of the normalised device coordinates at which the projection of a covariance is linearised. It prevents huge
 /// ellipses of splats far outside the picture.
-const MAX_OFF_CENTER = 1.3;
+const MAX_CENTER_OFFSET = 1.3;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -32,13 +32,13 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let center = row_at(3u * entry.x).xyz;
     let clip = camera.clip_from_world * vec4f(center, 1.0);
     if color.a < MIN_ALPHA || clip.z < 0.0 || clip.w <= 0.0 {
-        return Varying(OUTSIDE_CLIP_VOLUME, vec2f(0.0), vec4f(0.0));
+        return Varying(HIDDEN_POSITION, vec2f(0.0), vec4f(0.0));
     }
     let low = row_at(3u * entry.x + 1u);
     let high = row_at(3u * entry.x + 2u);
     let covariance = mat3x3f(low.x, low.y, low.z, low.y, low.w, high.x, low.z, high.x, high.y);
     // Derivatives of the pixel position (x, y) by the position in world space.
-    let at = clamp(clip.xy / clip.w, vec2f(-MAX_OFF_CENTER), vec2f(MAX_OFF_CENTER));
+    let at = clamp(clip.xy / clip.w, vec2f(-MAX_CENTER_OFFSET), vec2f(MAX_CENTER_OFFSET));
     let along_w = row_of_clip(3u);
     let x = 0.5 * camera.viewport.x / clip.w * (row_of_clip(0u) - at.x * along_w);
     let y = 0.5 * camera.viewport.y / clip.w * (row_of_clip(1u) - at.y * along_w);

@@ -3,7 +3,7 @@
 // cagework_core::stencil::restrict_residual.
 
 /// Number of fine rows per coarse row.
-const N_AROUND = 13u;
+const N_FINE_ROWS = 13u;
 /// Weights of the centre, 4/8, and of the twelve edge neighbours, 1/8 each.
 const RESTRICT_CENTRE = 0.5f;
 const RESTRICT_EDGE = 0.125f;
@@ -21,9 +21,9 @@ fn restrict_residual(@builtin(global_invocation_id) id: vec3u) {
     let row = item / work.n_quads;
     let quad = item % work.n_quads;
     var edges = vec4f(0.0);
-    for (var k = 1u; k < N_AROUND; k++) {
-        edges += red_residual[around[N_AROUND * row + k] * work.n_quads + quad];
+    for (var k = 1u; k < N_FINE_ROWS; k++) {
+        edges += red_residual[around[N_FINE_ROWS * row + k] * work.n_quads + quad];
     }
-    let centre = red_residual[around[N_AROUND * row] * work.n_quads + quad];
+    let centre = red_residual[around[N_FINE_ROWS * row] * work.n_quads + quad];
     coarse_rhs[item] = RESTRICT_CENTRE * centre + RESTRICT_EDGE * edges;
 }

@@ -6,9 +6,9 @@ use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{self, Field, FieldWeights, InverseField, bend_vertices};
 use cagework_core::progress::NoProgress;
-use cagework_core::sample::ClosestOnCage;
+use cagework_core::sample::FaceBoxes;
 use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
-use cagework_tests::random::Random;
+use cagework_tests::random::RandomGenerator;
 use glam::{Mat3, Vec3};
 
 /// Returns a sample's vertices, its cage, and the field of the pose that `posed` gives the cage.
@@ -23,7 +23,7 @@ fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec
 /// Finds vertices at a distance of at least `cells` lattice cells from the cage, among every seventh vertex.
 fn deep_vertices(positions: &[Vec3], cage: &Cage, field: &Field, cells: f32) -> Vec<usize> {
     let reach = f64::from(cells * field.lattice.cell);
-    let is_deep = |&v: &usize| ClosestOnCage::new(cage).find(positions[v].as_dvec3()).distance >= reach;
+    let is_deep = |&v: &usize| FaceBoxes::new(cage).find(positions[v].as_dvec3()).distance >= reach;
     (0..positions.len()).step_by(7).filter(is_deep).collect()
 }
 
@@ -107,7 +107,7 @@ fn bent_bar() -> (Cage, Vec<Vec3>) {
 }
 
 fn points_in_bar() -> Vec<Vec3> {
-    let mut random = Random::new(5);
+    let mut random = RandomGenerator::new(5);
     (0..2000).map(|_| random.point(Vec3::new(-0.5, -0.5, 0.0), Vec3::new(0.5, 0.5, 4.0))).collect()
 }
 

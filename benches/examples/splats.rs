@@ -17,7 +17,7 @@ use cagework_core::splats::{SortedSplats, SplatPose, Splats, deform_splats};
 use cagework_core::team::Team;
 use cagework_core::{Bounds, Cage};
 use cagework_io::{Model, ModelFormat};
-use cagework_tests::random::Random;
+use cagework_tests::random::RandomGenerator;
 use glam::{DVec3, Mat3, Vec3};
 
 /// Number of cells of the solver's grid along the cage's longest side. Splats and lattice nodes are bound on the same
@@ -68,7 +68,7 @@ fn poses(cage: &Cage, diagonal: f32) -> [(&'static str, Vec<Vec3>); 3] {
     let lowest = (0..rest.len()).min_by(|&a, &b| rest[a].y.total_cmp(&rest[b].y)).unwrap_or_default();
     let mut pulled = rest.to_vec();
     pulled[lowest].x += 0.3 * diagonal;
-    let mut random = Random::new(0);
+    let mut random = RandomGenerator::new(0);
     // The sum of twelve uniform numbers is nearly normal, with variance 1.
     let mut normal = || (0..12).map(|_| random.unit()).sum::<f32>() - 6.0;
     let noise = rest.iter().map(|&p| p + 0.03 * diagonal * Vec3::new(normal(), normal(), normal())).collect();
@@ -146,7 +146,7 @@ fn quantile(numbers: &mut [f32], share: f64) -> f32 {
 /// Prints times for a million splats, which are copies of the capture's splats with small random offsets.
 fn times(capture: &Splats, cage: &Cage, weights: &FieldWeights, team: &Team) {
     const N: usize = 1_000_000;
-    let mut random = Random::new(1);
+    let mut random = RandomGenerator::new(1);
     let mut splats = Splats::default();
     for k in 0..N {
         let from = k % capture.len();

@@ -5,7 +5,7 @@ use cagework_core::{BindOptions, Binding, ControlSet, Controls, InnerControls, I
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use cagework_tests::cages::{blocks, cage, cuboid, icosphere};
 use cagework_tests::points::is_inside;
-use cagework_tests::{Random, dense};
+use cagework_tests::{RandomGenerator, dense};
 use glam::{Mat3, Quat, Vec3, Vec3Swizzles as _};
 use pollster::block_on;
 
@@ -338,7 +338,7 @@ fn many_small_balls_do_not_stall_the_solve() {
 /// 0.1 cells from all `corners`.
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;
-    let mut random = Random::new(81);
+    let mut random = RandomGenerator::new(81);
     let lines = (0..300).map(|k| {
         let near = corners[k % corners.len()] + 0.3 * cell * random.point(Vec3::NEG_ONE, Vec3::ONE);
         let ends = [0, 1].map(|_| near + cell * random.point(Vec3::NEG_ONE, Vec3::ONE));

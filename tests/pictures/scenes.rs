@@ -127,22 +127,22 @@ pub(crate) fn textured(options: &ContextOptions) -> Session {
 /// Adds a ball of radius 1 with a texture seam.
 fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
     const RINGS: u32 = 24;
-    const N_AROUND: u32 = 48;
+    const N_SECTORS: u32 = 48;
     let first_vertex = model.positions.len() as u32;
     let first_corner = model.vertices.len() as u32;
     for ring in 0..=RINGS {
-        for step in 0..=N_AROUND {
-            let (u, v) = (step as f32 / N_AROUND as f32, ring as f32 / RINGS as f32);
+        for step in 0..=N_SECTORS {
+            let (u, v) = (step as f32 / N_SECTORS as f32, ring as f32 / RINGS as f32);
             let (polar, around) = (PI * v, TAU * u);
             let out = Vec3::new(polar.sin() * around.sin(), polar.cos(), polar.sin() * around.cos());
             // At the seam two corners share a position but not their texture coordinates.
-            if step < N_AROUND {
+            if step < N_SECTORS {
                 model.positions.push(center + out);
             }
             let one = u16::MAX;
             let part = |x: f32| (x * f32::from(one)) as u16;
             model.vertices.push(DrawVertex {
-                source: first_vertex + ring * N_AROUND + step % N_AROUND,
+                source: first_vertex + ring * N_SECTORS + step % N_SECTORS,
                 uv: [u, v],
                 color: if coloured {
                     [part(v), part(0.5 + 0.5 * out.x), part(1.0 - v), one]
@@ -153,8 +153,8 @@ fn ball(model: &mut DrawModel, center: Vec3, coloured: bool) {
         }
     }
     for ring in 0..RINGS {
-        for step in 0..N_AROUND {
-            let at = |r: u32, s: u32| first_corner + r * (N_AROUND + 1) + s;
+        for step in 0..N_SECTORS {
+            let at = |r: u32, s: u32| first_corner + r * (N_SECTORS + 1) + s;
             let [a, b, c, d] =
                 [at(ring, step), at(ring + 1, step), at(ring + 1, step + 1), at(ring, step + 1)];
             model.triangles.extend([[a, b, c], [a, c, d]]);

@@ -1,13 +1,13 @@
 //! Comparison of two back ends.
 
 use cagework_tests::cages::{c_shape, cage, moved, triangulated};
-use cagework_tests::{Random, assert_close, dense, points};
+use cagework_tests::{RandomGenerator, assert_close, dense, points};
 
 use super::{BackEnd, WEIGHT_TOLERANCE};
 
 /// The weights of two solvers of the same equations differ by less than the solvers' error bound.
 pub(crate) fn solvers_agree(a: &BackEnd, b: &BackEnd) {
-    let turn = Random::new(20).rotation();
+    let turn = RandomGenerator::new(20).rotation();
     for mesh in [c_shape(), moved(&triangulated(&c_shape()), |p| turn * p)] {
         let cage = cage(&mesh);
         let points = points::inside(&cage, 800, 20);

@@ -3,7 +3,7 @@
 
 use cagework_core::{Cage, PolygonMesh, Weights};
 use cagework_tests::cages::{cage, cuboid, icosphere, l_shape, moved, sphere, together};
-use cagework_tests::{Random, dense, points};
+use cagework_tests::{RandomGenerator, dense, points};
 use glam::{DVec3, Quat, Vec3};
 
 use super::reference::armadillo_cage;
@@ -67,7 +67,7 @@ fn assert_independent(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, tole
 
 /// Two parts that share a face, fully or partly, aligned with the grid or rotated, have independent weights.
 pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
-    let turn = Random::new(73).rotation();
+    let turn = RandomGenerator::new(73).rotation();
     let upper = cuboid(Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 2.0, 1.0));
     let smaller = cuboid(Vec3::new(0.25, 1.0, 0.5), Vec3::new(0.75, 2.0, 1.0));
     for other in [upper, smaller] {
@@ -81,7 +81,12 @@ pub(crate) fn parts_that_share_a_face_do_not_leak(back_end: &BackEnd) {
 /// Estimates harmonic coordinates of the union of two boxes at a point by Walk on Spheres (Muller 1956). Each step
 /// jumps to a random point of the largest sphere inside one of the boxes. A walk ends within 1e-4 of the union's
 /// boundary, with the trilinear coordinates of its last point in the box that contains this point.
-fn walk_on_spheres(boxes: &[[DVec3; 2]; 2], from: DVec3, n_walks: u32, random: &mut Random) -> [f64; 16] {
+fn walk_on_spheres(
+    boxes: &[[DVec3; 2]; 2],
+    from: DVec3,
+    n_walks: u32,
+    random: &mut RandomGenerator,
+) -> [f64; 16] {
     let mut sums = [0.0; 16];
     for _ in 0..n_walks {
         let mut p = from;
@@ -135,7 +140,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         assert_eq!(binding.report.outside_vertices, 0);
         let notices = &binding.report.notices;
         assert!(notices.iter().any(|n| n.contains("Parts of the cage overlap")), "{notices:?}");
-        let mut random = Random::new(74);
+        let mut random = RandomGenerator::new(74);
         let weights = dense(&binding.weights);
         for (v, p) in points.iter().enumerate() {
             let expected = walk_on_spheres(&boxes, p.as_dvec3(), 20_000, &mut random);
@@ -150,7 +155,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
 /// Finds the re-entrant edges of a cage. An edge counts as re-entrant if more than 60 % of random points near it are
 /// inside.
 fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {
-    let mut random = Random::new(75);
+    let mut random = RandomGenerator::new(75);
     let sides = cage.faces().iter().flat_map(|f| (0..f.len()).map(|k| [f[k], f[(k + 1) % f.len()]]));
     let edges = sides.filter(|[a, b]| a < b).map(|edge| edge.map(|i| cage.positions()[i as usize]));
     edges
@@ -167,7 +172,7 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
     let cell = cage.bounds().extent().max_element() / grid as f32;
     let edges = re_entrant_edges(cage, 0.1 * cell);
     assert!(!edges.is_empty());
-    let mut random = Random::new(77);
+    let mut random = RandomGenerator::new(77);
     let lines = (0..1000).map(|k| {
         let [a, b] = edges[k % edges.len()];
         let near = a.lerp(b, random.between(0.2, 0.8));
@@ -196,7 +201,7 @@ fn largest_jump(back_end: &BackEnd, cage: &Cage, grid: u32) -> f32 {
 /// Next to re-entrant edges, weights change by at most 4e-3 per 1/250 of a cell at g = 64, and by more at g = 32.
 /// Weights would jump if sampling rays that just miss an edge gave other values than rays that hit it.
 pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
-    let turn = Random::new(76).rotation();
+    let turn = RandomGenerator::new(76).rotation();
     let rotated = moved(&l_shape(), |p| turn * p);
     for cage in [cage(&l_shape()), cage(&rotated), armadillo_cage()] {
         let [coarse, fine] = [32, 64].map(|grid| largest_jump(back_end, &cage, grid));
@@ -233,7 +238,7 @@ pub(crate) fn unresolved_parts_are_reported_with_a_sufficient_grid(back_end: &Ba
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
     // The bar is rotated, so that grid lines cross its adjacent sides and not only its opposite sides.
-    let turn = Random::new(79).rotation();
+    let turn = RandomGenerator::new(79).rotation();
     let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
     for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {
         let points = points::inside(&cage, 50, 78);

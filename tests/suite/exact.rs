@@ -1,7 +1,7 @@
 //! Cages whose harmonic coordinates are known in closed form.
 
 use cagework_tests::cages::{cage, cuboid, moved, tetrahedron};
-use cagework_tests::{Random, assert_close, dense, points};
+use cagework_tests::{RandomGenerator, assert_close, dense, points};
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{BackEnd, WEIGHT_TOLERANCE};
@@ -72,7 +72,7 @@ pub(crate) fn box_is_trilinear(back_end: &BackEnd) {
 /// A box rotated against the grid: the exact coordinates are trilinear in the box's axes.
 pub(crate) fn error_is_second_order(back_end: &BackEnd) {
     let size = Vec3::new(1.0, 1.4, 0.8);
-    let turn = Random::new(3).rotation();
+    let turn = RandomGenerator::new(3).rotation();
     let cage = cage(&moved(&cuboid(Vec3::ZERO, size), |p| turn * p));
     let points = points::inside(&cage, 1000, 3);
     let into_box = turn.as_dquat().inverse();

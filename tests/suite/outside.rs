@@ -5,7 +5,7 @@ use cagework_core::bind::BindError;
 use cagework_core::deform::deform_bound;
 use cagework_core::options::OutsidePolicy;
 use cagework_tests::cages::{c_shape, cage, cuboid, moved, sphere};
-use cagework_tests::{Random, points};
+use cagework_tests::{RandomGenerator, points};
 use glam::{Mat3, Quat, Vec3};
 
 use super::BackEnd;
@@ -160,10 +160,10 @@ pub(crate) fn cage_that_contains_no_vertex_is_rejected(back_end: &BackEnd) {
 
 /// Vertices on the surface of the cage count as inside in spite of rounding.
 pub(crate) fn vertices_on_the_cage_are_not_outside(back_end: &BackEnd) {
-    let turn = Random::new(43).rotation();
+    let turn = RandomGenerator::new(43).rotation();
     for mesh in [moved(&c_shape(), |p| turn * p), sphere(2)] {
         let cage = cage(&mesh);
-        let mut random = Random::new(44);
+        let mut random = RandomGenerator::new(44);
         let vertices: Vec<Vec3> = (0..cage.triangles().len() as u32)
             .flat_map(|t| {
                 let [a, b, c] = cage.triangle_corners(t);

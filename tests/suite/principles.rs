@@ -5,7 +5,7 @@ use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::{
     blocks, c_prism, c_shape, cage, l_shape, moved, octahedron, sphere, tetrahedron, triangulated,
 };
-use cagework_tests::{Random, assert_close, dense, points};
+use cagework_tests::{RandomGenerator, assert_close, dense, points};
 use glam::{Mat3, Vec3};
 
 use super::{BackEnd, WEIGHT_TOLERANCE, assert_combined};
@@ -22,7 +22,7 @@ const REST_TOLERANCE: f64 = 1e-5;
 
 /// Cages of triangles and quads, convex and non-convex, aligned with the grid and rotated.
 pub(crate) fn cages() -> Vec<Cage> {
-    let turn = Random::new(7).rotation();
+    let turn = RandomGenerator::new(7).rotation();
     let rotated = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     [

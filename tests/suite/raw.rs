@@ -3,7 +3,7 @@
 
 use cagework_core::PolygonMesh;
 use cagework_tests::cages::{c_shape, cage, moved, sphere, triangulated};
-use cagework_tests::{Random, points};
+use cagework_tests::{RandomGenerator, points};
 
 use super::BackEnd;
 
@@ -14,7 +14,7 @@ const MAX_POINT_ERROR: f64 = 5e-5;
 /// On a convex and a non-convex cage: the mean distance between `sum w c` and the vertex, relative to the cage's
 /// diagonal, is below `mean` at tau = 1e-5, and at least ten times larger at tau = 1e-3.
 pub(crate) fn tau_bounds_the_solver_error(back_end: &BackEnd, grids: &[u32], mean: f64) {
-    let turn = Random::new(30).rotation();
+    let turn = RandomGenerator::new(30).rotation();
     let rotated = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
     for mesh in [sphere(1), rotated(&triangulated(&c_shape()))] {
         let cage = cage(&mesh);

@@ -4,7 +4,7 @@ use cagework_tests::cages::{
     blocks, c_shape, cage, cuboid, inside_out, l_shape, moved, pentagonal_prism, sphere, thin_bar, together,
     triangulated,
 };
-use cagework_tests::{Random, assert_close, dense, points};
+use cagework_tests::{RandomGenerator, assert_close, dense, points};
 use glam::Vec3;
 
 use super::{BackEnd, TAU, WEIGHT_TOLERANCE, assert_combined};
@@ -86,7 +86,7 @@ pub(crate) fn cage_far_from_the_origin_is_bound(back_end: &BackEnd) {
 }
 
 pub(crate) fn polygons_reproduce_points(back_end: &BackEnd) {
-    let turn = Random::new(75).rotation();
+    let turn = RandomGenerator::new(75).rotation();
     for mesh in [pentagonal_prism(), moved(&pentagonal_prism(), |p| turn * p)] {
         let cage = cage(&mesh);
         let points = points::inside(&cage, 400, 75);
@@ -97,7 +97,7 @@ pub(crate) fn polygons_reproduce_points(back_end: &BackEnd) {
 }
 
 pub(crate) fn quads_that_are_not_planar_reproduce_points(back_end: &BackEnd) {
-    let mut random = Random::new(76);
+    let mut random = RandomGenerator::new(76);
     let shaken: Vec<Vec3> = c_shape()
         .positions
         .iter()

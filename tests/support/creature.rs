@@ -26,7 +26,7 @@ const PARTS: [(Vec3, Vec3, f32); 8] = [
 
 /// Number of rings of a capsule, and of vertices per ring.
 const RINGS: u32 = 42;
-const N_AROUND: u32 = 44;
+const N_SECTORS: u32 = 44;
 
 /// Creates the animal: 8 capsules of 1,850 vertices, 14,800 in all.
 #[must_use]
@@ -62,16 +62,16 @@ fn add_capsule(mesh: &mut TriMesh, from: Vec3, to: Vec3, radius: f32) {
         // Half of the rings are on each hemisphere.
         let polar = PI * (ring + 1) as f32 / (RINGS + 1) as f32;
         let center = if 2 * ring < RINGS { from } else { to };
-        for step in 0..N_AROUND {
-            let (sin, cos) = (TAU * step as f32 / N_AROUND as f32).sin_cos();
+        for step in 0..N_SECTORS {
+            let (sin, cos) = (TAU * step as f32 / N_SECTORS as f32).sin_cos();
             let out = polar.sin() * (cos * side + sin * other) - polar.cos() * axis;
             mesh.positions.push(center + radius * out);
         }
     }
     mesh.positions.push(to + radius * axis);
     let last = mesh.positions.len() as u32 - 1;
-    let at = |ring: u32, step: u32| first + 1 + ring * N_AROUND + step % N_AROUND;
-    for step in 0..N_AROUND {
+    let at = |ring: u32, step: u32| first + 1 + ring * N_SECTORS + step % N_SECTORS;
+    for step in 0..N_SECTORS {
         mesh.triangles.push([first, at(0, step + 1), at(0, step)]);
         for ring in 1..RINGS {
             let quad = [at(ring - 1, step), at(ring - 1, step + 1), at(ring, step + 1), at(ring, step)];

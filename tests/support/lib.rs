@@ -10,4 +10,4 @@ pub mod points;
 pub mod random;
 
 pub use compare::{assert_close, dense, largest_difference};
-pub use random::Random;
+pub use random::RandomGenerator;

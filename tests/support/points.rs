@@ -4,7 +4,7 @@ use cagework_core::Cage;
 use cagework_core::geometry::winding_number;
 use glam::Vec3;
 
-use crate::Random;
+use crate::RandomGenerator;
 
 /// Whether a point is inside a cage, by its winding number.
 #[must_use]
@@ -16,7 +16,7 @@ pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
 /// Draws `n` uniformly distributed random points inside a cage.
 #[must_use]
 pub fn inside(cage: &Cage, n: usize, seed: u64) -> Vec<Vec3> {
-    let mut random = Random::new(seed);
+    let mut random = RandomGenerator::new(seed);
     let bounds = cage.bounds();
     let tries = std::iter::repeat_with(|| random.point(bounds.min, bounds.max));
     tries.filter(|&p| is_inside(cage, p)).take(n).collect()

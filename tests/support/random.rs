@@ -6,11 +6,11 @@ use glam::{Quat, Vec3};
 ///
 /// Source: Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators" (SplitMix64).
 #[derive(Clone, Debug)]
-pub struct Random {
+pub struct RandomGenerator {
     state: u64,
 }
 
-impl Random {
+impl RandomGenerator {
     /// Creates a generator with this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {

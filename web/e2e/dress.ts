@@ -6,7 +6,7 @@ import { Builder } from "./wardrobe";
 /** Height and semi-axes of an elliptic cross-section, metres. */
 type Ring = readonly [y: number, x: number, z: number];
 
-const N_AROUND = 64;
+const N_SECTORS = 64;
 
 /** Knots of the dummy's profile from the base to the neck. */
 const DUMMY: readonly Ring[] = [
@@ -87,13 +87,13 @@ function turned(sections: readonly Ring[], fold: (y: number) => number = () => 0
   const positions: number[] = [];
   const indices: number[] = [];
   for (const [j, [y, rx, rz]] of sections.entries()) {
-    for (let i = 0; i < N_AROUND; i++) {
-      const angle = (2 * Math.PI * i) / N_AROUND;
+    for (let i = 0; i < N_SECTORS; i++) {
+      const angle = (2 * Math.PI * i) / N_SECTORS;
       const radius = 1 + fold(y) * Math.cos(8 * angle);
       positions.push(rx * radius * Math.cos(angle), y, rz * radius * Math.sin(angle));
       if (j === 0) continue;
-      const [a, b] = [j * N_AROUND + i, j * N_AROUND + ((i + 1) % N_AROUND)];
-      indices.push(a - N_AROUND, a, b - N_AROUND, b - N_AROUND, a, b);
+      const [a, b] = [j * N_SECTORS + i, j * N_SECTORS + ((i + 1) % N_SECTORS)];
+      indices.push(a - N_SECTORS, a, b - N_SECTORS, b - N_SECTORS, a, b);
     }
   }
   return { positions, indices };

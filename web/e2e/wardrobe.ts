@@ -6,7 +6,7 @@ import type { DroppedFile } from "./support";
 /** Number of vertices of each model, summed over its primitives. */
 export const SIZES = { body: 2 * 13 * 24, shirt: 15 * 24, buckle: 8 } as const;
 
-const N_AROUND = 24;
+const N_SECTORS = 24;
 /** Largest radius of the body, which is 2 high and closed at both ends. Its lower half has another material. */
 const RADIUS = 0.35;
 const radiusAt = (y: number) => RADIUS * Math.sqrt(Math.max(0, Math.sin((Math.PI * y) / 2)));
@@ -17,12 +17,12 @@ function sleeve(from: number, to: number, rings: number, radius: (y: number) => 
   const indices: number[] = [];
   for (let j = 0; j < rings; j++) {
     const y = from + ((to - from) * j) / (rings - 1);
-    for (let i = 0; i < N_AROUND; i++) {
-      const angle = (2 * Math.PI * i) / N_AROUND;
+    for (let i = 0; i < N_SECTORS; i++) {
+      const angle = (2 * Math.PI * i) / N_SECTORS;
       positions.push(radius(y) * Math.cos(angle), y, radius(y) * Math.sin(angle));
       if (j === 0) continue;
-      const [a, b] = [j * N_AROUND + i, j * N_AROUND + ((i + 1) % N_AROUND)];
-      indices.push(a - N_AROUND, a, b - N_AROUND, b - N_AROUND, a, b);
+      const [a, b] = [j * N_SECTORS + i, j * N_SECTORS + ((i + 1) % N_SECTORS)];
+      indices.push(a - N_SECTORS, a, b - N_SECTORS, b - N_SECTORS, a, b);
     }
   }
   return { positions, indices };

@@ -18,7 +18,7 @@ use glam::Vec3;
 
 use crate::grid::NO_CELL;
 use crate::options::DeltaNorm;
-use crate::solve::rows::Prolong;
+use crate::solve::rows::ProlongationMode;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
 
@@ -137,7 +137,7 @@ pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f
 /// `shaders/prolong_correction.wgsl`.
 pub fn prolong_correction(
     n_lanes: usize,
-    mode: Prolong,
+    mode: ProlongationMode,
     n_sources: usize,
     entries: &[u32],
     coarse: &[f32],
@@ -152,8 +152,8 @@ pub fn prolong_correction(
             }
             let own = &mut field[head[0] as usize * n_lanes + lane];
             match mode {
-                Prolong::Correct => *own += sum * (1.0 / n_sources as f32),
-                Prolong::Replace => *own = sum * f32::from_bits(head[1]),
+                ProlongationMode::Correct => *own += sum * (1.0 / n_sources as f32),
+                ProlongationMode::Replace => *own = sum * f32::from_bits(head[1]),
             }
         }
     }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub const VERTEX_RUN: usize = 512;
 
 /// Limit on threads per processor. More threads would only take memory.
-const MAX_PER_PROCESSOR: usize = 4;
+const MAX_THREADS_PER_PROCESSOR: usize = 4;
 
 /// A fixed number of threads that share pieces of work.
 #[derive(Debug)]
@@ -27,7 +27,8 @@ impl Team {
         #[cfg(feature = "parallel")]
         {
             let processors = std::thread::available_parallelism().map_or(1, usize::from);
-            let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
+            let wanted =
+                if threads == 0 { processors } else { threads.min(MAX_THREADS_PER_PROCESSOR * processors) };
             // A single thread also needs a pool: otherwise rayon would distribute the tasks that the work spawns over
             // all processors.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok();
@@ -52,7 +53,7 @@ impl Team {
     pub fn notice(&self, asked: usize) -> Option<String> {
         let used = self.n_threads;
         (asked > used).then(|| {
-            format!("{asked} threads were requested, but {used} are used: at most {MAX_PER_PROCESSOR} per processor.")
+            format!("{asked} threads were requested, but {used} are used: at most {MAX_THREADS_PER_PROCESSOR} per processor.")
         })
     }
 

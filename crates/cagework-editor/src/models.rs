@@ -20,7 +20,7 @@ use crate::error::EditError;
 
 /// Largest number that is accepted from a project for the first triangle of a model. The limit leaves room for the
 /// triangles of models that are opened later.
-const MAX_FIRST: u32 = u32::MAX / 2;
+const MAX_FIRST_TRIANGLE: u32 = u32::MAX / 2;
 /// Name that stands for a whole model in a list of part names.
 const WHOLE_MODEL: &str = "all";
 
@@ -126,7 +126,7 @@ impl Models {
             self.origin = model.origin();
         }
         // Triangle numbers stay unique even if those in the project's settings collide.
-        let stored = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST);
+        let stored = settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST_TRIANGLE);
         let first_triangle = stored.max(self.next_triangle);
         let splats = model.drawn_splats();
         let stand_in = splats.as_deref().map(|splats| Arc::new(splats.stand_in()));

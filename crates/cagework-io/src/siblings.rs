@@ -54,13 +54,13 @@ impl Image {
     pub(crate) fn new(name: &str, bytes: Arc<Vec<u8>>) -> Result<Self, SiblingError> {
         match sniff_image(&bytes) {
             Some(mime) => Ok(Self { name: shown_start(name, MAX_NAME_CHARS).into(), bytes, mime }),
-            None => Err(SiblingError::Refused(NOT_AN_IMAGE.into())),
+            None => Err(SiblingError::Refused(IMAGE_FAULT.into())),
         }
     }
 }
 
 /// Predicate for a message: a file is not an image.
-pub(crate) const NOT_AN_IMAGE: &str = "is not a PNG, JPEG, WebP or KTX2 image";
+pub(crate) const IMAGE_FAULT: &str = "is not a PNG, JPEG, WebP or KTX2 image";
 
 impl<'a> Siblings<'a> {
     /// Creates a cache of files from `resolve`, up to `memory_limit` bytes.

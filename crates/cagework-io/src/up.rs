@@ -84,8 +84,8 @@ const MIN_LYING_RATIO: f32 = 1.2;
 const MAX_FLAT_SIDE_DISTANCE: f32 = 0.01;
 /// Minimum number of vertices on the flat side: as a fraction of all vertices, and as a multiple of the number of
 /// vertices near the lowest y.
-const FEET: f32 = 0.005;
-const MORE_FEET: usize = 3;
+const MIN_FLAT_SIDE_SHARE: f32 = 0.005;
+const MIN_FLAT_SIDE_RATIO: usize = 3;
 
 /// Whether a model with y up seems to lie on its back: it is longer along z than along y, and stands on a flat side at
 /// the lowest z rather than at the lowest y. This is a heuristic.
@@ -97,7 +97,9 @@ pub fn lies_on_back(positions: &[Vec3]) -> bool {
         positions.iter().filter(|p| p[axis] - bounds.min[axis] <= MAX_FLAT_SIDE_DISTANCE * extent.z).count()
     };
     let [y, z] = [at(1), at(2)];
-    extent.z > MIN_LYING_RATIO * extent.y && z as f32 >= FEET * positions.len() as f32 && z >= MORE_FEET * y
+    extent.z > MIN_LYING_RATIO * extent.y
+        && z as f32 >= MIN_FLAT_SIDE_SHARE * positions.len() as f32
+        && z >= MIN_FLAT_SIDE_RATIO * y
 }
 
 #[cfg(test)]

@@ -66,7 +66,7 @@ class Weights:
         return cw.deform(self.sparse(), posed, self.extra) - self.rested
 
 
-LOADED: dict[str, Weights] = {}
+WEIGHTS_CACHE: dict[str, Weights] = {}
 
 
 def sparse(rows):
@@ -77,12 +77,12 @@ def sparse(rows):
 def loaded(mesh):
     """Weights of a bound mesh, cached by its stamp."""
     stamp = mesh.cagework.stamp
-    if stamp not in LOADED:
+    if stamp not in WEIGHTS_CACHE:
         used = {each.cagework.stamp for each in bpy.data.meshes}
-        for old in LOADED.keys() - used:
-            del LOADED[old]
-        LOADED[stamp] = Weights(mesh.cagework.weights)
-    return LOADED[stamp]
+        for old in WEIGHTS_CACHE.keys() - used:
+            del WEIGHTS_CACHE[old]
+        WEIGHTS_CACHE[stamp] = Weights(mesh.cagework.weights)
+    return WEIGHTS_CACHE[stamp]
 
 
 def coordinates(points):
@@ -287,5 +287,5 @@ def rebind(obj, depsgraph):
 @persistent
 def forget(*_):
     """Handler: after undo, redo or opening a file, forgets the last poses, so that the next update writes the shape keys."""
-    for weights in LOADED.values():
+    for weights in WEIGHTS_CACHE.values():
         weights.posed = None

@@ -33,7 +33,7 @@ def kill_this_worker():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-class WorkKilledOnce:
+class SingleKill:
     """Calls cagework.reshape and logs it. At the first call for each file in `fatal`, kills its process."""
 
     def __init__(self, log, fatal):
@@ -79,7 +79,7 @@ def test_files_are_processed_once_each_although_workers_are_killed(client, files
     fatal = {files[20].name, files[150].name}
     workers = set(client.run(os.getpid).values())
     assert len(workers) == 2 and os.getpid() not in workers
-    options = {"grid": 8, "threads": 1, "client": client, "work": WorkKilledOnce(log, fatal)}
+    options = {"grid": 8, "threads": 1, "client": client, "work": SingleKill(log, fatal)}
     done = reshape_files(files, out, cage, posed, **options)
 
     assert len(list(log.glob("*.killed"))) == len(fatal) == 2
@@ -112,7 +112,7 @@ def test_failures_are_reported_and_other_files_are_written(client, files, tmp_pa
     assert [path.name for path in (tmp_path / "out").iterdir()] == [files[0].name]
 
 
-class WorkKilledAlways:
+class RepeatedKill:
     """Calls cagework.reshape, and kills its process at each call for one file."""
 
     def __init__(self, name):
@@ -129,7 +129,7 @@ def test_file_that_kills_its_worker_fails_and_another_is_written(client, files, 
     # restart it.
     monkeypatch.setattr(client.cluster.scheduler, "allowed_failures", 0)
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
-    work = WorkKilledAlways(files[1].name)
+    work = RepeatedKill(files[1].name)
     done = reshape_files(files[:2], tmp_path / "out", cage, cage.vertices, client=client, work=work, grid=8, threads=1)
     assert [result["state"] for result in done] == ["written", "failed"]
     assert done[1]["error"].startswith("KilledWorker")

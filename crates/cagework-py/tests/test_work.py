@@ -66,7 +66,7 @@ def test_another_thread_runs_while_a_bind_does():
 
 
 def test_progress_reports_fractions_and_cancels_by_raising():
-    class Enough(Exception):
+    class StopError(Exception):
         pass
 
     fractions = []
@@ -74,8 +74,8 @@ def test_progress_reports_fractions_and_cancels_by_raising():
     def progress(fraction):
         fractions.append(fraction)
         if len(fractions) == 3:
-            raise Enough
+            raise StopError
 
-    with pytest.raises(Enough):
+    with pytest.raises(StopError):
         cw.bind(np.zeros((1, 3)), cw.Cage(*box(5)), grid=96, progress=progress)
     assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] < 1

@@ -29,7 +29,7 @@ use crate::binder::Offsets;
 use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::opening::{CageContents, OpenContents, PoseContents};
-use crate::options::{Colour, JsBindOptions, JsRigOptions, JsSceneOptions, SliceShown, fields};
+use crate::options::{Colour, JsBindOptions, JsRigOptions, JsSceneOptions, SliceContent, fields};
 use crate::settings::{NUMBERS, Settings};
 use crate::views::{
     BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, LargestWeight, Legend, MemberInfo, Mend,
@@ -118,7 +118,7 @@ fn generated_types_are_up_to_date() {
         Theme,
         Colour,
         Coordinates,
-        SliceShown,
+        SliceContent,
         GizmoMode,
         JsSceneOptions,
         CameraView,

@@ -57,7 +57,7 @@ pub(crate) struct JsSceneOptions {
     pub(crate) cage: bool,
     pub(crate) original: bool,
     pub(crate) colour: Colour,
-    pub(crate) slice: SliceShown,
+    pub(crate) slice: SliceContent,
     /// What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
     pub(crate) gizmo: Option<GizmoMode>,
     /// Whether dragging pulls the model's surface. The cage is then drawn faintly.
@@ -77,7 +77,7 @@ impl Default for JsSceneOptions {
             cage: true,
             original: false,
             colour: Colour::Material,
-            slice: SliceShown::Off,
+            slice: SliceContent::Off,
             gizmo: None,
             pull: true,
             compare: vec![Coordinates::Harmonic],
@@ -102,7 +102,7 @@ pub(crate) enum Colour {
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(Serialize, ts_rs::TS))]
-pub(crate) enum SliceShown {
+pub(crate) enum SliceContent {
     Off,
     Kinds,
     Value,

@@ -9,7 +9,7 @@ use cagework_gpu::render::{Gizmo, Marks, MeshStyle, SceneOptions, Selection, Sli
 use cagework_io::Joints;
 use glam::{Quat, Vec3};
 
-use crate::options::{Colour, SliceShown};
+use crate::options::{Colour, SliceContent};
 use crate::state::State;
 
 impl State {
@@ -135,8 +135,8 @@ impl State {
     }
 
     fn shown_slice(&self) -> Option<SliceView> {
-        let slice = self.slice.as_ref().filter(|_| self.view.slice != SliceShown::Off)?;
-        let column = self.editor.selection.last().filter(|_| self.view.slice == SliceShown::Value);
+        let slice = self.slice.as_ref().filter(|_| self.view.slice != SliceContent::Off)?;
+        let column = self.editor.selection.last().filter(|_| self.view.slice == SliceContent::Value);
         Some(SliceView { slice: Arc::clone(slice), column })
     }
 

@@ -12,7 +12,7 @@ use crate::error::{Answer, ErrorName, Fault};
 
 /// Maximum number of unfinished frames. With 1, the GPU idles between frames; with more than 2, the picture of a slow
 /// GPU lags behind the pointer.
-const MAX_IN_FLIGHT: u32 = 2;
+const MAX_PENDING_FRAMES: u32 = 2;
 
 /// Frame time above which a GPU counts as slow, ms. A slow GPU gets one frame at a time, because queued frames delay
 /// other GPU work such as binds.
@@ -134,7 +134,7 @@ impl CanvasSurface {
         };
         context.check()?;
         let is_slow = self.is_slow.load(Ordering::Relaxed);
-        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MAX_IN_FLIGHT } {
+        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MAX_PENDING_FRAMES } {
             return Ok(FrameOutcome::NotNow);
         }
         let is_rough = is_slow && wanted == FrameQuality::Soon;

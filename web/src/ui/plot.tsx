@@ -22,6 +22,7 @@ export const KINDS = ["now", "before", "earlier"] as const;
  */
 const MIN_LENGTH_RATIO = 20;
 
+/** Size and margins of the plot, in units of the `viewBox`. */
 const WIDTH = 328;
 const HEIGHT = 168;
 const LEFT_MARGIN = 38;

@@ -43,7 +43,7 @@ const NARROW_SHARE: f64 = 0.1;
 
 /// A gap counts as lying across the thin axis of a stretched lattice if the mean `cos^2` between this axis and the
 /// vectors from wall to wall exceeds this.
-const MIN_ACROSS: f64 = 0.7;
+const MIN_ACROSS_COSINE_SQUARED: f64 = 0.7;
 
 /// If cubes leave as many gaps open as stretched voxels, voxels are stretched only if the number of cubes along the
 /// longest side would exceed this factor times [`super::first_voxels`].
@@ -172,7 +172,7 @@ fn resolution_of_narrows(
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| {
         gap.area >= MIN_GAP_AREA * n * n
-            && gap.across[axis] > MIN_ACROSS
+            && gap.across[axis] > MIN_ACROSS_COSINE_SQUARED
             && gap.narrow_width * lattice.shortest() > 2.0 * clearance
             && !gap.is_hollow(&lattice, positions, triangles)
     });

@@ -27,7 +27,7 @@ const SINGLE_CUT_PENALTY: f64 = 6.0;
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// Length of the outward step that is tried, as a multiple of the mean distance between a vertex and its neighbours.
 const OUTWARD_STEP: f64 = 0.3;
-/// Smallest decrease of [`Star::energy`] plus [`Star::penalty`] for which a move is accepted.
+/// Smallest decrease of [`Star::energy`] plus [`Star::penalty`], which have no unit, for which a move is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 /// Largest [`warp`] of a quad that counts as planar.
 const MAX_PLANAR_WARP: f64 = 1e-2;

@@ -7,7 +7,7 @@ use crate::support::{Sandbox, assert_close, obj_positions, sphere_obj};
 /// Inner controls as OBJ: a polyline of two segments, and a point in front of it.
 const SPINE: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.4\nl 1 2 3\np 4\n";
 /// A pose of the inner controls [`SPINE`], in which only the point has moved.
-const SPINE_MOVED: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.6\nl 1 2 3\np 4\n";
+const MOVED_SPINE: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.6\nl 1 2 3\np 4\n";
 
 fn with_spine() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
@@ -51,7 +51,7 @@ fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
     let deform = "deform mesh.obj --cage cage.obj --weights w.npz --pose cage.obj -o out.obj";
     sandbox.run(deform).success().stdout(contains("by 8 cage vertices and 4 inner controls"));
     assert_close(&obj_positions(&sandbox.read("out.obj")), &rest, 1e-6);
-    sandbox.write("moved.obj", SPINE_MOVED);
+    sandbox.write("moved.obj", MOVED_SPINE);
     sandbox.run(&format!("{deform} --pose-controls moved.obj")).success();
     let posed = obj_positions(&sandbox.read("out.obj"));
     // The front of the sphere, near the point, moves most; its back hardly moves.

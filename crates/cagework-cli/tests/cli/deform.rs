@@ -3,7 +3,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, glb_json, obj_positions, sphere_obj};
 
-/// Tolerance of positions: weights have the precision of `f32`, and coordinates are below 10.
+/// Tolerance of positions, object units: weights have the precision of `f32`, and coordinates are below 10.
 const TOLERANCE: f64 = 1e-4;
 
 /// An affine map with scale, shear and translation.

@@ -3,7 +3,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, obj_positions};
 
-/// Tolerance of positions: the field is stored and interpolated in `f32`.
+/// Tolerance of positions, object units: the field is stored and interpolated in `f32`.
 const TOLERANCE: f64 = 1e-5;
 
 /// A folder with a sphere in a box cage, `posed.obj`, the cage moved by [`affine`], and `probes.csv`, two points inside

@@ -275,14 +275,14 @@ fn bound_joints<'a>(
         steps => ControlSet::new(controls.cage(), steps, InnerControls::default())
             .unwrap_or_else(|_| ControlSet::plain(controls.cage())),
     };
-    let bound = run(&points, Controls::from(&plain), &options, &PollOnly(watch))?;
+    let bound = run(&points, Controls::from(&plain), &options, &CancellationPoll(watch))?;
     Ok(Some((joints, bound.weights)))
 }
 
 /// Progress of the bind in [`bound_joints`], which polls for cancellation but reports nothing.
-struct PollOnly<'a>(&'a Watch<'a>);
+struct CancellationPoll<'a>(&'a Watch<'a>);
 
-impl Progress for PollOnly<'_> {
+impl Progress for CancellationPoll<'_> {
     fn report(&self, _: ProgressEvent) -> ControlFlow<()> {
         match self.0.report(Stage::Sample, 0.0, 0, None) {
             Ok(()) => ControlFlow::Continue(()),

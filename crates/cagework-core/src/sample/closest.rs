@@ -8,13 +8,13 @@ use crate::geometry::closest_point_on_triangle;
 
 /// Bounding boxes of a cage's faces, by which closest-point queries skip most faces.
 #[derive(Clone, Debug)]
-pub struct ClosestOnCage<'a> {
+pub struct FaceBoxes<'a> {
     cage: &'a Cage,
     /// Range of facets, and bounding box, of each face.
     faces: Vec<(std::ops::Range<u32>, [DVec3; 2])>,
 }
 
-impl<'a> ClosestOnCage<'a> {
+impl<'a> FaceBoxes<'a> {
     /// Computes the bounding box of each face of a cage in its rest pose.
     #[must_use]
     pub fn new(cage: &'a Cage) -> Self {

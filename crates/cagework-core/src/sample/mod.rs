@@ -16,7 +16,7 @@ use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
-pub use closest::ClosestOnCage;
+pub use closest::FaceBoxes;
 
 /// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use super::{ClosestOnCage, OutsidePoint, Stencil};
+use super::{FaceBoxes, OutsidePoint, Stencil};
 use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::geometry::distance_along;
@@ -21,13 +21,13 @@ const FADE_RANGE: [f64; 2] = [0.05, 0.15];
 #[derive(Debug)]
 pub(super) struct OutsideSampler<'a> {
     controls: Controls<'a>,
-    closest: ClosestOnCage<'a>,
+    closest: FaceBoxes<'a>,
     policy: OutsidePolicy,
 }
 
 impl<'a> OutsideSampler<'a> {
     pub(super) fn new(controls: Controls<'a>, policy: OutsidePolicy) -> Self {
-        Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
+        Self { controls, closest: FaceBoxes::new(controls.surface()), policy }
     }
 
     /// Computes the stencil of a point outside the surface. A point inside a ball or tube takes the values of the

@@ -13,7 +13,7 @@ use super::rows::{LANES, Rhs, Row, ZERO, split, sum_around};
 
 /// Total weight that full weighting gives to the red cells around a coarse cell: its centre and twelve edge
 /// neighbours.
-pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
+pub const INJECTION_WEIGHT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 
 /// A red fine cell at the centre of a coarse cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl Centres {
                 for k in 0..LANES {
                     let residual = sum[k] - centre.diagonal * old[k];
                     squares[k] += residual * residual;
-                    out[k] = INJECT * residual;
+                    out[k] = INJECTION_WEIGHT * residual;
                 }
             }
         }

@@ -339,7 +339,7 @@ fn gather_edges(residual: &[Row], around: &RestrictRow) -> Row {
 
 /// How prolongation combines the interpolated value with a black cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Prolong {
+pub enum ProlongationMode {
     /// Adds the coarse correction, which is zero outside the cage.
     Correct,
     /// Replaces the value by the mean of those coarse cells that are unknowns, if any.
@@ -354,7 +354,7 @@ pub fn prolong_plane(
     plane: usize,
     coarse: &[Row],
     u: &mut [Row],
-    mode: Prolong,
+    mode: ProlongationMode,
 ) {
     let (black, _) = split(level, u, 1);
     let ([face, corner], [face_end, corner_end]) = (transfer.planes[plane], transfer.planes[plane + 1]);
@@ -363,7 +363,12 @@ pub fn prolong_plane(
 }
 
 #[inline(always)]
-fn prolong_rows<const N: usize>(rows: &[ProlongRow<N>], coarse: &[Row], black: &mut [Row], mode: Prolong) {
+fn prolong_rows<const N: usize>(
+    rows: &[ProlongRow<N>],
+    coarse: &[Row],
+    black: &mut [Row],
+    mode: ProlongationMode,
+) {
     for row in rows {
         let mut sum = ZERO;
         for from in row.coarse {
@@ -371,8 +376,8 @@ fn prolong_rows<const N: usize>(rows: &[ProlongRow<N>], coarse: &[Row], black: &
         }
         let out = &mut black[row.cell as usize];
         match mode {
-            Prolong::Replace => *out = sum.map(|s| s * row.mean),
-            Prolong::Correct => add(out, &sum.map(|s| s * (1.0 / N as f32))),
+            ProlongationMode::Replace => *out = sum.map(|s| s * row.mean),
+            ProlongationMode::Correct => add(out, &sum.map(|s| s * (1.0 / N as f32))),
         }
     }
 }

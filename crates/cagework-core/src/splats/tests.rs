@@ -84,6 +84,7 @@ fn affine_motion_of_the_cage_transforms_covariances_exactly() {
 
 #[test]
 fn rotation_of_the_cage_equals_rotation_of_the_capture() {
+    // Positions: object units. Covariances: relative to the largest entry. Colours: full intensity is 1.
     const TOLERANCE: f32 = 1e-4;
     let rotation = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 1.1);
     let field = field_of(|p| rotation * p);

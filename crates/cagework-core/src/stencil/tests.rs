@@ -93,7 +93,7 @@ fn multigrid_of_twins_equals_the_fast_one() {
             let rows = first..first + hierarchy.levels[k].colours[colour].n_cells as usize;
             relax_cells(rows, LANES, omega, &levels[k], f, u);
         };
-        let prolong = |k: usize, mode: Prolong, u: &mut [Vec<f32>]| {
+        let prolong = |k: usize, mode: ProlongationMode, u: &mut [Vec<f32>]| {
             let (fine, coarse) = u.split_at_mut(k + 1);
             for (n_sources, entries) in [(2, &transfers[k].faces), (8, &transfers[k].corners)] {
                 prolong_correction(LANES, mode, n_sources, entries, &coarse[0], &mut fine[k]);
@@ -101,7 +101,7 @@ fn multigrid_of_twins_equals_the_fast_one() {
         };
         for k in (0..n).rev() {
             if k + 1 < n {
-                prolong(k, Prolong::Replace, &mut u);
+                prolong(k, ProlongationMode::Replace, &mut u);
             }
             for fine in k..n - 1 {
                 for (colour, omega) in [(0, 1.0), (1, OMEGA), (0, 1.0), (1, 1.0)] {
@@ -118,7 +118,7 @@ fn multigrid_of_twins_equals_the_fast_one() {
                 relax(n - 1, 1, COARSEST_OMEGA, &mut u[n - 1], &f[n - 1]);
             }
             for fine in (k..n - 1).rev() {
-                prolong(fine, Prolong::Correct, &mut u);
+                prolong(fine, ProlongationMode::Correct, &mut u);
                 relax(fine, 0, 1.0, &mut u[fine], &f[fine]);
                 relax(fine, 1, 1.0, &mut u[fine], &f[fine]);
             }

@@ -125,7 +125,10 @@ fn parts_are_named_painted_and_kept_in_settings() {
     other.add([(model("b.obj", 0.0), Some(odd.clone()))]);
     assert!(other.parts().is_empty());
     assert_eq!(other.settings().len(), 2);
-    assert_eq!([MAX_FIRST, MAX_FIRST + 3].map(|t| other.corners(t)), [Some([0, 2, 1]), Some([4, 6, 5])]);
+    assert_eq!(
+        [MAX_FIRST_TRIANGLE, MAX_FIRST_TRIANGLE + 3].map(|t| other.corners(t)),
+        [Some([0, 2, 1]), Some([4, 6, 5])]
+    );
 }
 
 #[test]

@@ -62,20 +62,20 @@ impl Kind {
     /// Shader, depth test, and whether colours are blended with those behind them.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
-            Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
-            Self::Mesh | Self::MeshDepth => (&shaders::MESH, DEPTH_NEAREST, false),
-            Self::Splats => (&shaders::SPLATS, DEPTH_IGNORED, true),
-            Self::Layer => (&shaders::LAYER, DEPTH_IGNORED, true),
-            Self::MeshBlended => (&shaders::MESH, DEPTH_VISIBLE, true),
-            Self::Lines => (&shaders::LINES, DEPTH_VISIBLE, true),
-            Self::LinesBehind => (&shaders::LINES, DEPTH_HIDDEN, true),
-            Self::Points => (&shaders::POINTS, DEPTH_VISIBLE, true),
-            Self::PointsBehind => (&shaders::POINTS, DEPTH_HIDDEN, true),
-            Self::Faces => (&shaders::FACES, DEPTH_VISIBLE, true),
-            Self::Floor => (&shaders::FLOOR, DEPTH_VISIBLE, true),
-            Self::Slice => (&shaders::SLICE, DEPTH_NEAREST, true),
-            Self::Gizmo => (&shaders::GIZMO, DEPTH_NEAREST, true),
-            Self::Shadow => (&shaders::SHADOW, DEPTH_IGNORED, true),
+            Self::Background => (&shaders::BACKGROUND, IGNORED_DEPTH, false),
+            Self::Mesh | Self::MeshDepth => (&shaders::MESH, NEAREST_DEPTH, false),
+            Self::Splats => (&shaders::SPLATS, IGNORED_DEPTH, true),
+            Self::Layer => (&shaders::LAYER, IGNORED_DEPTH, true),
+            Self::MeshBlended => (&shaders::MESH, VISIBLE_DEPTH, true),
+            Self::Lines => (&shaders::LINES, VISIBLE_DEPTH, true),
+            Self::LinesBehind => (&shaders::LINES, HIDDEN_DEPTH, true),
+            Self::Points => (&shaders::POINTS, VISIBLE_DEPTH, true),
+            Self::PointsBehind => (&shaders::POINTS, HIDDEN_DEPTH, true),
+            Self::Faces => (&shaders::FACES, VISIBLE_DEPTH, true),
+            Self::Floor => (&shaders::FLOOR, VISIBLE_DEPTH, true),
+            Self::Slice => (&shaders::SLICE, NEAREST_DEPTH, true),
+            Self::Gizmo => (&shaders::GIZMO, NEAREST_DEPTH, true),
+            Self::Shadow => (&shaders::SHADOW, IGNORED_DEPTH, true),
         }
     }
 }
@@ -107,13 +107,13 @@ struct Depth {
 }
 
 /// Depth test of opaque surfaces.
-const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true };
+const NEAREST_DEPTH: Depth = Depth { compare: CompareFunction::Less, write: true };
 /// Depth test of overlays in front of surfaces.
-const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
+const VISIBLE_DEPTH: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
 /// Depth test of overlays behind surfaces.
-const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
+const HIDDEN_DEPTH: Depth = Depth { compare: CompareFunction::Greater, write: false };
 /// Depth test that always passes: nothing is hidden.
-const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
+const IGNORED_DEPTH: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0u32..)

@@ -12,7 +12,7 @@ use cagework_core::options::{BindOptions, DeltaNorm};
 use cagework_core::progress::NoProgress;
 use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;
-use cagework_core::solve::rows::Prolong;
+use cagework_core::solve::rows::ProlongationMode;
 use cagework_core::stencil;
 use cagework_core::stencil::tables::{LevelTable, SamplingTable, TransferTable};
 use cagework_gpu::buffers::Allocator;
@@ -230,7 +230,9 @@ fn prolong_correction_matches_cpu() {
         let (fine, coarse) = (&hierarchy.levels[0], &hierarchy.levels[1]);
         let transfer = &hierarchy.transfers[0];
         let table = TransferTable::new(fine, coarse, transfer);
-        for (prolong, bits) in [(Prolong::Correct, 0), (Prolong::Replace, mode::PROLONG_REPLACE)] {
+        for (prolong, bits) in
+            [(ProlongationMode::Correct, 0), (ProlongationMode::Replace, mode::PROLONG_REPLACE)]
+        {
             for (n_sources, entries, count) in
                 [(2, &table.faces, transfer.faces.len()), (8, &table.corners, transfer.corners.len())]
             {

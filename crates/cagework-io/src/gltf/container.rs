@@ -18,7 +18,7 @@ use super::root::{MESHOPT, typed, view_bytes};
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
-use crate::siblings::{Image, NOT_AN_IMAGE, Resolve, SiblingError, Siblings};
+use crate::siblings::{IMAGE_FAULT, Image, Resolve, SiblingError, Siblings};
 
 /// Limit on the items of each of [`LISTS`]. An item takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
@@ -373,7 +373,7 @@ fn load_images(
             let Some(uri) = image["uri"].as_str() else {
                 let view = image["bufferView"].as_u64().and_then(|view| view_bytes(root, buffers, view));
                 if view.is_some_and(|bytes| sniff_image(bytes).is_none()) {
-                    notices.push(format!("image {number} {NOT_AN_IMAGE}: it is not drawn"));
+                    notices.push(format!("image {number} {IMAGE_FAULT}: it is not drawn"));
                 }
                 return None;
             };

@@ -110,6 +110,7 @@ pub fn write_inner_controls(inner: &InnerControls, origin: DVec3) -> Vec<u8> {
 mod tests {
     use super::*;
 
+    /// File size limit, bytes.
     const LIMIT: u64 = 1 << 20;
 
     #[test]

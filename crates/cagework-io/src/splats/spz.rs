@@ -26,7 +26,7 @@ const HAS_EXTENSIONS: u8 = 2;
 /// Type of the extension record that names the axes of the file, and its value for the default axes: x right, y up, z
 /// back.
 const COORDINATE_SYSTEM: u32 = 0xadbe_0003;
-const RIGHT_UP_BACK: u32 = 4;
+const DEFAULT_AXES: u32 = 4;
 /// Limit on the size of the extension records of a gzip stream, bytes. The known records have at most 20 bytes.
 const MAX_EXTENSIONS: u64 = 1 << 16;
 /// Largest compression ratio of the Zstandard stream of positions that the format's reference implementation accepts.
@@ -234,7 +234,7 @@ fn axes_notice(mut records: &[u8]) -> Option<String> {
         let (payload, after) = rest.split_at_checked(word(head, 4) as usize)?;
         if word(head, 0) == COORDINATE_SYSTEM && payload.len() == 4 {
             let axes = word(payload, 0);
-            return (![0, RIGHT_UP_BACK].contains(&axes)).then(|| format!(
+            return (![0, DEFAULT_AXES].contains(&axes)).then(|| format!(
                 "the file names other axes than those of its format (SPZ_ADOBE_coordinate_system {axes}), and they are ignored: the capture may be upside down or mirrored"
             ));
         }
@@ -299,9 +299,9 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>, body: Option<&Body>) -> Result
         }
     }
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-    const TO_VEC: &str = "writing to a Vec cannot fail";
-    encoder.write_all(&bytes).expect(TO_VEC);
-    Ok(encoder.finish().expect(TO_VEC))
+    const VEC_WRITE_RULE: &str = "writing to a Vec cannot fail";
+    encoder.write_all(&bytes).expect(VEC_WRITE_RULE);
+    Ok(encoder.finish().expect(VEC_WRITE_RULE))
 }
 
 /// Decodes a rotation: two bits for the index of the largest component, then sign and size of each other component in

@@ -118,7 +118,7 @@ def test_saved_file_opens_bound(body, tmp_path):
     before = world(body)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    binding.LOADED.clear()
+    binding.WEIGHTS_CACHE.clear()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     body = bpy.data.objects["Body"]
     assert np.array_equal(world(body), before) and binding.problem(body, bpy.context.scene) is None

@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Fault;
-use crate::options::{JsSceneOptions, SliceShown, decode};
+use crate::options::{JsSceneOptions, SliceContent, decode};
 use crate::views::{ColorMap, LargestWeight, Legend, optional};
 
 #[wasm_bindgen]
@@ -39,8 +39,8 @@ impl Engine {
             self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
         let plain = |low, high, map| Legend { low, high, logarithmic: false, map, largest: None };
         let legend = match (slice, style) {
-            (Some(SliceShown::Kinds), _) => Some(plain(0.0, 2.0, ColorMap::Kinds)),
-            (Some(SliceShown::Value), _) => Some(plain(0.0, 1.0, ColorMap::Viridis)),
+            (Some(SliceContent::Kinds), _) => Some(plain(0.0, 2.0, ColorMap::Kinds)),
+            (Some(SliceContent::Value), _) => Some(plain(0.0, 1.0, ColorMap::Viridis)),
             (_, MeshStyle::Weights { column }) => {
                 let largest = self.largest_weight(column);
                 let high = match largest {

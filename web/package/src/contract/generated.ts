@@ -1013,7 +1013,7 @@ export type Coordinates = "harmonic" | "mean_value" | "green";
 /**
  * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
  */
-export type SliceShown = "off" | "kinds" | "value";
+export type SliceContent = "off" | "kinds" | "value";
 /**
  * Operation of a gizmo, with the shape of its handles.
  */
@@ -1021,7 +1021,7 @@ export type GizmoMode = "move" | "rotate" | "scale";
 /**
  * Elements of the scene that are drawn, and their colours.
  */
-export type SceneOptions = { model: boolean, cage: boolean, original: boolean, colour: Colour, slice: SliceShown,
+export type SceneOptions = { model: boolean, cage: boolean, original: boolean, colour: Colour, slice: SliceContent,
 /**
  * What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
  */

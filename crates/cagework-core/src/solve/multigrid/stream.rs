@@ -7,7 +7,7 @@
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{
-    Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
+    ProlongationMode, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
     relax_zeros_plane, residual_plane,
 };
 use crate::transfer::Transfer;
@@ -18,7 +18,7 @@ use super::OMEGA;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// Prolongation from the coarser level to black cells. The next sweep overwrites the red cells.
-    Prolong(Prolong),
+    Prolongation(ProlongationMode),
     /// Gauss-Seidel on red cells.
     Red,
     /// Gauss-Seidel on black cells.
@@ -41,17 +41,17 @@ pub(super) const DOWN_PASSES: &[Pass] = &[Red, BlackFurther, Red, Black, Residua
 pub(super) const DOWN_PASSES_FROM_ZERO: &[Pass] = &[RedFromZero, BlackFurtherFromZero, Red, Black, Residual];
 /// Pre-smoothing and residual, starting from the coarser level's solution.
 pub(super) const DOWN_PASSES_FROM_COARSE: &[Pass] =
-    &[Pass::Prolong(Prolong::Replace), Red, BlackFurther, Red, Black, Residual];
+    &[Pass::Prolongation(ProlongationMode::Replace), Red, BlackFurther, Red, Black, Residual];
 /// Coarse correction and post-smoothing.
-pub(super) const UP_PASSES: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
+pub(super) const UP_PASSES: &[Pass] = &[Pass::Prolongation(ProlongationMode::Correct), Red, Black];
 /// Passes on the finest level between two coarse corrections. The residual after the last pass is injected.
 pub(super) const MIDDLE_PASSES: &[Pass] =
-    &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
+    &[Pass::Prolongation(ProlongationMode::Correct), Red, Black, Red, BlackFurther, Red, Black];
 /// [`MIDDLE_PASSES`] with one sweep fewer, before a short last cycle.
 pub(super) const SHORT_MIDDLE_PASSES: &[Pass] =
-    &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
+    &[Pass::Prolongation(ProlongationMode::Correct), Red, BlackFurther, Red, Black];
 
-/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
+/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolongation`];
 /// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of squared residuals.
 pub(super) fn stream(
     passes: &[Pass],
@@ -75,7 +75,7 @@ pub(super) fn stream(
                 for (lag, pass) in passes.iter().enumerate() {
                     let Some(plane) = step.checked_sub(lag).filter(|&plane| plane < n) else { continue };
                     match *pass {
-                        Pass::Prolong(mode) => prolong_plane(level, transfer, plane, coarse, u, mode),
+                        Pass::Prolongation(mode) => prolong_plane(level, transfer, plane, coarse, u, mode),
                         Red => relax_plane(level, 0, plane, u, f),
                         Black => relax_plane(level, 1, plane, u, f),
                         BlackFurther => over_relax_plane(level, 1, plane, OMEGA, u, f),

@@ -212,7 +212,7 @@ fn prolongation_matches_plain_loops() {
     for (levels, transfer) in hierarchy.levels.windows(2).zip(&hierarchy.transfers) {
         let [fine, coarse] = levels else { unreachable!("windows of two") };
         let (from, before) = (some_field(coarse, 5), some_field(fine, 6));
-        for mode in [Prolong::Correct, Prolong::Replace] {
+        for mode in [ProlongationMode::Correct, ProlongationMode::Replace] {
             let mut expected = before.clone();
             let black = fine.grid.cells().filter(|&c| Grid::colour(c) == 1);
             for cell in black.filter(|&c| fine.row_of[fine.grid.index(c)] != NO_CELL) {
@@ -237,8 +237,8 @@ fn prolongation_matches_plain_loops() {
                 let out = &mut expected[fine.row_of[fine.grid.index(cell)] as usize];
                 for k in 0..LANES {
                     out[k] = match mode {
-                        Prolong::Correct => out[k] + weight * sum[k],
-                        Prolong::Replace => sum[k] / known.max(1.0),
+                        ProlongationMode::Correct => out[k] + weight * sum[k],
+                        ProlongationMode::Replace => sum[k] / known.max(1.0),
                     };
                 }
             }
@@ -264,7 +264,7 @@ fn kernels_leave_the_zero_rows_zero() {
     }
     let coarse = some_field(&hierarchy.levels[1], 8);
     for plane in 0..level.grid.dims[2] as usize {
-        prolong_plane(level, &hierarchy.transfers[0], plane, &coarse, &mut u, Prolong::Correct);
+        prolong_plane(level, &hierarchy.transfers[0], plane, &coarse, &mut u, ProlongationMode::Correct);
     }
     assert_eq!((u[level.zero_row() as usize], u[level.n_rows() - 1]), (ZERO, ZERO));
 }
