@@ -1,9 +1,11 @@
+use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::{Method, Solver};
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Binding, ControlSet, Controls, InnerControls, InnerElement};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use cagework_tests::cages::{blocks, cage, cuboid, icosphere};
+use cagework_tests::creature::creature;
 use cagework_tests::points::is_inside;
 use cagework_tests::{RandomGenerator, dense};
 use glam::{Mat3, Quat, Vec3, Vec3Swizzles as _};
@@ -339,7 +341,8 @@ fn many_small_balls_do_not_stall_the_solve() {
 fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     let cell = set.cage().bounds().extent().max_element() / grid as f32;
     let mut random = RandomGenerator::new(81);
-    let lines = (0..300).map(|k| {
+    let n_lines = corners.len().max(40);
+    let lines = (0..10 * n_lines).map(|k| {
         let near = corners[k % corners.len()] + 0.3 * cell * random.point(Vec3::NEG_ONE, Vec3::ONE);
         let ends = [0, 1].map(|_| near + cell * random.point(Vec3::NEG_ONE, Vec3::ONE));
         let n = (ends[0].distance(ends[1]) / (0.004 * cell)).ceil() as usize;
@@ -348,8 +351,8 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
         let is_clear = |p: &Vec3| corners.iter().all(|c| c.distance(*p) > 0.1 * cell);
         if line.iter().all(|p| is_clear(p) && is_inside(set.cage(), *p)) { line } else { Vec::new() }
     });
-    let lines: Vec<Vec<Vec3>> = lines.filter(|line| line.len() > 3).take(40).collect();
-    assert_eq!(lines.len(), 40);
+    let lines: Vec<Vec<Vec3>> = lines.filter(|line| line.len() > 3).take(n_lines).collect();
+    assert_eq!(lines.len(), n_lines);
     let weights = dense(&bound(&lines.concat(), set, |o| o.grid = grid).weights);
     let mut rows = weights.chunks(Controls::from(set).n_controls());
     let mut largest = 0.0f32;
@@ -362,8 +365,8 @@ fn largest_jump(set: &ControlSet, corners: &[Vec3], grid: u32) -> f32 {
     largest
 }
 
-/// At the tip of a spike and at the corners of a sheet, where re-entrant edges end, weights jump by at most 8e-3 at g =
-/// 64, and by more at g = 32. (The sampler blends the values of rays that hit an edge and rays that miss it. The test
+/// At the tip of a spike, at the corners of a sheet and at the vertices of a generated cage, where re-entrant edges end,
+/// weights jump by at most 8e-3 at g = 64, and by more at g = 32. (The sampler blends the values of rays that hit an edge and rays that miss it. The test
 /// fails if it does not do so just beyond the end of an edge.)
 #[test]
 fn weights_do_not_jump_where_re_entrant_edges_end() {
@@ -384,7 +387,13 @@ fn weights_do_not_jump_where_re_entrant_edges_end() {
         radius: None,
     };
     let sheet = ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap();
-    for (set, corners) in [(spike, vec![tip]), (sheet, corners.to_vec())] {
+    let creature = creature();
+    let generated = generate(&creature.positions, &creature.triangles, &CageOptions::default(), &NoProgress)
+        .unwrap()
+        .cage;
+    let vertices = generated.positions().to_vec();
+    let generated = ControlSet::new(&generated, 0, InnerControls::default()).unwrap();
+    for (set, corners) in [(spike, vec![tip]), (sheet, corners.to_vec()), (generated, vertices)] {
         let [coarse, fine] = [32, 64].map(|grid| largest_jump(&set, &corners, grid));
         println!("jumps of {coarse} at g = 32, {fine} at g = 64");
         assert!(fine <= 8e-3 && fine < coarse, "{coarse} at g = 32, {fine} at g = 64");
