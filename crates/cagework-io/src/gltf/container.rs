@@ -9,6 +9,8 @@ use ::gltf::binary::{Glb, Header};
 use ::gltf::json::Root;
 use data_url::DataUrl;
 use percent_encoding::percent_decode_str;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::GltfError;
@@ -20,11 +22,8 @@ use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
 use crate::siblings::{IMAGE_FAULT, Image, Resolve, SiblingError, Siblings};
 
-/// Limit on the items of each of [`LISTS`]. An item takes up to 1 KB while a file is written.
+/// Limit on the items of each of [`Lists`]. An item takes up to 1 KB while a file is written.
 const MAX_ITEMS: u64 = 1 << 18;
-/// Lists of a document whose lengths are not limited by the size of the buffers.
-const LISTS: [&str; 8] =
-    ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "cameras"];
 /// Limit on the values of a document's JSON; larger texts may have one value per 4 bytes. A value takes up to 200 bytes
 /// while it is read.
 const MAX_JSON_VALUES: u64 = 1 << 22;
@@ -62,12 +61,6 @@ pub(crate) fn load(
     let mut json = parsed(&json)?;
     check_version(&json)?;
     write_integers(&mut json, false);
-    for what in LISTS {
-        let count = json[what].as_array().map_or(0, Vec::len) as u64;
-        if count > MAX_ITEMS {
-            return Err(GltfError::TooLarge { what, count, limit: MAX_ITEMS });
-        }
-    }
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
     let (fallbacks, all) = (fallbacks(&json), (0..).zip(json["buffers"].as_array().into_iter().flatten()));
@@ -207,13 +200,45 @@ fn unpadded(json: &[u8]) -> &[u8] {
     })
 }
 
+/// The lists of a document whose lengths are not limited by the size of the buffers.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Lists {
+    nodes: Vec<IgnoredAny>,
+    meshes: Vec<IgnoredAny>,
+    materials: Vec<IgnoredAny>,
+    textures: Vec<IgnoredAny>,
+    images: Vec<IgnoredAny>,
+    samplers: Vec<IgnoredAny>,
+    skins: Vec<IgnoredAny>,
+    cameras: Vec<IgnoredAny>,
+}
+
 fn parsed(json: &[u8]) -> Result<Value, GltfError> {
     let (count, limit) =
         (values_of_json(json), MAX_JSON_VALUES.max(json.len() as u64 / BYTES_PER_JSON_VALUE));
     if count > limit {
         return Err(GltfError::TooLarge { what: "values in the JSON", count, limit });
     }
-    serde_json::from_slice(json).map_err(|e| GltfError::Json(json_fault(json, &e)))
+    let fault = |e: serde_json::Error| GltfError::Json(json_fault(json, &e));
+    // Lists are counted before values are built, because an object takes up to 600 bytes.
+    let Lists { nodes, meshes, materials, textures, images, samplers, skins, cameras } =
+        serde_json::from_slice(json).map_err(fault)?;
+    for (what, list) in [
+        ("nodes", nodes),
+        ("meshes", meshes),
+        ("materials", materials),
+        ("textures", textures),
+        ("images", images),
+        ("samplers", samplers),
+        ("skins", skins),
+        ("cameras", cameras),
+    ] {
+        if list.len() as u64 > MAX_ITEMS {
+            return Err(GltfError::TooLarge { what, count: list.len() as u64, limit: MAX_ITEMS });
+        }
+    }
+    serde_json::from_slice(json).map_err(fault)
 }
 
 /// Splits a GLB into its JSON and its binary chunk, without loading external files.

@@ -187,7 +187,7 @@ pub(crate) const MAX_MATERIALS: usize = 1 << 14;
 pub(super) const MIN_CORNERS: usize = 3;
 
 /// Limit on the corners of a face, each of which takes up to 100 bytes while a model is read and drawn.
-pub(crate) const MAX_FACE_CORNERS: usize = 1 << 22;
+pub(crate) const MAX_FACE_CORNERS: usize = 1 << 18;
 
 /// Number of lines or corners after which the memory limit is checked again.
 const MEMORY_CHECK_INTERVAL: usize = 1 << 12;
