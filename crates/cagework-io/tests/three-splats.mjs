@@ -9,14 +9,13 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 
 globalThis.self = globalThis;
-const addons = "three-r187/addons";
-const { GaussianSplatPLYLoader } = await import(`${addons}/loaders/GaussianSplatPLYLoader.js`);
+const { GaussianSplatPLYLoader } = await import("three/addons/loaders/GaussianSplatPLYLoader.js");
 const { GLTFGaussianSplatLoaderExtension } = await import(
-  `${addons}/loaders/GLTFGaussianSplatLoaderExtension.js`
+  "three/addons/loaders/GLTFGaussianSplatLoaderExtension.js"
 );
-const { GLTFLoader } = await import(`${addons}/loaders/GLTFLoader.js`);
-const { SPLATLoader } = await import(`${addons}/loaders/SPLATLoader.js`);
-const { SPZLoader } = await import(`${addons}/loaders/SPZLoader.js`);
+const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
+const { SPLATLoader } = await import("three/addons/loaders/SPLATLoader.js");
+const { SPZLoader } = await import("three/addons/loaders/SPZLoader.js");
 
 /** Tolerance of centres, as a fraction of the largest coordinate. Both programs decode to 32-bit floats. */
 const LIMIT = 1e-6;

@@ -73,13 +73,16 @@ fn blank_project(tarball: &str) -> Result<String, String> {
     std::fs::write(folder.join("package.json"), "{ \"private\": true, \"type\": \"module\" }\n")
         .map_err(|e| format!("cannot write package.json: {e}"))?;
     let project = path(&folder)?;
-    // Install the locked version of three.js, because npm has it in its cache and needs no network for it.
+    // Install the locked versions, because npm has them in its cache and needs no network for them.
     let lock = read(&root().join("package-lock.json"))?;
     let lock: Value = serde_json::from_str(&lock).map_err(|e| format!("package-lock.json: {e}"))?;
-    let three = lock["packages"]["node_modules/three"]["version"].as_str().ok_or("no three.js is locked")?;
-    let three = format!("three@{three}");
+    let locked = |name: &str| {
+        let version = lock["packages"][format!("node_modules/{name}")]["version"].as_str();
+        version.map(|version| format!("{name}@{version}")).ok_or(format!("{name} is not locked"))
+    };
+    let (three, types) = (locked("three")?, locked("@types/three")?);
     let quiet = ["--prefer-offline", "--no-audit", "--no-fund", "--ignore-scripts"];
-    run("npm", &[&["install", "--prefix", &project], &quiet[..], &[tarball, &three]].concat(), &[])?;
+    run("npm", &[&["install", "--prefix", &project], &quiet[..], &[tarball, &three, &types]].concat(), &[])?;
     for (from, to) in COPIED_FOLDERS {
         let (from, to) = (root().join(from), folder.join(to));
         std::fs::create_dir_all(&to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;

@@ -3,6 +3,7 @@
 import { type BindResult, bind, deform, generateCage, reshape } from "@cagework/core";
 import type { CageDeformer } from "@cagework/core/element";
 import { CageDeformer as Follower, type Geometry } from "@cagework/core/three";
+import type { BufferGeometry } from "three";
 
 export async function follow(glb: ArrayBuffer, positions: number[], triangles: Uint16Array): Promise<number> {
   const cage = await generateCage({ positions, triangles }, { target: 60, quads: false });
@@ -19,6 +20,11 @@ export async function follow(glb: ArrayBuffer, positions: number[], triangles: U
 
 export function poseOf(element: CageDeformer): Float32Array | null {
   return document.querySelector("cage-deformer")?.pose ?? element.pose;
+}
+
+export async function turn(geometry: BufferGeometry): Promise<void> {
+  const follower = await Follower.create(geometry, { grid: 16 });
+  geometry.setIndex(Array.from(follower.edges));
 }
 
 export async function widen(geometries: Geometry[], signal: AbortSignal): Promise<number> {
