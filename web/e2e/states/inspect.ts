@@ -48,7 +48,9 @@ export function inspect(seen: Set<string>): string[] {
     check(text, "text");
     if (!parent.closest(".visually-hidden")) faults.push(...cutOff(node, parent, text));
   }
-  const floating = [...document.querySelectorAll("#stage .floating")].filter(isShown);
+  const floating = [...document.querySelectorAll("#stage .floating, #stage .bottom-line > *")].filter(
+    isShown,
+  );
   for (const [k, one] of floating.entries())
     for (const other of floating.slice(k + 1))
       if (overlap(one.getBoundingClientRect(), other.getBoundingClientRect()))

@@ -36,11 +36,9 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
         <Looks app={app} />
       </div>
       {cage && editingRest && <ReshapeTools app={app} />}
-      <Placing app={app} />
       {cage && <Tools app={app} />}
       {model && <Axes app={app} />}
       {asksToPull(app.store.get()) && <Cue app={app} />}
-      <LegendOfColours app={app} />
       {isComparison(scene.compare) && (
         <div class="compare-labels" aria-hidden="true">
           {scene.compare.map((kind) => (
@@ -52,7 +50,11 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
           ))}
         </div>
       )}
-      <BottomLine app={app} />
+      <div class="bottom">
+        <LegendOfColours app={app} />
+        <Placing app={app} />
+        <BottomLine app={app} />
+      </div>
       <Busy app={app} />
     </>
   );
