@@ -49,7 +49,6 @@ pub struct Binder {
 impl Binder {
     /// Creates a binder. The first bind on a GPU opens the GPU.
     #[wasm_bindgen(constructor)]
-    #[must_use]
     #[allow(clippy::new_without_default, reason = "constructed by JavaScript only")]
     pub fn new() -> Self {
         Self { gpu: RefCell::default() }
@@ -257,7 +256,6 @@ impl Binder {
     }
 
     /// Identifiers of the built-in samples, which `buildSample` takes.
-    #[must_use]
     pub fn samples() -> Vec<String> {
         samples::all().iter().map(|sample| sample.id.to_owned()).collect()
     }

@@ -64,13 +64,11 @@ impl FieldMap {
     }
 
     /// Positions of points after the deformation. `[n, 3]`
-    #[must_use]
     pub fn map(&self, at: &[f32]) -> Vec<f32> {
         flat(&points(at).into_iter().map(|p| self.field.map(p)).collect::<Vec<_>>())
     }
 
     /// The points that `map` moves to `at`; NaN if there is no such point. `[n, 3]`
-    #[must_use]
     pub fn inverse(&self, at: &[f32]) -> Vec<f32> {
         let inverse = InverseField::new(&self.field);
         let find = |p: Vec3| inverse.find(p).unwrap_or(Vec3::NAN);
@@ -78,21 +76,18 @@ impl FieldMap {
     }
 
     /// Deformation gradients at points, by rows. `[n, 3, 3]`
-    #[must_use]
     pub fn gradient(&self, at: &[f32]) -> Vec<f32> {
         points(at).into_iter().flat_map(|p| self.field.gradient(p).transpose().to_cols_array()).collect()
     }
 
     /// Position of the lattice's first node (three numbers), then the distance between adjacent nodes. Object units.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn frame(&self) -> Vec<f32> {
         self.field.lattice.origin.extend(self.field.lattice.cell).to_array().to_vec()
     }
 
     /// Number of the lattice's nodes along x, y and z. `[3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn dims(&self) -> Vec<u32> {
         self.field.lattice.dims.to_array().to_vec()
     }
@@ -100,7 +95,6 @@ impl FieldMap {
     /// Displacements at the nodes, as an RGBA texture stores them; x varies fastest. The fourth component is 1 at nodes
     /// that have weights of the controls, and 0 at other nodes. `[nz, ny, nx, 4]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn displacements(&self) -> Vec<f32> {
         self.field.values.iter().flat_map(glam::Vec4::to_array).collect()
     }

@@ -28,7 +28,6 @@ pub struct FileBytes(Vec<u8>);
 impl FileBytes {
     /// Reserves memory for a file of `size` bytes.
     #[wasm_bindgen(constructor)]
-    #[must_use]
     pub fn new(size: usize) -> Self {
         Self(Vec::with_capacity(size))
     }
@@ -100,7 +99,6 @@ impl LoadedModel {
 
     /// Origin of model, cage and poses, in the file's axes; zero unless the model is far from the world origin. `[3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.model.origin().to_array().to_vec()
     }
@@ -135,7 +133,6 @@ impl LoadedModel {
 
     /// Converts the model to arrays, from which [`Self::restore`] recreates it in another instance of the module
     /// without reading its file. Call it after [`Self::prepare`] and [`Self::take_next`]. The cage is not included.
-    #[must_use]
     pub fn store(self) -> Vec<Uint8Array> {
         let mut store = Store::default();
         let names: Vec<&str> = self.poses.iter().map(|(name, _)| name.as_str()).collect();
@@ -166,14 +163,12 @@ impl LoadedModel {
 
     /// Removes and returns the next remaining model of a project; undefined after the last one.
     #[wasm_bindgen(js_name = takeNext)]
-    #[must_use]
     pub fn take_next(&mut self) -> Option<LoadedModel> {
         self.more.pop_front()
     }
 
     /// Vertices of the model. `[n_vertices, 3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         flat(&self.model.positions)
     }
@@ -181,7 +176,6 @@ impl LoadedModel {
     /// Vertices that a cage must enclose: those of the model or, for splats, of the mesh that approximates them.
     /// `[n_vertices, 3]`
     #[wasm_bindgen(getter, js_name = checkedPositions)]
-    #[must_use]
     pub fn checked_positions(&self) -> Vec<f32> {
         match self.model.drawn_splats() {
             Some(splats) => flat(&splats.stand_in().positions),
@@ -191,7 +185,6 @@ impl LoadedModel {
 
     /// The cage of a project; undefined for other files.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
         self.cage.clone().map(|mesh| {
             let (cage, _) = self.document_settings().cage(&mesh);
@@ -201,35 +194,30 @@ impl LoadedModel {
 
     /// The mesh of the model, used as a cage.
     #[wasm_bindgen(js_name = asCage)]
-    #[must_use]
     pub fn as_cage(&self) -> Polygons {
         self.model.cage_mesh().into()
     }
 
     /// Number of textures to decode.
     #[wasm_bindgen(getter, js_name = textureCount)]
-    #[must_use]
     pub fn texture_count(&self) -> usize {
         self.look.images.len()
     }
 
     /// Upper limit of the longer side of decoded textures, pixels. Larger textures must be scaled down to this limit.
     #[wasm_bindgen(getter, js_name = textureSide)]
-    #[must_use]
     pub fn texture_side(&self) -> u32 {
         self.side
     }
 
     /// Encoded bytes of a texture; empty if the texture is not drawn.
     #[wasm_bindgen(js_name = textureBytes)]
-    #[must_use]
     pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
         self.look.images.get(index).map(|t| t.bytes.clone()).unwrap_or_default()
     }
 
     /// Media type of a texture; empty if unknown.
     #[wasm_bindgen(js_name = textureType)]
-    #[must_use]
     pub fn texture_type(&self, index: usize) -> String {
         self.look.images.get(index).map(|t| t.mime.clone()).unwrap_or_default()
     }
@@ -245,7 +233,6 @@ impl LoadedModel {
 
     /// JSON of the page's settings in a project; undefined for other files.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn settings(&self) -> Option<String> {
         self.settings.clone()
     }

@@ -41,42 +41,36 @@ pub struct Check {
 impl Check {
     /// Messages and fixes of the faults.
     #[wasm_bindgen(getter, unchecked_return_type = "readonly Problem[]")]
-    #[must_use]
     pub fn problems(&self) -> JsValue {
         views::object(&self.check.problems.iter().map(view).collect::<Vec<_>>())
     }
 
     /// Indices of faulty cage vertices.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn vertices(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.vertices.iter().copied()).collect()
     }
 
     /// Faulty cage edges as pairs of vertex indices. `[n, 2]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn edges(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.edges.iter().flatten().copied()).collect()
     }
 
     /// Indices of faulty cage faces.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn faces(&self) -> Vec<u32> {
         self.places(false).flat_map(|p| p.faces.iter().copied()).collect()
     }
 
     /// Positions of faults that are at no vertex, edge or face. `[n, 3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn points(&self) -> Vec<f32> {
         self.places(false).flat_map(|p| p.points.iter().flatten().copied()).collect()
     }
 
     /// Indices of model vertices outside the cage.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn outside(&self) -> Vec<u32> {
         self.places(true).flat_map(|p| p.vertices.iter().copied()).collect()
     }

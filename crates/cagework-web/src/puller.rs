@@ -67,7 +67,6 @@ impl Puller {
 
     /// How much each vertex of the model stays in place during the drag, from 0 to 1; empty without a drag.
     /// `[n_vertices]`
-    #[must_use]
     pub fn stays(&self) -> Vec<f32> {
         self.drag.as_ref().map_or_else(Vec::new, |drag| {
             (0..drag.walks().len() as u32).map(|v| drag.stays(v) as f32).collect()
@@ -77,7 +76,6 @@ impl Puller {
     /// Advances the solve by one frame towards the targets `to` of the grabs, `[n_grabs, 3]`; the target of a grab's
     /// mirror image may be omitted. Returns the positions of the controls, `[n_controls, 3]`, or an empty array without
     /// a drag.
-    #[must_use]
     pub fn frame(&mut self, to: &[f32]) -> Vec<f32> {
         let Some(drag) = &mut self.drag else { return Vec::new() };
         let mut to: Vec<DVec3> = points(to).into_iter().map(Vec3::as_dvec3).collect();
@@ -91,7 +89,6 @@ impl Puller {
 
     /// Whether the last frame barely moved the cage, so that no further frame is needed. True without a drag.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn settled(&self) -> bool {
         self.drag.as_ref().is_none_or(Drag::is_settled)
     }
@@ -99,14 +96,12 @@ impl Puller {
     /// Distance along the surface within which the drag moves the model, as a fraction of the model's size. Infinite if
     /// the drag moves the whole model; 0 without a drag.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn reach(&self) -> f64 {
         self.drag.as_ref().map_or(0.0, Drag::reach)
     }
 
     /// Largest distance of a grab or pin from its target, as a fraction of the model's size; 0 without a drag.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn error(&self) -> f64 {
         self.drag.as_ref().map_or(0.0, Drag::error)
     }

@@ -21,7 +21,6 @@ use crate::options::{JsBindOptions, JsRigOptions, decode};
 impl LoadedModel {
     /// Triangles of the model. `[n_triangles, 3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn triangles(&self) -> Vec<u32> {
         self.model.triangles.as_flattened().to_vec()
     }

@@ -61,7 +61,6 @@ pub(crate) struct Settings {
 /// undefined. `text`: JSON of the settings. `memory_limit`: the most memory that a bind may use, bytes. The limit in the
 /// file is ignored, because the right limit depends on the computer.
 #[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
-#[must_use]
 pub fn read_settings(text: &str, memory_limit: f64) -> JsValue {
     object(&Settings::read(text, memory_limit as u64))
 }

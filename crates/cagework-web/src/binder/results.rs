@@ -87,21 +87,18 @@ pub struct BuiltSample {
 impl BindResult {
     /// Row pointers of the sparse rows. `[n_vertices + 1]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn indptr(&self) -> Vec<u32> {
         self.weights.indptr().to_vec()
     }
 
     /// Number of non-zero weights.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn count(&self) -> usize {
         self.weights.data().len()
     }
 
     /// Column indices and values of the non-zero weights `start` to `end - 1`, so that the page can read them in parts.
     #[wasm_bindgen(unchecked_return_type = "[Uint32Array, Float32Array]")]
-    #[must_use]
     pub fn rows(&self, start: usize, end: usize) -> JsValue {
         let (indices, data) = (self.weights.indices().get(start..end), self.weights.data().get(start..end));
         let indices = Uint32Array::from(indices.unwrap_or_default());
@@ -110,14 +107,12 @@ impl BindResult {
 
     /// Column indices: controls first, then frames. `[n_nonzeros]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn indices(&self) -> Vec<u32> {
         self.weights.indices().to_vec()
     }
 
     /// Non-zero weights. `[n_nonzeros]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn data(&self) -> Vec<f32> {
         self.weights.data().to_vec()
     }
@@ -125,14 +120,12 @@ impl BindResult {
     /// Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce,
     /// and the points outside the cage. In the weights, the columns of the frames follow the columns of the controls.
     #[wasm_bindgen(getter, unchecked_return_type = "Offsets")]
-    #[must_use]
     pub fn offsets(&self) -> JsValue {
         object(&self.offsets)
     }
 
     /// Report of the bind; undefined for closed-form coordinates, slices and lattices.
     #[wasm_bindgen(getter, unchecked_return_type = "BindReport | undefined")]
-    #[must_use]
     pub fn report(&self) -> JsValue {
         self.report.clone()
     }
@@ -142,14 +135,12 @@ impl BindResult {
 impl Polygons {
     /// Vertex positions. `[n, 3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         flat(&self.mesh.positions)
     }
 
     /// For each face its corner count, then the vertex indices of its corners.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn corners(&self) -> Vec<u32> {
         corners(&self.mesh.faces)
     }
@@ -157,14 +148,12 @@ impl Polygons {
     /// Subdivision and interior controls of a project's cage; undefined for other meshes. In `positions`, the positions
     /// of interior controls follow the vertices.
     #[wasm_bindgen(getter, unchecked_return_type = "CageControls | undefined")]
-    #[must_use]
     pub fn controls(&self) -> JsValue {
         optional(self.controls.as_ref())
     }
 
     /// Number of disconnected parts of the model that a generated cage joins into one; 0 if it joins none.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn bridged(&self) -> u32 {
         self.bridged
     }
@@ -172,7 +161,6 @@ impl Polygons {
     /// Notices of the generator, one sentence each: gaps of the model that the cage covers, and how to keep each gap
     /// open.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn notices(&self) -> Vec<String> {
         self.notices.clone()
     }
@@ -182,42 +170,36 @@ impl Polygons {
 impl BuiltSample {
     /// The model as a GLB file.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn glb(&self) -> Vec<u8> {
         self.glb.clone()
     }
 
     /// Vertices of the model. `[n_vertices, 3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         flat(&self.positions)
     }
 
     /// The cage of the sample, at rest.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn cage(&self) -> Polygons {
         self.cage.clone().into()
     }
 
     /// Point of the model that the page asks the user to pull first. `[3]`
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn grip(&self) -> Vec<f32> {
         self.grip.to_array().to_vec()
     }
 
     /// Names of the sample's poses, by the index that `posePositions` takes.
     #[wasm_bindgen(getter, js_name = poseNames)]
-    #[must_use]
     pub fn pose_names(&self) -> Vec<String> {
         self.poses.iter().map(|(name, _)| name.clone()).collect()
     }
 
     /// Cage positions of the pose at `index`. `[n_cage, 3]`
     #[wasm_bindgen(js_name = posePositions)]
-    #[must_use]
     pub fn pose_positions(&self, index: usize) -> Vec<f32> {
         self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
     }

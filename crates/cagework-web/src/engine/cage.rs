@@ -83,7 +83,6 @@ impl Engine {
 
     /// Properties of the cage for panels; undefined without a cage.
     #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
-    #[must_use]
     pub fn cage_state(&self) -> JsValue {
         self.read(|state| optional(state.cage_state()))
     }
@@ -102,7 +101,6 @@ impl Engine {
     }
 
     /// Adds a step to the history with all changes since the last history step; false if nothing has changed.
-    #[must_use]
     pub fn commit(&self, label: &str) -> bool {
         self.change(|state| state.editor.commit(label))
     }
@@ -122,13 +120,11 @@ impl Engine {
     }
 
     /// Undoes the last history step; false if there is no step to undo, or while models are being added.
-    #[must_use]
     pub fn undo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.undo())
     }
 
     /// Redoes the history step that was undone last; false if nothing was undone, or while models are being added.
-    #[must_use]
     pub fn redo(&self) -> bool {
         self.change(|state| !state.is_adding && state.editor.redo())
     }
@@ -141,21 +137,18 @@ impl Engine {
 
     /// For each face of the cage its corner count, then its vertex indices.
     #[wasm_bindgen(js_name = cageCorners)]
-    #[must_use]
     pub fn cage_corners(&self) -> Vec<u32> {
         self.read(|state| corners(&state.rest().faces))
     }
 
     /// Cage vertices and interior controls at rest. `[n_controls, 3]`
     #[wasm_bindgen(js_name = restPositions)]
-    #[must_use]
     pub fn rest_positions(&self) -> Vec<f32> {
         self.read(|state| flat(&state.rest().positions))
     }
 
     /// Current positions of cage vertices and interior controls. `[n_controls, 3]`
     #[wasm_bindgen(js_name = cagePositions)]
-    #[must_use]
     pub fn cage_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.pose()))
     }
@@ -169,7 +162,6 @@ impl Engine {
 
     /// Returns the current pose and each saved pose that fits this cage, for `Binder.carryPoses`.
     /// `[n_poses, n_controls, 3]`
-    #[must_use]
     pub fn carriable(&self) -> Vec<f32> {
         self.read(|state| {
             let document = state.editor.document();
@@ -228,7 +220,6 @@ impl Engine {
 
     /// Encodes the current pose compactly, in the axes of the model's file.
     #[wasm_bindgen(js_name = encodePose)]
-    #[must_use]
     pub fn encode_pose(&self) -> Vec<u8> {
         self.read(|state| {
             let in_file = |positions| state.up().turned_back(positions);

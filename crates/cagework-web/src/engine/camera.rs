@@ -20,7 +20,6 @@ const PIXELS_PER_TURN: f32 = 900.0;
 impl Engine {
     /// Target, direction, distance and projection of the camera.
     #[wasm_bindgen(unchecked_return_type = "CameraView")]
-    #[must_use]
     pub fn camera(&self) -> JsValue {
         let camera = self.read(|state| state.camera);
         object(&CameraView {
@@ -100,7 +99,6 @@ impl Engine {
     }
 
     /// Directions of the axes x, y, z in the view: right, up, and towards the eye. `[3, 3]`
-    #[must_use]
     pub fn axes(&self) -> Vec<f32> {
         self.read(|state| state.camera.axes()).iter().flat_map(|axis| axis.to_array()).collect()
     }
@@ -121,7 +119,6 @@ impl Engine {
 
     /// Toggles between perspective and parallel projection; returns true if the projection is now parallel.
     #[wasm_bindgen(js_name = toggleOrtho)]
-    #[must_use]
     pub fn toggle_ortho(&self) -> bool {
         self.change(|state| {
             let parallel = state.camera.projection == Projection::Perspective;
@@ -133,7 +130,6 @@ impl Engine {
 
     /// Projects a point to the view. Returns x and y in CSS pixels, then 1; all zero if the point is behind the camera.
     /// `[3]`
-    #[must_use]
     pub fn project(&self, x: f32, y: f32, z: f32) -> Vec<f32> {
         let projected = self.read(|state| state.camera.project(Vec3::new(x, y, z)));
         projected.map_or_else(|| vec![0.0; 3], |p| vec![p.position.x, p.position.y, 1.0])

@@ -18,7 +18,6 @@ use crate::views::object;
 impl Engine {
     /// Subdivision and interior controls of the cage, in the form that `setCage` takes.
     #[wasm_bindgen(js_name = cageControls, unchecked_return_type = "CageControls")]
-    #[must_use]
     pub fn cage_controls(&self) -> JsValue {
         self.read(|state| object(&state.cage().controls))
     }
@@ -43,7 +42,6 @@ impl Engine {
     /// two surfaces. If the pointer is not on the model, the point of the pointer's ray that is nearest to the centre
     /// of model and cage. `[3]`
     #[wasm_bindgen(js_name = middleAt)]
-    #[must_use]
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {
         let middle = self.read(|state| {
             let center = state.editor.bounds().map_or(Vec3::ZERO, |b| b.center());

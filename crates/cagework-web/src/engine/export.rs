@@ -151,7 +151,6 @@ impl Engine {
     /// Returns notices from the last export, one sentence each: changes of the rig, and data that the file format
     /// loses. Clears them, so that each is returned once.
     #[wasm_bindgen(js_name = rigNotices)]
-    #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {
         std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
@@ -255,21 +254,18 @@ impl Engine {
 
     /// Up axis of the models' files.
     #[wasm_bindgen(unchecked_return_type = "UpAxis")]
-    #[must_use]
     pub fn up(&self) -> JsValue {
         self.read(|state| object(&state.up()))
     }
 
     /// Origin of all positions, in the axes of the models' files; zero unless the models are far from the world origin.
     /// `[3]`
-    #[must_use]
     pub fn origin(&self) -> Vec<f64> {
         self.read(|state| state.models().origin().to_array().to_vec())
     }
 
     /// Vertices of all models at rest, concatenated. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
-    #[must_use]
     pub fn model_positions(&self) -> Vec<f32> {
         self.read(|state| flat(state.models().positions()))
     }
@@ -315,7 +311,6 @@ impl Engine {
 
     /// Triangles of all models. `[n_triangles, 3]`
     #[wasm_bindgen(js_name = modelTriangles)]
-    #[must_use]
     pub fn model_triangles(&self) -> Vec<u32> {
         self.read(|state| state.models().triangles().as_flattened().to_vec())
     }

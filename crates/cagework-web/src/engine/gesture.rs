@@ -39,7 +39,6 @@ impl Engine {
     /// Highlights and returns the gizmo's handle under the pointer, or the nearest handle within `radius` CSS pixels.
     /// Undefined if there is no such handle.
     #[wasm_bindgen(js_name = gizmoAt, unchecked_return_type = "GizmoPart | undefined")]
-    #[must_use]
     pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> JsValue {
         let part = self.read(|state| {
             let gizmo = state.gizmo().filter(|_| state.has_cage_in_view())?;
@@ -114,14 +113,12 @@ impl Engine {
 
     /// State of the gesture for the status line; null without one.
     #[wasm_bindgen(js_name = gestureView, unchecked_return_type = "GestureView | null")]
-    #[must_use]
     pub fn gesture_view(&self) -> JsValue {
         object(&self.read(|state| state.editor.gesture().as_ref().map(|g| g.view(&state.camera))))
     }
 
     /// Ends the gesture, and reverts it unless `keep` is set. Returns true if `keep` is set and a vertex has moved.
     #[wasm_bindgen(js_name = endTransform)]
-    #[must_use]
     pub fn end_transform(&self, keep: bool) -> bool {
         self.change(|state| {
             state.active_part = None;
@@ -132,7 +129,6 @@ impl Engine {
 
     /// Moves the selection so that its centre is at a point; false if nothing is selected or the movement is too small.
     #[wasm_bindgen(js_name = moveSelectionTo)]
-    #[must_use]
     pub fn move_selection_to(&self, x: f32, y: f32, z: f32) -> bool {
         self.change(|state| {
             let Some(center) = state.editor.selection.center(state.pose()) else { return false };
@@ -141,7 +137,6 @@ impl Engine {
     }
 
     /// Moves the selection in the view plane by CSS pixels; false if nothing is selected or the movement is too small.
-    #[must_use]
     pub fn nudge(&self, right: f32, up: f32) -> bool {
         self.change(|state| {
             let Some(center) = state.editor.selection.center(state.pose()) else { return false };

@@ -199,14 +199,12 @@ impl Engine {
 
     /// Whether weights of the current models and cage are in use, or cached from an earlier bind.
     #[wasm_bindgen(getter, js_name = hasWeights)]
-    #[must_use]
     pub fn has_weights(&self) -> bool {
         self.read(|state| state.bound.is_some() || state.cache.contains(state.editor.key()))
     }
 
     /// Bind report of the weights in use; undefined without weights.
     #[wasm_bindgen(js_name = boundReport, unchecked_return_type = "BindReport | undefined")]
-    #[must_use]
     pub fn bound_report(&self) -> JsValue {
         self.read(|state| state.bound.as_ref().map_or(JsValue::UNDEFINED, |bound| bound.report.clone()))
     }
@@ -261,7 +259,6 @@ impl Engine {
 
     /// Number that increases with each change of the models' joined mesh or of the rest cage.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn revision(&self) -> u32 {
         self.read(|state| state.revision)
     }
@@ -277,7 +274,6 @@ impl Engine {
 
     /// Whether weights are in use, so that the model follows the cage.
     #[wasm_bindgen(getter)]
-    #[must_use]
     pub fn bound(&self) -> bool {
         self.read(|state| state.bound.is_some())
     }

@@ -81,7 +81,6 @@ impl Engine {
 
     /// Total number of pixels of the models' textures, at the sizes at which they are drawn, without those of one model.
     #[wasm_bindgen(js_name = texturePixels)]
-    #[must_use]
     pub fn texture_pixels(&self, without: Option<u32>) -> f64 {
         self.read(|state| {
             let ids = state.models().iter().map(|member| member.id).filter(|id| Some(*id) != without);

@@ -54,7 +54,6 @@ impl Engine {
     /// Whether playback of a clip is shown instead of the posed model. A change of models, cage or weights stops
     /// playback; after a change of the pose, playback shows the models in the new pose.
     #[wasm_bindgen(getter, js_name = showsClip)]
-    #[must_use]
     pub fn shows_clip(&self) -> bool {
         self.read(|state| state.playing.is_some())
     }
@@ -70,7 +69,6 @@ impl Engine {
 
     /// Whether weights on a lattice around the current cage are available.
     #[wasm_bindgen(getter, js_name = hasLattice)]
-    #[must_use]
     pub fn has_lattice(&self) -> bool {
         self.read(|state| state.lattice.is_some())
     }
@@ -109,7 +107,6 @@ impl Engine {
     /// the unit sphere's image under the deformation gradient at this splat, and the splat in the pose. `[3, 3]`; empty
     /// if the pointer is not on a capture.
     #[wasm_bindgen(js_name = outlinesAt)]
-    #[must_use]
     pub fn outlines_at(&self, x: f32, y: f32) -> Vec<f32> {
         let found = self.posed(|state, _| {
             let models = state.models();
@@ -125,7 +122,6 @@ impl Engine {
 
     /// Computes the vertices during playback on the CPU, for tests and pictures. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = clipPositions)]
-    #[must_use]
     pub fn clip_positions(&self) -> Vec<f32> {
         self.read(|state| {
             let at = state.playing.as_ref().map(Playback::positions);

@@ -22,7 +22,6 @@ impl Engine {
     /// Finds the surface point under the pointer; undefined if the pointer is not on a model, without weights, during
     /// playback, or while the GPU is busy.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
-    #[must_use]
     pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
         let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
         optional(found)
@@ -70,7 +69,6 @@ impl Engine {
     /// pin is added at the surface point under the pointer. Undefined if nothing changes, without weights, or while the
     /// GPU is busy.
     #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
-    #[must_use]
     pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
         let pins = self.posed(|state, _| Ok(state.pins_after(state.pointer(x, y), may_pin)));
         optional(pins.ok().flatten())
@@ -93,7 +91,6 @@ impl Engine {
 
     /// Moves a position parallel to the view plane by `dx`, `dy` CSS pixels. `[3]`
     #[wasm_bindgen(js_name = followed)]
-    #[must_use]
     pub fn followed(&self, place: &[f32], dx: f32, dy: f32) -> Vec<f32> {
         let [x, y, z] = place.first_chunk().copied().unwrap_or_default();
         let place = Vec3::new(x, y, z);

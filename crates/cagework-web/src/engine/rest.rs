@@ -33,7 +33,6 @@ impl Engine {
 
     /// Counts the vertices outside the dragged cage, in a sample of the models' vertices that is small enough to be
     /// tested at every pointer event. The check of all vertices runs after the drag.
-    #[must_use]
     pub fn strays(&self) -> u32 {
         // Borrow the state directly: `change` would request a frame, but nothing visible changes.
         let mut state = self.state.borrow_mut();

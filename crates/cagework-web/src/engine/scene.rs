@@ -33,7 +33,6 @@ impl Engine {
 
     /// Legend of the colours of the slice or the model; undefined if the colours show no quantity.
     #[wasm_bindgen(unchecked_return_type = "Legend | undefined")]
-    #[must_use]
     pub fn legend(&self) -> JsValue {
         let (slice, style) =
             self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));

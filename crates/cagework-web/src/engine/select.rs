@@ -31,7 +31,6 @@ impl Engine {
     /// Returns the vertices of the picked cage element, whose type the tools select: a vertex or an edge within
     /// `radius` CSS pixels of the pointer, or the face under the pointer. Empty if there is none. Vertices that the model
     /// covers are not picked.
-    #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         let picked = self.pick_on_cage(x, y, radius);
         if matches!(picked[..], [vertex] if self.is_covered(vertex, [x, y], radius)) {
@@ -100,14 +99,12 @@ impl Engine {
     }
 
     /// Indices of the selected vertices, ascending.
-    #[must_use]
     pub fn selection(&self) -> Vec<u32> {
         self.read(|state| state.editor.selection.vertices())
     }
 
     /// Mean position of the selection; empty if nothing is selected. `[3]`
     #[wasm_bindgen(js_name = selectionCenter)]
-    #[must_use]
     pub fn selection_center(&self) -> Vec<f32> {
         self.read(|state| state.editor.selection.center(state.pose()).map(|c| flat(&[c])).unwrap_or_default())
     }
