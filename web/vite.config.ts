@@ -120,7 +120,11 @@ export default defineConfig({
       checks: { pluginTimings: false },
     },
   },
-  worker: { format: "es", plugins: () => [licencesOfWorkers()] },
+  worker: {
+    format: "es",
+    plugins: () => [licencesOfWorkers()],
+    rolldownOptions: { checks: { pluginTimings: false } },
+  },
   server: { host: "127.0.0.1" },
   preview: { host: "127.0.0.1", port: 4173 },
 });
