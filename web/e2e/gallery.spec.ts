@@ -8,6 +8,9 @@ import { bound, expect, largestMove, open, restPositions, shoot, test } from "./
 /** Lower limit for the size of a picture of an example, bytes. A PNG of a view in a single colour is smaller. */
 const PNG_OF_NOTHING = 3000;
 
+/** Limit for the files that the gallery downloads until all examples are live, bytes before compression. */
+const MAX_DOWNLOAD = 6_000_000;
+
 test.use({ viewport: { width: 1440, height: 900 } });
 
 test("both pages name a picture for links to them", async ({ page }) => {
@@ -58,6 +61,15 @@ test("every example is drawn, and a title opens the page in its pose", async ({ 
       PNG_OF_NOTHING,
     );
   }
+  // Count each file once: a server that allows caching sends the script of the six workers once.
+  const downloads = await page.evaluate(() => {
+    const ofType = (type: string) => performance.getEntriesByType(type) as PerformanceResourceTiming[];
+    const entries = [...ofType("navigation"), ...ofType("resource")];
+    return [...new Map(entries.map(({ name, encodedBodySize }) => [name, encodedBodySize]))];
+  });
+  expect(downloads.filter(([name]) => name.endsWith(".wasm"))).toHaveLength(1);
+  const bytes = downloads.reduce((sum, [, bytes]) => sum + bytes, 0);
+  expect(bytes, downloads.join("\n")).toBeLessThan(MAX_DOWNLOAD);
   // Wait until the last example draws nothing for 60 frames of the browser. If it never stops, the test times out.
   await page.evaluate(async () => {
     let quiet = 0;
