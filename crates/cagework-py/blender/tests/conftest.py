@@ -91,3 +91,12 @@ def move(cage, offsets):
     cage.data.vertices.foreach_set("co", (local(cage.data) + offsets).astype(np.float32).ravel())
     cage.data.update()
     bpy.context.view_layer.update()
+
+
+def attach(obj, matrix):
+    """Makes an object the child of a new empty, which it returns."""
+    empty = bpy.data.objects.new(f"{obj.name} Parent", None)
+    bpy.context.scene.collection.objects.link(empty)
+    empty.matrix_world, obj.parent = matrix, empty
+    bpy.context.view_layer.update()
+    return empty

@@ -8,7 +8,7 @@ import bpy
 import cagework as cw
 import numpy as np
 import pytest
-from conftest import EXTENSION, ball, bind, delete, local, move, select, world
+from conftest import EXTENSION, attach, ball, bind, delete, local, move, select, world
 from mathutils import Euler, Matrix, Vector
 
 binding = EXTENSION.binding
@@ -68,6 +68,47 @@ def test_moving_the_cage_object_moves_the_mesh_and_moving_the_mesh_moves_both(bo
     body.matrix_world = PLACES["turned, scaled unevenly, far"]
     both = binding.transform(before + [0.5, 0.0, 1.0], body.matrix_world)
     assert np.abs(world(body) - both).max() < 10 * TOLERANCE
+
+
+PARENT = PLACES["turned, scaled unevenly, far"]
+CHILD = Matrix.LocRotScale(Vector((0.3, -0.2, 0.1)), Euler((-0.4, 0.6, 1.1)), Vector((0.7, 1.3, 1.0)))
+OTHER = Matrix.LocRotScale(Vector((-1, 4, -2)), Euler((1.2, 0.1, 0.5)), Vector((0.4, 1.1, 3.0)))
+
+
+@pytest.mark.parametrize("apart", [False, True], ids=["cage below the mesh", "cage below another empty"])
+def test_mesh_below_an_unevenly_scaled_empty_is_its_weights_times_the_cage_in_world_space(body, apart):
+    parents = [attach(body, PARENT)]
+    body.matrix_basis = CHILD
+    select(body)
+    bpy.ops.cagework.make_cage(vertices=40)
+    cage = body.data.cagework.cage
+    if apart:
+        cage.parent, in_world = None, binding.transform(local(cage.data), PARENT @ CHILD)
+        parents.append(attach(cage, OTHER))
+        cage.matrix_basis = CHILD
+        move(cage, binding.transform(in_world, (OTHER @ CHILD).inverted()) - local(cage.data))
+    body.data.cagework.grid = 24
+    bpy.ops.cagework.bind()
+
+    def posed():
+        """The cage in world space, from the matrices that were set."""
+        return binding.transform(local(cage.data), parents[-1].matrix_basis @ CHILD)
+
+    points, rest = binding.transform(local(body.data), PARENT @ CHILD), posed()
+    weights, report = cw.bind(points, cw.Cage(rest, faces_of(cage.data)), grid=24)
+    assert report["outside_vertices"] == 0
+    at_rest = local(cage.data)
+    move(cage, bend(at_rest))
+    assert np.abs(world(body) - points).max() > 0.1
+    for parent, matrix in [(parents[-1], parents[-1].matrix_basis), (parents[0], OTHER), (parents[-1], PARENT)]:
+        parent.matrix_basis = matrix
+        assert np.abs(world(body) - weights @ posed()).max() < TOLERANCE * 10, parent.name
+    top, before = 5, world(body)
+    bpy.ops.cagework.pull(vertex=top, offset=(0.1, 0.2, 0.3))
+    assert np.abs((world(body) - before)[top] - [0.1, 0.2, 0.3]).max() < 0.02
+    assert np.abs(world(body) - weights @ posed()).max() < TOLERANCE * 10
+    bpy.ops.cagework.reset()
+    assert np.array_equal(local(cage.data), at_rest)
 
 
 def test_mesh_follows_a_cage_in_edit_mode(body):
@@ -144,6 +185,25 @@ def test_undo_restores_the_pose_and_the_bind(body):
     assert not bpy.data.objects["Body"].data.cagework.stamp
 
 
+def test_undo_brings_a_deleted_cage_back_and_redo_its_pose(body):
+    cage = bind(body)
+    before = world(body)
+    bpy.ops.ed.undo_push(message="bind")
+    cage.location.x += 1
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="move")
+    delete(cage)
+    bpy.ops.ed.undo_push(message="delete")
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    assert np.abs(world(bpy.data.objects["Body"]) - before).max() < TOLERANCE
+    bpy.ops.ed.redo()
+    body = bpy.data.objects["Body"]
+    assert np.abs(world(body) - before - [1, 0, 0]).max() < TOLERANCE
+    body.data.cagework.cage.location.x += 1
+    assert np.abs(world(body) - before - [2, 0, 0]).max() < TOLERANCE
+
+
 def test_edited_mesh_is_bound_again_and_keeps_the_pose(body):
     cage = bind(body)
     rest = local(cage.data)
@@ -218,6 +278,13 @@ def test_linked_mesh_is_refused_and_its_override_does_not_fail(body, tmp_path):
     select(linked)
     with pytest.raises(RuntimeError, match="make it local"):
         bpy.ops.cagework.make_cage()
+    before = world(linked)
+    bpy.ops.object.select_all(action="SELECT")
+    bpy.ops.object.make_local(type="SELECT_OBDATA")
+    own = bpy.context.active_object
+    assert binding.problem(own, bpy.context.scene) is None
+    own.data.cagework.cage.location.x += 1
+    assert np.abs(world(own) - before - [1, 0, 0]).max() < TOLERANCE
 
 
 def test_linked_duplicates_take_the_same_shape_and_are_bound_once(body):
