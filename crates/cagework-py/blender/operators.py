@@ -14,6 +14,8 @@ from . import binding
 
 # Seconds between two updates of the progress of a bind.
 INTERVAL = 0.05
+# Distance by which the shape of a cage may differ from its active shape key, as a fraction of its size. Above rounding.
+SHAPE_TOLERANCE = 1e-5
 
 
 def meshes(context):
@@ -194,13 +196,16 @@ class Reset(BoundObjectOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+def posed_points(cage):
+    """The vertices of a cage, or the points of its active shape key if the cage has shape keys."""
+    return cage.active_shape_key.points if cage.data.shape_keys else cage.data.vertices
+
+
 def write_cage(cage, local):
-    """Sets the local positions of a cage's vertices, or of its active shape key if the cage has shape keys."""
-    keys = cage.data.shape_keys
-    points = cage.active_shape_key.points if keys else cage.data.vertices
-    points.foreach_set("co", np.asarray(local, np.float32).ravel())
+    """Sets the local positions of a cage's `posed_points`."""
+    posed_points(cage).foreach_set("co", np.asarray(local, np.float32).ravel())
     cage.data.update()
-    if keys:
+    if cage.data.shape_keys:
         cage.data.update_tag()
 
 
@@ -233,7 +238,10 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
         self.moved = self.rest + self.weights.displacements(self.posed)
         self.to_world = np.array(self.obj.matrix_world) @ np.linalg.inv(self.weights.to_bind)
         self.world_to_cage = np.linalg.inv(np.array(cage.matrix_world))
-        self.before = binding.transform(cage_now, self.world_to_cage)
+        self.before = binding.coordinates(posed_points(cage))
+        size = np.ptp(self.before, axis=0).max()
+        if np.abs(binding.transform(cage_now, self.world_to_cage) - self.before).max() > SHAPE_TOLERANCE * size:
+            return f"{cage.name} mixes shape keys: set the active key to 1 and the others to 0"
         return None
 
     def pull(self, vertex, world_target):
@@ -293,6 +301,7 @@ class Pull(BoundObjectOperator, bpy.types.Operator):
             elif not self.dragging and event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER"}:
                 return {"PASS_THROUGH"}
         except cw.Error as error:
+            write_cage(self.cage, self.before)
             self.end(context, {"CANCELLED"})
             return self.refuse(str(error))
         return {"RUNNING_MODAL"}

@@ -1,13 +1,15 @@
 """Loads the extension's sources into Blender as a Python module (package `bpy`)."""
 
 import importlib.util
+import inspect
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Euler, Matrix, Vector
 
 FOLDER = Path(__file__).parents[1]
 
@@ -100,3 +102,66 @@ def attach(obj, matrix):
     empty.matrix_world, obj.parent = matrix, empty
     bpy.context.view_layer.update()
     return empty
+
+
+class Modal:
+    """Runs the methods of a modal operator on a plain object, because Blender sends no events in the background.
+
+    Window, workspace and 3-D view are plain objects too. Scene, selection and dependency graph are Blender's.
+    """
+
+    def __init__(self, operator, perspective=True):
+        methods = {**vars(EXTENSION.operators.BoundObjectOperator), **vars(operator)}
+        functions = {name: each for name, each in methods.items() if inspect.isfunction(each)}
+        self.reports, self.handlers, self.timers, self.status = [], [], [], None
+        self.operator = type(operator.__name__, (), functions)()
+        self.operator.keep_rest, self.operator.report = False, lambda kind, text: self.reports.append((kind, text))
+        self.region = SimpleNamespace(type="WINDOW", x=50, y=100, width=800, height=600)
+        view = Matrix.Translation((0, 0, -6)) @ Euler((-1.1, 0, 0.6)).to_matrix().to_4x4()
+        scale = 2 if perspective else 0.5
+        lens = Matrix.Diagonal((scale, scale * 800 / 600, -0.02, 1))
+        if perspective:
+            lens[2][3], lens[3][2], lens[3][3] = -0.2, -1, 0
+        self.view = SimpleNamespace(
+            view_matrix=view,
+            perspective_matrix=lens @ view,
+            is_perspective=perspective,
+            view_perspective="PERSP" if perspective else "ORTHO",
+        )
+
+    def context(self):
+        def status(text):
+            self.status = text
+
+        now = bpy.context
+        manager = SimpleNamespace(
+            event_timer_add=lambda *_, **__: self.timers.append("timer") or "timer",
+            event_timer_remove=self.timers.remove,
+            modal_handler_add=self.handlers.append,
+        )
+        return SimpleNamespace(
+            scene=now.scene,
+            active_object=now.active_object,
+            selected_objects=now.selected_objects,
+            evaluated_depsgraph_get=now.evaluated_depsgraph_get,
+            window=now.window,
+            window_manager=manager,
+            workspace=SimpleNamespace(status_text_set=status),
+            area=SimpleNamespace(type="VIEW_3D", regions=[self.region]),
+            space_data=SimpleNamespace(region_3d=self.view),
+        )
+
+    def invoke(self):
+        result = self.operator.invoke(self.context(), None)
+        assert (result == {"RUNNING_MODAL"}) == (self.handlers == [self.operator])
+        return result
+
+    def send(self, kind, value="NOTHING", at=(0, 0)):
+        """Sends an event; `at` is relative to the region, in pixels."""
+        x, y = at[0] + self.region.x, at[1] + self.region.y
+        return self.operator.modal(self.context(), SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=y))
+
+    def pixel(self, point):
+        """The pixel at which the view shows a point, relative to the region."""
+        x, y, _, w = self.view.perspective_matrix @ Vector((*point, 1.0))
+        return (x / w + 1) / 2 * self.region.width, (y / w + 1) / 2 * self.region.height

@@ -8,7 +8,7 @@ import bpy
 import cagework as cw
 import numpy as np
 import pytest
-from conftest import EXTENSION, attach, ball, bind, delete, local, move, select, world
+from conftest import EXTENSION, Modal, attach, ball, bind, delete, local, move, select, world
 from mathutils import Euler, Matrix, Vector
 
 binding = EXTENSION.binding
@@ -336,6 +336,99 @@ def test_pulled_vertex_reaches_its_target():
     for offset in [(0.2, 0.0, 0.3), (0.0, 0.1, 0.0)]:
         assert bpy.ops.cagework.pull(vertex=top, offset=offset) == {"FINISHED"}
     assert np.abs((world(body) - before)[top] - [0.2, 0.1, 0.3]).max() < 0.02
+
+
+def test_bind_in_a_window_reports_progress_and_stores_the_weights_at_the_end(body):
+    cage = bind(body)
+    points, rest = world(body), local(cage.data)
+    bpy.ops.cagework.unbind()
+    modal = Modal(EXTENSION.operators.Bind)
+    assert modal.invoke() == {"RUNNING_MODAL"} and modal.timers and not body.data.cagework.stamp
+    assert modal.send("MOUSEMOVE") == {"RUNNING_MODAL"} and "Esc" in modal.status
+    modal.operator.thread.join()
+    assert modal.send("TIMER") == {"FINISHED"} and not modal.timers and modal.status is None
+    assert [kind for kind, _ in modal.reports] == [{"INFO"}]
+    move(cage, bend(rest))
+    assert np.abs(world(body) - expected(points, faces_of(cage.data), rest, rest + bend(rest))).max() < TOLERANCE
+
+
+def test_escape_stops_a_bind_and_keeps_the_previous_one(body):
+    cage = bind(body)
+    move(cage, bend(local(cage.data)))
+    posed, stamp = world(body), body.data.cagework.stamp
+    body.data.cagework.grid = 160
+    modal = Modal(EXTENSION.operators.Bind)
+    modal.invoke()
+    assert modal.send("ESC", "PRESS") == {"RUNNING_MODAL"}
+    modal.operator.thread.join()
+    assert modal.operator.jobs[0].results is None, "the thread stopped before the end"
+    assert modal.send("TIMER") == {"CANCELLED"} and not modal.timers and modal.status is None
+    assert modal.reports == [({"ERROR"}, "The bind was cancelled")]
+    assert body.data.cagework.stamp == stamp and np.array_equal(world(body), posed)
+    cage.location.x += 1
+    assert np.abs(world(body) - posed - [1, 0, 0]).max() < TOLERANCE
+
+
+@pytest.mark.parametrize("keys", [False, True], ids=["vertices", "shape keys"])
+@pytest.mark.parametrize("perspective", [True, False], ids=["perspective", "orthographic"])
+def test_dragged_vertex_follows_the_mouse_until_it_is_released_or_escape_restores_the_cage(body, perspective, keys):
+    cage = bind(body, grid=32)
+    if keys:
+        cage.shape_key_add(name="Basis")
+        cage.shape_key_add(name="Pose").value = 1
+        cage.active_shape_key_index = 1
+    points = EXTENSION.operators.posed_points(cage)
+    rest, before = binding.coordinates(points), world(body)
+
+    def drag():
+        select(body)
+        modal = Modal(EXTENSION.operators.Pull, perspective)
+        assert modal.invoke() == {"RUNNING_MODAL"} and "Esc" in modal.status
+        front = np.argmin([(modal.view.view_matrix @ Vector(point)).length for point in before])
+        assert modal.send("MIDDLEMOUSE", "PRESS") == {"PASS_THROUGH"}
+        start = np.array(modal.pixel(before[front]))
+        modal.send("LEFTMOUSE", "PRESS", start)
+        assert modal.operator.vertex == front
+        for step in [(10, 5), (40, 25)]:
+            assert modal.send("MOUSEMOVE", at=start + step) == {"RUNNING_MODAL"}
+            assert np.abs(modal.pixel(world(body)[front]) - start - step).max() < 2
+            assert np.abs(world(body)[front] - before[front] - modal.operator.offset).max() < 0.02
+        return modal
+
+    modal = drag()
+    assert modal.send("ESC", "PRESS") == {"CANCELLED"} and modal.status is None
+    assert np.array_equal(binding.coordinates(points), rest) and np.abs(world(body) - before).max() < TOLERANCE
+    modal = drag()
+    assert modal.send("LEFTMOUSE", "RELEASE") == {"FINISHED"} and modal.status is None
+    assert np.abs(binding.coordinates(points) - rest).max() > 0.01
+    pulled = binding.coordinates(points)
+    modal = Modal(EXTENSION.operators.Pull)
+    modal.invoke()
+    assert modal.send("LEFTMOUSE", "PRESS", (1, 1)) == {"CANCELLED"}, "no point of the mesh is in the corner"
+    assert np.array_equal(binding.coordinates(points), pulled)
+
+
+def test_pull_refuses_a_cage_that_mixes_shape_keys_and_restores_it_after_a_fault(body):
+    cage = bind(body)
+    cage.shape_key_add(name="Basis")
+    wide = cage.shape_key_add(name="Wide")
+    wide.points.foreach_set("co", (local(cage.data) * [2, 1, 1]).astype(np.float32).ravel())
+    wide.value, cage.active_shape_key_index = 0.5, 1
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="mixes shape keys"):
+        bpy.ops.cagework.pull(vertex=0, offset=(0.1, 0, 0))
+    wide.value = 1
+    bpy.context.view_layer.update()
+    before = binding.coordinates(wide.points)
+    select(body)
+    modal = Modal(EXTENSION.operators.Pull)
+    modal.invoke()
+    modal.send("LEFTMOUSE", "PRESS", (modal.region.width / 2, modal.region.height / 2))
+    modal.send("MOUSEMOVE", at=(modal.region.width / 2 + 30, modal.region.height / 2))
+    assert not np.array_equal(binding.coordinates(wide.points), before)
+    modal.operator.posed = modal.operator.posed * np.nan
+    assert modal.send("MOUSEMOVE", at=(0, 0)) == {"CANCELLED"} and modal.reports[0][0] == {"ERROR"}
+    assert np.array_equal(binding.coordinates(wide.points), before)
 
 
 def test_saved_key_has_the_pose_and_stays_after_unbinding(body):
