@@ -169,6 +169,13 @@ test("poses are edited by keyboard and pointer", async ({ page }) => {
     await shoot(page, "poses");
     await page.keyboard.press("Control+z");
     await expect(motion).toHaveValue("");
+    // The last pose becomes the first one. The field that has the focus shows the time of the pose that is now last.
+    const times = page.getByRole("spinbutton", { name: /^Time of / });
+    await times.last().fill("0.5");
+    await times.last().press("Enter");
+    await expect.poll(names).toEqual([d, a, b, e, c]);
+    await expect(times.first()).toHaveValue("0.5");
+    await expect(times.last()).toHaveValue("4");
   });
 
   await test.step("a higher closeness lets the cage follow the model more closely", async () => {

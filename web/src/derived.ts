@@ -80,8 +80,8 @@ export function isCageSparse(state: AppState): boolean {
 
 /** Whether the page asks the user to pull the sample, because nothing has been changed yet. */
 export function asksToPull(state: AppState): boolean {
-  const { step, grip, bound, posed, undo, gesture, playing, clip, tour, scene } = state;
-  const isUntouched = grip !== null && bound && !posed && undo === null && step !== "cage";
+  const { step, grip, pullReady, posed, undo, gesture, playing, clip, tour, scene } = state;
+  const isUntouched = grip !== null && pullReady && !posed && undo === null && step !== "cage";
   return isUntouched && scene.pull && !gesture && !playing && clip.clip === null && tour === null;
 }
 

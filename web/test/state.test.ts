@@ -25,15 +25,17 @@ describe("store", () => {
   });
 });
 
-it("the cue at the sample goes away at the first pull and comes back when it is undone", () => {
-  const opened = { ...INITIAL_STATE, grip: new Float32Array([0, 1, 0]), bound: true };
+it("the cue at the sample is shown when pulls are ready, until the first pull, and again when it is undone", () => {
+  const bound = { ...INITIAL_STATE, grip: new Float32Array([0, 1, 0]), bound: true };
+  const opened = { ...bound, pullReady: true };
   const pulled = { ...opened, posed: true, undo: "Pull" };
   const states: AppState[] = [
     INITIAL_STATE,
+    bound,
     opened,
     { ...opened, gesture: "Pull" },
     pulled,
     { ...pulled, posed: false, undo: null },
   ];
-  expect(states.map(asksToPull)).toEqual([false, true, false, false, true]);
+  expect(states.map(asksToPull)).toEqual([false, false, true, false, false, true]);
 });

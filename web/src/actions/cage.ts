@@ -48,7 +48,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     if (!before || !(posed || saved.length > 0)) return;
     const back = { label: T.pose.backToCage, run: () => void engine().undo() };
     const carry = { label: T.pose.carry, run: () => void poses.carry(before, T.did.carry) };
-    ctx.tell.say(T.cage.posesWait, carry, back);
+    ctx.tell.say(T.cage.posesWait(saved.length), carry, back);
   };
 
   /** The last preview, which `make` takes if nothing has changed since. */

@@ -13,11 +13,11 @@ export interface Fix {
 }
 
 export interface Messages {
-  /** Shows a short message that disappears by itself. */
+  /** Shows a short message that disappears by itself, unless it has several `fixes`. */
   say(text: Message, ...fixes: Fix[]): void;
   /** Shows an error that stays until it is closed or fixed. */
   problem(explained: Explanation, fix?: Fix): void;
-  /** Removes all error messages. Called when the user starts something new. */
+  /** Removes all error messages and questions. Called when the user starts something new. */
   clear(): void;
 }
 

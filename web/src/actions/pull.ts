@@ -15,6 +15,9 @@ const MAX_SETTLING_FRAMES = 30;
 const MAX_LOCAL_REACH = SLIDERS.reach.max / 2;
 /** Longest interval between two presses of arrow keys that belong to the same pull, ms. */
 const NUDGE_PAUSE_MS = 600;
+/** Distances from the middle of the view, CSS pixels, and number of directions, in which `nudge` looks for the model. */
+const SEARCH_RADII = [40, 80, 160, 320];
+const SEARCH_DIRECTIONS = 8;
 
 interface Drag {
   /** Pose of the cage at the start of the drag. */
@@ -49,6 +52,20 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
 
   /** Marks the point that is grabbed, or would be by a press, and its target. Without arguments, removes the marks. */
   const show = (held?: SurfacePoint, target?: Float32Array) => engine().showHeld(held ? [held] : [], target);
+
+  /** Grabs the point that `nudge` moves. Returns false if there is none near the middle of the view. */
+  const beginAtMiddle = (): boolean => {
+    const place = held ? engine().placeOf(held) : (store.get().grip ?? []);
+    const [x = 0, y = 0, z = 0] = place.length > 0 ? place : engine().camera().target;
+    const [right = 0, down = 0] = engine().project(x, y, z);
+    if (pulling.begin(right, down)) return true;
+    for (const radius of SEARCH_RADII)
+      for (let k = 0; k < SEARCH_DIRECTIONS; k++) {
+        const angle = (2 * Math.PI * k) / SEARCH_DIRECTIONS;
+        if (pulling.begin(right + radius * Math.cos(angle), down + radius * Math.sin(angle))) return true;
+      }
+    return false;
+  };
 
   const isReady = () => {
     const { bound, editingRest, playing, pullReady } = store.get();
@@ -222,16 +239,14 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
       drag.reach = clamped(drag.reach * factor, SLIDERS.reach);
       void attempt(ctx, T.failed.pull, () => grab(drag));
     },
-    /** Moves the point that was grabbed last, or the point in the middle of the view, by CSS pixels. */
+    /**
+     * Moves a point of the model by CSS pixels: the one grabbed last, the one that the page asks to pull, or the one
+     * nearest to the middle of the view.
+     */
     nudge(right: number, up: number) {
-      if (!current || current.letGo) {
-        const place = held ? engine().placeOf(held) : [];
-        const [x = 0, y = 0, z = 0] = place.length > 0 ? place : engine().camera().target;
-        const [right = 0, down = 0] = engine().project(x, y, z);
-        if (!pulling.begin(right, down)) {
-          ctx.tell.say(T.pull.nothingThere);
-          return;
-        }
+      if ((!current || current.letGo) && !beginAtMiddle()) {
+        ctx.tell.say(T.pull.nothingThere);
+        return;
       }
       if (!current) return;
       current.by = { right: current.by.right + right, up: current.by.up - up };

@@ -3,6 +3,7 @@
 import { createTouch } from "@cagework/core/session/touch";
 import type { App } from "../app";
 import type { GizmoPart, SelectMode } from "../contract";
+import { asksToPull } from "../derived";
 import type { Stage } from "../ui/viewport";
 
 /** Movement of the pointer above which a press is a drag instead of a click, CSS pixels. */
@@ -78,10 +79,12 @@ export function attachPointer(stage: Stage, app: App): void {
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
       const part = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
       if (part !== undefined && takeGizmo(part, at)) return { kind: "gizmo" };
-      // A finger on the model pulls the model, unless a handle is closer to the finger than MOUSE_RADIUS.
+      // A finger on the model pulls the model, unless a handle is closer to the finger than MOUSE_RADIUS. While the page
+      // asks the user to pull, a handle beside the indicated point must not be taken instead.
       const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
+      const isAsked = isOnModel && event.pointerType === "touch" && asksToPull(store.get());
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
-      if (vertices.length > 0) {
+      if (vertices.length > 0 && !isAsked) {
         const selected = new Set(engine().selection());
         const was = vertices.every((vertex) => selected.has(vertex));
         const mode: SelectMode =

@@ -63,7 +63,7 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
   const rat = { sample: "rat", turn: [90, 30] } as const;
   return {
     cage: { ...rat, step: "pose", binds: [{}] },
-    weight: { ...rat, step: "pose", binds: [{}], scene: { colour: "weight" }, vertex: 55 },
+    weight: { ...rat, step: "pose", binds: [{}], scene: { colour: "weight" }, vertex: 57 },
     grid: {
       ...rat,
       step: "bind",

@@ -206,10 +206,10 @@ interface NumberInputProps {
 /** Number field. Calls `onCommit` when the user presses Enter or leaves the field, if the number is valid. */
 export function NumberInput({ name, value, onCommit, ...rest }: NumberInputProps) {
   const input = useRef<HTMLInputElement>(null);
+  /** Whether the user has typed something that is not committed. The field is not overwritten then. */
+  const isTyping = useRef(false);
   useLayoutEffect(() => {
-    // Do not overwrite the field while the user types in it.
-    const { current } = input;
-    if (current && document.activeElement !== current) current.value = String(value);
+    if (input.current && !isTyping.current) input.current.value = String(value);
   }, [value]);
   return (
     <input
@@ -219,7 +219,14 @@ export function NumberInput({ name, value, onCommit, ...rest }: NumberInputProps
       type="number"
       aria-label={name}
       inputMode="decimal"
+      onInput={() => {
+        isTyping.current = true;
+      }}
+      onBlur={() => {
+        isTyping.current = false;
+      }}
       onChange={(event) => {
+        isTyping.current = false;
         const { currentTarget: field } = event;
         const isValid = field.value !== "" && field.validity.valid;
         field.setAttribute("aria-invalid", String(!isValid));

@@ -34,6 +34,9 @@ interface Toast {
   readonly since: number;
 }
 
+/** A message with several buttons is a question, which stays until it is answered or something new starts. */
+const isQuestion = (fixes: readonly Fix[]) => fixes.length > 1;
+
 let next = 0;
 
 export interface ToastParts {
@@ -74,6 +77,7 @@ export function createToasts(): ToastParts {
       problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),
       clear: () => {
         problems.value = [];
+        said.value = said.value.filter(({ fixes }) => !isQuestion(fixes));
       },
     },
     offer: (text, fix) => add(said, { text, fixes: [fix], stays: true }),
@@ -145,7 +149,7 @@ function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: (
   const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
   const leaveIn = (ms: number) => {
     clearTimeout(timer.current);
-    if (!stays) timer.current = setTimeout(close, ms);
+    if (!stays && !isQuestion(fixes)) timer.current = setTimeout(close, ms);
   };
   // Do not close a message that is hovered or focused.
   const stay = () => clearTimeout(timer.current);

@@ -135,3 +135,15 @@ it("a pull does not change a cage that has been replaced", async () => {
   await settled();
   expect([engine.cagePositions(), did, problems]).toEqual([other, [], []]);
 });
+
+it("arrow keys pull the nearest point of the model if the middle of the view is empty", async () => {
+  const { pull, answer, took, asked, teach, said } = page();
+  // The middle of the view is at x = 50; the model is 40 pixels to its left.
+  teach({
+    camera: () => ({ target: [0, 0, 0], yaw: 0, pitch: 0, distance: 1, parallel: false }),
+    project: () => Float32Array.of(50, 10, 1),
+  });
+  pull.nudge(0, 1);
+  await answer(took);
+  expect([asked.at(-1)?.kind, said]).toEqual(["pullFrame", []]);
+});

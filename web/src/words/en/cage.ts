@@ -95,7 +95,10 @@ export const cage = {
   vertices: (n: number) => plural(n, "vertex", "vertices"),
   edges: "Edges",
   faces: "Faces",
-  posesWait: "The pose and the saved poses belong to the previous cage and return with it.",
+  posesWait: (saved: number) =>
+    saved > 0
+      ? "Saved poses belong to the previous cage and return with it."
+      : "The pose belongs to the previous cage and returns with it.",
   bridged: (parts: number, models: number) =>
     `${models > 1 ? "The models have" : "The model has"} ${count(parts)} separate parts; this cage joins them.`,
   sparse: (share: string, wanted: string) =>

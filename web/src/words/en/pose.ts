@@ -88,7 +88,7 @@ export const pull = {
   unpinAll: "Remove all pins",
   pulling: "Pulling; Esc cancels",
   nothingThere:
-    "There is no model in the middle of the view. Drag a point of the model first, then press the arrow keys.",
+    "There is no model near the middle of the view. Press ] to choose a handle, or drag a point of the model, then press the arrow keys.",
 };
 
 /** Status line during a gesture. `by`: amounts of the gesture, formatted. */
