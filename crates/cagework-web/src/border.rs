@@ -1,40 +1,30 @@
 //! Generates TypeScript declarations of the serde types that Rust and the page exchange, the page's default values and
 //! ranges, and the table of ranges in docs/limits.md.
 
+use std::any::TypeId;
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::fs;
 
-use cagework_cage::check::{Code, Repair, Severity};
-use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, HULL_TARGET, Shape, Symmetry};
-use cagework_core::deform::OutsideVertex;
-use cagework_core::options::{
-    Backend, CellShape, Choice, DeltaNorm, Method, OutsidePolicy, Preconditioner, Solver,
-};
-use cagework_core::report::{
-    BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
-};
-use cagework_core::{Coordinates, Frames, InnerElement, Stage};
-use cagework_editor::edit::{Element, GestureKind, GestureView, Pivot, SelectMode};
-use cagework_editor::{
-    CageControls, Command, InnerKind, PartOptions, PoseView, RestEdit, SelectionView, SurfacePoint, Tools,
-    Transition,
-};
-use cagework_gpu::render::{GizmoMode, GizmoPart, Theme};
-use cagework_io::{Compression, Feet, FormatFacts, Interpolation, Joints, ModelFormat, UpAxis};
-use cagework_pose::pull::{DragOptions, Reach};
+use cagework_cage::generate::{BOX_DIVISIONS, CageOptions, HULL_TARGET};
+use cagework_core::Coordinates;
+use cagework_core::options::Choice;
+use cagework_core::report::BindReport;
+use cagework_editor::Command;
+use cagework_editor::edit::{GestureView, SelectMode};
+use cagework_gpu::render::GizmoPart;
+use cagework_io::{FormatFacts, ModelFormat};
+use cagework_pose::pull::DragOptions;
 use serde_json::Value;
-use ts_rs::{Config, TS};
+use ts_rs::{Config, TS, TypeVisitor};
 
 use crate::binder::Offsets;
 use crate::clock::Event;
 use crate::error::ErrorName;
-use crate::opening::{CageContents, OpenContents, PoseContents};
-use crate::options::{Colour, JsBindOptions, JsRigOptions, JsSceneOptions, SliceContent, fields};
+use crate::opening::OpenContents;
+use crate::options::{JsBindOptions, JsRigOptions, JsSceneOptions, fields};
 use crate::settings::{NUMBERS, Settings};
-use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, LargestWeight, Legend, MemberInfo, Mend,
-    ModelInfo, Problem, TargetView, View,
-};
+use crate::views::{CageState, CameraView, Legend, ModelInfo, Problem, View};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
@@ -43,13 +33,23 @@ const LIMITS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/limits.md"
 const TABLE_START: &str = "<!-- Written by crates/cagework-web/src/border.rs -->";
 const TABLE_END: &str = "<!-- end -->";
 
-/// Doc comment and TypeScript declaration of each listed type.
-macro_rules! declarations {
-    ($($type:ty),* $(,)?) => {{
-        // 64-bit integers are sent as JavaScript numbers.
-        let config = Config::default().with_large_int("number");
-        [$((<$type>::docs().unwrap_or_default(), <$type>::decl(&config)),)*]
-    }};
+/// TypeScript declarations of types and of all types that these refer to.
+struct Declarations {
+    config: Config,
+    seen: HashSet<TypeId>,
+    text: String,
+}
+
+impl TypeVisitor for Declarations {
+    fn visit<T: TS + 'static + ?Sized>(&mut self) {
+        // A type of the standard library has no declaration, hence no file.
+        if T::output_path().is_none() || !self.seen.insert(TypeId::of::<T>()) {
+            return;
+        }
+        T::visit_dependencies(self);
+        let (docs, declaration) = (T::docs().unwrap_or_default(), T::decl(&self.config));
+        writeln!(self.text, "{docs}export {declaration}").unwrap();
+    }
 }
 
 /// Writes the declaration of a TypeScript constant.
@@ -59,92 +59,29 @@ fn constant(name: &str, r#type: &str, value: impl Into<Value>) -> String {
 
 #[test]
 fn generated_types_are_up_to_date() {
-    let mut text =
-        "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n"
-            .to_owned();
-    for (docs, declaration) in declarations![
-        ErrorName,
-        Method,
-        Solver,
-        Preconditioner,
-        Backend,
-        CellShape,
-        DeltaNorm,
-        OutsidePolicy,
-        JsBindOptions,
-        Stage,
-        Event,
-        Frames,
-        OutsideVertex,
-        Offsets,
-        BindReport,
-        CellCounts,
-        Timings,
-        MemoryBytes,
-        RestError,
-        RawError,
-        MeanMax,
-        WeightStats,
-        Shape,
-        Symmetry,
-        CageOptions,
-        BoundsView,
-        InnerElement,
-        InnerKind,
-        CageControls,
-        CageInfo,
-        CageState,
-        Code,
-        Severity,
-        Repair,
-        Mend,
-        Problem,
-        ModelFormat,
-        UpAxis,
-        PartOptions,
-        MemberInfo,
-        ModelInfo,
-        Interpolation,
-        Transition,
-        Command,
-        PoseView,
-        SelectionView,
-        Tools,
-        View,
-        CageContents,
-        PoseContents,
-        OpenContents,
-        Settings,
-        Theme,
-        Colour,
-        Coordinates,
-        SliceContent,
-        GizmoMode,
-        JsSceneOptions,
-        CameraView,
-        SurfacePoint,
-        Reach,
-        DragOptions,
-        Joints,
-        Feet,
-        Compression,
-        JsRigOptions,
-        ClipView,
-        TargetView,
-        ColorMap,
-        LargestWeight,
-        Legend,
-        Element,
-        Pivot,
-        SelectMode,
-        GestureKind,
-        GestureView,
-        GizmoPart,
-        RestEdit,
-    ] {
-        writeln!(text, "{docs}export {declaration}").unwrap();
-        text = text.replace(" \n", "\n");
-    }
+    // 64-bit integers are sent as JavaScript numbers.
+    let config = Config::default().with_large_int("number");
+    let text = "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n";
+    let mut found = Declarations { config, seen: HashSet::new(), text: text.to_owned() };
+    found.visit::<ErrorName>();
+    found.visit::<Event>();
+    found.visit::<Offsets>();
+    found.visit::<BindReport>();
+    found.visit::<CageState>();
+    found.visit::<Problem>();
+    found.visit::<ModelInfo>();
+    found.visit::<Command>();
+    found.visit::<View>();
+    found.visit::<OpenContents>();
+    found.visit::<Settings>();
+    found.visit::<JsSceneOptions>();
+    found.visit::<CameraView>();
+    found.visit::<DragOptions>();
+    found.visit::<Legend>();
+    found.visit::<SelectMode>();
+    found.visit::<GestureView>();
+    found.visit::<GizmoPart>();
+    let mut text = found.text.replace(" \n", "\n");
     text += &constant("BIND_DEFAULTS", "BindOptions", fields(&JsBindOptions::default()));
     text += &constant("CAGE_DEFAULTS", "CageOptions", fields(&CageOptions::default()));
     text += &constant("RIG_DEFAULTS", "RigOptions", fields(&JsRigOptions::default()));

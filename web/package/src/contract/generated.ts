@@ -5,85 +5,6 @@
  */
 export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
 /**
- * Discretisation of the cage.
- */
-export type Method = "classic" | "embedded";
-/**
- * Solver of Laplace's equation.
- */
-export type Solver = "jacobi" | "multigrid" | "cg";
-/**
- * Preconditioner of conjugate gradients.
- */
-export type Preconditioner = "none" | "v_cycle";
-/**
- * Processor that computes a bind.
- */
-export type Backend = "cpu" | "gpu";
-/**
- * Cell shape of the classic method.
- */
-export type CellShape = "box" | "cubic";
-/**
- * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
- */
-export type DeltaNorm = "euclidean" | "literal";
-/**
- * Treatment of mesh vertices outside the cage.
- */
-export type OutsidePolicy = "extend" | "stay" | "refuse";
-/**
- * Options of a bind, and the processor that it runs on.
- */
-export type BindOptions = { backend: Backend,
-/**
- * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
- */
-grid: number,
-/**
- * Discretisation of the cage. Default embedded.
- */
-method: Method,
-/**
- * Solver of Laplace's equation. Default multigrid.
- */
-solver: Solver,
-/**
- * Preconditioner of conjugate gradients. Default none.
- */
-preconditioner: Preconditioner,
-/**
- * Cell shape of the classic method. Default box.
- */
-cell_shape: CellShape,
-/**
- * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
- */
-delta_norm: DeltaNorm,
-/**
- * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
- * of the other solvers. Default 1e-5.
- */
-tau: number,
-/**
- * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
- */
-max_iterations: number,
-/**
- * Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
- * restored. 0 drops none. Default 0.
- */
-sparsify: number,
-/**
- * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
- * exceed this. Default 4 GiB; 2 GiB in wasm.
- */
-memory_limit: number,
-/**
- * Treatment of vertices outside the cage. Default extend.
- */
-outside: OutsidePolicy, };
-/**
  * Stages of a bind, in order, and of cage generation.
  */
 export type Stage = "voxelize" | "solve" | "sample" | "simplify";
@@ -91,6 +12,22 @@ export type Stage = "voxelize" | "solve" | "sample" | "simplify";
  * A [`ProgressEvent`] as JavaScript receives it.
  */
 export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
+/**
+ * A mesh vertex outside the cage.
+ */
+export type OutsideVertex = {
+/**
+ * Index of the mesh vertex.
+ */
+vertex: number,
+/**
+ * Distance from the cage, object units.
+ */
+distance: number,
+/**
+ * Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
+ */
+share: number, };
 /**
  * Columns of a bind's weights that follow those of its controls.
  */
@@ -114,22 +51,6 @@ bones: Array<[number, number]>,
  */
 plain: Array<[number, number, number, number]>, };
 /**
- * A mesh vertex outside the cage.
- */
-export type OutsideVertex = {
-/**
- * Index of the mesh vertex.
- */
-vertex: number,
-/**
- * Distance from the cage, object units.
- */
-distance: number,
-/**
- * Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
- */
-share: number, };
-/**
  * Frames of a bind, and the points outside the cage.
  */
 export type Offsets = {
@@ -142,6 +63,153 @@ frames: Frames,
  * Points outside the cage.
  */
 outside: Array<OutsideVertex>, };
+/**
+ * Numbers of cells by kind.
+ */
+export type CellCounts = {
+/**
+ * Cells inside the cage, without the boundary cells.
+ */
+interior: number,
+/**
+ * Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
+ * and less than a cell from its surface along an axis.
+ */
+boundary: number,
+/**
+ * Cells outside the cage.
+ */
+exterior: number, };
+/**
+ * Discretisation of the cage.
+ */
+export type Method = "classic" | "embedded";
+/**
+ * Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
+ * K. Smith's paper (`docs/method.md`, sources).
+ */
+export type RestError = {
+/**
+ * Mean over the vertices, object units.
+ */
+mean: number,
+/**
+ * 99th percentile over the vertices, object units.
+ */
+p99: number,
+/**
+ * Largest error of a vertex, object units.
+ */
+max: number,
+/**
+ * Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
+ */
+mean_rel: number,
+/**
+ * Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
+ */
+max_rel: number, };
+/**
+ * Statistics of the stored weights.
+ */
+export type WeightStats = {
+/**
+ * Smallest weight.
+ */
+min: number,
+/**
+ * Largest weight.
+ */
+max: number,
+/**
+ * Largest `|sum of a row - 1|`.
+ */
+max_sum_error: number,
+/**
+ * Number of stored weights.
+ */
+nonzeros: number, };
+/**
+ * Processor that computes a bind.
+ */
+export type Backend = "cpu" | "gpu";
+/**
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
+ */
+export type DeltaNorm = "euclidean" | "literal";
+/**
+ * Cell shape of the classic method.
+ */
+export type CellShape = "box" | "cubic";
+/**
+ * Wall-clock time of each stage of a bind, milliseconds.
+ */
+export type Timings = {
+/**
+ * Voxelization, levels and transfer tables.
+ */
+voxelize: number,
+/**
+ * Solve of all columns.
+ */
+solve: number,
+/**
+ * Sampling and assembly.
+ */
+sample: number,
+/**
+ * The whole bind.
+ */
+total: number, };
+/**
+ * Mean and maximum of an error over the mesh vertices inside the cage.
+ */
+export type MeanMax = {
+/**
+ * Mean of the error.
+ */
+mean: number,
+/**
+ * Largest error of a vertex.
+ */
+max: number, };
+/**
+ * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
+ * exactly, so with the embedded method this error is that of the solver.
+ */
+export type RawError = {
+/**
+ * Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
+ */
+sum: MeanMax,
+/**
+ * Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
+ */
+point_rel: MeanMax,
+/**
+ * Smallest weight, before negative weights are set to 0.
+ */
+min_weight: number, };
+/**
+ * Preconditioner of conjugate gradients.
+ */
+export type Preconditioner = "none" | "v_cycle";
+/**
+ * Solver of Laplace's equation.
+ */
+export type Solver = "jacobi" | "multigrid" | "cg";
+/**
+ * Working memory of a bind, bytes.
+ */
+export type MemoryBytes = {
+/**
+ * Estimate that is compared with the memory limit before the bind starts.
+ */
+estimated: number,
+/**
+ * Largest sum of buffers alive at the same time.
+ */
+peak: number, };
 /**
  * Options, grid, convergence, times and errors of a bind.
  */
@@ -289,189 +357,21 @@ ambiguous_cells: number,
  */
 notices: Array<string>, };
 /**
- * Numbers of cells by kind.
- */
-export type CellCounts = {
-/**
- * Cells inside the cage, without the boundary cells.
- */
-interior: number,
-/**
- * Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
- * and less than a cell from its surface along an axis.
- */
-boundary: number,
-/**
- * Cells outside the cage.
- */
-exterior: number, };
-/**
- * Wall-clock time of each stage of a bind, milliseconds.
- */
-export type Timings = {
-/**
- * Voxelization, levels and transfer tables.
- */
-voxelize: number,
-/**
- * Solve of all columns.
- */
-solve: number,
-/**
- * Sampling and assembly.
- */
-sample: number,
-/**
- * The whole bind.
- */
-total: number, };
-/**
- * Working memory of a bind, bytes.
- */
-export type MemoryBytes = {
-/**
- * Estimate that is compared with the memory limit before the bind starts.
- */
-estimated: number,
-/**
- * Largest sum of buffers alive at the same time.
- */
-peak: number, };
-/**
- * Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
- * K. Smith's paper (`docs/method.md`, sources).
- */
-export type RestError = {
-/**
- * Mean over the vertices, object units.
- */
-mean: number,
-/**
- * 99th percentile over the vertices, object units.
- */
-p99: number,
-/**
- * Largest error of a vertex, object units.
- */
-max: number,
-/**
- * Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
- */
-mean_rel: number,
-/**
- * Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
- */
-max_rel: number, };
-/**
- * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
- * exactly, so with the embedded method this error is that of the solver.
- */
-export type RawError = {
-/**
- * Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
- */
-sum: MeanMax,
-/**
- * Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
- */
-point_rel: MeanMax,
-/**
- * Smallest weight, before negative weights are set to 0.
- */
-min_weight: number, };
-/**
- * Mean and maximum of an error over the mesh vertices inside the cage.
- */
-export type MeanMax = {
-/**
- * Mean of the error.
- */
-mean: number,
-/**
- * Largest error of a vertex.
- */
-max: number, };
-/**
- * Statistics of the stored weights.
- */
-export type WeightStats = {
-/**
- * Smallest weight.
- */
-min: number,
-/**
- * Largest weight.
- */
-max: number,
-/**
- * Largest `|sum of a row - 1|`.
- */
-max_sum_error: number,
-/**
- * Number of stored weights.
- */
-nonzeros: number, };
-/**
- * Shape that the cage follows.
- */
-export type Shape = "follow" | "hull";
-/**
- * Mirror symmetry of the cage about a plane through the centre of the model's box.
- */
-export type Symmetry = "auto" | "none" | "x" | "y" | "z";
-/**
- * Options of [`super::generate`]. Serde aliases are names in older project files.
- */
-export type CageOptions = {
-/**
- * Target number of vertices, 8 to 400. Default 80.
- */
-target: number,
-/**
- * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
- * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
- * lattice for the default target, which has 36 voxels along the longest side.
- */
-detail: number,
-/**
- * Whether to pair triangles into quads. Default true.
- */
-quads: boolean,
-/**
- * Shape that the cage follows. Default follow.
- */
-shape: Shape,
-/**
- * Mirror symmetry. Default auto.
- */
-symmetry: Symmetry,
-/**
- * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
- * Otherwise thin bridges join them into one cage. Default false.
- */
-per_component: boolean,
-/**
- * Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
- * of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
- */
-clearance: number,
-/**
- * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
- * voxels are closed, and details thinner than one voxel are lost. Default 0.
- */
-voxels: number, };
-/**
  * Lower and upper corner of an axis-aligned box.
  */
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 /**
+ * Counts, bounds and notices of the cage.
+ */
+export type CageInfo = { vertices: number, edges: number, faces: number,
+/**
+ * Number of quads among the faces.
+ */
+quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+/**
  * An element of inner controls: indices into [`InnerControls::positions`].
  */
 export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
-/**
- * A kind of interior control.
- */
-export type InnerKind = "point" | "line" | "face";
 /**
  * Subdivision and interior controls of a cage.
  */
@@ -493,14 +393,6 @@ elements: Array<InnerElement>,
  */
 radius: number | null, };
 /**
- * Counts, bounds and notices of the cage.
- */
-export type CageInfo = { vertices: number, edges: number, faces: number,
-/**
- * Number of quads among the faces.
- */
-quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
-/**
  * The cage's properties, and its interior controls.
  */
 export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
@@ -513,10 +405,6 @@ radius: number, };
  */
 export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
 /**
- * Effect of a problem on binding and its results.
- */
-export type Severity = "error" | "warning" | "note";
-/**
  * A repair of a cage mesh that needs no decision by the user.
  */
 export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
@@ -524,6 +412,10 @@ export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "fli
  * Action of the button that fixes a fault.
  */
 export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
+/**
+ * Effect of a problem on binding and its results.
+ */
+export type Severity = "error" | "warning" | "note";
 /**
  * Faults of one kind in a cage: their number, and the best fix.
  */
@@ -533,14 +425,18 @@ export type Problem = { code: Code, severity: Severity,
  */
 message: string, count: number, fix: Mend | null, };
 /**
- * File format of a model.
- */
-export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz";
-/**
  * The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
  * they are read, and back when they are written. The rotations are exact.
  */
 export type UpAxis = "y" | "z" | "y_down";
+/**
+ * A morph target and its default weight.
+ */
+export type TargetView = { name: string, default: number, };
+/**
+ * File format of a model.
+ */
+export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz";
 /**
  * Visibility of a model, and which of its parts the cage does not bend.
  */
@@ -577,6 +473,14 @@ parts: Array<string>, options: PartOptions,
  * Whether some vertices of the model are painted to stay in place.
  */
 painted: boolean, };
+/**
+ * Name and duration of an animation clip, for the list of clips.
+ */
+export type ClipView = {
+/**
+ * Name of the clip, or its number if it has no name.
+ */
+name: string, seconds: number, };
 /**
  * Combined properties of all models in the cage.
  */
@@ -619,9 +523,25 @@ suggestedUp: UpAxis | null, notices: Array<string>,
  */
 members: Array<MemberInfo>, };
 /**
+ * A point on the surface of the models.
+ */
+export type SurfacePoint = {
+/**
+ * Number of the triangle, unique among all models that the document has ever contained.
+ */
+triangle: number,
+/**
+ * Barycentric coordinates in the triangle.
+ */
+bary: [number, number, number], };
+/**
  * Interpolation between two keys, as in glTF 2.0, appendix C.
  */
 export type Interpolation = "step" | "linear" | "cubic";
+/**
+ * An edit of the selected elements of the cage.
+ */
+export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 /**
  * How the animation of the saved poses goes from one to the next, and how it ends.
  */
@@ -638,6 +558,10 @@ loops: boolean,
  * Time of the return from the last pose to the shape at the start, seconds.
  */
 back: number, };
+/**
+ * A kind of interior control.
+ */
+export type InnerKind = "point" | "line" | "face";
 /**
  * A change of the document.
  */
@@ -799,6 +723,38 @@ id: number,
  */
 amounts: Array<number>, };
 /**
+ * Element type that a click selects.
+ */
+export type Element = "vertex" | "edge" | "face";
+/**
+ * Centre of rotation and scaling.
+ */
+export type Pivot = "middle" | "border" | "last";
+/**
+ * How clicks and gestures act on the cage.
+ */
+export type Tools = {
+/**
+ * Element type that a click selects.
+ */
+element: Element,
+/**
+ * Whether gestures also move the mirror images of the selected vertices.
+ */
+symmetry: boolean,
+/**
+ * Centre of rotation and scaling.
+ */
+pivot: Pivot,
+/**
+ * Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
+ */
+proportional: number,
+/**
+ * Whether vertices near the selection follow it.
+ */
+proportionalOn: boolean, };
+/**
  * A saved pose, as panels show it.
  */
 export type PoseView = {
@@ -838,30 +794,6 @@ last: number | null,
  * Centre of the selection, object units; null without a selection and during a gesture.
  */
 center: [number, number, number] | null, };
-/**
- * How clicks and gestures act on the cage.
- */
-export type Tools = {
-/**
- * Element type that a click selects.
- */
-element: Element,
-/**
- * Whether gestures also move the mirror images of the selected vertices.
- */
-symmetry: boolean,
-/**
- * Centre of rotation and scaling.
- */
-pivot: Pivot,
-/**
- * Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
- */
-proportional: number,
-/**
- * Whether vertices near the selection follow it.
- */
-proportionalOn: boolean, };
 /**
  * Document and bind state that panels show.
  */
@@ -955,6 +887,14 @@ redo: string | null,
  */
 forgotten: number, };
 /**
+ * A saved pose of the cage and the name that the list of poses shows.
+ */
+export type PoseContents = { name: string,
+/**
+ * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+ */
+positions: Float32Array, };
+/**
  * A cage that the page opens.
  */
 export type CageContents = {
@@ -966,14 +906,6 @@ positions: Float32Array,
  * For each face, the number of its corners, then the vertex index of each corner.
  */
 corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
-/**
- * A saved pose of the cage and the name that the list of poses shows.
- */
-export type PoseContents = { name: string,
-/**
- * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
- */
-positions: Float32Array, };
 /**
  * Contents that the page opens together with models.
  */
@@ -991,6 +923,166 @@ settings: string | null, cage: CageContents | null,
  */
 poses: Array<PoseContents>, };
 /**
+ * Mirror symmetry of the cage about a plane through the centre of the model's box.
+ */
+export type Symmetry = "auto" | "none" | "x" | "y" | "z";
+/**
+ * Shape that the cage follows.
+ */
+export type Shape = "follow" | "hull";
+/**
+ * Options of [`super::generate`]. Serde aliases are names in older project files.
+ */
+export type CageOptions = {
+/**
+ * Target number of vertices, 8 to 400. Default 80.
+ */
+target: number,
+/**
+ * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
+ * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
+ * lattice for the default target, which has 36 voxels along the longest side.
+ */
+detail: number,
+/**
+ * Whether to pair triangles into quads. Default true.
+ */
+quads: boolean,
+/**
+ * Shape that the cage follows. Default follow.
+ */
+shape: Shape,
+/**
+ * Mirror symmetry. Default auto.
+ */
+symmetry: Symmetry,
+/**
+ * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
+ * Otherwise thin bridges join them into one cage. Default false.
+ */
+per_component: boolean,
+/**
+ * Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
+ * of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
+ */
+clearance: number,
+/**
+ * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
+ * voxels are closed, and details thinner than one voxel are lost. Default 0.
+ */
+voxels: number, };
+/**
+ * Treatment of mesh vertices outside the cage.
+ */
+export type OutsidePolicy = "extend" | "stay" | "refuse";
+/**
+ * Options of a bind, and the processor that it runs on.
+ */
+export type BindOptions = { backend: Backend,
+/**
+ * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
+ */
+grid: number,
+/**
+ * Discretisation of the cage. Default embedded.
+ */
+method: Method,
+/**
+ * Solver of Laplace's equation. Default multigrid.
+ */
+solver: Solver,
+/**
+ * Preconditioner of conjugate gradients. Default none.
+ */
+preconditioner: Preconditioner,
+/**
+ * Cell shape of the classic method. Default box.
+ */
+cell_shape: CellShape,
+/**
+ * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
+ */
+delta_norm: DeltaNorm,
+/**
+ * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
+ * of the other solvers. Default 1e-5.
+ */
+tau: number,
+/**
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
+ */
+max_iterations: number,
+/**
+ * Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
+ * restored. 0 drops none. Default 0.
+ */
+sparsify: number,
+/**
+ * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
+ * exceed this. Default 4 GiB; 2 GiB in wasm.
+ */
+memory_limit: number,
+/**
+ * Treatment of vertices outside the cage. Default extend.
+ */
+outside: OutsidePolicy, };
+/**
+ * Compression of a GLB.
+ */
+export type Compression = "none" | "meshopt";
+/**
+ * What happens to planted feet in clips.
+ */
+export type Feet = "free" | "lock";
+/**
+ * How the skeleton follows the cage.
+ */
+export type Joints = "follow" | "stay" | "turn";
+/**
+ * How an export treats the rig of a model.
+ */
+export type RigOptions = {
+/**
+ * Whether to export only the shape, without the rig.
+ */
+plain: boolean,
+/**
+ * Whether the cage deforms the model after a clip has moved it.
+ */
+dynamic: boolean,
+/**
+ * How the skeleton follows the cage.
+ */
+joints: Joints,
+/**
+ * Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
+ */
+keep_travel: boolean,
+/**
+ * Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
+ */
+rigid: Array<string>,
+/**
+ * Whether the lowest points of the shape at rest and in each clip keep their heights.
+ */
+ground: boolean,
+/**
+ * What happens to planted feet in clips.
+ */
+feet: Feet,
+/**
+ * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
+ */
+expressions: boolean,
+/**
+ * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
+ */
+quantize: boolean,
+/**
+ * Compression of the buffers.
+ */
+compress: Compression, };
+/**
  * Settings of a project, with all values valid.
  */
 export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
@@ -999,25 +1091,25 @@ export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOption
  */
 notices: Array<string>, };
 /**
+ * Operation of a gizmo, with the shape of its handles.
+ */
+export type GizmoMode = "move" | "rotate" | "scale";
+/**
  * Colours of background and overlays.
  */
 export type Theme = "dark" | "light";
-/**
- * What the colours of the model show: its materials, plain clay, weights, or errors.
- */
-export type Colour = "material" | "clay" | "weight" | "error";
 /**
  * Kind of coordinates.
  */
 export type Coordinates = "harmonic" | "mean_value" | "green";
 /**
+ * What the colours of the model show: its materials, plain clay, weights, or errors.
+ */
+export type Colour = "material" | "clay" | "weight" | "error";
+/**
  * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
  */
 export type SliceContent = "off" | "kinds" | "value";
-/**
- * Operation of a gizmo, with the shape of its handles.
- */
-export type GizmoMode = "move" | "rotate" | "scale";
 /**
  * Elements of the scene that are drawn, and their colours.
  */
@@ -1076,18 +1168,6 @@ yaw: number, pitch: number,
  */
 distance: number, parallel: boolean, };
 /**
- * A point on the surface of the models.
- */
-export type SurfacePoint = {
-/**
- * Number of the triangle, unique among all models that the document has ever contained.
- */
-triangle: number,
-/**
- * Barycentric coordinates in the triangle.
- */
-bary: [number, number, number], };
-/**
  * Distance along the surface, from the grabs, up to which a drag moves the model.
  */
 export type Reach = "automatic" | { "of": number } | "whole";
@@ -1108,74 +1188,6 @@ relax: number,
  */
 symmetry: boolean, };
 /**
- * How the skeleton follows the cage.
- */
-export type Joints = "follow" | "stay" | "turn";
-/**
- * What happens to planted feet in clips.
- */
-export type Feet = "free" | "lock";
-/**
- * Compression of a GLB.
- */
-export type Compression = "none" | "meshopt";
-/**
- * How an export treats the rig of a model.
- */
-export type RigOptions = {
-/**
- * Whether to export only the shape, without the rig.
- */
-plain: boolean,
-/**
- * Whether the cage deforms the model after a clip has moved it.
- */
-dynamic: boolean,
-/**
- * How the skeleton follows the cage.
- */
-joints: Joints,
-/**
- * Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
- */
-keep_travel: boolean,
-/**
- * Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
- */
-rigid: Array<string>,
-/**
- * Whether the lowest points of the shape at rest and in each clip keep their heights.
- */
-ground: boolean,
-/**
- * What happens to planted feet in clips.
- */
-feet: Feet,
-/**
- * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
- */
-expressions: boolean,
-/**
- * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
- */
-quantize: boolean,
-/**
- * Compression of the buffers.
- */
-compress: Compression, };
-/**
- * Name and duration of an animation clip, for the list of clips.
- */
-export type ClipView = {
-/**
- * Name of the clip, or its number if it has no name.
- */
-name: string, seconds: number, };
-/**
- * A morph target and its default weight.
- */
-export type TargetView = { name: string, default: number, };
-/**
  * Colour map that a legend shows.
  */
 export type ColorMap = "viridis" | "error" | "kinds";
@@ -1191,14 +1203,6 @@ export type Legend = { low: number, high: number, logarithmic: boolean, map: Col
  * Largest of the displayed weights; null for other quantities.
  */
 largest: LargestWeight | null, };
-/**
- * Element type that a click selects.
- */
-export type Element = "vertex" | "edge" | "face";
-/**
- * Centre of rotation and scaling.
- */
-export type Pivot = "middle" | "border" | "last";
 /**
  * How a set of vertices changes the selection.
  */
@@ -1231,10 +1235,6 @@ plane: boolean, };
  * A handle of a gizmo.
  */
 export type GizmoPart = { "axis": number } | { "plane": number } | "view";
-/**
- * An edit of the selected elements of the cage.
- */
-export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
