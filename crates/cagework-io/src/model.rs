@@ -38,7 +38,7 @@ pub enum ReadError {
     Format(#[from] FormatError),
     /// A file of vertices without faces where faces are required.
     #[error(
-        "{} has {vertices} vertices but no faces: export it with faces (points and splats can only be deformed, or be a pose)",
+        "{} has {vertices} vertices but no faces: export it with faces (points and splats can be deformed, pulled, mapped or drawn, and be a pose)",
         shown(name)
     )]
     NoFaces {

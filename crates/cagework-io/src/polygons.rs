@@ -184,6 +184,12 @@ impl Polygons {
             self.notices
                 .push(format!("{} with fewer than three corners: ignored", counted(n, "face", "faces")));
         }
+        if self.has_normals && self.face_starts.len() < 2 {
+            self.has_normals = false;
+            self.notices.push(
+                "normals of points are not kept: without faces, they cannot be computed again".to_owned(),
+            );
+        }
         let mut document = ObjDocument {
             corners: std::mem::take(&mut self.corners)
                 .into_iter()

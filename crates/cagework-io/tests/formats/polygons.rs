@@ -388,16 +388,29 @@ fn ply_colours_can_have_any_numeric_type() {
 }
 
 #[test]
-fn a_face_has_at_most_4_194_304_corners() {
-    // One more corner than 2^22 would be no multiple of three, so add two.
-    let n = (1 << 22) + 2;
+fn a_face_has_at_most_262_144_corners() {
+    // One more corner than 2^18 would be no multiple of three, so add two.
+    let n = (1 << 18) + 2;
     let corners = |from: usize| (0..n).map(|k| format!(" {}", from + k % 3)).collect::<String>();
     let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf{}\n", corners(1));
     let off = format!("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{n}{}\n", corners(0));
     for (name, text, message) in [
-        ("a.obj", obj, "a.obj: line 4: the face has more than 4194304 corners: split it"),
-        ("a.off", off, "a.off: face 0 has 4194306 corners, more than the limit of 4194304: split it"),
+        ("a.obj", obj, "a.obj: line 4: the face has more than 262144 corners: split it"),
+        ("a.off", off, "a.off: face 0 has 262146 corners, more than the limit of 262144: split it"),
     ] {
         assert_eq!(fault(name, text.as_bytes()), message);
     }
+}
+
+#[test]
+fn normals_of_points_are_left_out_with_a_notice() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+        property float nx\nproperty float ny\nproperty float nz\nend_header\n1 2 3 0 0 1\n";
+    let model = read("points.ply", text.as_bytes()).unwrap();
+    assert_eq!(
+        model.notices,
+        ["normals of points are not kept: without faces, they cannot be computed again"]
+    );
+    let written = String::from_utf8(model.write(ModelFormat::Ply, &model.positions).unwrap()).unwrap();
+    assert!(!written.contains("nx") && written.ends_with("1 2 3\n"), "{written}");
 }
