@@ -26,6 +26,18 @@ pub enum PointFileError {
         /// Line number, from 1.
         line: usize,
     },
+    /// A line has commas beside semicolons, as files with decimal commas have.
+    #[error("line {line} has semicolons and commas: write decimals with points, not commas")]
+    DecimalComma {
+        /// Line number, from 1.
+        line: usize,
+    },
+    /// A header has other names for the columns.
+    #[error("line {line} names columns, but none x, y and z: rename those of the coordinates")]
+    Header {
+        /// Line number, from 1.
+        line: usize,
+    },
     /// A coordinate of a point is not finite.
     #[error("point {point} is not finite")]
     NotFinite {
@@ -70,8 +82,9 @@ impl PointFile {
     }
 
     /// Reads a NumPy array `[n, 3]` of 32- or 64-bit floats, or a text file with one point per line. Numbers are
-    /// separated by commas, semicolons or blanks. x, y and z are the first three, or the columns with these names in a
-    /// header. Lines before the first point, lines that begin with `#` and empty lines are kept.
+    /// separated by commas, semicolons or blanks, and may be quoted. x, y and z are the first three, or the columns with
+    /// these names in a header, which may add a unit (`x [m]`), or those that ParaView calls `Points:0` to `Points:2`.
+    /// Lines before the first point, lines that begin with `#` and empty lines are kept.
     ///
     /// # Errors
     /// [`PointFileError`] if the text or the array is invalid, a coordinate is not finite, there are no points, or the
@@ -99,20 +112,36 @@ impl PointFile {
     fn read_text(text: &str, bytes: u64) -> Result<Self, PointFileError> {
         let (mut positions, mut places) = (Vec::new(), Vec::new());
         let mut columns = [0, 1, 2];
+        // Number of names in a header without x, y and z, and its line.
+        let mut unnamed = None;
         let mut start = 0;
         for (number, line) in text.split_inclusive('\n').enumerate() {
             let found = words(line);
             let word = |column: usize| found.get(column).map(|range| &line[range.clone()]);
             let numbers = columns.map(|c| word(c).and_then(|word| word.parse::<f64>().ok()));
+            if line.contains(';') && line.contains(',') && numbers.iter().any(Option::is_some) {
+                return Err(PointFileError::DecimalComma { line: number + 1 });
+            }
             if let [Some(x), Some(y), Some(z)] = numbers {
+                if let Some((_, line)) = unnamed.filter(|(n, _)| positions.is_empty() && *n == found.len()) {
+                    return Err(PointFileError::Header { line });
+                }
                 positions.push(DVec3::new(x, y, z));
                 places.push(columns.map(|c| start + found[c].start..start + found[c].end));
             } else if positions.is_empty() {
-                let named = ["x", "y", "z"].map(|name| {
-                    found.iter().position(|r| line[r.clone()].trim_matches('"').eq_ignore_ascii_case(name))
+                let header = line.trim_start_matches(['#', ' ']);
+                let found = words(header);
+                let named = [["x", "points:0"], ["y", "points:1"], ["z", "points:2"]].map(|names| {
+                    found.iter().position(|range| {
+                        let name = header[range.clone()].split([' ', '[', '(']).next();
+                        name.is_some_and(|name| names.iter().any(|n| n.eq_ignore_ascii_case(name)))
+                    })
                 });
                 if let [Some(x), Some(y), Some(z)] = named {
                     columns = [x, y, z];
+                    unnamed = None;
+                } else if line.contains([',', ';']) && !line.starts_with('#') {
+                    unnamed = Some((found.len(), number + 1));
                 }
             } else if !found.is_empty() && !line.starts_with('#') {
                 return Err(PointFileError::Line { line: number + 1 });
@@ -150,15 +179,17 @@ impl PointFile {
     }
 }
 
-/// Splits a line into words. A comma or semicolon separates two words, which may be empty; blanks are trimmed.
+/// Splits a line into words. A comma or semicolon separates two words, which may be empty; blanks and quotes around a
+/// word are trimmed.
 fn words(line: &str) -> Vec<Range<usize>> {
     let is_separated = line.contains([',', ';']);
     let is_separator = |c: char| if is_separated { matches!(c, ',' | ';') } else { c.is_ascii_whitespace() };
     let mut start = 0;
     let mut found = Vec::new();
     for word in line.split(is_separator) {
-        let trimmed = word.trim();
-        let first = start + (word.len() - word.trim_start().len());
+        let is_around = |c: char| c.is_whitespace() || c == '"';
+        let trimmed = word.trim_matches(is_around);
+        let first = start + (word.len() - word.trim_start_matches(is_around).len());
         if is_separated || !trimmed.is_empty() {
             found.push(first..first + trimmed.len());
         }
@@ -185,6 +216,12 @@ mod tests {
             "# probes\nid,Z,X,Y,t\na,3.0,1.5,2,9\r\n\nb, -3 ,1.5,2,\n"
         );
         assert_eq!(moved("1;2;3;red\n# end"), "1.5;2;3;red\n# end");
+        assert_eq!(moved("# t x y z\n9 1 2 3\n"), "# t x y z\n9 1.5 2 3\n");
+        assert_eq!(moved("t, x [m],y (m),Z\n9,\"1\",2,3\n"), "t, x [m],y (m),Z\n9,\"1.5\",2,3\n");
+        assert_eq!(
+            moved("\"id\",\"Points:0\",\"Points:1\",\"Points:2\"\n0,1,2,3\n"),
+            "\"id\",\"Points:0\",\"Points:1\",\"Points:2\"\n0,1.5,2,3\n"
+        );
         assert_eq!(moved("\t1\t 2  3 255 0\n"), "\t1.5\t 2  3 255 0\n");
     }
 
@@ -205,6 +242,9 @@ mod tests {
         assert!(fault(b"").contains("no points"));
         assert!(fault(b"only words\n").contains("no points"));
         assert!(fault(b"1 2 3\n4 5\n").contains("line 2"));
+        assert!(fault(b"x;y;z\n0,1;0,2;0,3\n").contains("line 2 has semicolons and commas"));
+        assert!(fault(b"0,5;0,5;0,5\n").contains("line 1 has semicolons and commas"));
+        assert!(fault(b"id,a,b,c\n0,1,2,3\n").contains("line 1 names columns, but none x, y and z"));
         assert!(fault(b"1 2 3\nnan 0 0\n").contains("point 2 is not finite"));
         assert!(fault(b"\xff\xfe1").contains("UTF-8"));
         assert!(fault(b"\x93NUMPY\x01\x00").contains(".npy"));
