@@ -2,6 +2,7 @@
 //! cage lie in one axis-aligned plane.
 
 use cagework_core::mesh::PolygonMesh;
+use glam::DVec3;
 
 /// Largest distance of a vertex that counts as in the mirror plane, as a fraction of the diagonal of the mesh. It
 /// allows for rounding by the modelling program.
@@ -15,11 +16,19 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// Returns the plane that contains all `open` edges, if there is one and the whole mesh lies on one side of it.
+    /// Returns the plane that contains all `open` edges, if there is one, the whole mesh lies on one side of it, and the
+    /// open edges enclose an area. They enclose none where a vertex of one face lies on an edge of another.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
         let reach = (PLANE_TOLERANCE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];
+        let position =
+            |v: u32| mesh.positions.get(v as usize).map_or(DVec3::ZERO, |p| (*p - first).as_dvec3());
+        let area = open.iter().map(|&[a, b]| 0.5 * position(a).cross(position(b))).sum::<DVec3>();
+        let min_area = PLANE_TOLERANCE * mesh.diagonal().powi(2);
         (0..3).find_map(|axis| {
+            if area[axis].abs() <= min_area {
+                return None;
+            }
             let at = if first[axis].abs() <= reach { 0.0 } else { first[axis] };
             // Faces may have invalid indices.
             let from_plane = |v: u32| mesh.positions.get(v as usize).map_or(0.0, |p| p[axis] - at);
@@ -103,6 +112,18 @@ mod tests {
         );
         let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
         assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
+        // A corner in the middle of one edge leaves three open edges in a plane, which enclose no area.
+        let mut whole = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1; 3]);
+        let face = &mut whole.faces[0];
+        let [a, b] = [face[0], face[1]].map(|v| whole.positions[v as usize]);
+        face.insert(1, whole.positions.len() as u32);
+        whole.positions.push(a.midpoint(b));
+        let problem = check(&whole, None, None);
+        let problem = problem.problem(Code::OpenEdge).unwrap();
+        assert_eq!(
+            (problem.count, &problem.fixes[..]),
+            (3, &[Fix::Repair { repair: Repair::FillHoles }][..])
+        );
         // The open boundary is not planar, so there is no mirror plane.
         let mut bent = half(0, 0.0);
         bent.positions.iter_mut().filter(|p| p.x == 0.0 && p.y > 0.5).for_each(|p| p.x = 0.25);
