@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::Cage;
-use cagework_core::deform::{displacements, outside_in_words};
+use cagework_core::deform::{deform_bound, displacements, outside_in_words};
 use cagework_core::words::counted;
 use cagework_io::{
     MemoryError, Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, Timeline, read_weights_npz,
@@ -332,10 +332,15 @@ impl Deformation {
     }
 }
 
+/// Largest distance of a vertex from its position by the weights, at rest, as a fraction of the cage's diagonal. Weights
+/// of this mesh and this cage are off by rounding only, below 1e-5.
+const MAX_MISFIT: f64 = 1e-3;
+
 /// Reads weights, and checks that they match the mesh and the cage.
 ///
 /// # Errors
-/// If the file cannot be read, or its numbers of vertices differ from those of mesh and cage.
+/// If the file cannot be read, its numbers of vertices differ from those of mesh and cage, or the weights do not give the
+/// mesh at rest.
 pub(crate) fn load_weights(
     path: &Path,
     model: &Model,
@@ -346,8 +351,18 @@ pub(crate) fn load_weights(
     let (n_vertices, n_cage) = (model.positions.len(), cage.n_vertices());
     let n_bound =
         (saved.weights.n_columns() - saved.frames.n_columns()).saturating_sub(saved.inner_controls.len());
+    let hint = "use the mesh and the cage that were bound, or bind these again";
     if (saved.n_vertices(), n_bound) == (n_vertices, n_cage) {
-        return Ok(saved);
+        let misfit = misfit(&saved, model, cage) / f64::from(cage.diagonal());
+        if misfit <= MAX_MISFIT {
+            return Ok(saved);
+        }
+        let message = format!(
+            "{}: at rest its weights miss the mesh by {:.2} % of the cage's size: they belong to another mesh or cage",
+            shown_path(path),
+            100.0 * misfit,
+        );
+        return Err(CliError::Mismatch { message, hint });
     }
     Err(CliError::Mismatch {
         message: format!(
@@ -357,8 +372,22 @@ pub(crate) fn load_weights(
             saved.n_vertices(),
             n_bound,
         ),
-        hint: "use the mesh and the cage that were bound, or bind these again",
+        hint,
     })
+}
+
+/// Finds the largest distance between a vertex inside the cage and its position by the weights, at rest, object units.
+fn misfit(saved: &SavedWeights, model: &Model, cage: &Cage) -> f64 {
+    let mut by_weights = deform_bound(&saved.weights, &saved.frames, &rest_of(cage, saved));
+    for outside in &saved.outside {
+        if let (Some(at), Some(p)) =
+            (by_weights.get_mut(outside.vertex as usize), model.positions.get(outside.vertex as usize))
+        {
+            *at = *p;
+        }
+    }
+    let distance = |(at, p): (&Vec3, &Vec3)| at.as_dvec3().distance(p.as_dvec3());
+    by_weights.iter().zip(&model.positions).map(distance).fold(0.0, f64::max)
 }
 
 /// Returns the name of a pose: its file name without folder and extension.

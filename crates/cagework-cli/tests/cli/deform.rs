@@ -143,6 +143,11 @@ fn weights_of_another_mesh_or_cage_are_rejected_with_the_numbers() {
         .run("deform cage.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
         .code(1)
         .stderr(contains("w.npz").and(contains("178 mesh vertices")).and(contains("the mesh has 8")));
+    // As many vertices, in other places.
+    sandbox
+        .run("deform mesh.obj --cage lifted.obj --weights w.npz --pose affine.obj -o out.obj")
+        .code(1)
+        .stderr(contains("w.npz: at rest its weights miss the mesh by").and(contains("hint: ")));
     sandbox
         .run("deform mesh.obj --cage box:2 --weights w.npz --pose affine.obj -o out.obj")
         .code(1)
