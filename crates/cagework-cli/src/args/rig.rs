@@ -14,7 +14,7 @@ pub(crate) struct PartArgs {
     /// a joint (the vertices it influences most) or an OBJ group; use material:NAME, node:NAME, joint:NAME or group:NAME if several have the name. May be given several times.
     #[arg(long, value_name = "NAME")]
     rigid: Vec<String>,
-    /// Part that stays in place, named as for --rigid; with =0.5 after the name it follows half the way. May be given several
+    /// Part that stays in place, named as for --rigid; with =0.25 after the name it stays by a quarter and follows three quarters of the way. May be given several
     /// times.
     #[arg(long, value_name = "NAME[=AMOUNT]", value_parser = mask)]
     mask: Vec<(String, f32)>,

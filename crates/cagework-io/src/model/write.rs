@@ -148,7 +148,9 @@ impl Model {
         };
         let is_mesh_of_splats = self.capture.is_some() && !format.holds_splats();
         let has_harmonics = self.splats().is_some_and(|splats| splats.degree > 0) && format.holds_splats();
+        let is_clamped = format == ModelFormat::Spz && self.splats().is_some_and(spz::exceeds_ranges);
         let all = [
+            (is_clamped, "scales, colours or harmonics of splats outside the ranges of the format"),
             (is_mesh_of_splats, "everything but the centres of the splats"),
             (has_harmonics && loses(ModelProperty::Harmonics), "spherical harmonics of the splats"),
             (colors, "colours"),

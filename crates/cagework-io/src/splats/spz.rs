@@ -3,7 +3,7 @@
 
 use std::io::{Read as _, Write as _};
 
-use cagework_core::splats::n_harmonics;
+use cagework_core::splats::{Splats, n_harmonics};
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
@@ -245,6 +245,18 @@ fn axes_notice(mut records: &[u8]) -> Option<String> {
 
 fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+/// Whether the format has no numbers for some values of the splats: scales above 379, colours or harmonics far from those
+/// that can be displayed. Scales below 4.5e-5 become 4.5e-5, which cannot be seen.
+pub(crate) fn exceeds_ranges(splats: &Splats) -> bool {
+    let byte = 0.0..=255.5;
+    let is_scale = |&s: &Vec3| byte.contains(&(16.0 * (log_scale(s).max_element() + 10.0)).max(0.0));
+    let is_color = |&c: &Vec3| (COLOR_SCALE * band_0(c)).abs().max_element() <= 0.502;
+    let is_harmonic = |c: &Vec3| c.abs().max_element() <= 1.0;
+    !(splats.scales.iter().all(is_scale)
+        && splats.colors.iter().all(is_color)
+        && splats.harmonics.iter().all(is_harmonic))
 }
 
 /// Writes splats into a copy of the arrays of a file, or as a new file.

@@ -309,6 +309,19 @@ fn every_format_returns_what_every_other_wrote() {
     }
 }
 
+/// 16 (ln 400 + 10) = 256 exceeds a byte. The colour of band 0 is stored from -10/3 to 10/3, harmonics from -1 to 1.
+#[test]
+fn values_outside_the_ranges_of_spz_are_named() {
+    let of = |column: usize, x: f32| {
+        let model = read("a.ply", &ply(|s, c| (s == 2 && c == column).then_some(x))).unwrap();
+        model.lost_in(ModelFormat::Spz)
+    };
+    for (column, within, beyond) in [(19, 5.9, 6.0), (7, 3.3, 3.4), (12, -1.0, -1.1)] {
+        assert_eq!(of(column, within), None, "column {column}");
+        assert!(of(column, beyond).unwrap().contains("outside the ranges"), "column {column}");
+    }
+}
+
 #[test]
 fn unchanged_splats_keep_their_bytes_and_changed_ones_the_rest() {
     let file = ply(|_, _| None);
