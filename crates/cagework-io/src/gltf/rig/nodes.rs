@@ -45,10 +45,8 @@ pub(super) struct NodeUpdate {
     pub(super) nodes: Vec<Node>,
     /// World transforms, computed from the local transforms after rounding them to f32, as they are written.
     pub(super) world: Vec<DMat4>,
-    /// Displacement of each node; zero for nodes that do not follow the cage. `[n_nodes]`
-    pub(super) deltas: Vec<DVec3>,
-    /// Scale factor of clip translations of each node. `[n_nodes]`
-    pub(super) ratios: Vec<f64>,
+    /// `[n_nodes]`
+    pub(super) moves: Vec<NodeMove>,
     pub(super) n_moved: usize,
     /// Number of joints outside the cage that carry vertices.
     pub(super) n_outside: usize,
@@ -56,10 +54,18 @@ pub(super) struct NodeUpdate {
     pub(super) n_loose: usize,
 }
 
+/// How a node moves, in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct NodeMove {
+    pub(super) by: DVec3,
+    /// Scale factor of clip translations.
+    pub(super) ratio: f64,
+}
+
 /// Moves of a document's nodes, taken from the nodes of the same names in a [`Skeleton`](super::Skeleton).
 pub(super) struct NamedMoves {
-    /// Displacement of each node and scale factor of its clip translations. `[n_nodes]`
-    pub(super) of_nodes: Vec<Option<(DVec3, f64)>>,
+    /// A node with a move follows the cage, even if this document alone gives no reason for that. `[n_nodes]`
+    pub(super) of_nodes: Vec<Option<NodeMove>>,
     /// Whether each node carries vertices in one of the files. `[n_nodes]`
     pub(super) holds: Vec<bool>,
 }
@@ -143,6 +149,14 @@ impl Rig<'_> {
         joints
     }
 
+    /// Whether each node follows the cage or moves as a node of the same name. `[n_nodes]`
+    pub(super) fn following(&self, named: Option<&NamedMoves>) -> Vec<bool> {
+        let is_named = |node: usize| named.is_some_and(|named| named.of_nodes[node].is_some());
+        let mut follows: Vec<bool> = (0..self.held.len()).map(is_named).collect();
+        self.follows.iter().for_each(|&(node, _)| follows[node as usize] = true);
+        follows
+    }
+
     /// Names of skeleton nodes with unskinned meshes.
     pub(crate) fn props(&self) -> Vec<String> {
         let name = |node| name_of(&self.document.json, "nodes", node, "node");
@@ -182,12 +196,12 @@ impl Rig<'_> {
     pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
+        let still = NodeMove { by: DVec3::ZERO, ratio: 1.0 };
         let mut moved = NodeUpdate {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
             world: self.worlds.world.clone(),
-            deltas: vec![DVec3::ZERO; n],
-            ratios: vec![1.0; n],
+            moves: vec![still; n],
             n_moved: 0,
             n_outside: 0,
             n_loose: 0,
@@ -203,61 +217,69 @@ impl Rig<'_> {
             .iter()
             .filter(|(node, _)| goes(*node))
             .for_each(|&(node, at)| anchor[node as usize] = Some(at));
+        let named = |i: usize| given.named.and_then(|named| named.of_nodes[i]);
+        let follows = |i: usize| anchor[i].is_some() || !stays && named(i).is_some();
         let old = &self.worlds.world;
-        let mut delta = vec![DVec3::ZERO; n];
+        let mut moves = vec![still; n];
         let mut new: Vec<DMat4> = Vec::from(old.as_slice());
+        let turn = |at: usize| {
+            let turns = given.joints == Joints::Turn;
+            let turn = turns.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
+            turn.unwrap_or(DMat3::IDENTITY)
+        };
         for &(node, parent) in &self.worlds.order {
-            let i = node as usize;
-            let Some(at) = anchor[i] else {
-                if let Some(parent) = parent {
-                    let parent = parent as usize;
-                    if new[parent] != old[parent] {
-                        new[i] = new[parent] * local(&root.nodes[i]);
-                    }
-                }
-                continue;
-            };
+            let (i, parent) = (node as usize, parent.map(|p| p as usize));
             if let Some(motion) = given.rigid.get(&node) {
                 new[i] = motion.transform() * old[i];
-                delta[i] = (new[i].w_axis - old[i].w_axis).truncate();
+                moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
                 continue;
             }
-            let named = given.named.and_then(|named| named.of_nodes[i]);
-            let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
-            let is_outside = given.is_outside[at] && named.is_none();
             // A file that contains only clips has no vertices, and its points are not bound.
-            let is_loose = named.is_none() && (self.parts.is_empty() || is_outside && !holds);
-            moved.n_outside += usize::from(is_outside && !is_loose);
-            moved.n_loose += usize::from(is_loose);
-            // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a chain, follow
-            // their parent.
-            let by = match named {
-                Some((by, _)) => by,
-                None if is_loose => parent.map_or(DVec3::ZERO, |p| delta[p as usize]),
-                None => given.by[at],
+            let anchor = anchor[i].filter(|_| !self.parts.is_empty());
+            let (by, turn) = match (named(i).filter(|_| !stays), anchor) {
+                (Some(named), _) => (named.by, anchor.map_or(DMat3::IDENTITY, turn)),
+                (None, Some(at)) => {
+                    let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
+                    let is_loose = given.is_outside[at] && !holds;
+                    moved.n_outside += usize::from(given.is_outside[at] && holds);
+                    moved.n_loose += usize::from(is_loose);
+                    // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a
+                    // chain, follow their parent.
+                    let by =
+                        if is_loose { parent.map_or(DVec3::ZERO, |p| moves[p].by) } else { given.by[at] };
+                    (by, turn(at))
+                }
+                (None, None) => {
+                    moved.n_loose += usize::from(follows(i));
+                    if let Some(parent) = parent.filter(|&p| new[p] != old[p]) {
+                        new[i] = new[parent] * local(&root.nodes[i]);
+                        moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
+                    }
+                    continue;
+                }
             };
-            delta[i] = if by.length() <= MIN_DISPLACEMENT * self.diagonal { DVec3::ZERO } else { by };
-            let turn = given.joints == Joints::Turn;
-            let turn = turn.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
-            if delta[i] == DVec3::ZERO && turn.is_none_or(|t| t == DMat3::IDENTITY) {
+            let by = if by.length() <= MIN_DISPLACEMENT * self.diagonal { DVec3::ZERO } else { by };
+            moves[i].by = by;
+            if by == DVec3::ZERO && turn == DMat3::IDENTITY {
                 continue;
             }
-            let linear = turn.unwrap_or(DMat3::IDENTITY) * DMat3::from_mat4(old[i]);
-            new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + delta[i]);
+            let linear = turn * DMat3::from_mat4(old[i]);
+            new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + by);
         }
         let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
-        let mut ratios = if travels { self.ratios(given, &delta) } else { vec![1.0; n] };
-        if let Some(named) = given.named.filter(|_| travels) {
+        if travels {
+            let ratios = self.ratios(given, &moves);
             // Joints that are missing in the shared skeleton get the factor of another joint.
-            let one = named.of_nodes.iter().flatten().map(|(_, ratio)| *ratio).next();
-            let of_nodes = ratios.iter_mut().zip(&named.of_nodes);
-            of_nodes.for_each(|(own, named)| *own = named.map(|(_, ratio)| ratio).or(one).unwrap_or(*own));
+            let one = (0..n).find_map(named).map(|named| named.ratio);
+            for (i, ratio) in ratios.into_iter().enumerate() {
+                moves[i].ratio = named(i).map(|named| named.ratio).or(one).unwrap_or(ratio);
+            }
         }
         for &(node, parent) in &self.worlds.order {
             let i = node as usize;
             let [above, above_new] =
                 [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
-            if anchor[i].is_none() || (new[i] == old[i] && above == above_new) {
+            if !follows(i) || (new[i] == old[i] && above == above_new) {
                 continue;
             }
             let to = above_new.inverse() * new[i];
@@ -297,16 +319,16 @@ impl Rig<'_> {
             // Bone lengths are relative to the parent's scale.
             let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
             let short = MIN_BONE_LENGTH * self.diagonal / scale;
+            let moving = DMat3::from_diagonal(DVec3::splat(moves[i].ratio));
             let still = if t0.length().min(t1.length()) > short {
                 let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
                 DMat3::from_quat(turn) * (t1.length() / t0.length())
             } else {
                 DMat3::IDENTITY
             };
-            let moving = DMat3::from_diagonal(DVec3::splat(ratios[i]));
             moved.changes[i] = Some(NodeChange { from: t0, to: t1, still, moving, turn });
         }
-        (moved.deltas, moved.ratios) = (delta, ratios);
+        moved.moves = moves;
         if moved.n_moved > 0 {
             let mut root = root.clone();
             root.nodes = std::mem::take(&mut moved.nodes);
@@ -325,7 +347,7 @@ impl Rig<'_> {
     /// The factor is the height of the hips above the skeleton's lowest vertex after the deformation, divided by this
     /// height before the deformation. The hips are the node above the floor that, together with its descendants,
     /// carries the most vertices.
-    fn ratios(&self, given: &Deformation<'_>, delta: &[DVec3]) -> Vec<f64> {
+    fn ratios(&self, given: &Deformation<'_>, moves: &[NodeMove]) -> Vec<f64> {
         let (skeletons, n_skeletons) = self.skeletons();
         let mut carried = self.held.clone();
         for &(node, parent) in self.worlds.order.iter().rev() {
@@ -353,7 +375,7 @@ impl Rig<'_> {
             let i = node as usize;
             let Some(skeleton) = skeletons[i] else { continue };
             let ([low, high, after], at) = (spans[skeleton], self.worlds.world[i].w_axis.truncate());
-            let (before, now) = (at.dot(given.up) - low, (at + delta[i]).dot(given.up) - after);
+            let (before, now) = (at.dot(given.up) - low, (at + moves[i].by).dot(given.up) - after);
             if carried[i] > hips[skeleton].0 && before > MIN_HIP_HEIGHT * (high - low) {
                 hips[skeleton] =
                     (carried[i], (now / before).clamp(TRAVEL_SCALE_RANGE.0, TRAVEL_SCALE_RANGE.1));
@@ -375,8 +397,7 @@ impl Rig<'_> {
         };
         // Entry `n` stands for the missing parent of root nodes.
         let mut above: Vec<usize> = (0..=n).collect();
-        let mut follows = vec![false; n];
-        self.follows.iter().for_each(|(node, _)| follows[*node as usize] = true);
+        let follows = self.following(None);
         for &(node, parent) in self.worlds.order.iter().filter(|(node, _)| follows[*node as usize]) {
             above[node as usize] = parent.map_or(n, |parent| above[parent as usize]);
         }

@@ -93,22 +93,22 @@ pub(crate) fn reshape(
         }
         rigid.extend(found);
     }
+    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     let mut report = ReshapeReport {
-        joints: rig.follows.len(),
+        joints: rig.following(named.as_ref()).into_iter().filter(|follows| *follows).count(),
         morph_ends: rig.n_ends,
         morph_ends_outside: rig.ends_outside(is_outside),
         lattice_points: rig.lattice.as_ref().map_or(0, |lattice| lattice.nodes.len()),
         lattice_cell: rig.lattice.as_ref().map_or(0.0, |lattice| lattice.cell / rig.diagonal),
         ..ReshapeReport::default()
     };
-    let named = options.skeleton.as_ref().map(|skeleton| rig.named(skeleton));
     if let Some(named) = named.as_ref().filter(|_| rig.parts.is_empty())
         && named.of_nodes.iter().all(Option::is_none)
     {
         return Err(WriteError::Document("none of its nodes has the name of a joint of the skeleton".into()));
     }
     let is_shared =
-        named.iter().flat_map(|named| named.of_nodes.iter().flatten()).any(|m| m.0 != DVec3::ZERO);
+        named.iter().flat_map(|named| named.of_nodes.iter().flatten()).any(|named| named.by != DVec3::ZERO);
     let has_moved = is_shared || by.iter().any(|&by| by != DVec3::ZERO);
     if has_moved || !poses.is_empty() {
         separate(rig, &mut edit);

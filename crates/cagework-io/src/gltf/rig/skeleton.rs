@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::Rig;
 use super::ground::Ground;
-use super::nodes::{Deformation, NamedMoves, holders};
+use super::nodes::{Deformation, NamedMoves, NodeMove, holders};
 use crate::gltf::GltfDocument;
 use crate::gltf::geometry::attribute;
 use crate::gltf::scene::name_of;
@@ -24,9 +24,8 @@ const MAX_SAME_SCALE: f64 = 0.01;
 pub struct Skeleton {
     /// Joints that carry vertices in one of the files.
     holds: BTreeSet<String>,
-    /// For each joint of the body, the file whose deformation all files share: world position at rest, displacement,
-    /// and scale factor of clip translations.
-    moves: BTreeMap<String, (DVec3, DVec3, f64)>,
+    /// For each joint of the body, the file whose deformation all files share: world position at rest, and move.
+    moves: BTreeMap<String, (DVec3, NodeMove)>,
     /// Lowest points of the body or of all files, which determine how far every file is lifted. Displacements in
     /// `moves` include this lift.
     pub(super) ground: Option<Ground>,
@@ -103,9 +102,8 @@ impl Rig<'_> {
         let follows = self.follows.iter().map(|&(node, _)| node as usize);
         for node in holders(self.document).into_iter().chain(follows) {
             let from = self.worlds.world[node].w_axis.truncate();
-            let by = moved.deltas[node];
             let name = bare(&self.node_name(node as u32)).to_owned();
-            skeleton.moves.entry(name).or_insert((from, by, moved.ratios[node]));
+            skeleton.moves.entry(name).or_insert((from, moved.moves[node]));
         }
         skeleton
     }
@@ -117,7 +115,9 @@ impl Rig<'_> {
             (0..self.held.len() as u32).map(|node| bare(&self.node_name(node)).to_owned()).collect();
         let mut found: BTreeMap<&str, usize> = BTreeMap::new();
         let follows = self.follows.iter().map(|&(node, _)| node as usize);
-        for node in holders(self.document).into_iter().chain(follows) {
+        // A joint of the body that no clip of this file moves can still be the parent of one that a clip moves.
+        let others = (0..names.len()).filter(|&node| self.document.root.nodes[node].skin.is_none());
+        for node in holders(self.document).into_iter().chain(follows).chain(others) {
             if skeleton.moves.contains_key(&names[node]) {
                 found.entry(&names[node]).or_insert(node);
             }
@@ -137,8 +137,8 @@ impl Rig<'_> {
             .unwrap_or(1.0);
         let mut of_nodes = vec![None; names.len()];
         for (name, node) in found {
-            let (_, by, ratio) = skeleton.moves[name];
-            of_nodes[node] = Some((scale * by, ratio));
+            let (_, body) = skeleton.moves[name];
+            of_nodes[node] = Some(NodeMove { by: scale * body.by, ..body });
         }
         let holds = names.iter().map(|name| skeleton.holds(name)).collect();
         NamedMoves { of_nodes, holds }

@@ -66,7 +66,7 @@ pub(super) fn stand(
     let after = gltf::read("export.glb", &glb, &mut |_| None, u64::MAX, (Some(DVec3::ZERO), true))?.document;
     let players = [Player::new(before, before, rig.origin)?, Player::new(&after, before, rig.origin)?];
     let height = rig.origin.dot(given.up);
-    let top_of = tops(rig);
+    let top_of = tops(rig, given.named);
     let worlds = Worlds::new(&after.root)?;
     let names = given.named.filter(|named| named.of_nodes.iter().any(Option::is_some));
     let candidates = if names.is_some() { Vec::new() } else { candidates(&players[0]) };
@@ -118,10 +118,9 @@ pub(super) fn stand(
 
 /// For each node, the node that moves it together with its skeleton: from the root down, the first one that follows the
 /// cage and can be animated, because it has no matrix. `[n_nodes]`
-fn tops(rig: &Rig<'_>) -> Vec<Option<usize>> {
+fn tops(rig: &Rig<'_>, named: Option<&NamedMoves>) -> Vec<Option<usize>> {
     let nodes = &rig.document.root.nodes;
-    let mut follows = vec![false; nodes.len()];
-    rig.follows.iter().for_each(|&(node, _)| follows[node as usize] = true);
+    let follows = rig.following(named);
     let mut tops = vec![None; nodes.len()];
     for &(node, parent) in &rig.worlds.order {
         let i = node as usize;

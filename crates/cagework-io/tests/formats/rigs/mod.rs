@@ -7,6 +7,7 @@ mod features;
 mod feet;
 mod nodes;
 mod people;
+mod skeleton;
 mod surfaces;
 
 use crate::common::{self, json_of, rigged};
