@@ -58,6 +58,7 @@ pub(super) struct NodeUpdate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct NodeMove {
     pub(super) by: DVec3,
+    pub(super) turn: DMat3,
     /// Scale factor of clip translations.
     pub(super) ratio: f64,
 }
@@ -196,7 +197,7 @@ impl Rig<'_> {
     pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
-        let still = NodeMove { by: DVec3::ZERO, ratio: 1.0 };
+        let still = NodeMove { by: DVec3::ZERO, turn: DMat3::IDENTITY, ratio: 1.0 };
         let mut moved = NodeUpdate {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
@@ -237,7 +238,7 @@ impl Rig<'_> {
             // A file that contains only clips has no vertices, and its points are not bound.
             let anchor = anchor[i].filter(|_| !self.parts.is_empty());
             let (by, turn) = match (named(i).filter(|_| !stays), anchor) {
-                (Some(named), _) => (named.by, anchor.map_or(DMat3::IDENTITY, turn)),
+                (Some(named), _) => (named.by, named.turn),
                 (None, Some(at)) => {
                     let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
                     let is_loose = given.is_outside[at] && !holds;
@@ -254,12 +255,13 @@ impl Rig<'_> {
                     if let Some(parent) = parent.filter(|&p| new[p] != old[p]) {
                         new[i] = new[parent] * local(&root.nodes[i]);
                         moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
+                        moves[i].turn = moves[parent].turn;
                     }
                     continue;
                 }
             };
             let by = if by.length() <= MIN_DISPLACEMENT * self.diagonal { DVec3::ZERO } else { by };
-            moves[i].by = by;
+            (moves[i].by, moves[i].turn) = (by, turn);
             if by == DVec3::ZERO && turn == DMat3::IDENTITY {
                 continue;
             }

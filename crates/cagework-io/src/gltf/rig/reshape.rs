@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use cagework_pose::Parts;
-use glam::{DMat4, DVec3, Mat4, Vec3};
+use glam::{DMat3, DMat4, DVec3, Mat4, Vec3};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -68,10 +68,7 @@ pub(crate) fn reshape(
     poses: &[PoseDisplacements<'_>],
     (options, up): (&ReshapeOptions, DVec3),
 ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
-    if options.joints == Joints::Turn && document.json.pointer("/extensions/VRM").is_some() {
-        let message = "bones of a VRM 0 cannot have rotations: choose --joints follow or stay, or convert the file to VRM 1";
-        return Err(WriteError::Document(message.into()));
-    }
+    check_turn(document, options)?;
     let mut edit = Edit::new(document);
     let grounded;
     let mut by = by;
@@ -107,8 +104,10 @@ pub(crate) fn reshape(
     {
         return Err(WriteError::Document("none of its nodes has the name of a joint of the skeleton".into()));
     }
-    let is_shared =
-        named.iter().flat_map(|named| named.of_nodes.iter().flatten()).any(|named| named.by != DVec3::ZERO);
+    let is_shared = named
+        .iter()
+        .flat_map(|named| named.of_nodes.iter().flatten())
+        .any(|named| named.by != DVec3::ZERO || named.turn != DMat3::IDENTITY);
     let has_moved = is_shared || by.iter().any(|&by| by != DVec3::ZERO);
     if has_moved || !poses.is_empty() {
         separate(rig, &mut edit);
@@ -177,6 +176,15 @@ pub(crate) fn reshape(
     Ok((glb, report))
 }
 
+/// Refuses `--joints turn` for VRM 0.
+fn check_turn(document: &GltfDocument, options: &ReshapeOptions) -> Result<(), WriteError> {
+    if options.joints == Joints::Turn && document.json.pointer("/extensions/VRM").is_some() {
+        let message = "bones of a VRM 0 cannot have rotations: choose --joints follow or stay, or convert the file to VRM 1";
+        return Err(WriteError::Document(message.into()));
+    }
+    Ok(())
+}
+
 /// Writes the document with its vertices displaced by `by`, `[n_vertices]`, and its joints in place. Ends of morph targets
 /// move with the vertices.
 pub(crate) fn write_moved(
@@ -212,6 +220,7 @@ pub(crate) fn skeleton(
     (by, is_outside): (&[DVec3], &[bool]),
     (options, up): (&ReshapeOptions, DVec3),
 ) -> Result<Skeleton, WriteError> {
+    check_turn(document, options)?;
     let (joints, keep_travel, none) = (options.joints, options.keep_travel, HashMap::new());
     let ground = if options.ground {
         let options = ReshapeOptions { feet: Feet::Free, ..options.clone() };

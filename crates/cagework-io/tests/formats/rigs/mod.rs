@@ -335,6 +335,7 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     let turns = ReshapeOptions { joints: Joints::Turn, ..ReshapeOptions::default() };
     let message = model.write_reshaped(&by(&model), &[], &[], &turns).unwrap_err().to_string();
     assert!(message.contains("bones of a VRM 0 cannot have rotations"), "{message}");
+    assert_eq!(model.skeleton(&by(&model), &[], &turns).unwrap_err().to_string(), message);
     let springs = &json["VRM"]["secondaryAnimation"]["colliderGroups"][0]["colliders"][0];
     let colliders = &json["VRMC_springBone"]["colliders"];
     let capsule = &colliders[0]["shape"]["capsule"];

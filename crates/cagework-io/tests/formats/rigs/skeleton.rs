@@ -3,18 +3,23 @@
 use std::sync::Arc;
 
 use cagework_io::{Joints, Model, ReshapeOptions};
-use glam::{DVec3, Vec3, vec3};
+use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::json;
 
 use super::{ROUNDING_TOLERANCE, assert_near, f, player, read};
 use crate::common::rigged;
 
-/// The skeleton and the clip of [`rigged`] without its mesh. `tracks`: channels of the clip that are kept.
+/// Tolerance for joints that turn. The gradient of a deformation that moves points of f32 has an error of about 3e-6.
+const TURN_TOLERANCE: f32 = 2e-5;
+
+/// The skeleton and the clip of [`rigged`] without its mesh. `tracks`: channels of the clip that are kept. The clip rotates
+/// the middle joint.
 fn clip_of(tracks: &[usize]) -> Model {
     let mut rig = rigged();
     let file = rig.json.as_object_mut().unwrap();
     ["meshes", "skins"].into_iter().for_each(|key| drop(file.shift_remove(key)));
     rig.json["nodes"][4] = json!({ "name": "bar" });
+    rig.json["animations"][0]["channels"][2]["target"]["node"] = 2.into();
     let channels = rig.json["animations"][0]["channels"].as_array().unwrap();
     rig.json["animations"][0]["channels"] = tracks.iter().map(|&track| channels[track].clone()).collect();
     Model::read_with_clips("walk.glb", rig.glb(), &mut |_| None, u64::MAX).unwrap()
@@ -50,5 +55,18 @@ fn joints_without_tracks_follow_the_body() {
         assert_near(&after, &expected, ROUNDING_TOLERANCE, &format!("tracks {tracks:?}"));
         let [_, after, body] = origins((tracks, 0.0), Joints::Follow, f);
         assert_near(&after, &body, ROUNDING_TOLERANCE, "first key, which is the rest pose");
+    }
+}
+
+#[test]
+fn joints_turn_as_in_the_body() {
+    let turn = Quat::from_axis_angle(vec3(1.0, 2.0, 3.0).normalize(), 0.8);
+    let moved = |p| turn * p + vec3(0.2, 0.0, 0.1);
+    for (tracks, seconds) in [(&[1, 2][..], 0.4), (&[1, 2], 1.0), (&[2], 0.7)] {
+        let [before, after, _] = origins((tracks, seconds), Joints::Turn, moved);
+        let expected: Vec<Vec3> = before.into_iter().map(moved).collect();
+        assert_near(&after, &expected, TURN_TOLERANCE, &format!("tracks {tracks:?} at {seconds} s"));
+        let [_, after, body] = origins((tracks, 0.0), Joints::Turn, f);
+        assert_near(&after, &body, TURN_TOLERANCE, "first key, which is the rest pose");
     }
 }
