@@ -61,6 +61,9 @@ pub(super) struct NodeMove {
     pub(super) turn: DMat3,
     /// Scale factor of clip translations.
     pub(super) ratio: f64,
+    /// Whether the cage can move none of the nodes above. Constant translations of such a node are positions, not
+    /// lengths of a bone.
+    pub(super) is_top: bool,
 }
 
 /// Moves of a document's nodes, taken from the nodes of the same names in a [`Skeleton`](super::Skeleton).
@@ -197,7 +200,7 @@ impl Rig<'_> {
     pub(super) fn moved(&self, given: &Deformation<'_>, json: &mut Value) -> NodeUpdate {
         let root = &self.document.root;
         let n = root.nodes.len();
-        let still = NodeMove { by: DVec3::ZERO, turn: DMat3::IDENTITY, ratio: 1.0 };
+        let still = NodeMove { by: DVec3::ZERO, turn: DMat3::IDENTITY, ratio: 1.0, is_top: true };
         let mut moved = NodeUpdate {
             changes: (0..n).map(|_| None).collect(),
             nodes: root.nodes.clone(),
@@ -222,6 +225,8 @@ impl Rig<'_> {
         let follows = |i: usize| anchor[i].is_some() || !stays && named(i).is_some();
         let old = &self.worlds.world;
         let mut moves = vec![still; n];
+        // Whether the cage can move each node or one above it.
+        let mut movable = vec![false; n];
         let mut new: Vec<DMat4> = Vec::from(old.as_slice());
         let turn = |at: usize| {
             let turns = given.joints == Joints::Turn;
@@ -230,7 +235,10 @@ impl Rig<'_> {
         };
         for &(node, parent) in &self.worlds.order {
             let (i, parent) = (node as usize, parent.map(|p| p as usize));
+            let is_below = parent.is_some_and(|p| movable[p]);
+            (movable[i], moves[i].is_top) = (is_below, !is_below);
             if let Some(motion) = given.rigid.get(&node) {
+                movable[i] = true;
                 new[i] = motion.transform() * old[i];
                 moves[i].by = (new[i].w_axis - old[i].w_axis).truncate();
                 continue;
@@ -238,12 +246,16 @@ impl Rig<'_> {
             // A file that contains only clips has no vertices, and its points are not bound.
             let anchor = anchor[i].filter(|_| !self.parts.is_empty());
             let (by, turn) = match (named(i).filter(|_| !stays), anchor) {
-                (Some(named), _) => (named.by, named.turn),
+                (Some(named), _) => {
+                    (movable[i], moves[i].is_top) = (true, named.is_top);
+                    (named.by, named.turn)
+                }
                 (None, Some(at)) => {
                     let holds = self.held[i] > 0.0 || given.named.is_some_and(|named| named.holds[i]);
                     let is_loose = given.is_outside[at] && !holds;
                     moved.n_outside += usize::from(given.is_outside[at] && holds);
                     moved.n_loose += usize::from(is_loose);
+                    movable[i] |= !is_loose;
                     // Nodes outside the cage that carry no vertices, such as a root on the floor or the end of a
                     // chain, follow their parent.
                     let by =
@@ -322,7 +334,9 @@ impl Rig<'_> {
             let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
             let short = MIN_BONE_LENGTH * self.diagonal / scale;
             let moving = DMat3::from_diagonal(DVec3::splat(moves[i].ratio));
-            let still = if t0.length().min(t1.length()) > short {
+            let still = if moves[i].is_top {
+                moving
+            } else if t0.length().min(t1.length()) > short {
                 let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
                 DMat3::from_quat(turn) * (t1.length() / t0.length())
             } else {

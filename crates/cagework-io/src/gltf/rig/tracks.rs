@@ -27,7 +27,7 @@ pub(super) struct NodeChange {
     pub(super) from: DVec3,
     pub(super) to: DVec3,
     /// Linear maps for deviations from `from`: `still` in tracks of constant translation, `moving` in tracks that move
-    /// the node.
+    /// the node. They are equal if no node above moves.
     pub(super) still: DMat3,
     pub(super) moving: DMat3,
     /// Rotation by which rotation keys are multiplied from the left.
@@ -108,7 +108,8 @@ pub(super) fn values<const N: usize>(document: &GltfDocument, output: &Output) -
 }
 
 /// Whether a clip moves each changed node: the range of a translation track exceeds [`MIN_TRANSLATION_RANGE`]. The
-/// translation tracks of other nodes are constant and repeat the length of the node's bone.
+/// translation tracks of other nodes are constant. They repeat the length of the node's bone, or place a node at the top
+/// of a skeleton.
 fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<NodeChange>]) -> Vec<bool> {
     let mut moving = vec![false; changes.len()];
     for animation in edit.json["animations"].as_array().into_iter().flatten() {

@@ -183,3 +183,40 @@ fn feet_stay_attached_to_legs_in_clips() {
     let way = |seconds| kept.at(Some(0), seconds, &[]).origins[1];
     assert!((way(1.0) - way(0.0)).distance(vec3(0.0, 0.2, 0.4)) <= ROUNDING_TOLERANCE);
 }
+
+/// The clip in which the robot stands somewhere else places its hips and its foot. The root cannot be moved: it has no reason
+/// to follow the cage or, with a track, is outside the cage and carries no vertices.
+#[test]
+fn constant_translations_of_top_nodes_are_positions() {
+    let shifted = |p: Vec3| p + vec3(0.5, -0.9, 0.0);
+    let taller = |p: Vec3| vec3(p.x, 1.35 * p.y, p.z);
+    for root_has_track in [false, true] {
+        let mut robot = robot();
+        robot.json["animations"].as_array_mut().unwrap().remove(0);
+        if root_has_track {
+            clip(&mut robot, &[(0, "rotation", [0.0, 0.0, 0.0, 1.0].repeat(2))]);
+        }
+        let model = read(&robot.glb());
+        let (joints, extra) = (model.joints().unwrap(), model.extra_points().unwrap());
+        let outside: Vec<u32> = joints
+            .iter()
+            .filter(|joint| joint.node == 0)
+            .map(|joint| (model.positions.len() + joint.point) as u32)
+            .collect();
+        for (moved, ratio) in [(&shifted as &dyn Fn(Vec3) -> Vec3, 1.0), (&taller, 1.35)] {
+            let points = model.positions.iter().chain(&extra);
+            let by: Vec<DVec3> = points.map(|&p| moved(p).as_dvec3() - p.as_dvec3()).collect();
+            let options = ReshapeOptions::default();
+            let (bytes, _) = model.write_reshaped(&by, &outside, &[], &options).unwrap();
+            let origins = player(&read(&bytes)).at(Some(0), 0.5, &[]).origins;
+            for (node, at) in [(1, vec3(0.0, 1.0, 0.0)), (3, vec3(0.5, 0.25, 0.0))] {
+                let expected = moved(at) + ratio * vec3(0.0, 0.0, 0.5);
+                assert!(
+                    origins[node].distance(expected) <= ROUNDING_TOLERANCE,
+                    "node {node}: {} instead of {expected}",
+                    origins[node]
+                );
+            }
+        }
+    }
+}
