@@ -252,6 +252,17 @@ fn poses_become_expressions_of_a_vrm() {
         .run(&deform("one.vrm", "--pose wide.obj --name aa"))
         .code(1)
         .stderr(contains("the file has an expression 'aa' already"));
+    // Presets of VRM 0 are case-insensitive, and applications find an expression by its preset, not by its name.
+    for name in ["a", "A"] {
+        sandbox
+            .run(&deform("zero.vrm", &format!("--pose wide.obj --name {name}")))
+            .code(1)
+            .stderr(contains(format!("the file has an expression '{name}' already")));
+    }
+    sandbox
+        .run(&deform("zero.vrm", "--pose wide.obj --name Joy --pose wide.obj --name joy"))
+        .code(1)
+        .stderr(contains("the file has an expression 'joy' already"));
     sandbox
         .run(&format!("{} --times 0.5", deform("one.vrm", one)))
         .success()

@@ -100,14 +100,18 @@ pub(crate) fn vrm(document: &GltfDocument) -> Option<Vrm> {
 
 fn names(json: &Value) -> Vec<String> {
     let of_1 = &json["extensions"]["VRMC_vrm"]["expressions"];
-    let groups = &json["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"];
     let of_1 = ["preset", "custom"].into_iter().filter_map(|kind| of_1[kind].as_object());
     let of_1: Vec<String> = of_1.flat_map(|all| all.keys().cloned()).collect();
     if !of_1.is_empty() {
         return of_1;
     }
-    let groups = groups.as_array().into_iter().flatten();
-    groups.filter_map(|group| Some(group["name"].as_str()?.to_owned())).collect()
+    groups(json).filter_map(|group| Some(group["name"].as_str()?.to_owned())).collect()
+}
+
+/// Expressions of VRM 0.
+fn groups(json: &Value) -> impl Iterator<Item = &Value> {
+    let groups = &json["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"];
+    groups.as_array().into_iter().flatten()
 }
 
 /// Adds an expression for each pose.
@@ -119,9 +123,15 @@ pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result
     if !is_1 && !json.pointer("/extensions/VRM").is_some_and(Value::is_object) {
         return Err(WriteError::Document("the file has no VRM data, which expressions need".into()));
     }
-    let mut known: BTreeSet<String> = names(json).into_iter().collect();
+    // Applications find a preset of VRM 0 by `presetName`, which is compared without case.
+    let preset_0 = |name: &str| Some(name.to_lowercase()).filter(|small| PRESETS_0.contains(&small.as_str()));
+    let key = |name: &str| preset_0(name).filter(|_| !is_1).unwrap_or_else(|| name.to_owned());
+    let mut known: BTreeSet<String> = names(json).iter().map(|name| key(name)).collect();
+    if !is_1 {
+        known.extend(groups(json).filter_map(|group| preset_0(group["presetName"].as_str()?)));
+    }
     for (name, targets) in poses {
-        if !known.insert((*name).to_owned()) {
+        if !known.insert(key(name)) {
             return Err(WriteError::Document(format!(
                 "the file has an expression '{}' already: give the pose another name",
                 shown(name)
@@ -140,8 +150,7 @@ pub(super) fn add(json: &mut Value, poses: &[(&str, Vec<PoseTarget>)]) -> Result
                 .iter()
                 .map(|(mesh, target)| json!({ "mesh": mesh, "index": target, "weight": 100.0 }))
                 .collect();
-            let small = name.to_lowercase();
-            let preset = if PRESETS_0.contains(&small.as_str()) { &small } else { "unknown" };
+            let preset = preset_0(name).unwrap_or_else(|| "unknown".into());
             let group = json!({
                 "name": name, "presetName": preset, "binds": binds, "materialValues": [], "isBinary": false,
             });
