@@ -2,7 +2,7 @@
 //! ranges, and the table of ranges in docs/limits.md.
 
 use std::any::TypeId;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write as _;
 use std::fs;
 
@@ -33,11 +33,12 @@ const LIMITS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/limits.md"
 const TABLE_START: &str = "<!-- Written by crates/cagework-web/src/border.rs -->";
 const TABLE_END: &str = "<!-- end -->";
 
-/// TypeScript declarations of types and of all types that these refer to.
+/// TypeScript declarations of types and of all types that these refer to, by name: the order in which types are visited
+/// can change with each compilation.
 struct Declarations {
     config: Config,
     seen: HashSet<TypeId>,
-    text: String,
+    found: BTreeMap<String, String>,
 }
 
 impl TypeVisitor for Declarations {
@@ -48,7 +49,7 @@ impl TypeVisitor for Declarations {
         }
         T::visit_dependencies(self);
         let (docs, declaration) = (T::docs().unwrap_or_default(), T::decl(&self.config));
-        writeln!(self.text, "{docs}export {declaration}").unwrap();
+        self.found.insert(T::ident(&self.config), format!("{docs}export {declaration}\n"));
     }
 }
 
@@ -61,8 +62,7 @@ fn constant(name: &str, r#type: &str, value: impl Into<Value>) -> String {
 fn generated_types_are_up_to_date() {
     // 64-bit integers are sent as JavaScript numbers.
     let config = Config::default().with_large_int("number");
-    let text = "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n";
-    let mut found = Declarations { config, seen: HashSet::new(), text: text.to_owned() };
+    let mut found = Declarations { config, seen: HashSet::new(), found: BTreeMap::new() };
     found.visit::<ErrorName>();
     found.visit::<Event>();
     found.visit::<Offsets>();
@@ -81,7 +81,11 @@ fn generated_types_are_up_to_date() {
     found.visit::<SelectMode>();
     found.visit::<GestureView>();
     found.visit::<GizmoPart>();
-    let mut text = found.text.replace(" \n", "\n");
+    let declarations: String = found.found.into_values().collect();
+    let mut text = format!(
+        "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n{}",
+        declarations.replace(" \n", "\n")
+    );
     text += &constant("BIND_DEFAULTS", "BindOptions", fields(&JsBindOptions::default()));
     text += &constant("CAGE_DEFAULTS", "CageOptions", fields(&CageOptions::default()));
     text += &constant("RIG_DEFAULTS", "RigOptions", fields(&JsRigOptions::default()));

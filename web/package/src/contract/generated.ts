@@ -1,215 +1,60 @@
 // Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.
 
 /**
- * Kinds of errors that the page handles differently.
- */
-export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
-/**
- * Stages of a bind, in order, and of cage generation.
- */
-export type Stage = "voxelize" | "solve" | "sample" | "simplify";
-/**
- * A [`ProgressEvent`] as JavaScript receives it.
- */
-export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
-/**
- * A mesh vertex outside the cage.
- */
-export type OutsideVertex = {
-/**
- * Index of the mesh vertex.
- */
-vertex: number,
-/**
- * Distance from the cage, object units.
- */
-distance: number,
-/**
- * Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
- */
-share: number, };
-/**
- * Columns of a bind's weights that follow those of its controls.
- */
-export type Frames = {
-/**
- * Contribution of each cage vertex to the matrix of the whole cage's motion, per object unit; empty without
- * frames. `[n_cage]`
- */
-whole: Array<[number, number, number]>,
-/**
- * The control of each joint. `[n_joints]`
- */
-joints: Array<number>,
-/**
- * The two joints of each bone, as indices into `joints`; bones of a line are consecutive. `[n_bones]`
- */
-bones: Array<[number, number]>,
-/**
- * Weights of the cage vertices at each joint in the cage without inner controls, and their gradients (per object
- * unit). `[n_joints, n_cage]`
- */
-plain: Array<[number, number, number, number]>, };
-/**
- * Frames of a bind, and the points outside the cage.
- */
-export type Offsets = {
-/**
- * Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
- * In the weights, their columns follow the columns of the controls.
- */
-frames: Frames,
-/**
- * Points outside the cage.
- */
-outside: Array<OutsideVertex>, };
-/**
- * Numbers of cells by kind.
- */
-export type CellCounts = {
-/**
- * Cells inside the cage, without the boundary cells.
- */
-interior: number,
-/**
- * Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
- * and less than a cell from its surface along an axis.
- */
-boundary: number,
-/**
- * Cells outside the cage.
- */
-exterior: number, };
-/**
- * Discretisation of the cage.
- */
-export type Method = "classic" | "embedded";
-/**
- * Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
- * K. Smith's paper (`docs/method.md`, sources).
- */
-export type RestError = {
-/**
- * Mean over the vertices, object units.
- */
-mean: number,
-/**
- * 99th percentile over the vertices, object units.
- */
-p99: number,
-/**
- * Largest error of a vertex, object units.
- */
-max: number,
-/**
- * Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
- */
-mean_rel: number,
-/**
- * Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
- */
-max_rel: number, };
-/**
- * Statistics of the stored weights.
- */
-export type WeightStats = {
-/**
- * Smallest weight.
- */
-min: number,
-/**
- * Largest weight.
- */
-max: number,
-/**
- * Largest `|sum of a row - 1|`.
- */
-max_sum_error: number,
-/**
- * Number of stored weights.
- */
-nonzeros: number, };
-/**
  * Processor that computes a bind.
  */
 export type Backend = "cpu" | "gpu";
 /**
- * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
+ * Options of a bind, and the processor that it runs on.
  */
-export type DeltaNorm = "euclidean" | "literal";
+export type BindOptions = { backend: Backend,
 /**
- * Cell shape of the classic method.
+ * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
  */
-export type CellShape = "box" | "cubic";
+grid: number,
 /**
- * Wall-clock time of each stage of a bind, milliseconds.
+ * Discretisation of the cage. Default embedded.
  */
-export type Timings = {
+method: Method,
 /**
- * Voxelization, levels and transfer tables.
+ * Solver of Laplace's equation. Default multigrid.
  */
-voxelize: number,
+solver: Solver,
 /**
- * Solve of all columns.
+ * Preconditioner of conjugate gradients. Default none.
  */
-solve: number,
+preconditioner: Preconditioner,
 /**
- * Sampling and assembly.
+ * Cell shape of the classic method. Default box.
  */
-sample: number,
+cell_shape: CellShape,
 /**
- * The whole bind.
+ * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
  */
-total: number, };
+delta_norm: DeltaNorm,
 /**
- * Mean and maximum of an error over the mesh vertices inside the cage.
+ * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
+ * of the other solvers. Default 1e-5.
  */
-export type MeanMax = {
+tau: number,
 /**
- * Mean of the error.
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
  */
-mean: number,
+max_iterations: number,
 /**
- * Largest error of a vertex.
+ * Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
+ * restored. 0 drops none. Default 0.
  */
-max: number, };
+sparsify: number,
 /**
- * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
- * exactly, so with the embedded method this error is that of the solver.
+ * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
+ * exceed this. Default 4 GiB; 2 GiB in wasm.
  */
-export type RawError = {
+memory_limit: number,
 /**
- * Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
+ * Treatment of vertices outside the cage. Default extend.
  */
-sum: MeanMax,
-/**
- * Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
- */
-point_rel: MeanMax,
-/**
- * Smallest weight, before negative weights are set to 0.
- */
-min_weight: number, };
-/**
- * Preconditioner of conjugate gradients.
- */
-export type Preconditioner = "none" | "v_cycle";
-/**
- * Solver of Laplace's equation.
- */
-export type Solver = "jacobi" | "multigrid" | "cg";
-/**
- * Working memory of a bind, bytes.
- */
-export type MemoryBytes = {
-/**
- * Estimate that is compared with the memory limit before the bind starts.
- */
-estimated: number,
-/**
- * Largest sum of buffers alive at the same time.
- */
-peak: number, };
+outside: OutsidePolicy, };
 /**
  * Options, grid, convergence, times and errors of a bind.
  */
@@ -361,17 +206,17 @@ notices: Array<string>, };
  */
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 /**
- * Counts, bounds and notices of the cage.
+ * A cage that the page opens.
  */
-export type CageInfo = { vertices: number, edges: number, faces: number,
+export type CageContents = {
 /**
- * Number of quads among the faces.
+ * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
  */
-quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+positions: Float32Array,
 /**
- * An element of inner controls: indices into [`InnerControls::positions`].
+ * For each face, the number of its corners, then the vertex index of each corner.
  */
-export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
+corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
 /**
  * Subdivision and interior controls of a cage.
  */
@@ -393,6 +238,55 @@ elements: Array<InnerElement>,
  */
 radius: number | null, };
 /**
+ * Counts, bounds and notices of the cage.
+ */
+export type CageInfo = { vertices: number, edges: number, faces: number,
+/**
+ * Number of quads among the faces.
+ */
+quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+/**
+ * Options of [`super::generate`]. Serde aliases are names in older project files.
+ */
+export type CageOptions = {
+/**
+ * Target number of vertices, 8 to 400. Default 80.
+ */
+target: number,
+/**
+ * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
+ * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
+ * lattice for the default target, which has 36 voxels along the longest side.
+ */
+detail: number,
+/**
+ * Whether to pair triangles into quads. Default true.
+ */
+quads: boolean,
+/**
+ * Shape that the cage follows. Default follow.
+ */
+shape: Shape,
+/**
+ * Mirror symmetry. Default auto.
+ */
+symmetry: Symmetry,
+/**
+ * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
+ * Otherwise thin bridges join them into one cage. Default false.
+ */
+per_component: boolean,
+/**
+ * Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
+ * of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
+ */
+clearance: number,
+/**
+ * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
+ * voxels are closed, and details thinner than one voxel are lost. Default 0.
+ */
+voxels: number, };
+/**
  * The cage's properties, and its interior controls.
  */
 export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
@@ -401,78 +295,42 @@ export type CageState = { usable: boolean, info: CageInfo, controls: CageControl
  */
 radius: number, };
 /**
- * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
+ * Position and direction of the camera.
  */
-export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
+export type CameraView = {
 /**
- * A repair of a cage mesh that needs no decision by the user.
+ * Point that the camera orbits, object units.
  */
-export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
+target: [number, number, number],
 /**
- * Action of the button that fixes a fault.
+ * Rotation of the camera about y, radians; `pitch` is its elevation above the horizon.
  */
-export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
+yaw: number, pitch: number,
 /**
- * Effect of a problem on binding and its results.
+ * Distance from the eye to the target, object units.
  */
-export type Severity = "error" | "warning" | "note";
+distance: number, parallel: boolean, };
 /**
- * Faults of one kind in a cage: their number, and the best fix.
+ * Numbers of cells by kind.
  */
-export type Problem = { code: Code, severity: Severity,
+export type CellCounts = {
 /**
- * Message of one or more complete sentences.
+ * Cells inside the cage, without the boundary cells.
  */
-message: string, count: number, fix: Mend | null, };
+interior: number,
 /**
- * The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
- * they are read, and back when they are written. The rotations are exact.
+ * Classic method: cells that the cage's surface intersects. Embedded method: cells whose centre is inside the cage
+ * and less than a cell from its surface along an axis.
  */
-export type UpAxis = "y" | "z" | "y_down";
+boundary: number,
 /**
- * A morph target and its default weight.
+ * Cells outside the cage.
  */
-export type TargetView = { name: string, default: number, };
+exterior: number, };
 /**
- * File format of a model.
+ * Cell shape of the classic method.
  */
-export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz";
-/**
- * Visibility of a model, and which of its parts the cage does not bend.
- */
-export type PartOptions = {
-/**
- * Whether the model is drawn and can be picked.
- */
-shown: boolean,
-/**
- * Names of parts that keep their shape; "all" for the whole model.
- */
-rigid: Array<string>,
-/**
- * Names of parts that stay in place; "all" for the whole model.
- */
-stays: Array<string>, };
-/**
- * Properties and options of one of the models in the cage.
- */
-export type MemberInfo = {
-/**
- * Identifier, which stays the same for the model's lifetime.
- */
-id: number, name: string, format: ModelFormat, vertices: number, triangles: number,
-/**
- * Number of joints of its skins.
- */
-joints: number,
-/**
- * Names of the parts, prefixed by their kind, such as `material:Cloth`.
- */
-parts: Array<string>, options: PartOptions,
-/**
- * Whether some vertices of the model are painted to stay in place.
- */
-painted: boolean, };
+export type CellShape = "box" | "cubic";
 /**
  * Name and duration of an animation clip, for the list of clips.
  */
@@ -482,86 +340,17 @@ export type ClipView = {
  */
 name: string, seconds: number, };
 /**
- * Combined properties of all models in the cage.
+ * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
-export type ModelInfo = {
+export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
 /**
- * Name of the first model.
+ * Colour map that a legend shows.
  */
-name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number,
+export type ColorMap = "viridis" | "error" | "kinds";
 /**
- * Number of splats of a capture, otherwise 0.
+ * What the colours of the model show: its materials, plain clay, weights, or errors.
  */
-splats: number,
-/**
- * Number of points of a point cloud, otherwise 0.
- */
-points: number, skins: number, joints: number, clips: Array<ClipView>,
-/**
- * Morph targets of all models, and their weights at rest.
- */
-targets: Array<TargetView>,
-/**
- * Names of unskinned parts attached to joints or animated nodes, which an export can keep rigid.
- */
-props: Array<string>,
-/**
- * Whether a model has a rig that an export keeps.
- */
-rigged: boolean,
-/**
- * Whether a model is a VRM.
- */
-vrm: boolean, bounds: Bounds,
-/**
- * Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
- * other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
- */
-suggestedUp: UpAxis | null, notices: Array<string>,
-/**
- * Properties of each model.
- */
-members: Array<MemberInfo>, };
-/**
- * A point on the surface of the models.
- */
-export type SurfacePoint = {
-/**
- * Number of the triangle, unique among all models that the document has ever contained.
- */
-triangle: number,
-/**
- * Barycentric coordinates in the triangle.
- */
-bary: [number, number, number], };
-/**
- * Interpolation between two keys, as in glTF 2.0, appendix C.
- */
-export type Interpolation = "step" | "linear" | "cubic";
-/**
- * An edit of the selected elements of the cage.
- */
-export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
-/**
- * How the animation of the saved poses goes from one to the next, and how it ends.
- */
-export type Transition = {
-/**
- * Interpolation towards poses that have none of their own, and of the return to the start.
- */
-interpolation: Interpolation,
-/**
- * Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
- */
-loops: boolean,
-/**
- * Time of the return from the last pose to the shape at the start, seconds.
- */
-back: number, };
-/**
- * A kind of interior control.
- */
-export type InnerKind = "point" | "line" | "face";
+export type Colour = "material" | "clay" | "weight" | "error";
 /**
  * A change of the document.
  */
@@ -723,37 +512,301 @@ id: number,
  */
 amounts: Array<number>, };
 /**
+ * Compression of a GLB.
+ */
+export type Compression = "none" | "meshopt";
+/**
+ * Kind of coordinates.
+ */
+export type Coordinates = "harmonic" | "mean_value" | "green";
+/**
+ * Norm of the change of a cell's weights in a Jacobi sweep (K. Smith, Eq. 2).
+ */
+export type DeltaNorm = "euclidean" | "literal";
+/**
+ * Options of a drag.
+ */
+export type DragOptions = {
+/**
+ * Distance along the surface up to which the model moves.
+ */
+reach: Reach,
+/**
+ * Share by which parts within the reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
+ */
+relax: number,
+/**
+ * Whether the cage stays symmetric: each step averages it with its mirror image. Default false.
+ */
+symmetry: boolean, };
+/**
  * Element type that a click selects.
  */
 export type Element = "vertex" | "edge" | "face";
+/**
+ * Kinds of errors that the page handles differently.
+ */
+export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
+/**
+ * What happens to planted feet in clips.
+ */
+export type Feet = "free" | "lock";
+/**
+ * Columns of a bind's weights that follow those of its controls.
+ */
+export type Frames = {
+/**
+ * Contribution of each cage vertex to the matrix of the whole cage's motion, per object unit; empty without
+ * frames. `[n_cage]`
+ */
+whole: Array<[number, number, number]>,
+/**
+ * The control of each joint. `[n_joints]`
+ */
+joints: Array<number>,
+/**
+ * The two joints of each bone, as indices into `joints`; bones of a line are consecutive. `[n_bones]`
+ */
+bones: Array<[number, number]>,
+/**
+ * Weights of the cage vertices at each joint in the cage without inner controls, and their gradients (per object
+ * unit). `[n_joints, n_cage]`
+ */
+plain: Array<[number, number, number, number]>, };
+/**
+ * Transformation that a gesture applies to the selection.
+ */
+export type Gesture = "grab" | "rotate" | "scale";
+/**
+ * Kind, amount and constraint of a gesture, for a status line.
+ */
+export type GestureView = {
+/**
+ * Whether the gesture translates, rotates or scales, which determines the unit of `amounts`.
+ */
+kind: Gesture,
+/**
+ * Movement along the axis or along x, y and z, object units; the angle in degrees; or the factor.
+ */
+amounts: Array<number>,
+/**
+ * Axis of the constraint, 0 to 2; null if the gesture is free.
+ */
+axis: number | null,
+/**
+ * Whether the gesture is restricted to the plane normal to `axis`.
+ */
+plane: boolean, };
+/**
+ * Operation of a gizmo, with the shape of its handles.
+ */
+export type GizmoMode = "move" | "rotate" | "scale";
+/**
+ * A handle of a gizmo.
+ */
+export type GizmoPart = { "axis": number } | { "plane": number } | "view";
+/**
+ * An element of inner controls: indices into [`InnerControls::positions`].
+ */
+export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
+/**
+ * A kind of interior control.
+ */
+export type InnerKind = "point" | "line" | "face";
+/**
+ * Interpolation between two keys, as in glTF 2.0, appendix C.
+ */
+export type Interpolation = "step" | "linear" | "cubic";
+/**
+ * How the skeleton follows the cage.
+ */
+export type Joints = "follow" | "stay" | "turn";
+/**
+ * The largest weight, and the index of the model vertex that has it.
+ */
+export type LargestWeight = { value: number, vertex: number, };
+/**
+ * Legend of the colours of the slice or the model.
+ */
+export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap,
+/**
+ * Largest of the displayed weights; null for other quantities.
+ */
+largest: LargestWeight | null, };
+/**
+ * Mean and maximum of an error over the mesh vertices inside the cage.
+ */
+export type MeanMax = {
+/**
+ * Mean of the error.
+ */
+mean: number,
+/**
+ * Largest error of a vertex.
+ */
+max: number, };
+/**
+ * Properties and options of one of the models in the cage.
+ */
+export type MemberInfo = {
+/**
+ * Identifier, which stays the same for the model's lifetime.
+ */
+id: number, name: string, format: ModelFormat, vertices: number, triangles: number,
+/**
+ * Number of joints of its skins.
+ */
+joints: number,
+/**
+ * Names of the parts, prefixed by their kind, such as `material:Cloth`.
+ */
+parts: Array<string>, options: PartOptions,
+/**
+ * Whether some vertices of the model are painted to stay in place.
+ */
+painted: boolean, };
+/**
+ * Working memory of a bind, bytes.
+ */
+export type MemoryBytes = {
+/**
+ * Estimate that is compared with the memory limit before the bind starts.
+ */
+estimated: number,
+/**
+ * Largest sum of buffers alive at the same time.
+ */
+peak: number, };
+/**
+ * Action of the button that fixes a fault.
+ */
+export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
+/**
+ * Discretisation of the cage.
+ */
+export type Method = "classic" | "embedded";
+/**
+ * File format of a model.
+ */
+export type ModelFormat = "gltf" | "obj" | "ply" | "stl" | "off" | "3mf" | "splat" | "spz";
+/**
+ * Combined properties of all models in the cage.
+ */
+export type ModelInfo = {
+/**
+ * Name of the first model.
+ */
+name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number,
+/**
+ * Number of splats of a capture, otherwise 0.
+ */
+splats: number,
+/**
+ * Number of points of a point cloud, otherwise 0.
+ */
+points: number, skins: number, joints: number, clips: Array<ClipView>,
+/**
+ * Morph targets of all models, and their weights at rest.
+ */
+targets: Array<TargetView>,
+/**
+ * Names of unskinned parts attached to joints or animated nodes, which an export can keep rigid.
+ */
+props: Array<string>,
+/**
+ * Whether a model has a rig that an export keeps.
+ */
+rigged: boolean,
+/**
+ * Whether a model is a VRM.
+ */
+vrm: boolean, bounds: Bounds,
+/**
+ * Another up axis that the file probably has: the conventional one of the format for captures and 3MF files, z for
+ * other models that seem to lie on their back. Null if there is none, or if the up axis is not y.
+ */
+suggestedUp: UpAxis | null, notices: Array<string>,
+/**
+ * Properties of each model.
+ */
+members: Array<MemberInfo>, };
+/**
+ * Frames of a bind, and the points outside the cage.
+ */
+export type Offsets = {
+/**
+ * Local coordinate frames that carry the part of each position that the weights of the controls do not reproduce.
+ * In the weights, their columns follow the columns of the controls.
+ */
+frames: Frames,
+/**
+ * Points outside the cage.
+ */
+outside: Array<OutsideVertex>, };
+/**
+ * Contents that the page opens together with models.
+ */
+export type OpenContents = {
+/**
+ * Identifier of the built-in sample; null for other models.
+ */
+sample: string | null,
+/**
+ * JSON of the page's settings in a project.
+ */
+settings: string | null, cage: CageContents | null,
+/**
+ * Poses of a sample. The poses of a project are in its `LoadedModel`.
+ */
+poses: Array<PoseContents>, };
+/**
+ * Treatment of mesh vertices outside the cage.
+ */
+export type OutsidePolicy = "extend" | "stay" | "refuse";
+/**
+ * A mesh vertex outside the cage.
+ */
+export type OutsideVertex = {
+/**
+ * Index of the mesh vertex.
+ */
+vertex: number,
+/**
+ * Distance from the cage, object units.
+ */
+distance: number,
+/**
+ * Share of the cage's motion that the vertex follows: 1 near the cage, 0 if the vertex stays in place.
+ */
+share: number, };
+/**
+ * Visibility of a model, and which of its parts the cage does not bend.
+ */
+export type PartOptions = {
+/**
+ * Whether the model is drawn and can be picked.
+ */
+shown: boolean,
+/**
+ * Names of parts that keep their shape; "all" for the whole model.
+ */
+rigid: Array<string>,
+/**
+ * Names of parts that stay in place; "all" for the whole model.
+ */
+stays: Array<string>, };
 /**
  * Centre of rotation and scaling.
  */
 export type Pivot = "middle" | "border" | "last";
 /**
- * How clicks and gestures act on the cage.
+ * A saved pose of the cage and the name that the list of poses shows.
  */
-export type Tools = {
+export type PoseContents = { name: string,
 /**
- * Element type that a click selects.
+ * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
  */
-element: Element,
-/**
- * Whether gestures also move the mirror images of the selected vertices.
- */
-symmetry: boolean,
-/**
- * Centre of rotation and scaling.
- */
-pivot: Pivot,
-/**
- * Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
- */
-proportional: number,
-/**
- * Whether vertices near the selection follow it.
- */
-proportionalOn: boolean, };
+positions: Float32Array, };
 /**
  * A saved pose, as panels show it.
  */
@@ -779,6 +832,165 @@ interpolation: Interpolation | null,
  */
 hash: number, };
 /**
+ * Preconditioner of conjugate gradients.
+ */
+export type Preconditioner = "none" | "v_cycle";
+/**
+ * Faults of one kind in a cage: their number, and the best fix.
+ */
+export type Problem = { code: Code, severity: Severity,
+/**
+ * Message of one or more complete sentences.
+ */
+message: string, count: number, fix: Mend | null, };
+/**
+ * A [`ProgressEvent`] as JavaScript receives it.
+ */
+export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
+/**
+ * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
+ * exactly, so with the embedded method this error is that of the solver.
+ */
+export type RawError = {
+/**
+ * Deviation of a row's sum from 1: `|sum_i w_i - 1|`.
+ */
+sum: MeanMax,
+/**
+ * Distance of `sum_i w_i c_i` from the vertex, as a fraction of the diagonal of the cage's bounding box.
+ */
+point_rel: MeanMax,
+/**
+ * Smallest weight, before negative weights are set to 0.
+ */
+min_weight: number, };
+/**
+ * Distance along the surface, from the grabs, up to which a drag moves the model.
+ */
+export type Reach = "automatic" | { "of": number } | "whole";
+/**
+ * A repair of a cage mesh that needs no decision by the user.
+ */
+export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
+/**
+ * An edit of the selected elements of the cage.
+ */
+export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
+/**
+ * Reconstruction error of the rest pose: distance of `sum_i w_i c_i` from the mesh vertex. The mean is Eq. 3 in
+ * K. Smith's paper (`docs/method.md`, sources).
+ */
+export type RestError = {
+/**
+ * Mean over the vertices, object units.
+ */
+mean: number,
+/**
+ * 99th percentile over the vertices, object units.
+ */
+p99: number,
+/**
+ * Largest error of a vertex, object units.
+ */
+max: number,
+/**
+ * Mean over the vertices, as a fraction of the diagonal of the cage's bounding box.
+ */
+mean_rel: number,
+/**
+ * Largest error of a vertex, as a fraction of the diagonal of the cage's bounding box.
+ */
+max_rel: number, };
+/**
+ * How an export treats the rig of a model.
+ */
+export type RigOptions = {
+/**
+ * Whether to export only the shape, without the rig.
+ */
+plain: boolean,
+/**
+ * Whether the cage deforms the model after a clip has moved it.
+ */
+dynamic: boolean,
+/**
+ * How the skeleton follows the cage.
+ */
+joints: Joints,
+/**
+ * Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
+ */
+keep_travel: boolean,
+/**
+ * Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
+ */
+rigid: Array<string>,
+/**
+ * Whether the lowest points of the shape at rest and in each clip keep their heights.
+ */
+ground: boolean,
+/**
+ * What happens to planted feet in clips.
+ */
+feet: Feet,
+/**
+ * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
+ */
+expressions: boolean,
+/**
+ * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
+ */
+quantize: boolean,
+/**
+ * Compression of the buffers.
+ */
+compress: Compression, };
+/**
+ * Elements of the scene that are drawn, and their colours.
+ */
+export type SceneOptions = { model: boolean, cage: boolean, original: boolean, colour: Colour, slice: SliceContent,
+/**
+ * What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
+ */
+gizmo: GizmoMode | null,
+/**
+ * Whether dragging pulls the model's surface. The cage is then drawn faintly.
+ */
+pull: boolean,
+/**
+ * Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
+ */
+compare: Array<Coordinates>, problems: boolean,
+/**
+ * How the next export treats joints, which determines where the joints are marked. Null hides the marks.
+ */
+joints: Joints | null,
+/**
+ * Colours of background and overlays.
+ */
+theme: Theme,
+/**
+ * Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of K. Smith's paper (`docs/method.md`,
+ * sources).
+ */
+base_wireframe: boolean,
+/**
+ * Whether the floor grid is drawn.
+ */
+floor: boolean,
+/**
+ * Whether splats outside the cage are drawn.
+ */
+floaters: boolean,
+/**
+ * Whether colours of weights span 0 to 1 instead of 0 to the maximum.
+ */
+weights_to_one: boolean, };
+/**
+ * How a set of vertices changes the selection.
+ */
+export type SelectMode = "replace" | "add" | "remove" | "toggle";
+/**
  * The selected vertices, as panels show them.
  */
 export type SelectionView = {
@@ -794,6 +1006,123 @@ last: number | null,
  * Centre of the selection, object units; null without a selection and during a gesture.
  */
 center: [number, number, number] | null, };
+/**
+ * Settings of a project, with all values valid.
+ */
+export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
+/**
+ * Notices about values that were replaced by defaults, one sentence each.
+ */
+notices: Array<string>, };
+/**
+ * Effect of a problem on binding and its results.
+ */
+export type Severity = "error" | "warning" | "note";
+/**
+ * Shape that the cage follows.
+ */
+export type Shape = "follow" | "hull";
+/**
+ * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
+ */
+export type SliceContent = "off" | "kinds" | "value";
+/**
+ * Solver of Laplace's equation.
+ */
+export type Solver = "jacobi" | "multigrid" | "cg";
+/**
+ * Stages of a bind, in order, and of cage generation.
+ */
+export type Stage = "voxelize" | "solve" | "sample" | "simplify";
+/**
+ * A point on the surface of the models.
+ */
+export type SurfacePoint = {
+/**
+ * Number of the triangle, unique among all models that the document has ever contained.
+ */
+triangle: number,
+/**
+ * Barycentric coordinates in the triangle.
+ */
+bary: [number, number, number], };
+/**
+ * Mirror symmetry of the cage about a plane through the centre of the model's box.
+ */
+export type Symmetry = "auto" | "none" | "x" | "y" | "z";
+/**
+ * A morph target and its default weight.
+ */
+export type TargetView = { name: string, default: number, };
+/**
+ * Colours of background and overlays.
+ */
+export type Theme = "dark" | "light";
+/**
+ * Wall-clock time of each stage of a bind, milliseconds.
+ */
+export type Timings = {
+/**
+ * Voxelization, levels and transfer tables.
+ */
+voxelize: number,
+/**
+ * Solve of all columns.
+ */
+solve: number,
+/**
+ * Sampling and assembly.
+ */
+sample: number,
+/**
+ * The whole bind.
+ */
+total: number, };
+/**
+ * How clicks and gestures act on the cage.
+ */
+export type Tools = {
+/**
+ * Element type that a click selects.
+ */
+element: Element,
+/**
+ * Whether gestures also move the mirror images of the selected vertices.
+ */
+symmetry: boolean,
+/**
+ * Centre of rotation and scaling.
+ */
+pivot: Pivot,
+/**
+ * Radius of proportional editing, as a fraction of the cage's diagonal. Kept while `proportional_on` is false.
+ */
+proportional: number,
+/**
+ * Whether vertices near the selection follow it.
+ */
+proportionalOn: boolean, };
+/**
+ * How the animation of the saved poses goes from one to the next, and how it ends.
+ */
+export type Transition = {
+/**
+ * Interpolation towards poses that have none of their own, and of the return to the start.
+ */
+interpolation: Interpolation,
+/**
+ * Whether the animation returns to the shape at its start after the last pose, so that it can repeat.
+ */
+loops: boolean,
+/**
+ * Time of the return from the last pose to the shape at the start, seconds.
+ */
+back: number, };
+/**
+ * The up axis of a file. In memory Y is always up: files with another axis are rotated about x when
+ * they are read, and back when they are written. The rotations are exact.
+ */
+export type UpAxis = "y" | "z" | "y_down";
 /**
  * Document and bind state that panels show.
  */
@@ -887,354 +1216,25 @@ redo: string | null,
  */
 forgotten: number, };
 /**
- * A saved pose of the cage and the name that the list of poses shows.
+ * Statistics of the stored weights.
  */
-export type PoseContents = { name: string,
+export type WeightStats = {
 /**
- * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+ * Smallest weight.
  */
-positions: Float32Array, };
+min: number,
 /**
- * A cage that the page opens.
+ * Largest weight.
  */
-export type CageContents = {
+max: number,
 /**
- * Positions of the cage's vertices and interior controls. `[n_controls, 3]`
+ * Largest `|sum of a row - 1|`.
  */
-positions: Float32Array,
+max_sum_error: number,
 /**
- * For each face, the number of its corners, then the vertex index of each corner.
+ * Number of stored weights.
  */
-corners: Uint32Array, controls?: CageControls | null, notices: Array<string>, };
-/**
- * Contents that the page opens together with models.
- */
-export type OpenContents = {
-/**
- * Identifier of the built-in sample; null for other models.
- */
-sample: string | null,
-/**
- * JSON of the page's settings in a project.
- */
-settings: string | null, cage: CageContents | null,
-/**
- * Poses of a sample. The poses of a project are in its `LoadedModel`.
- */
-poses: Array<PoseContents>, };
-/**
- * Mirror symmetry of the cage about a plane through the centre of the model's box.
- */
-export type Symmetry = "auto" | "none" | "x" | "y" | "z";
-/**
- * Shape that the cage follows.
- */
-export type Shape = "follow" | "hull";
-/**
- * Options of [`super::generate`]. Serde aliases are names in older project files.
- */
-export type CageOptions = {
-/**
- * Target number of vertices, 8 to 400. Default 80.
- */
-target: number,
-/**
- * Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
- * 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, about one voxel of the first
- * lattice for the default target, which has 36 voxels along the longest side.
- */
-detail: number,
-/**
- * Whether to pair triangles into quads. Default true.
- */
-quads: boolean,
-/**
- * Shape that the cage follows. Default follow.
- */
-shape: Shape,
-/**
- * Mirror symmetry. Default auto.
- */
-symmetry: Symmetry,
-/**
- * Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
- * Otherwise thin bridges join them into one cage. Default false.
- */
-per_component: boolean,
-/**
- * Smallest allowed Chebyshev distance (largest distance along an axis) of the cage from the model, as a fraction
- * of the diagonal of the model's box, 0 to 0.25; at least half a voxel. Default 0.
- */
-clearance: number,
-/**
- * Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
- * voxels are closed, and details thinner than one voxel are lost. Default 0.
- */
-voxels: number, };
-/**
- * Treatment of mesh vertices outside the cage.
- */
-export type OutsidePolicy = "extend" | "stay" | "refuse";
-/**
- * Options of a bind, and the processor that it runs on.
- */
-export type BindOptions = { backend: Backend,
-/**
- * Cells along the longest side of the cage's box, or along each side for box cells; 8 to 512. Default 64.
- */
-grid: number,
-/**
- * Discretisation of the cage. Default embedded.
- */
-method: Method,
-/**
- * Solver of Laplace's equation. Default multigrid.
- */
-solver: Solver,
-/**
- * Preconditioner of conjugate gradients. Default none.
- */
-preconditioner: Preconditioner,
-/**
- * Cell shape of the classic method. Default box.
- */
-cell_shape: CellShape,
-/**
- * Norm of a cell's change in a Jacobi sweep, from which delta is computed. Default Euclidean.
- */
-delta_norm: DeltaNorm,
-/**
- * Convergence threshold for delta: the mean change of a cell per Jacobi sweep, or the estimated remaining error
- * of the other solvers. Default 1e-5.
- */
-tau: number,
-/**
- * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
- */
-max_iterations: number,
-/**
- * Limit on the sum of the weights dropped from each row, smallest first. The row's sum and rest position are then
- * restored. 0 drops none. Default 0.
- */
-sparsify: number,
-/**
- * Limit on memory, bytes. A bind fails before it starts if its estimated memory and the caller's own data together
- * exceed this. Default 4 GiB; 2 GiB in wasm.
- */
-memory_limit: number,
-/**
- * Treatment of vertices outside the cage. Default extend.
- */
-outside: OutsidePolicy, };
-/**
- * Compression of a GLB.
- */
-export type Compression = "none" | "meshopt";
-/**
- * What happens to planted feet in clips.
- */
-export type Feet = "free" | "lock";
-/**
- * How the skeleton follows the cage.
- */
-export type Joints = "follow" | "stay" | "turn";
-/**
- * How an export treats the rig of a model.
- */
-export type RigOptions = {
-/**
- * Whether to export only the shape, without the rig.
- */
-plain: boolean,
-/**
- * Whether the cage deforms the model after a clip has moved it.
- */
-dynamic: boolean,
-/**
- * How the skeleton follows the cage.
- */
-joints: Joints,
-/**
- * Whether translations of clips stay unchanged. Otherwise they scale with the height of the hips.
- */
-keep_travel: boolean,
-/**
- * Names of nodes with unskinned meshes that stay rigid, such as buckles, eyes and weapons.
- */
-rigid: Array<string>,
-/**
- * Whether the lowest points of the shape at rest and in each clip keep their heights.
- */
-ground: boolean,
-/**
- * What happens to planted feet in clips.
- */
-feet: Feet,
-/**
- * Whether each pose becomes an expression of a VRM. The poses then get a clip only if `timeline` is set.
- */
-expressions: boolean,
-/**
- * Whether attributes other than positions are stored as integers (KHR_mesh_quantization).
- */
-quantize: boolean,
-/**
- * Compression of the buffers.
- */
-compress: Compression, };
-/**
- * Settings of a project, with all values valid.
- */
-export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, symmetry?: boolean,
-/**
- * Notices about values that were replaced by defaults, one sentence each.
- */
-notices: Array<string>, };
-/**
- * Operation of a gizmo, with the shape of its handles.
- */
-export type GizmoMode = "move" | "rotate" | "scale";
-/**
- * Colours of background and overlays.
- */
-export type Theme = "dark" | "light";
-/**
- * Kind of coordinates.
- */
-export type Coordinates = "harmonic" | "mean_value" | "green";
-/**
- * What the colours of the model show: its materials, plain clay, weights, or errors.
- */
-export type Colour = "material" | "clay" | "weight" | "error";
-/**
- * What the slice through the grid shows: nothing, the types of the cells, or the weights of a control.
- */
-export type SliceContent = "off" | "kinds" | "value";
-/**
- * Elements of the scene that are drawn, and their colours.
- */
-export type SceneOptions = { model: boolean, cage: boolean, original: boolean, colour: Colour, slice: SliceContent,
-/**
- * What dragging a handle of the gizmo does to the selection. Null hides the gizmo.
- */
-gizmo: GizmoMode | null,
-/**
- * Whether dragging pulls the model's surface. The cage is then drawn faintly.
- */
-pull: boolean,
-/**
- * Kinds of coordinates shown side by side, from the left. Kinds that are not computed yet are skipped.
- */
-compare: Array<Coordinates>, problems: boolean,
-/**
- * How the next export treats joints, which determines where the joints are marked. Null hides the marks.
- */
-joints: Joints | null,
-/**
- * Colours of background and overlays.
- */
-theme: Theme,
-/**
- * Whether the rest pose is drawn as a wireframe, as in figures 2 to 5 of K. Smith's paper (`docs/method.md`,
- * sources).
- */
-base_wireframe: boolean,
-/**
- * Whether the floor grid is drawn.
- */
-floor: boolean,
-/**
- * Whether splats outside the cage are drawn.
- */
-floaters: boolean,
-/**
- * Whether colours of weights span 0 to 1 instead of 0 to the maximum.
- */
-weights_to_one: boolean, };
-/**
- * Position and direction of the camera.
- */
-export type CameraView = {
-/**
- * Point that the camera orbits, object units.
- */
-target: [number, number, number],
-/**
- * Rotation of the camera about y, radians; `pitch` is its elevation above the horizon.
- */
-yaw: number, pitch: number,
-/**
- * Distance from the eye to the target, object units.
- */
-distance: number, parallel: boolean, };
-/**
- * Distance along the surface, from the grabs, up to which a drag moves the model.
- */
-export type Reach = "automatic" | { "of": number } | "whole";
-/**
- * Options of a drag.
- */
-export type DragOptions = {
-/**
- * Distance along the surface up to which the model moves.
- */
-reach: Reach,
-/**
- * Share by which parts within the reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
- */
-relax: number,
-/**
- * Whether the cage stays symmetric: each step averages it with its mirror image. Default false.
- */
-symmetry: boolean, };
-/**
- * Colour map that a legend shows.
- */
-export type ColorMap = "viridis" | "error" | "kinds";
-/**
- * The largest weight, and the index of the model vertex that has it.
- */
-export type LargestWeight = { value: number, vertex: number, };
-/**
- * Legend of the colours of the slice or the model.
- */
-export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap,
-/**
- * Largest of the displayed weights; null for other quantities.
- */
-largest: LargestWeight | null, };
-/**
- * How a set of vertices changes the selection.
- */
-export type SelectMode = "replace" | "add" | "remove" | "toggle";
-/**
- * Transformation that a gesture applies to the selection.
- */
-export type Gesture = "grab" | "rotate" | "scale";
-/**
- * Kind, amount and constraint of a gesture, for a status line.
- */
-export type GestureView = {
-/**
- * Whether the gesture translates, rotates or scales, which determines the unit of `amounts`.
- */
-kind: Gesture,
-/**
- * Movement along the axis or along x, y and z, object units; the angle in degrees; or the factor.
- */
-amounts: Array<number>,
-/**
- * Axis of the constraint, 0 to 2; null if the gesture is free.
- */
-axis: number | null,
-/**
- * Whether the gesture is restricted to the plane normal to `axis`.
- */
-plane: boolean, };
-/**
- * A handle of a gizmo.
- */
-export type GizmoPart = { "axis": number } | { "plane": number } | "view";
+nonzeros: number, };
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"target":80,"detail":0.028,"quads":true,"shape":"follow","symmetry":"auto","per_component":false,"clearance":0.0,"voxels":0};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"ground":false,"feet":"free","expressions":false,"quantize":false,"compress":"none","plain":false,"dynamic":false};
