@@ -174,6 +174,14 @@ fn deform(
     let mut notices = model.notices.clone();
     notices.extend(of_names);
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
+    let misfit = misfit(&saved, model, &cage.cage) / f64::from(cage.cage.diagonal());
+    if misfit > MAX_MISFIT {
+        notices.push(format!(
+            "at rest the weights miss the mesh by up to {:.2} % of the cage's size: they are those of another mesh or \
+             cage, or of the classic method",
+            100.0 * misfit
+        ));
+    }
     let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
     let deformation = Deformation::new(model, saved, &poses, format, (&options, args.rig.shape_only));
@@ -333,14 +341,13 @@ impl Deformation {
 }
 
 /// Largest distance of a vertex from its position by the weights, at rest, as a fraction of the cage's diagonal. Weights
-/// of this mesh and this cage are off by rounding only, below 1e-5.
+/// of this mesh and this cage are off by rounding only, except those of the classic method, which restores no rows.
 const MAX_MISFIT: f64 = 1e-3;
 
 /// Reads weights, and checks that they match the mesh and the cage.
 ///
 /// # Errors
-/// If the file cannot be read, its numbers of vertices differ from those of mesh and cage, or the weights do not give the
-/// mesh at rest.
+/// If the file cannot be read, or its numbers of vertices differ from those of mesh and cage.
 pub(crate) fn load_weights(
     path: &Path,
     model: &Model,
@@ -351,18 +358,8 @@ pub(crate) fn load_weights(
     let (n_vertices, n_cage) = (model.positions.len(), cage.n_vertices());
     let n_bound =
         (saved.weights.n_columns() - saved.frames.n_columns()).saturating_sub(saved.inner_controls.len());
-    let hint = "use the mesh and the cage that were bound, or bind these again";
     if (saved.n_vertices(), n_bound) == (n_vertices, n_cage) {
-        let misfit = misfit(&saved, model, cage) / f64::from(cage.diagonal());
-        if misfit <= MAX_MISFIT {
-            return Ok(saved);
-        }
-        let message = format!(
-            "{}: at rest its weights miss the mesh by {:.2} % of the cage's size: they belong to another mesh or cage",
-            shown_path(path),
-            100.0 * misfit,
-        );
-        return Err(CliError::Mismatch { message, hint });
+        return Ok(saved);
     }
     Err(CliError::Mismatch {
         message: format!(
@@ -372,7 +369,7 @@ pub(crate) fn load_weights(
             saved.n_vertices(),
             n_bound,
         ),
-        hint,
+        hint: "use the mesh and the cage that were bound, or bind these again",
     })
 }
 
