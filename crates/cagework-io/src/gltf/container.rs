@@ -222,20 +222,19 @@ fn parsed(json: &[u8]) -> Result<Value, GltfError> {
     }
     let fault = |e: serde_json::Error| GltfError::Json(json_fault(json, &e));
     // Lists are counted before values are built, because an object takes up to 600 bytes.
-    let Lists { nodes, meshes, materials, textures, images, samplers, skins, cameras } =
-        serde_json::from_slice(json).map_err(fault)?;
-    for (what, list) in [
-        ("nodes", nodes),
-        ("meshes", meshes),
-        ("materials", materials),
-        ("textures", textures),
-        ("images", images),
-        ("samplers", samplers),
-        ("skins", skins),
-        ("cameras", cameras),
+    let lists: Lists = serde_json::from_slice(json).map_err(fault)?;
+    for (what, count) in [
+        ("nodes", lists.nodes.len() as u64),
+        ("meshes", lists.meshes.len() as u64),
+        ("materials", lists.materials.len() as u64),
+        ("textures", lists.textures.len() as u64),
+        ("images", lists.images.len() as u64),
+        ("samplers", lists.samplers.len() as u64),
+        ("skins", lists.skins.len() as u64),
+        ("cameras", lists.cameras.len() as u64),
     ] {
-        if list.len() as u64 > MAX_ITEMS {
-            return Err(GltfError::TooLarge { what, count: list.len() as u64, limit: MAX_ITEMS });
+        if count > MAX_ITEMS {
+            return Err(GltfError::TooLarge { what, count, limit: MAX_ITEMS });
         }
     }
     serde_json::from_slice(json).map_err(fault)
