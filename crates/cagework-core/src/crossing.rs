@@ -15,7 +15,7 @@ pub const MAX_PLACES: usize = 2000;
 
 /// Distance, as a fraction of the mesh's diagonal, up to which vertices count as being at the same position. It is
 /// larger than the rounding of coordinates to six decimals in a file.
-const WELD_DISTANCE: f64 = 2e-6;
+pub const WELD_DISTANCE: f64 = 2e-6;
 
 /// Intersecting faces.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,11 @@
-//! Faults in connectivity: open and non-manifold edges; duplicate, unused and non-manifold vertices.
+//! Faults in connectivity: open and non-manifold edges; T-junctions; duplicate, unused and non-manifold vertices.
+
+use glam::DVec3;
 
 use super::mirror::Plane;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
 use cagework_core::cage::{Side, sides_of};
-use cagework_core::crossing::same_places;
+use cagework_core::crossing::{WELD_DISTANCE, same_places};
 use cagework_core::mesh::PolygonMesh;
 
 /// All sides of valid faces, sorted by edge.
@@ -31,22 +33,39 @@ impl Edges {
             .collect()
     }
 
-    /// Reports edges that do not have exactly two faces.
+    /// Reports edges that do not have exactly two faces, and T-junctions.
     pub(super) fn report(&self, mesh: &PolygonMesh, found: &mut Vec<Problem>) {
         let open = self.open();
         if !open.is_empty() {
-            // Vertices split at a seam also leave open edges, so welding is the first remedy.
-            let (_, joined) = same_places(mesh);
-            let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
-            let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
-            let fixes =
-                fixes.filter(|&r| (r != Repair::Weld || joined > 0) && (r != Repair::Mirror || is_half));
+            let (first, joined) = same_places(mesh);
+            let junctions = junctions(mesh, &open, &first);
+            // Vertices split at a seam and T-junctions also leave open edges: welding closes these without new faces.
+            let fixes = if !junctions.is_empty() {
+                vec![Repair::Weld]
+            } else if joined > 0 {
+                vec![Repair::Weld, Repair::FillHoles]
+            } else if Plane::of(mesh, &open).is_some_and(Plane::is_central) {
+                vec![Repair::Mirror, Repair::FillHoles]
+            } else {
+                vec![Repair::FillHoles]
+            };
+            if !junctions.is_empty() {
+                let mut vertices: Vec<u32> = junctions.iter().map(|j| j.vertex).collect();
+                vertices.sort_unstable();
+                vertices.dedup();
+                let count = vertices.len();
+                found.push(Problem {
+                    places: Places { vertices, ..Places::default() },
+                    fixes: vec![Fix::Repair { repair: Repair::Weld }],
+                    ..problem(Code::TJunction, Severity::Error, count)
+                });
+            }
             found.push(Problem {
                 places: Places {
                     edges: open.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect(),
                     ..Places::default()
                 },
-                fixes: fixes.map(|repair| Fix::Repair { repair }).collect(),
+                fixes: fixes.into_iter().map(|repair| Fix::Repair { repair }).collect(),
                 ..problem(Code::OpenEdge, Severity::Error, open.len())
             });
         }
@@ -65,6 +84,47 @@ impl Edges {
             });
         }
     }
+}
+
+/// A vertex of an open edge that lies on another open edge, between its ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Junction {
+    pub(super) vertex: u32,
+    /// Index into the open edges.
+    pub(super) edge: usize,
+}
+
+/// Largest number of open edges of a mesh in which T-junctions are looked for: each edge is compared with each vertex.
+const MAX_OPEN_EDGES: usize = 4096;
+
+/// Finds the T-junctions of a mesh, sorted by edge and along each edge. `first`: result of [`same_places`];
+/// of several vertices at one position, the first is found.
+pub(super) fn junctions(mesh: &PolygonMesh, open: &[[u32; 2]], first: &[u32]) -> Vec<Junction> {
+    let mut found = Vec::new();
+    if open.len() > MAX_OPEN_EDGES {
+        return found;
+    }
+    let reach = WELD_DISTANCE * mesh.diagonal();
+    let place = |v: u32| mesh.positions[v as usize].as_dvec3();
+    let mut ends: Vec<u32> = open.iter().flatten().map(|&v| first[v as usize]).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let ends: Vec<(u32, DVec3)> = ends.into_iter().map(|v| (v, place(v))).collect();
+    for (edge, &[a, b]) in open.iter().enumerate() {
+        let mut on_edge: Vec<(f64, u32)> = Vec::new();
+        let (a, b) = (place(a), place(b));
+        let along = (b - a) / (b - a).length_squared();
+        for &(vertex, p) in &ends {
+            let at = (p - a).dot(along);
+            let is_between = at > 0.0 && at < 1.0 && p.distance(a) > reach && p.distance(b) > reach;
+            if is_between && p.distance(a.lerp(b, at)) <= reach {
+                on_edge.push((at, vertex));
+            }
+        }
+        on_edge.sort_by(|p, q| p.0.total_cmp(&q.0));
+        found.extend(on_edge.into_iter().map(|(_, vertex)| Junction { vertex, edge }));
+    }
+    found
 }
 
 /// Reports duplicate, unused and non-manifold vertices.

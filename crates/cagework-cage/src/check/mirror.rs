@@ -112,7 +112,7 @@ mod tests {
         );
         let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
         assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
-        // A corner in the middle of one edge leaves three open edges in a plane, which enclose no area.
+        // A corner in the middle of one edge leaves three open edges in a plane, which enclose no area: a T-junction.
         let mut whole = subdivided_box(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, 0.0, [1; 3]);
         let face = &mut whole.faces[0];
         let [a, b] = [face[0], face[1]].map(|v| whole.positions[v as usize]);
@@ -120,10 +120,7 @@ mod tests {
         whole.positions.push(a.midpoint(b));
         let problem = check(&whole, None, None);
         let problem = problem.problem(Code::OpenEdge).unwrap();
-        assert_eq!(
-            (problem.count, &problem.fixes[..]),
-            (3, &[Fix::Repair { repair: Repair::FillHoles }][..])
-        );
+        assert_eq!((problem.count, &problem.fixes[..]), (3, &[Fix::Repair { repair: Repair::Weld }][..]));
         // The open boundary is not planar, so there is no mirror plane.
         let mut bent = half(0, 0.0);
         bent.positions.iter_mut().filter(|p| p.x == 0.0 && p.y > 0.5).for_each(|p| p.x = 0.25);

@@ -42,6 +42,8 @@ pub enum Code {
     DuplicateFace,
     /// Vertices at the same position that are not joined.
     DuplicateVertex,
+    /// A vertex lies on an edge of a face without being its corner.
+    TJunction,
     /// An edge has only one face.
     OpenEdge,
     /// An edge has three or more faces.

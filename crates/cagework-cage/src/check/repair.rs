@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::edges::Edges;
+use super::edges::{Edges, Junction, junctions};
 use super::grow;
 use super::mirror::Plane;
 use super::{orient, shape};
@@ -24,7 +24,7 @@ use cagework_core::words::counted;
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Repair {
-    /// Joins vertices at the same position.
+    /// Joins vertices at the same position, and makes vertices on open edges corners of the faces there.
     Weld,
     /// Drops faces without area, duplicate faces, repeated corners and unused vertices.
     DropDegenerate,
@@ -164,9 +164,14 @@ impl RepairedMesh {
 
 fn weld(repaired: &mut RepairedMesh) {
     let (first, joined) = same_places(&repaired.mesh);
-    if joined == 0 {
-        return;
+    if joined > 0 {
+        join_places(repaired, &first, joined);
     }
+    join_junctions(repaired);
+}
+
+/// Joins the vertices at the same position. `first`, `joined`: results of [`same_places`].
+fn join_places(repaired: &mut RepairedMesh, first: &[u32], joined: usize) {
     let n = first.len() as u32;
     for i in repaired.mesh.faces.iter_mut().flatten().filter(|i| **i < n) {
         *i = first[*i as usize];
@@ -179,6 +184,32 @@ fn weld(repaired: &mut RepairedMesh) {
     repaired
         .done
         .push(format!("Joined {} with others at the same position.", counted(joined, "vertex", "vertices")));
+}
+
+/// Makes each vertex on an open edge a corner of the face there.
+fn join_junctions(repaired: &mut RepairedMesh) {
+    let mesh = &mut repaired.mesh;
+    let edges = Edges::of(mesh, &shape::sound_faces(mesh, &mut Vec::new()));
+    let open = edges.open();
+    let face_of: Vec<u32> = edges.groups().filter(|g| g.len() == 1).map(|g| g[0].face).collect();
+    let first: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    let mut joined = HashSet::new();
+    for Junction { vertex, edge } in junctions(mesh, &open, &first) {
+        // The face traverses the edge from its second end to its first one, along which the vertices are sorted. Each
+        // is therefore inserted before those of the same edge that were inserted earlier.
+        let face = &mut mesh.faces[face_of[edge] as usize];
+        let start = face.iter().position(|&v| v == open[edge][1]);
+        if let Some(start) = start.filter(|_| !face.contains(&vertex)) {
+            face.insert(start + 1, vertex);
+            joined.insert(vertex);
+        }
+    }
+    if !joined.is_empty() {
+        repaired.done.push(format!(
+            "Joined {} with the edges on which they lie.",
+            counted(joined.len(), "vertex", "vertices")
+        ));
+    }
 }
 
 fn drop_degenerate(repaired: &mut RepairedMesh) {

@@ -27,6 +27,10 @@ pub(super) fn of(code: Code, n: usize) -> String {
             "{} at the same position as another one: at open edges they are joined, elsewhere they stay separate handles.",
             with("vertex is", "vertices are")
         ),
+        Code::TJunction => format!(
+            "{} on an edge of a face without being a corner of it: the edge is open there.",
+            with("vertex lies", "vertices lie")
+        ),
         Code::OpenEdge => {
             format!("The cage is not closed: {} to one face only.", with("edge belongs", "edges belong"))
         }

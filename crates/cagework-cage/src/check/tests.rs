@@ -81,6 +81,25 @@ fn split_seams_are_welded() {
     }
 }
 
+/// A face of a cube is cut into three. The four cuts end on edges of its neighbours, two on each, which is a T-junction.
+#[test]
+fn vertices_on_edges_are_reported_and_become_corners() {
+    let mut mesh = box_mesh(1);
+    let face = mesh.faces.remove(2);
+    let [a, b, c, d] = face[..] else { panic!("a quad") };
+    let at = |p: u32, q: u32, t: f32| mesh.positions[p as usize].lerp(mesh.positions[q as usize], t);
+    let cuts = [at(a, b, 0.25), at(a, b, 0.7), at(d, c, 0.25), at(d, c, 0.7)];
+    mesh.positions.extend(cuts);
+    mesh.faces.extend([vec![a, 8, 10, d], vec![8, 9, 11, 10], vec![9, b, c, 11]]);
+    let found = check(&mesh, None, None);
+    assert_eq!(found.problem(Code::TJunction).unwrap().places.vertices, [8, 9, 10, 11]);
+    assert_eq!(found.problem(Code::OpenEdge).unwrap().fixes, [Fix::Repair { repair: Repair::Weld }]);
+    let repaired = repair(&mesh, &[Repair::Weld], None).unwrap();
+    assert_eq!(repaired.done, ["Joined 4 vertices with the edges on which they lie."]);
+    assert_eq!(codes(&repaired.mesh), []);
+    assert_eq!(Cage::new(&repaired.mesh).unwrap().notices(), []);
+}
+
 #[test]
 fn flipped_faces_are_reported_by_component_and_flipped_back() {
     let inner = box_mesh(1);

@@ -342,7 +342,7 @@ name: string, seconds: number, };
 /**
  * Kinds of problems of a cage. Scripts read these names in JSON reports: never rename a variant.
  */
-export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
+export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "t_junction" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
 /**
  * Colour map that a legend shows.
  */
