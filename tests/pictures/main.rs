@@ -18,7 +18,7 @@ use cagework_gpu::render::{
 use cagework_gpu::{ContextOptions, Session};
 use glam::{Quat, Vec2, Vec3};
 use golden::{SIZE, assert_picture};
-use scenes::{bind, bow, classic, creature, creature_on, embedded, everywhere, textured};
+use scenes::{bind, bow, classic, creature, creature_on, creature_positions, embedded, everywhere, textured};
 
 #[test]
 fn solid_in_its_cage() {
@@ -48,6 +48,26 @@ fn posed_with_selection() {
         };
         session.set_scene(SceneOptions { selection, ..SceneOptions::default() });
         assert_picture(&mut session, "posed-selection");
+    }
+}
+
+/// The share to which each vertex is blended rises from 0 at the tail to 1 at the head. Paint blends towards a colour;
+/// vertices that a drag keeps in place are blended towards grey.
+#[test]
+fn painted_and_greyed_vertices() {
+    for (painted, theme, name) in [(true, Theme::Light, "painted"), (false, Theme::Dark, "greyed")] {
+        for device in everywhere() {
+            let mut session = creature_on(&device);
+            let share = |p: &Vec3| ((p.x + 5.0) / 10.0).clamp(0.0, 1.0);
+            let shares = creature_positions().iter().map(share).collect();
+            session.set_scene(SceneOptions {
+                view: ViewOptions { theme, ..ViewOptions::default() },
+                greyed: Some(Arc::new(shares)),
+                painted,
+                ..SceneOptions::default()
+            });
+            assert_picture(&mut session, name);
+        }
     }
 }
 

@@ -34,6 +34,11 @@ fn upright(p: Vec3) -> Vec3 {
     Vec3::new(p.x, p.z, -p.y)
 }
 
+/// Vertices of the animal in [`creature`].
+pub(crate) fn creature_positions() -> Vec<Vec3> {
+    creature::creature().positions.into_iter().map(upright).collect()
+}
+
 /// Creates a session with the animal of [`creature::creature`] in its cage of 112 vertices.
 pub(crate) fn creature() -> Session {
     creature_on(&ContextOptions::default())
@@ -41,11 +46,11 @@ pub(crate) fn creature() -> Session {
 
 /// Like [`creature`], on a device with these options.
 pub(crate) fn creature_on(options: &ContextOptions) -> Session {
-    let mesh = creature::creature();
+    let triangles = creature::creature().triangles;
     let around: Cage = cage(&moved(&creature::creature_cage(), upright));
     let mut session = empty(options);
-    let positions = mesh.positions.into_iter().map(upright).collect();
-    block_on(session.set_model(DrawModel::plain(positions, mesh.triangles))).expect("the model is drawn");
+    block_on(session.set_model(DrawModel::plain(creature_positions(), triangles)))
+        .expect("the model is drawn");
     block_on(session.set_cage(&around)).expect("the cage is drawn");
     look(&mut session);
     session
