@@ -263,7 +263,8 @@ pub enum CageGenError {
     },
     /// The model is smaller than [`MIN_DIAGONAL`].
     #[error(
-        "the model's bounding box has a diagonal of {diagonal:.2e}; it must be at least {MIN_DIAGONAL:e}: scale it"
+        "the model's bounding box has a diagonal of {diagonal:.2e}; it must be at least {MIN_DIAGONAL:e}: {}",
+        if *diagonal > 0.0 { "scale it" } else { "its vertices are all at one position" }
     )]
     Diagonal {
         /// Diagonal of the bounding box, object units.

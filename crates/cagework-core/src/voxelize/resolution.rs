@@ -2,7 +2,7 @@
 //! cell.
 //!
 //! Whether values on such faces reach the grid depends on where grid lines happen to run. Weights then depend on the
-//! cage's orientation, and a vertex whose faces meet no grid line has no influence. The weights are still valid; a
+//! cage's orientation, and a vertex whose faces meet no grid line has almost no influence. The weights are still valid; a
 //! finer grid gives better ones.
 
 use glam::DVec3;
@@ -108,8 +108,8 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
     let n = unresolved.iter().filter(|&&is| is).count();
     let of_vertices = match still.len() {
         0 => String::new(),
-        1 => format!("; cage vertex {} moves nothing", still[0]),
-        n => format!("; {n} cage vertices (from {} on) move nothing", still[0]),
+        1 => format!("; cage vertex {} moves little or nothing", still[0]),
+        n => format!("; {n} cage vertices (from {} on) move little or nothing", still[0]),
     };
     let wanted = (f64::from(cells) * finer).ceil();
     let advice = if wanted <= f64::from(MAX_GRID) {
