@@ -129,7 +129,11 @@ impl Deformer {
         let cage = allocator.storage("cage vertices", u64::from(n_columns) * size_of::<Vec4>() as u64)?;
         let positions = allocator.zeros("positions", vertex_bytes, vertex_usage)?;
         let normals = allocator.zeros("normals", vertex_bytes, vertex_usage)?;
+        // Settling yields to other tasks, such as events and frames of a browser, before and after the table is made.
+        allocator.settle().await?;
         let table = NormalTable::new(n_vertices as usize, triangles);
+        Allocator::new(context, "the deformed mesh").settle().await?;
+        let mut allocator = Allocator::new(context, "the deformed mesh");
         let starts = allocator.table("starts of triangle lists", &table.starts)?;
         let others = allocator.table("triangle lists", &table.others)?;
         let n_steps = weights.chunks.len() as u64 + 1;

@@ -183,6 +183,9 @@ impl HeldMotion {
 /// If a vertex is not in `positions`.
 #[must_use]
 pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> Vec<Vec<u32>> {
+    if selected.is_empty() {
+        return Vec::new();
+    }
     let mut is_selected = vec![false; positions.len()];
     selected.iter().for_each(|&v| is_selected[v as usize] = true);
     let unique_of = weld(positions).unique_of;

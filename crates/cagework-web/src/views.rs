@@ -208,7 +208,8 @@ impl TargetView {
         let is_alone = models.iter().nth(1).is_none();
         let of = |member: &Member| {
             let model = &member.model;
-            let player = model.player().ok().flatten().filter(|_| model.is_rigged());
+            // Making a player reads the whole skin: do so only if there can be targets.
+            let player = model.is_rigged().then(|| model.player().ok().flatten()).flatten();
             let named =
                 |name: &String| if is_alone { name.clone() } else { format!("{}: {name}", model.name) };
             player.map_or_else(Vec::new, |player| {

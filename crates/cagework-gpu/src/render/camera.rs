@@ -443,13 +443,22 @@ impl Camera {
     /// Projects a point into the picture. `None` if the point is nearer to the eye than the near plane.
     #[must_use]
     pub fn project(&self, point: Vec3) -> Option<ImagePoint> {
-        let clip = self.clip_from_world() * point.extend(1.0);
-        if clip.z < 0.0 || clip.w <= 0.0 {
-            return None;
+        self.projector()(point)
+    }
+
+    /// Returns [`Self::project`] as a function, for many points: the camera's matrices are computed once.
+    pub fn projector(&self) -> impl Fn(Vec3) -> Option<ImagePoint> + use<> {
+        let (clip_from_world, half) = (self.clip_from_world(), 0.5 * self.viewport);
+        let (eye, backward) = (self.eye(), self.backward());
+        move |point| {
+            let clip = clip_from_world * point.extend(1.0);
+            if clip.z < 0.0 || clip.w <= 0.0 {
+                return None;
+            }
+            let ndc = clip.truncate() / clip.w;
+            let position = half * Vec2::new(1.0 + ndc.x, 1.0 - ndc.y);
+            Some(ImagePoint { position, depth: (eye - point).dot(backward) })
         }
-        let ndc = clip.truncate() / clip.w;
-        let position = 0.5 * self.viewport * Vec2::new(1.0 + ndc.x, 1.0 - ndc.y);
-        Some(ImagePoint { position, depth: (self.eye() - point).dot(self.backward()) })
     }
 
     /// Ray through a pixel.

@@ -36,7 +36,8 @@ pub fn check_layers(
 /// behind the camera counts as the whole picture.
 fn covered(camera: &Camera, positions: &[Vec3], triangles: &[[u32; 3]], size: [u32; 2]) -> f64 {
     let picture = f64::from(size[0]) * f64::from(size[1]);
-    let places: Vec<_> = positions.iter().map(|&p| camera.project(p).map(|at| at.position)).collect();
+    let project = camera.projector();
+    let places: Vec<_> = positions.iter().map(|&p| project(p).map(|at| at.position)).collect();
     let area = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| places[i as usize]);
         let (Some(a), Some(b), Some(c)) = (a, b, c) else { return picture };
