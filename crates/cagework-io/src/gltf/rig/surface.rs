@@ -10,6 +10,12 @@ use crate::origin::{origin_near, relative};
 /// identity. The value is also the diagonal term that regularises the least squares.
 const MIN_DETERMINANT: f64 = 1e-9;
 
+/// Weights of the pair of normals relative to all edges at a vertex, in the order in which they are tried. At a flat
+/// vertex, the pair alone determines the gradient along the normal, whatever its weight. At a sharp vertex, the edges
+/// determine it, and the pair contradicts them where the surface is stretched along its normal. Edges of a curved
+/// surface that bends the other way can give a mirrored gradient; the larger weight prevents it.
+const NORMAL_WEIGHTS: [f64; 2] = [1e-4, 1.0];
+
 /// Coincident vertices whose normals have a smaller dot product belong to opposite sides of a thin sheet,
 /// such as hair or a cape.
 const MIN_FACING_COS: f64 = -0.5;
@@ -57,8 +63,8 @@ impl Surface {
     }
 
     /// Computes the gradient of the map from `from` to `to` at each vertex: least squares over the edges at the vertex,
-    /// and over the unit normals before and after as one more pair of vectors. `None` if no adjacent triangle has
-    /// moved. `[n]`
+    /// and, with a small weight, over the unit normals before and after as one more pair of vectors. `None` if no adjacent
+    /// triangle has moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
         self.gradients_where(from, to, &vec![true; self.n_unique], &[])
     }
@@ -123,13 +129,13 @@ impl Surface {
                 let (both, one, length) = sums[v];
                 let [n, m] = normals[v].map(DVec3::normalize_or_zero);
                 let scale = 1.0 / length.max(1e-30);
-                let one = scale * one + outer(n, n) + DMat3::from_diagonal(DVec3::splat(MIN_DETERMINANT));
-                let gradient = (scale * both + outer(m, n)) * one.inverse();
-                moved[v].then_some(if gradient.determinant() > MIN_DETERMINANT {
-                    gradient
-                } else {
-                    DMat3::IDENTITY
-                })
+                let one = scale * one + DMat3::from_diagonal(DVec3::splat(MIN_DETERMINANT));
+                let with = |weight: f64| {
+                    (scale * both + weight * outer(m, n)) * (one + weight * outer(n, n)).inverse()
+                };
+                let mut tried = NORMAL_WEIGHTS.into_iter().map(with);
+                let found = tried.find(|gradient| gradient.determinant() > MIN_DETERMINANT);
+                moved[v].then_some(found.unwrap_or(DMat3::IDENTITY))
             })
             .collect();
         let of = |(v, &unique): (usize, &u32)| {

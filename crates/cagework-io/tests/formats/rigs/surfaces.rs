@@ -1,11 +1,11 @@
 //! Normals of double-sided sheets and at seams between primitives.
 
-use cagework_io::Joints;
+use cagework_io::{Joints, ReshapeOptions};
 use glam::{Mat3, Vec3, vec3};
 use serde_json::json;
 
 use super::{f, read, reshaped};
-use crate::common::{Builder, json_of};
+use crate::common::{Builder, F32, floats, json_of};
 
 /// Number of cells along a side of the sheet.
 const N: u32 = 24;
@@ -108,4 +108,91 @@ fn normals_of_two_primitives_agree_at_their_seam() {
     let one = largest_angle(&[sheet(roof, 0, N)]);
     let two = largest_angle(&[sheet(roof, 0, N / 2), sheet(roof, N / 2, N)]);
     assert!((two - one).abs() < 0.05, "{one} and {two} degrees");
+}
+
+/// The numbers of an attribute of the first primitive. `[n_vertices, width]`
+fn attribute(glb: &[u8], name: &str, width: usize) -> Vec<Vec3> {
+    let document = json_of(glb);
+    let start = glb.len() - document["buffers"][0]["byteLength"].as_u64().unwrap() as usize;
+    let accessor = &document["meshes"][0]["primitives"][0]["attributes"][name];
+    let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+    let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+    let first = start + view["byteOffset"].as_u64().unwrap_or(0) as usize;
+    let number = |at: usize| f32::from_le_bytes(glb[at..at + 4].try_into().unwrap());
+    let count = accessor["count"].as_u64().unwrap() as usize;
+    (0..count).map(|v| Vec3::from_array([0, 4, 8].map(|c| number(first + 4 * width * v + c)))).collect()
+}
+
+/// At the corners of a cube, the edges span all directions. An affine map A turns normals by its inverse transpose and
+/// tangents by A.
+#[test]
+fn flat_faces_keep_the_normals_of_affine_maps() {
+    let mut rig = Builder::new();
+    let (mut at, mut normals, mut tangents) = (Vec::new(), Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let [normal, u, v] = [0, 1, 2].map(|k| Vec3::AXES[(axis + k) % 3]);
+            for [a, b] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
+                at.push(side * (normal + a * u) + b * v);
+                normals.push(side * normal);
+                tangents.push(side * u);
+            }
+        }
+    }
+    let indices: Vec<u32> = (0..6).flat_map(|f| [0, 1, 2, 0, 2, 3].map(|k| 4 * f + k)).collect();
+    let list = |all: &[Vec3]| all.iter().map(Vec3::to_array).collect::<Vec<_>>();
+    let of_tangents: Vec<f32> = tangents.iter().flat_map(|t: &Vec3| [t.x, t.y, t.z, 1.0]).collect();
+    let of_tangents = rig.accessor(&floats(&of_tangents), F32, 24, "VEC4");
+    let attributes = json!({
+        "POSITION": rig.vec3(&list(&at)), "NORMAL": rig.vec3(&list(&normals)), "TANGENT": of_tangents,
+    });
+    let indices = rig.indices(&indices);
+    rig.push("meshes", json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }));
+    rig.json["nodes"] = json!([{ "mesh": 0, "translation": [1.0, 2.0, 3.0] }]);
+    let model = read(&rig.glb());
+    assert!(model.is_rigged());
+    let shear = Mat3::from_cols(Vec3::X, vec3(0.5, 1.5, 0.0), vec3(0.0, -0.25, 0.75));
+    for map in [Mat3::from_diagonal(Vec3::splat(2.0)), Mat3::from_diagonal(vec3(3.0, 1.0, 0.5)), shear] {
+        let points = [model.positions.clone(), model.extra_points().unwrap()].concat();
+        let by: Vec<_> = points.iter().map(|&p| (map * p - p).as_dvec3()).collect();
+        let (bytes, _) = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap();
+        let of_normals = map.inverse().transpose();
+        for (name, width, before, turn) in
+            [("NORMAL", 3, &normals, of_normals), ("TANGENT", 4, &tangents, map)]
+        {
+            for (found, &before) in attribute(&bytes, name, width).iter().zip(before) {
+                let angle = found.angle_between(turn * before).to_degrees();
+                assert!(angle < 0.1, "{name} {before} under {map}: {angle} degrees");
+            }
+        }
+    }
+}
+
+/// A dome that is bent into a bowl reverses the height differences of its edges. The gradient must not be mirrored.
+#[test]
+fn dome_bent_into_a_bowl_has_the_normals_of_the_bowl() {
+    const BEND: f32 = 0.3;
+    let height = |p: Vec3| BEND * (p.x * p.x + p.y * p.y);
+    let grid = || (-4..=4).flat_map(|k| (-4..=4).map(move |i| vec3(i as f32 / 4.0, k as f32 / 4.0, 0.0)));
+    let at: Vec<Vec3> = grid().map(|p| p.with_z(-height(p))).collect();
+    let normals: Vec<Vec3> =
+        grid().map(|p| vec3(2.0 * BEND * p.x, 2.0 * BEND * p.y, 1.0).normalize()).collect();
+    let cells = (0..8).flat_map(|k| (0..8).map(move |i| 9 * k + i));
+    let indices: Vec<u32> = cells.flat_map(|a| [a, a + 1, a + 9, a + 1, a + 10, a + 9]).collect();
+    let mut rig = Builder::new();
+    let list = |all: &[Vec3]| all.iter().map(Vec3::to_array).collect::<Vec<_>>();
+    let attributes = json!({ "POSITION": rig.vec3(&list(&at)), "NORMAL": rig.vec3(&list(&normals)) });
+    let indices = rig.indices(&indices);
+    rig.push("meshes", json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }));
+    rig.json["nodes"] = json!([{ "mesh": 0, "translation": [0.0, 0.0, 1.0] }]);
+    let model = read(&rig.glb());
+    let mut by: Vec<_> = grid().map(|p| vec3(0.0, 0.0, 2.0 * height(p)).as_dvec3()).collect();
+    by.resize(by.len() + model.extra_points().unwrap().len(), Vec3::ZERO.as_dvec3());
+    let (bytes, _) = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap();
+    let inner = grid().zip(attribute(&bytes, "NORMAL", 3)).filter(|(p, _)| p.abs().max_element() < 1.0);
+    for (p, found) in inner {
+        let expected = vec3(-2.0 * BEND * p.x, -2.0 * BEND * p.y, 1.0);
+        let angle = found.angle_between(expected).to_degrees();
+        assert!(angle < 3.0, "at {p}: {angle} degrees");
+    }
 }
