@@ -4,6 +4,7 @@ use ::gltf::json::mesh::Semantic;
 use glam::Vec3;
 
 use super::geometry::{attribute, world_normals};
+use super::look::{Texture, material_of};
 use super::patch::Rest;
 use super::scene::name_of;
 use super::{GltfDocument, Slot};
@@ -65,11 +66,18 @@ fn material(document: &GltfDocument, slot: &Slot) -> Option<String> {
     Some(name_of(&document.json, "materials", material.value() as u32, "material"))
 }
 
-/// Texture coordinates, v upwards as in OBJ. Empty if missing or invalid.
+/// Texture coordinates of the base colour, v upwards as in OBJ, with the texture transform applied, for which OBJ has no
+/// field. Empty if missing or invalid.
 fn texcoords(document: &GltfDocument, slot: &Slot) -> Vec<[f32; 2]> {
-    attribute(document.primitive(slot).1, Semantic::TexCoords(0))
-        .and_then(|accessor| document.source().floats::<2>(accessor, "TEXCOORD_0").ok())
+    let texture = material_of(document, slot).map(|material| Texture::of(&document.json, material));
+    let set = texture.as_ref().map_or(0, |texture| texture.set);
+    let placed = |uv| {
+        let [u, v] = texture.as_ref().map_or(uv, |texture| texture.transformed(uv));
+        [u, 1.0 - v]
+    };
+    attribute(document.primitive(slot).1, Semantic::TexCoords(set))
+        .and_then(|accessor| document.source().floats::<2>(accessor, "TEXCOORD").ok())
+        .map(|uv| uv.into_iter().map(placed).collect::<Vec<_>>())
         .filter(|uv| uv.len() == slot.count as usize && uv.iter().flatten().all(|x| x.is_finite()))
-        .map(|uv| uv.into_iter().map(|[u, v]| [u, 1.0 - v]).collect())
         .unwrap_or_default()
 }

@@ -69,7 +69,7 @@ fn number(value: &Value, default: f32) -> f32 {
     value.as_f64().map_or(default, |x| x as f32)
 }
 
-fn material_of<'a>(document: &'a GltfDocument, slot: &Slot) -> Option<&'a Value> {
+pub(super) fn material_of<'a>(document: &'a GltfDocument, slot: &Slot) -> Option<&'a Value> {
     let mesh = document.instances[slot.instance as usize].mesh as usize;
     let primitive = &document.json["meshes"][mesh]["primitives"][slot.primitive as usize];
     let index = primitive["material"].as_u64()?;
@@ -77,18 +77,19 @@ fn material_of<'a>(document: &'a GltfDocument, slot: &Slot) -> Option<&'a Value>
 }
 
 /// Base colour and its texture, from the core material or KHR_materials_pbrSpecularGlossiness.
-struct Texture {
+pub(super) struct Texture {
     factor: [f32; 4],
     image: Option<usize>,
     wrap: [LookWrap; 2],
-    set: u32,
+    /// Number of the attribute TEXCOORD_n.
+    pub(super) set: u32,
     offset: Vec2,
     scale: Vec2,
     rotation: f32,
 }
 
 impl Texture {
-    fn of(json: &Value, material: &Value) -> Self {
+    pub(super) fn of(json: &Value, material: &Value) -> Self {
         let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
         let (factor, info) = if glossy.is_object() && material.get("pbrMetallicRoughness").is_none() {
             (&glossy["diffuseFactor"], &glossy["diffuseTexture"])
@@ -119,7 +120,7 @@ impl Texture {
     }
 
     /// Applies KHR_texture_transform: scales, rotates counter-clockwise (v points down), and translates.
-    fn transformed(&self, uv: [f32; 2]) -> [f32; 2] {
+    pub(super) fn transformed(&self, uv: [f32; 2]) -> [f32; 2] {
         let (sin, cos) = self.rotation.sin_cos();
         let scaled = self.scale * Vec2::from(uv);
         let turned = Vec2::new(cos * scaled.x + sin * scaled.y, cos * scaled.y - sin * scaled.x);

@@ -360,3 +360,18 @@ fn gltf_becomes_an_obj_with_its_texture_coordinates_and_names() {
     let text = String::from_utf8(text.write_obj(&text.positions).unwrap()).unwrap();
     assert!(text.contains("o left") && text.contains("o right") && !text.contains('/'));
 }
+
+/// OBJ has no texture transform, so its texture coordinates contain it.
+#[test]
+fn texture_transform_is_applied_to_the_coordinates_of_an_obj() {
+    let mut b = textured_square();
+    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = json!({
+        "KHR_texture_transform": { "offset": [0.1, 0.2], "rotation": std::f32::consts::FRAC_PI_2, "scale": [2.0, 4.0] }
+    });
+    let model = read("x.glb", &b.glb()).unwrap();
+    let text = String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap();
+    let third = text.lines().filter_map(|line| line.strip_prefix("vt ")).nth(2).unwrap();
+    let [u, v] = [0, 1].map(|k| third.split(' ').nth(k).unwrap().parse::<f32>().unwrap());
+    // (0.5, 1) scales to (1, 4), rotates by 90 degrees to (4, -1) and moves to (4.1, -0.8); v points up in an OBJ.
+    assert!((u - 4.1).abs() < 1e-5 && (v - 1.8).abs() < 1e-5, "{third}");
+}
