@@ -187,7 +187,7 @@ impl Frame {
 }
 
 /// Positions in mesh space with default morph weights, and the number of targets.
-fn positions(
+pub(super) fn positions(
     document: &GltfDocument,
     instance: &Instance,
     primitive: &Primitive,

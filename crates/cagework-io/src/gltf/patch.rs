@@ -11,11 +11,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use ::gltf::json::mesh::Semantic;
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
 use super::animate::{self, MeshPlacement, Pose, PoseClip};
-use super::geometry::{Frame, world_normals, world_tangents};
+use super::geometry::{Frame, attribute, positions, surface, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Rig, Slot};
@@ -94,11 +95,58 @@ pub(crate) fn patch(
             push(&mut json["meshes"][place.mesh]["primitives"][slot.primitive as usize], "targets", target);
         }
     }
+    for (number, place) in places.iter().enumerate() {
+        patch_loose(document, number as u32, place, rest.origin, poses.len(), &mut json, &mut pack)?;
+    }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
         animate::play_poses(&mut json, &mut pack, &places, poses, clip);
     }
     pack.finish(json)
+}
+
+/// Patches the points and lines of an instance, which are not deformed. They lose their skin and morph targets, stay in
+/// their rest pose, and get one empty target per pose, because all primitives of a mesh have equally many targets.
+fn patch_loose(
+    document: &GltfDocument,
+    instance: u32,
+    place: &MeshPlacement,
+    origin: DVec3,
+    n_poses: usize,
+    json: &mut Value,
+    pack: &mut Pack<'_>,
+) -> Result<(), WriteError> {
+    let mesh = document.instances[instance as usize].mesh as usize;
+    for (number, primitive) in document.root.meshes[mesh].primitives.iter().enumerate() {
+        let position = attribute(primitive, Semantic::Positions).filter(|_| surface(primitive).is_none());
+        let Some(position) = position else { continue };
+        let count = document.source().count(position)? as usize;
+        if place.detached || primitive.targets.is_some() {
+            let slot =
+                Slot { instance, primitive: number as u32, start: 0, count: count as u32, triangles: 0..0 };
+            let instance = &document.instances[instance as usize];
+            let (local, _) = positions(document, instance, primitive, position)?;
+            let (frame, _) = Frame::of(document, instance, primitive, count)?;
+            let at = |(v, p): (usize, &DVec3)| {
+                let world = frame.world(v).transform_point3(*p) - origin;
+                place.mesh_from_world.transform_point3(world).as_vec3()
+            };
+            let at: Vec<Vec3> = local.iter().enumerate().map(at).collect();
+            let position = pack.push_vec3(json, &at, true);
+            let world_from_mesh = DMat3::from_mat4(place.mesh_from_world.inverse());
+            let to_mesh = |n: &Vec3| unit(world_from_mesh.transpose() * n.as_dvec3()).as_vec3();
+            let normal = world_normals(document, &slot)?
+                .map(|world| pack.push_vec3(json, &world.iter().map(to_mesh).collect::<Vec<_>>(), false));
+            let of_json = &mut json["meshes"][place.mesh]["primitives"][number];
+            patch_primitive(of_json, place.detached, Some(position), normal, None, None);
+        }
+        if n_poses > 0 {
+            let still = pack.push_vec3(json, &vec![Vec3::ZERO; count], true);
+            let targets = vec![json!({ "POSITION": still }); n_poses];
+            json["meshes"][place.mesh]["primitives"][number]["targets"] = targets.into();
+        }
+    }
+    Ok(())
 }
 
 /// Gives every instance a mesh of its own, at a node whose transform can be inverted.

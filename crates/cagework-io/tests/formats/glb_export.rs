@@ -375,3 +375,26 @@ fn texture_transform_is_applied_to_the_coordinates_of_an_obj() {
     // (0.5, 1) scales to (1, 4), rotates by 90 degrees to (4, -1) and moves to (4.1, -0.8); v points up in an OBJ.
     assert!((u - 4.1).abs() < 1e-5 && (v - 1.8).abs() < 1e-5, "{third}");
 }
+
+/// Lines in a mesh with triangles lose their skin and targets too, and get as many targets as there are poses.
+#[test]
+fn lines_beside_triangles_stay_at_rest() {
+    let mut b = skinned();
+    b.json["meshes"][0]["weights"] = json!([1.0]);
+    let mut lines = b.primitive(0).clone();
+    lines["mode"] = json!(1);
+    b.json["meshes"][0]["primitives"].as_array_mut().unwrap().insert(0, lines);
+    let model = read("x.glb", &b.glb()).unwrap();
+    for poses in [Vec::new(), poses(&model)] {
+        let glb = model.write_glb_poses(&deformed(&model), &poses).unwrap();
+        let primitives = &json_of(&glb)["meshes"][0]["primitives"];
+        for primitive in [&primitives[0], &primitives[1]] {
+            assert_eq!(primitive["targets"].as_array().map_or(0, Vec::len), poses.len());
+            let names: Vec<&String> = primitive["attributes"].as_object().unwrap().keys().collect();
+            assert_eq!(names, ["POSITION"]);
+        }
+        let at = attribute(&glb, "POSITION", 3);
+        let at: Vec<Vec3> = at.iter().map(|p| Vec3::from_slice(p)).collect();
+        assert!(relative_error(&model.positions, &at) < ROUND_TRIP, "{at:?}");
+    }
+}
