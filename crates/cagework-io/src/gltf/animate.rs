@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 
 use glam::{DMat4, Vec3};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::pack::{Pack, push};
+use super::rig::{ChannelTarget, channel_target};
 use crate::timeline::Timeline;
 
 /// A pose of the model: its name and vertex positions.
@@ -27,6 +28,20 @@ pub(crate) struct MeshPlacement {
     pub(super) mesh_from_world: DMat4,
 }
 
+/// Names of the morph targets of a mesh: in its extras or, as UniVRM writes them, in the extras of its first primitive.
+pub(super) fn target_names(mesh: &Value) -> &Value {
+    let own = &mesh["extras"]["targetNames"];
+    if own.is_array() { own } else { &mesh["primitives"][0]["extras"]["targetNames"] }
+}
+
+/// The lists of target names in the extras of the primitives of a mesh.
+pub(super) fn name_lists_of_primitives(mesh: &mut Value) -> impl Iterator<Item = &mut Map<String, Value>> {
+    let primitives = mesh.get_mut("primitives").and_then(Value::as_array_mut).into_iter().flatten();
+    primitives
+        .filter_map(|primitive| primitive.get_mut("extras")?.as_object_mut())
+        .filter(|extras| extras.contains_key("targetNames"))
+}
+
 /// Removes the weights, names and animation channels of the original morph targets.
 pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
     for place in places {
@@ -35,20 +50,23 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[MeshPlacement]) {
                 node.shift_remove("weights");
             }
         }
-        let Some(mesh) = json["meshes"][place.mesh].as_object_mut() else { continue };
+        let mesh = &mut json["meshes"][place.mesh];
+        name_lists_of_primitives(mesh).for_each(|extras| drop(extras.shift_remove("targetNames")));
+        let Some(mesh) = mesh.as_object_mut() else { continue };
         mesh.shift_remove("weights");
         if let Some(extras) = mesh.get_mut("extras").and_then(Value::as_object_mut) {
             extras.shift_remove("targetNames");
         }
     }
     let Some(animations) = json.get_mut("animations").and_then(Value::as_array_mut) else { return };
-    let ours: HashSet<u64> = places.iter().filter_map(|p| Some(p.original? as u64)).collect();
+    let nodes: HashSet<usize> = places.iter().filter_map(|p| p.original).collect();
+    let meshes: HashSet<usize> = places.iter().map(|p| p.mesh).collect();
     for animation in &mut *animations {
         let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
-        channels.retain(|channel| {
-            let target = &channel["target"];
-            let node = target["node"].as_u64();
-            target["path"] != "weights" || !node.is_some_and(|n| ours.contains(&n))
+        channels.retain(|channel| match channel_target(channel) {
+            Some(ChannelTarget::Weights(node)) => !nodes.contains(&node),
+            Some(ChannelTarget::MeshWeights(mesh)) => !meshes.contains(&mesh),
+            _ => true,
         });
     }
     animations.retain(|animation| animation["channels"].as_array().is_none_or(|c| !c.is_empty()));

@@ -398,3 +398,30 @@ fn lines_beside_triangles_stay_at_rest() {
         assert!(relative_error(&model.positions, &at) < ROUND_TRIP, "{at:?}");
     }
 }
+
+/// A channel of KHR_animation_pointer can animate the weights of a node or of a mesh.
+#[test]
+fn static_export_has_no_channels_of_morph_weights() {
+    for pointer in ["/nodes/0/weights", "/meshes/0/weights"] {
+        let mut b = skinned();
+        b.json["animations"][1]["channels"][0]["target"] = json!({
+            "path": "pointer", "extensions": { "KHR_animation_pointer": { "pointer": pointer } }
+        });
+        let model = read("x.glb", &b.glb()).unwrap();
+        let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
+        assert_eq!(after["animations"].as_array().unwrap().len(), 1, "{pointer}");
+        assert_eq!(after["animations"][0]["channels"][0]["target"]["path"], "rotation");
+    }
+}
+
+/// UniVRM writes the names of morph targets to the extras of primitives.
+#[test]
+fn static_export_forgets_the_target_names_of_primitives() {
+    let mut b = skinned();
+    let names = json!({ "targetNames": ["wide"], "kept": 7 });
+    b.json["meshes"][0]["extras"] = json!({});
+    b.primitive(0)["extras"] = names;
+    let model = read("x.glb", &b.glb()).unwrap();
+    let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
+    assert_eq!(after["meshes"][0]["primitives"][0]["extras"], json!({ "kept": 7 }));
+}

@@ -4,7 +4,8 @@ use cagework_core::TriMesh;
 use cagework_core::inpaint::Origins;
 use cagework_core::skin::{Joint, Rig, skin_vertices};
 use cagework_io::{
-    Model, Penetration, ReshapeOptions, TransferError, TransferOptions, TransferReport, write_mesh_glb,
+    Interpolation, Model, Penetration, ReshapeOptions, Timeline, TransferError, TransferOptions,
+    TransferReport, write_mesh_glb,
 };
 use glam::{DVec3, Quat, Vec3, vec3};
 use serde_json::{Value, json};
@@ -183,6 +184,11 @@ type Displacement = fn(Vec3) -> Vec3;
 
 /// A GLB with morph targets, from a formula for each.
 fn morphed(glb: &[u8], targets: &[(&str, Displacement)]) -> Vec<u8> {
+    morphed_in_time(glb, targets, None)
+}
+
+/// Like [`morphed`], with the timeline of the clip that plays the targets.
+fn morphed_in_time(glb: &[u8], targets: &[(&str, Displacement)], timeline: Option<Timeline>) -> Vec<u8> {
     let model = read("body.glb", glb).unwrap();
     let n_extra = model.extra_points().unwrap().len();
     let by = |of: Displacement| -> Vec<DVec3> {
@@ -191,7 +197,8 @@ fn morphed(glb: &[u8], targets: &[(&str, Displacement)]) -> Vec<u8> {
     };
     let named: Vec<_> = targets.iter().map(|&(name, of)| (name.to_owned(), by(of))).collect();
     let still = vec![DVec3::ZERO; model.positions.len() + n_extra];
-    model.write_reshaped(&still, &[], &named, &ReshapeOptions::default()).unwrap().0
+    let options = ReshapeOptions { timeline, ..ReshapeOptions::default() };
+    model.write_reshaped(&still, &[], &named, &options).unwrap().0
 }
 
 /// Twice as thick; taller; the upper end moves.
@@ -271,6 +278,25 @@ fn default_weights_of_the_body_are_kept() {
     }
     // From the default weight to 1.
     assert_targets(&dressed, 0.5);
+}
+
+/// A spline with equal values and tangents of 0 at its keys is constant.
+#[test]
+fn new_targets_stay_at_their_default_weight_in_splines() {
+    let bytes = morphed(&body(), &TARGETS);
+    let mut json = json_of(&bytes);
+    json["meshes"][0]["weights"] = json!([0.5, 0.0, 0.0]);
+    let body = glb(&json, Some(&bytes[28 + json_length(&bytes)..]));
+    let own = write_mesh_glb("own", &tube(0.32, 0.5, 1.5, 7), &[], None).unwrap();
+    let cubic = Timeline::every_second(1).with(Interpolation::Cubic);
+    let own = morphed_in_time(&own, &[("puffed", |p| 0.5 * p)], Some(cubic));
+    let (dressed, json, _) = transferred(&body, &read("own.glb", &own).unwrap(), None);
+    assert_eq!(json["animations"][0]["samplers"][0]["interpolation"], "CUBICSPLINE");
+    let player = dressed.player().unwrap().unwrap();
+    assert_eq!(player.targets().0[..2], ["puffed", "wide"]);
+    for seconds in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        assert_eq!(player.at(Some(0), seconds, &[]).targets[1], 0.5, "{seconds} s");
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use glam::{DMat4, DVec3, Mat4, Vec3};
 use super::clip::{Clip, clips, quaternion, vector};
 use super::skeleton::bare;
 use super::tracks::ChannelTarget;
+use crate::gltf::animate::target_names;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
 use crate::gltf::{GltfDocument, GltfError, Slot, skin};
@@ -85,7 +86,7 @@ impl Player {
             player.of_meshes.entry(mesh).or_default().push(first);
             let defaults = document.default_weights(instance);
             player.defaults.extend((0..n).map(|k| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0)));
-            let named = &document.json["meshes"][mesh]["extras"]["targetNames"];
+            let named = target_names(&document.json["meshes"][mesh]);
             player.names.extend((0..n).map(|k| match named[k].as_str() {
                 Some(name) => name.to_owned(),
                 None => format!("target {k}"),

@@ -12,6 +12,7 @@ use super::shape::SurfaceGradients;
 use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
+use crate::gltf::animate::{name_lists_of_primitives, target_names};
 use crate::gltf::pack::push;
 use crate::timeline::Timeline;
 
@@ -90,14 +91,18 @@ pub(super) fn append<'p>(
     let defaults: Vec<f32> = poses.iter().map(|pose| pose.default).collect();
     for (&mesh, &n_before) in &meshes {
         pad(&mut edit.json["meshes"][mesh]["weights"], n_before, &defaults);
-        let extras = &mut edit.json["meshes"][mesh]["extras"];
-        if !extras.is_object() {
-            *extras = json!({});
-        }
-        let mut all: Vec<Value> = extras["targetNames"].as_array().cloned().unwrap_or_default();
+        let mesh = &mut edit.json["meshes"][mesh];
+        let mut all: Vec<Value> = target_names(mesh).as_array().cloned().unwrap_or_default();
         all.extend((all.len()..n_before).map(|k| json!(format!("target {k}"))));
         all.truncate(n_before);
         all.extend(names.iter().map(|&name| json!(name)));
+        for extras in name_lists_of_primitives(mesh) {
+            extras.insert("targetNames".into(), all.clone().into());
+        }
+        let extras = &mut mesh["extras"];
+        if !extras.is_object() {
+            *extras = json!({});
+        }
         extras["targetNames"] = all.into();
     }
     let targets_of = |json: &Value, node: usize| {
@@ -128,7 +133,12 @@ pub(super) fn append<'p>(
             let Ok(values) = rig.document.source().floats::<1>(output.accessor, "weights") else { continue };
             let padded: Vec<[f32; 1]> = values
                 .chunks(n_before)
-                .flat_map(|key| key.iter().copied().chain(defaults.iter().map(|&default| [default])))
+                .enumerate()
+                .flat_map(|(k, of_key)| {
+                    // Tangents of a constant weight are zero.
+                    let share = if output.is_value(k) { 1.0 } else { 0.0 };
+                    of_key.iter().copied().chain(defaults.iter().map(move |&default| [share * default]))
+                })
                 .collect();
             let accessor = edit.write(None, &padded, false, false);
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();

@@ -13,7 +13,7 @@ const MIN_TRANSLATION_RANGE: f64 = 1e-3;
 
 /// Property that an animation channel animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ChannelTarget {
+pub(in crate::gltf) enum ChannelTarget {
     Translation(usize),
     Rotation(usize),
     Scale(usize),
@@ -35,7 +35,7 @@ pub(super) struct NodeChange {
 }
 
 /// Reads the target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
-pub(super) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
+pub(in crate::gltf) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
     let target = &channel["target"];
     if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str)
     {

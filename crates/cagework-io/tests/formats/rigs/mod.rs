@@ -536,3 +536,23 @@ fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
         assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDING_TOLERANCE, &format!("{targets:?}"));
     }
 }
+
+/// UniVRM writes the names of morph targets to the extras of primitives.
+#[test]
+fn target_names_of_primitives_are_read_and_extended() {
+    let mut rig = rigged();
+    let names = rig.json["meshes"][0]["extras"].take();
+    rig.primitive(0)["extras"] = names;
+    let model = read(&rig.glb());
+    assert_eq!(player(&model).targets().0, ["wide", "tall"]);
+    let by = by(&model);
+    let still = vec![DVec3::ZERO; by.len()];
+    let poses = [("bent".to_owned(), by)];
+    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &ReshapeOptions::default()).unwrap();
+    let mesh = &json_of(&bytes)["meshes"][0];
+    let all = serde_json::json!(["wide", "tall", "bent"]);
+    assert_eq!(
+        (&mesh["extras"]["targetNames"], &mesh["primitives"][0]["extras"]["targetNames"]),
+        (&all, &all)
+    );
+}
