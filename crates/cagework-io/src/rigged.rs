@@ -329,7 +329,8 @@ impl Model {
     pub fn frames(&self, clip: usize) -> Result<Vec<Vec<Vec3>>, WriteError> {
         let player = self.player()?.ok_or(WriteError::NoRig)?;
         let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
-        let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(1.0, MAX_BAKED_FRAMES) as usize + 1;
+        // A clip of length 0 has one frame, because the times of keys must increase.
+        let n = (found.seconds * BAKED_FRAMES_PER_SECOND).ceil().clamp(0.0, MAX_BAKED_FRAMES) as usize + 1;
         // The position and the normal of a vertex take 24 bytes.
         let needed = (n * self.positions.len() * 24) as u64;
         if needed > MAX_BAKED_BYTES {

@@ -201,3 +201,23 @@ fn channels_with_too_few_values_are_ignored() {
         assert!(model.states(Some(&player.clips()[0].label(0))).is_ok());
     }
 }
+
+/// A clip with one key has length 0. Times of keys must increase strictly (glTF 2.0, section 3.11), so it has one frame.
+#[test]
+fn baked_clip_of_one_key_has_one_frame() {
+    let mut rig = rigged();
+    let samplers = rig.json["animations"][0]["samplers"].clone();
+    for accessor in samplers.as_array().unwrap().iter().flat_map(|s| [&s["input"], &s["output"]]) {
+        let accessor = &mut rig.json["accessors"][accessor.as_u64().unwrap() as usize];
+        let is_weights = accessor["type"] == "SCALAR" && accessor["count"] == 4;
+        accessor["count"] = if is_weights { 2 } else { 1 }.into();
+        accessor["max"] = accessor["min"].clone();
+    }
+    let model = read(&rig.glb());
+    assert_eq!(model.clips()[0].seconds, 0.0);
+    let frames = model.frames(0).unwrap();
+    assert_eq!(frames.len(), 1);
+    let json = json_of(&model.write_baked(0, &model.positions, frames).unwrap());
+    let input = json["animations"][0]["samplers"][0]["input"].as_u64().unwrap() as usize;
+    assert_eq!(json["accessors"][input]["count"], 1);
+}
