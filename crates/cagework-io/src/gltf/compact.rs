@@ -61,8 +61,8 @@ enum Use {
     Index(bool),
     /// Keys of clips, and inverse bind matrices.
     Other,
-    /// References of different kinds.
-    Several,
+    /// References of different kinds, and whether any of them is a vertex attribute.
+    Several(bool),
 }
 
 /// Elements of an accessor in a buffer view of their own.
@@ -107,6 +107,13 @@ fn parts(glb: &[u8]) -> Result<(Value, Vec<u8>), WriteError> {
     Ok((json, glb.bin.map_or_else(Vec::new, std::borrow::Cow::into_owned)))
 }
 
+impl Use {
+    /// Whether vertices use the accessor, so that its elements must be aligned to 4 bytes.
+    fn is_vertex(&self) -> bool {
+        matches!(self, Self::Vertex(..) | Self::Several(true))
+    }
+}
+
 /// The use of each accessor.
 fn uses(json: &Value) -> BTreeMap<usize, Use> {
     let mut all: BTreeMap<usize, Use> = BTreeMap::new();
@@ -115,7 +122,7 @@ fn uses(json: &Value) -> BTreeMap<usize, Use> {
         all.entry(accessor as usize)
             .and_modify(|known| {
                 if *known != of {
-                    *known = Use::Several;
+                    *known = Use::Several(known.is_vertex() || of.is_vertex());
                 }
             })
             .or_insert(of);
@@ -185,13 +192,13 @@ fn split(json: &mut Value, bin: &[u8], quantize: bool) -> Result<Vec<u8>, WriteE
             _ => None,
         };
         needs_extension |= quantized.as_ref().is_some_and(|elements| elements.component == I8);
-        let is_vertex = matches!(of, Use::Vertex(..));
+        let is_vertex = of.is_vertex();
         let is_quantized = quantized.is_some();
         let Some(elements) = quantized.or_else(|| raw(&before, bin, of_json, is_vertex)) else { continue };
         let Elements { bytes, component, normalized, stride } = elements;
         let element = component_size(component) * width(of_json);
         let target = match of {
-            Use::Vertex(..) => Some(VERTICES),
+            _ if is_vertex => Some(VERTICES),
             Use::Index(_) => Some(INDICES),
             _ => None,
         };

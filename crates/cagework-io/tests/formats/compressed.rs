@@ -345,3 +345,25 @@ fn unusual_accessors_survive_compaction() {
     // An accessor that extends beyond the buffer is an error or is left unchanged. It must not cause a panic.
     let _ = compact(small.glb(), CompactOptions { quantize: true, compress: Compression::Meshopt });
 }
+
+/// Elements of vertex attributes start at multiples of 4 bytes (glTF 2.0, section 3.6.2.4), also if two attributes share
+/// them.
+#[test]
+fn shared_attributes_stay_aligned() {
+    let mut b = plain_cube();
+    let bytes: Vec<u8> = (0..8).flat_map(|v| [v, 2 * v, 3 * v, 0]).collect();
+    let colors = b.accessor(&bytes, common::U8, 8, "VEC3");
+    b.json["accessors"][colors]["normalized"] = json!(true);
+    let view = b.json["accessors"][colors]["bufferView"].as_u64().unwrap() as usize;
+    b.json["bufferViews"][view]["byteStride"] = json!(4);
+    for name in ["COLOR_0", "COLOR_1"] {
+        b.primitive(0)["attributes"][name] = json!(colors);
+    }
+    for compress in [Compression::None, Compression::Meshopt] {
+        let small = compact(b.glb(), CompactOptions { quantize: true, compress }).unwrap();
+        let json = json_of(&small);
+        let view = json["accessors"][colors]["bufferView"].as_u64().unwrap() as usize;
+        assert_eq!(json["bufferViews"][view]["byteStride"], 4, "{compress:?}");
+        assert_eq!(read("x.glb", &small).unwrap().look().vertices[7].color[1], 14.0 / 255.0);
+    }
+}
