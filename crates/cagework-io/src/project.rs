@@ -92,11 +92,8 @@ pub fn write_project(
                 Some(Cow::Owned(points)) => {
                     let positions = model.positions_in_file().into_owned();
                     let splats = Splats { positions, ..points };
-                    gltf::write_splats(&SplatsToWrite {
-                        splats: &splats,
-                        origin: model.origin,
-                        changed: None,
-                    })?
+                    let to_write = SplatsToWrite { splats: &splats, origin: model.origin, changed: None };
+                    gltf::write_splats(&to_write, None)?
                 }
                 _ => model.write(ModelFormat::Gltf, &model.positions)?,
             };

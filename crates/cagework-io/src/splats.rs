@@ -94,6 +94,8 @@ pub(crate) enum Records {
     Ply(ply::Table),
     Splat,
     Spz(spz::Body),
+    /// Colour space of a glTF, whose exports are new files.
+    Gltf(String),
     /// Exports are new files.
     New,
 }

@@ -62,7 +62,7 @@ pub use rig::{
 };
 pub(crate) use rig::{PoseDisplacements, Rig, clips, reshape, skeleton, vrm, write_moved, write_targets};
 pub(crate) use size::MAX_TRIANGLES;
-pub(crate) use splats::write as write_splats;
+pub(crate) use splats::{LINEAR as LINEAR_SPLATS, write as write_splats};
 pub(crate) use transfer::write_skinned;
 
 /// Formats a size and the declared size, such as "30 of 236 kB", in the largest unit in which the two numbers differ.
@@ -327,7 +327,7 @@ pub(crate) struct GltfModel {
     pub(crate) counts: Counts,
     pub(crate) notices: Vec<String>,
     /// Splats of a file without triangles. All other members except the notices are empty.
-    pub(crate) splats: Option<RawSplats>,
+    pub(crate) splats: Option<(RawSplats, String)>,
 }
 
 /// Reads a glTF or GLB file using at most `memory_limit` bytes. `resolve` returns external files by decoded

@@ -10,9 +10,14 @@ use super::container::glb_of;
 use super::size::MAX_PRIMITIVES;
 use super::{GltfDocument, GltfError};
 use crate::error::WriteError;
+use crate::look::linear_from_srgb;
 use crate::splats::{RawSplats, SplatError, SplatsToWrite, band_0, color_of, unit_byte};
 
 const EXTENSION: &str = "KHR_gaussian_splatting";
+/// Colour space of 3DGS captures.
+const SRGB: &str = "srgb_rec709_display";
+/// Colour space whose numbers are linear.
+pub(crate) const LINEAR: &str = "lin_rec709_display";
 /// Limit on the splats of all nodes; or [`SPLATS_PER_BYTE`] per byte of the document, if that is more.
 const MAX_SPLATS: u64 = 1 << 20;
 const SPLATS_PER_BYTE: u64 = 1;
@@ -32,12 +37,13 @@ fn harmonic(degree: u8, coefficient: usize) -> String {
     format!("{EXTENSION}:SH_DEGREE_{degree}_COEF_{coefficient}")
 }
 
-/// Reads the splats of the scene. `None` if it has triangles or no splats.
+/// Reads the splats of the scene, and their colour space. `None` if it has triangles or no splats.
 pub(crate) fn read(
     document: &GltfDocument,
     held: u64,
     memory_limit: u64,
-) -> Result<Option<RawSplats>, GltfError> {
+) -> Result<Option<(RawSplats, String)>, GltfError> {
+    let mut spaces = Vec::new();
     let source = document.source();
     let mut parts = Vec::new();
     for instance in &document.instances {
@@ -57,6 +63,7 @@ pub(crate) fn read(
                 );
                 return Err(SplatError::Unsupported(problem).into());
             }
+            spaces.push(extension["colorSpace"].as_str().unwrap_or(SRGB));
             let attributes = &json["attributes"];
             let has = |degree: u8| {
                 (0..2 * usize::from(degree) + 1).all(|k| attributes.get(harmonic(degree, k)).is_some())
@@ -79,11 +86,15 @@ pub(crate) fn read(
             return Err(GltfError::TooLarge { what, count, limit });
         }
     }
+    if spaces.iter().any(|space| *space != spaces[0]) {
+        let problem = "its splats have different colour spaces: export them as .ply or .spz instead";
+        return Err(SplatError::Unsupported(problem.into()).into());
+    }
     let mut raw = RawSplats::new(count, degree, held, memory_limit)?;
     for part in &parts {
         part.read(source, &mut raw)?;
     }
-    Ok(Some(raw))
+    Ok(Some((raw, spaces[0].to_owned())))
 }
 
 fn accessor(attributes: &Value, name: &str) -> Result<u32, GltfError> {
@@ -143,11 +154,12 @@ impl SplatPrimitive<'_> {
     }
 }
 
-/// Writes splats as a new GLB.
+/// Writes splats as a new GLB. `color_space`: colour space of the file that the splats come from, if it is a glTF.
 ///
 /// # Errors
 /// [`WriteError::TooLarge`] above 4 GiB.
-pub(crate) fn write(to_write: &SplatsToWrite<'_>) -> Result<Vec<u8>, WriteError> {
+pub(crate) fn write(to_write: &SplatsToWrite<'_>, color_space: Option<&str>) -> Result<Vec<u8>, WriteError> {
+    let color_space = color_space.unwrap_or(SRGB);
     let SplatsToWrite { splats, origin, .. } = *to_write;
     let n = splats.len();
     let mut glb =
@@ -171,8 +183,12 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>) -> Result<Vec<u8>, WriteError>
             glb.floats(&harmonic(degree, k), (0..n).map(|s| splats.harmonics_of(s)[at].to_array()));
         }
     }
-    // Colours for programs that draw the splats as points.
-    let color = |s: usize| splats.colors[s].extend(splats.opacities[s]).to_array().map(unit_byte);
+    // Colours for programs that draw the splats as points. COLOR_0 is linear (glTF 2.0, section 3.9.2).
+    let color = |s: usize| {
+        let color = splats.colors[s];
+        let linear = if color_space == SRGB { color.map(linear_from_srgb) } else { color };
+        linear.extend(splats.opacities[s]).to_array().map(unit_byte)
+    };
     glb.push("COLOR_0", (0..n).flat_map(color).collect(), (UNSIGNED_BYTE, "VEC4"));
     glb.accessors[glb.views.len() - 1]["normalized"] = true.into();
     let mut node = json!({ "mesh": 0 });
@@ -188,7 +204,7 @@ pub(crate) fn write(to_write: &SplatsToWrite<'_>) -> Result<Vec<u8>, WriteError>
         "meshes": [{ "primitives": [{
             "mode": 0,
             "attributes": glb.attributes,
-            "extensions": { EXTENSION: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
+            "extensions": { EXTENSION: { "kernel": "ellipse", "colorSpace": color_space } },
         }] }],
         "accessors": glb.accessors,
         "bufferViews": glb.views,

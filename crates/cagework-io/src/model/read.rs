@@ -33,8 +33,12 @@ impl Source<'_, '_> {
         let place = (origin, self.clips_alone);
         let mut model = gltf::read(self.name, &self.bytes, self.resolve, self.memory_limit, place)
             .map_err(|source| ReadError::Gltf { name: self.name.into(), source })?;
-        if let Some(raw) = model.splats.take() {
-            let mut read = raw.finish(self.near, Records::New).map_err(|e| self.splat_fault(e))?;
+        if let Some((raw, color_space)) = model.splats.take() {
+            if color_space == gltf::LINEAR_SPLATS {
+                model.notices.push("the colours of the splats are linear: drawn too dark".to_owned());
+            }
+            let mut read =
+                raw.finish(self.near, Records::Gltf(color_space)).map_err(|e| self.splat_fault(e))?;
             read.notices.append(&mut model.notices);
             return Ok(self.capture(ModelFormat::Gltf, read));
         }

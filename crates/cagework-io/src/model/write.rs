@@ -14,9 +14,10 @@ use super::format::ModelProperty;
 use super::{Document, Model, ModelFormat};
 use crate::error::WriteError;
 use crate::gltf::{self, Pose, PoseClip, Rest};
+use crate::look::srgb_from_linear;
 use crate::obj;
 use crate::polygons::{Encoding, Shape};
-use crate::splats::{self, MAX_COLOR, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
+use crate::splats::{self, Capture, MAX_COLOR, MAX_SCALE, Records, SplatsToWrite, changed, records, spz};
 use crate::timeline::Timeline;
 use crate::up::UpAxis;
 
@@ -105,6 +106,9 @@ impl Model {
             turn(Quat::from_mat4(&half.turn()), &|positions| half.turned(positions).into_owned());
             origin = half.vector_turned(origin);
         }
+        if is_linear(capture) && format != ModelFormat::Gltf {
+            turned.to_mut().colors.iter_mut().for_each(|color| *color = color.map(srgb_from_linear));
+        }
         let to_write = SplatsToWrite { splats: &turned, origin, changed: changed.as_deref() };
         Ok(match (format, &capture.records) {
             (ModelFormat::Ply, Records::Ply(table)) => splats::ply::write(&to_write, Some(table)),
@@ -113,7 +117,8 @@ impl Model {
             (ModelFormat::Splat, _) => records::write(&to_write, None),
             (ModelFormat::Spz, Records::Spz(body)) => spz::write(&to_write, Some(body))?,
             (ModelFormat::Spz, _) => spz::write(&to_write, None)?,
-            _ => gltf::write_splats(&to_write)?,
+            (_, Records::Gltf(color_space)) => gltf::write_splats(&to_write, Some(color_space))?,
+            _ => gltf::write_splats(&to_write, None)?,
         })
     }
 
@@ -149,7 +154,15 @@ impl Model {
         let is_mesh_of_splats = self.capture.is_some() && !format.holds_splats();
         let has_harmonics = self.splats().is_some_and(|splats| splats.degree > 0) && format.holds_splats();
         let is_clamped = format == ModelFormat::Spz && self.splats().is_some_and(spz::exceeds_ranges);
+        let is_converted = has_harmonics
+            && !loses(ModelProperty::Harmonics)
+            && format != ModelFormat::Gltf
+            && self.capture.as_ref().is_some_and(|capture| is_linear(capture));
         let all = [
+            (
+                is_converted,
+                "the exact colours from each side (harmonics of linear colours are not converted)",
+            ),
             (is_clamped, "scales, colours or harmonics of splats outside the ranges of the format"),
             (is_mesh_of_splats, "everything but the centres of the splats"),
             (has_harmonics && loses(ModelProperty::Harmonics), "spherical harmonics of the splats"),
@@ -296,6 +309,11 @@ impl Model {
             None => Ok(()),
         }
     }
+}
+
+/// Whether the numbers of the colours are linear. Those of all formats but glTF are sRGB.
+fn is_linear(capture: &Capture) -> bool {
+    matches!(&capture.records, Records::Gltf(space) if space == gltf::LINEAR_SPLATS)
 }
 
 /// Pairs the name of each pose with its positions in the axes and vertex order of the exported document.

@@ -584,3 +584,46 @@ fn damaged_captures_are_refused_with_value_and_limit() {
         "the model has no splats, but a SPZ stores nothing else: export GLB, OBJ, PLY, STL, OFF or 3MF"
     );
 }
+
+/// The colour space of a GLB is kept. Other formats store sRGB: converted by IEC 61966-2-1.
+#[test]
+fn linear_colours_are_kept_or_converted() {
+    let glb = capture().write(ModelFormat::Gltf, &capture().positions).unwrap();
+    let text: String = glb.iter().map(|&b| char::from(b)).collect();
+    let linear = text.replace(r#""srgb_rec709_display""#, r#""lin_rec709_display" "#);
+    let linear: Vec<u8> = linear.chars().map(|c| c as u8).collect();
+    let model = read("a.glb", &linear).unwrap();
+    assert_eq!(model.notices, ["the colours of the splats are linear: drawn too dark"]);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::X).collect();
+    let again = model.write(ModelFormat::Gltf, &moved).unwrap();
+    let again: String = again.iter().map(|&b| char::from(b)).collect();
+    assert!(again.contains(r#""colorSpace":"lin_rec709_display""#));
+    assert_eq!(model.lost_in(ModelFormat::Gltf), None);
+    let lost = model.lost_in(ModelFormat::Ply).unwrap();
+    assert!(lost.contains("harmonics of linear colours are not converted"), "{lost}");
+    let converted = read("a.ply", &model.write(ModelFormat::Ply, &model.positions).unwrap()).unwrap();
+    let [before, after] = [&model, &converted].map(|model| model.splats().unwrap());
+    for (before, after) in before.colors.iter().zip(&after.colors) {
+        let srgb = |c: f32| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+        assert!(after.abs_diff_eq(before.map(srgb), 1e-5), "{before}: {after}");
+    }
+}
+
+/// The point colours of a GLB of splats are linear (glTF 2.0, section 3.9.2), and its harmonics are sRGB.
+#[test]
+fn fallback_colours_of_a_glb_are_linear() {
+    let model = capture();
+    let glb = model.write(ModelFormat::Gltf, &model.positions).unwrap();
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let accessor = json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"].as_u64().unwrap() as usize;
+    let view = &json["bufferViews"][json["accessors"][accessor]["bufferView"].as_u64().unwrap() as usize];
+    let start = 28 + length + view["byteOffset"].as_u64().unwrap() as usize;
+    let splats = model.splats().unwrap();
+    for (color, bytes) in splats.colors.iter().zip(glb[start..].chunks_exact(4)) {
+        let linear = color.map(|c| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) });
+        for (expected, &byte) in linear.to_array().iter().zip(bytes) {
+            assert!((255.0 * expected - f32::from(byte)).abs() < 0.51, "{expected} {byte}");
+        }
+    }
+}
