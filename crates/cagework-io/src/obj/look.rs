@@ -4,12 +4,13 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::lex::{lines, tokens};
+use cagework_core::words::counted;
 use glam::Vec3;
 
 use super::{NONE, ObjDocument};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb};
 use crate::normals::Shading;
-use crate::siblings::{Image, Resolve, Siblings};
+use crate::siblings::{Image, Resolve, SiblingError, Siblings};
 
 /// A material of an `.mtl` file.
 #[derive(Clone, Debug)]
@@ -39,6 +40,7 @@ pub(crate) fn read_materials(
     into: &mut HashMap<String, Material>,
 ) {
     let mut name: Option<String> = None;
+    let (mut has_opacity, mut n_placed) = (false, 0_usize);
     for line in lines(bytes) {
         let mut words = tokens(bytes, line.range.clone());
         let Some(keyword) = words.next() else { continue };
@@ -47,7 +49,7 @@ pub(crate) fn read_materials(
             || words.next().and_then(|w| std::str::from_utf8(&bytes[w]).ok()?.parse::<f32>().ok());
         if &bytes[keyword.clone()] == b"newmtl" {
             into.insert(rest.clone(), Material { color: [1.0; 4], image: None });
-            name = Some(rest);
+            (name, has_opacity) = (Some(rest), false);
             continue;
         }
         let Some(material) = name.as_ref().and_then(|n| into.get_mut(n)) else { continue };
@@ -57,16 +59,47 @@ pub(crate) fn read_materials(
                     material.color[..3].copy_from_slice(&[r, g, b]);
                 }
             }
-            b"d" => material.color[3] = number().unwrap_or(1.0),
-            b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
-            // Skip text that starts with an option such as `-s 1 1 1`. Names may contain blanks, so it is unclear where
-            // the name begins.
-            b"map_Kd" if !rest.starts_with('-') => {
-                material.image = siblings.image(&rest.replace('\\', "/"), "it is not drawn", notices);
+            b"d" => (material.color[3], has_opacity) = (number().unwrap_or(1.0), true),
+            // Some exporters write the opacity as both `d` and `Tr`.
+            b"Tr" if !has_opacity => material.color[3] = 1.0 - number().unwrap_or(0.0),
+            b"map_Kd" => {
+                let (file, is_placed) = without_options(&rest);
+                n_placed += usize::from(is_placed);
+                material.image = siblings.image(&file.replace('\\', "/"), "it is not drawn", notices);
             }
             _ => {}
         }
     }
+    if n_placed > 0 {
+        let textures = counted(n_placed, "texture has", "textures have");
+        notices.push(format!("{textures} an offset, a scale or a turbulence in a material file: ignored"));
+    }
+}
+
+/// Returns the file name after the options of a `map_Kd` line, and whether an option moves or scales the texture. File
+/// names may contain blanks.
+fn without_options(line: &str) -> (&str, bool) {
+    let (mut rest, mut is_placed) = (line, false);
+    while let Some((option, mut after)) = rest.split_once(char::is_whitespace) {
+        let (n_words, identity) = match option {
+            "-blendu" | "-blendv" | "-cc" | "-clamp" | "-imfchan" | "-texres" | "-boost" | "-bm" => (1, None),
+            "-mm" => (2, None),
+            // One to three numbers.
+            "-o" | "-t" => (3, Some(0.0)),
+            "-s" => (3, Some(1.0)),
+            _ => break,
+        };
+        for _ in 0..n_words {
+            let Some((word, next)) = after.trim_start().split_once(char::is_whitespace) else { break };
+            if let Some(identity) = identity {
+                let Ok(number) = word.parse::<f32>() else { break };
+                is_placed |= number != identity;
+            }
+            after = next;
+        }
+        rest = after.trim_start();
+    }
+    (rest, is_placed)
 }
 
 /// Lists the names of an OBJ's material files and their textures.
@@ -82,14 +115,33 @@ pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit:
         if keyword.is_none_or(|keyword| &bytes[keyword] != b"mtllib") {
             continue;
         }
-        let name = rest_of(&bytes[line.range], b"mtllib").replace('\\', "/");
-        if libraries.insert(name.clone())
-            && let Ok(file) = siblings.file(&name)
+        for (_, file) in libraries_of(&rest_of(&bytes[line.range], b"mtllib"), &mut siblings, &mut libraries)
         {
-            read_materials(&file, &mut siblings, &mut Vec::new(), &mut HashMap::new());
+            if let Ok(file) = file {
+                read_materials(&file, &mut siblings, &mut Vec::new(), &mut HashMap::new());
+            }
         }
     }
     names
+}
+
+/// Name and content of a material file.
+type Library = (String, Result<Arc<Vec<u8>>, SiblingError>);
+
+/// Reads the files of a `mtllib` line that are not in `known`, and adds them to it. The text after the keyword is one name
+/// with blanks or, if there is no such file, several names.
+pub(super) fn libraries_of(
+    text: &str,
+    siblings: &mut Siblings<'_>,
+    known: &mut HashSet<String>,
+) -> Vec<Library> {
+    let text = text.replace('\\', "/");
+    let names = match siblings.file(&text) {
+        Err(SiblingError::Missing) => text.split_whitespace().map(str::to_owned).collect(),
+        _ => vec![text],
+    };
+    let new = names.into_iter().filter(|name| known.insert(name.clone()));
+    new.map(|name| (name.clone(), siblings.file(&name))).collect()
 }
 
 /// Returns the text after the keyword. Names may contain blanks.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
-use super::look::{Material, read_materials, rest_of};
+use super::look::{Material, libraries_of, read_materials, rest_of};
 use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
 use crate::origin::relative;
@@ -265,8 +265,9 @@ impl<'a> Reader<'a> {
                     })?;
                 }
                 let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).take(4).collect();
-                // One number after the coordinates is a weight, three numbers are a colour.
-                if let [r, g, b] = after[..] {
+                // One number after the coordinates is a weight, three numbers are a colour, four a colour with its
+                // opacity, which is ignored.
+                if let [r, g, b] | [r, g, b, _] = after[..] {
                     self.document.colors.insert(self.positions.len() as u32, [r, g, b]);
                 }
                 self.positions.push(Vec3::from_array(p));
@@ -384,20 +385,22 @@ impl<'a> Reader<'a> {
         groups.push(Group { is_object, name, first_face: self.document.face_materials.len() as u32 });
     }
 
-    /// Reads a material file, unless it has been read before.
-    fn library(&mut self, name: &str) {
-        let name = name.replace('\\', "/");
-        match self.libraries.insert(name.clone()).then(|| self.siblings.file(&name)) {
-            Some(Ok(file)) => {
-                let looks = &mut self.document.looks;
-                read_materials(&file, &mut self.siblings, &mut self.notices, looks);
+    /// Reads the material files of a line, except those that have been read before.
+    fn library(&mut self, text: &str) {
+        for (name, file) in libraries_of(text, &mut self.siblings, &mut self.libraries) {
+            match file {
+                Ok(file) => {
+                    let looks = &mut self.document.looks;
+                    read_materials(&file, &mut self.siblings, &mut self.notices, looks);
+                }
+                Err(SiblingError::Refused(reason)) => {
+                    let name = shown_start(&name, MAX_NAME_CHARS);
+                    self.notices
+                        .push(format!("material file '{name}' {reason}: its materials are not drawn"));
+                }
+                // Material files are often missing, so this causes no notice.
+                Err(SiblingError::Missing) => {}
             }
-            Some(Err(SiblingError::Refused(reason))) => {
-                let name = shown_start(&name, MAX_NAME_CHARS);
-                self.notices.push(format!("material file '{name}' {reason}: its materials are not drawn"));
-            }
-            // Material files are often missing, so this causes no notice.
-            Some(Err(SiblingError::Missing)) | None => {}
         }
     }
 

@@ -198,6 +198,8 @@ fn obj_colours_after_coordinates_are_vertex_colours() {
     let color = look.vertices[0].color;
     assert!(color.iter().zip([1.0, 0.0, 0.2140, 1.0]).all(|(a, b)| (a - b).abs() < COLOUR_TOLERANCE));
     assert_eq!(look.groups.len(), 1);
+    let with_alpha = obj("v 0 0 0 1 0 0.5 1\nv 1 0 0 1 1 1 1\nv 0 1 0 0 0 0 1\nf 1 2 3\n", &[]);
+    assert_eq!(with_alpha, look);
     // A fourth number alone is a weight.
     assert!(obj("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", &[]).groups.is_empty());
 }
@@ -297,4 +299,47 @@ fn smoothing_groups_share_no_normal() {
     let again = smoothed_cube(|_, _| 0, |face| ["s 1\n", "s 2\n"][face % 2]);
     assert_eq!(again.copies.len(), 6, "all faces around two opposite corners belong to one group");
     assert_eq!(smoothed_cube(|_, v| v, |_| "s off\n"), smooth);
+}
+
+#[test]
+fn options_before_the_name_of_a_texture_are_skipped() {
+    for (options, is_placed) in [
+        ("", false),
+        ("-s 1 1 1 -o 0 0 0 ", false),
+        ("-clamp on -bm 0.5 -blendu off -mm 0 1 -imfchan r ", false),
+        ("-s 2 2 ", true),
+        ("-o 0.5 -texres 512 ", true),
+    ] {
+        let mtl = format!("newmtl blue\nmap_Kd {options}my dot.png\n");
+        let files = [("paint box.mtl", mtl.as_bytes()), ("my dot.png", &PNG)];
+        let mut resolve =
+            |name: &str| files.iter().find(|(n, _)| *n == name).map(|(_, bytes)| Ok(bytes.to_vec()));
+        let model = Model::read("x.obj", SQUARE.as_bytes(), &mut resolve).unwrap();
+        assert_eq!(model.look().groups[0].image, Some(0), "{options}");
+        assert_eq!(model.notices.len(), usize::from(is_placed), "{options}: {:?}", model.notices);
+    }
+}
+
+/// The name of a material file may have blanks, and a line may name several files.
+#[test]
+fn one_line_names_several_material_files() {
+    let (first, second) = (b"newmtl plain\nKd 1 0 0\n", b"newmtl blue\nKd 0 0 1\n");
+    let text = SQUARE.replace("paint box.mtl", "a.mtl b.mtl");
+    let look = obj(&text, &[("a.mtl", first), ("b.mtl", second)]);
+    let colors: Vec<_> = look.groups.iter().map(|group| group.base_color).collect();
+    assert_eq!(colors, [[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0]]);
+}
+
+/// Some exporters write the opacity as both `d` and `Tr`.
+#[test]
+fn opacity_overrides_transparency() {
+    for (lines, alpha) in [("d 1\nTr 1", 1.0), ("Tr 1\nd 1", 1.0), ("Tr 0.25", 0.75), ("d 0.5\nTr 0.5", 0.5)]
+    {
+        let mtl = format!("newmtl blue\nKd 1 1 1\n{lines}\n");
+        assert_eq!(
+            obj(SQUARE, &[("paint box.mtl", mtl.as_bytes())]).groups[0].base_color[3],
+            alpha,
+            "{lines}"
+        );
+    }
 }
