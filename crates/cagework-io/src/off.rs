@@ -1,57 +1,87 @@
 //! OFF reader and writer (Geomview's object file format, text only): vertices with colours or normals, and polygons.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::obj::{lines, shown_token, tokens};
+use crate::obj::{Line, lines, shown_token, tokens};
 use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, Shape, color_bytes, fault, numbers};
 
 /// Whether the first word is `OFF`, with optional prefix letters for vertex attributes.
 pub(crate) fn is_off(bytes: &[u8]) -> bool {
     let word = lines(bytes).find_map(|line| tokens(bytes, line.range).next());
-    word.is_some_and(|word| prefix(&bytes[word]).is_some())
+    word.is_some_and(|word| keyword(&bytes[word]).is_some())
 }
 
-/// Letters before `OFF` in the keyword of a header.
-fn prefix(word: &[u8]) -> Option<&[u8]> {
-    word.strip_suffix(b"OFF").filter(|letters| letters.iter().all(|b| b"STCN4n".contains(b)))
+/// Letters before `OFF` in the keyword of a header, and the digits after it: some programs write no blank before the
+/// number of vertices.
+fn keyword(word: &[u8]) -> Option<(&[u8], &[u8])> {
+    let at = word.windows(3).position(|three| three == b"OFF")?;
+    let (letters, digits) = (&word[..at], &word[at + 3..]);
+    let is_valid = letters.iter().all(|b| b"STCN4n".contains(b)) && digits.iter().all(u8::is_ascii_digit);
+    is_valid.then_some((letters, digits))
 }
 
-/// Reads a file using at most `memory_limit` bytes. Each vertex and each face has its own line. `near`: store
-/// positions relative to an origin near them.
+/// Splits the words of a file on one line into the lines of its vertices and faces. `per_vertex`: number of words of a
+/// vertex.
+fn split_line(
+    bytes: &[u8],
+    number: usize,
+    mut words: impl Iterator<Item = Range<usize>>,
+    (n_vertices, per_vertex): (u64, u32),
+) -> impl Iterator<Item = Line> {
+    let mut n_before = 0;
+    std::iter::from_fn(move || {
+        let first = words.next()?;
+        let corners = || std::str::from_utf8(&bytes[first.clone()]).ok()?.parse::<u32>().ok();
+        let more = if n_before < n_vertices { per_vertex - 1 } else { corners().unwrap_or(0) };
+        n_before += 1;
+        let end = words.by_ref().take(more as usize).last().map_or(first.end, |word| word.end);
+        Some(Line { number, range: first.start..end })
+    })
+}
+
+/// Reads a file using at most `memory_limit` bytes. Each vertex and each face has its own line, unless the whole file is
+/// one line. `near`: store positions relative to an origin near them.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let n_bytes = bytes.len() as u64;
     Polygons::check_memory(n_bytes, 0, 0, memory_limit)?;
     let mut rows = lines(bytes).filter(|line| tokens(bytes, line.range.clone()).next().is_some()).peekable();
     let mut last = 1;
     let (mut has_colors, mut has_normals) = (false, false);
-    let mut header = None;
-    if let Some(line) = rows.peek().cloned() {
-        let mut words = tokens(bytes, line.range.clone()).peekable();
-        if let Some(letters) = words.peek().and_then(|word| prefix(&bytes[word.clone()])) {
-            words.next();
-            rows.next();
-            if letters.contains(&b'4') || letters.contains(&b'n') {
-                return Err(fault(line.number, "only three-dimensional vertices are supported"));
-            }
-            (has_colors, has_normals) = (letters.contains(&b'C'), letters.contains(&b'N'));
-            // The counts may follow on the line of the keyword.
-            header = words.peek().is_some().then(|| (line, words.collect::<Vec<_>>()));
+    let mut n_texcoords = 0;
+    let mut header = rows.next();
+    if let Some(line) = &mut header
+        && let Some(word) = tokens(bytes, line.range.clone()).next()
+        && let Some((letters, digits)) = keyword(&bytes[word.clone()])
+    {
+        if letters.contains(&b'4') || letters.contains(&b'n') {
+            return Err(fault(line.number, "only three-dimensional vertices are supported"));
+        }
+        (has_colors, has_normals) = (letters.contains(&b'C'), letters.contains(&b'N'));
+        n_texcoords = if letters.contains(&b'T') { 2 } else { 0 };
+        // The counts are on the line of the keyword or on the next one.
+        line.range.start = word.end - digits.len();
+        if tokens(bytes, line.range.clone()).next().is_none() {
+            header = rows.next();
         }
     }
-    let header = header.or_else(|| {
-        rows.next().map(|line| {
-            let words = tokens(bytes, line.range.clone()).collect();
-            (line, words)
-        })
-    });
-    let Some((line, words)) = header else { return Err(PolygonsError::Empty) };
-    if words.first().is_some_and(|word| bytes[word.clone()].eq_ignore_ascii_case(b"BINARY")) {
+    let Some(line) = header else { return Err(PolygonsError::Empty) };
+    let mut words = tokens(bytes, line.range.clone());
+    if words.clone().next().is_some_and(|word| bytes[word].eq_ignore_ascii_case(b"BINARY")) {
         return Err(fault(line.number, "it is a binary OFF file: save it as text"));
     }
-    let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.into_iter())?;
+    let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.by_ref())?;
+    let is_one_line = rows.peek().is_none();
+    let mut rows: Box<dyn Iterator<Item = Line>> = if is_one_line {
+        // The number of edges precedes the vertices. A colour has four channels.
+        let per_vertex = 3 + 3 * u32::from(has_normals) + 4 * u32::from(has_colors) + n_texcoords;
+        Box::new(split_line(bytes, line.number, words.skip(1), (n_vertices, per_vertex)))
+    } else {
+        Box::new(rows)
+    };
     // A vertex or face takes at least two bytes, since each is on its own line.
     for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
         if count > n_bytes / 2 {

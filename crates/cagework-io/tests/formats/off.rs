@@ -31,6 +31,7 @@ fn off_files_are_read_with_polygons_and_colours() {
         ("# by hand\n\nOFF 8 6 0 # counts\n", ["", " 3 0.5 0.5 0.5"], None, vec![colors]),
         ("OFF\r\n8 6\r\n", [" # a vertex", " # a face"], None, vec![]),
         ("8 6 0\n", ["", ""], None, vec![]),
+        ("OFF8 6 0\n", ["", ""], None, vec![]),
         ("COFF\n8 6 0\n", [" 255 0 51 255", ""], Some([1.0, 0.0, 0.2]), vec![]),
         ("COFF\n8 6 0\n", [" 1.0 0 0.2 1", ""], Some([1.0, 0.0, 0.2]), vec![]),
         ("NOFF\n8 6 0\n", [" 0 0 1", ""], None, vec![]),
@@ -105,4 +106,20 @@ fn damaged_off_files_are_errors() {
     }
     let tight = Model::read_within("x.off", good.as_bytes(), &mut |_| None, 1000);
     assert!(tight.unwrap_err().to_string().contains("memory"));
+}
+
+#[test]
+fn off_files_on_one_line_are_read() {
+    let faces = quads().cage_mesh().faces;
+    for (header, after) in [("OFF 8 6 0\n", ""), ("OFF8 6 0\n", ""), ("COFF 8 6 0\n", " 255 0 51 255")] {
+        let text = off(header, [after, ""]).replace('\n', " ");
+        let model = read("cube.off", text.as_bytes()).unwrap();
+        assert_eq!((&model.positions, model.cage_mesh().faces), (&cube(), faces.clone()), "{header}");
+        let red = if after.is_empty() { [1.0; 3] } else { [1.0, 0.0, 0.033_104_77] };
+        let found = model.look().vertices[0].color;
+        assert!(found.iter().zip(red).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
+        let cut = text.trim_end().rsplit_once(' ').unwrap().0;
+        let message = read("cube.off", cut.as_bytes()).unwrap_err().to_string();
+        assert!(message.contains("has 3 corners of 4"), "{message}");
+    }
 }
