@@ -94,7 +94,7 @@ pub(crate) fn pull<'py>(
         let drag_options = DragOptions { reach, relax, ..DragOptions::default() };
         let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
         let mut drag = drag.map_err(error::pull)?;
-        let to = drag.targets(&grabs, &to, &deform_bound(&weights, &frames, &start));
+        let to = drag.targets(&grabs, &to, &mesh.triangles, &deform_bound(&weights, &frames, &start));
         drag.go(&to, FRAMES);
         drag.settle(&to);
         Ok(drag.cage())

@@ -92,7 +92,8 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
     let deformed = |cage: &[Vec3]| deform_bound(weights, frames, cage);
     let before = deformed(&start);
-    let to = drag.targets(&job.grabs, &model.up().turned(&job.to(model.origin())), &before);
+    let to = job.to(model.origin());
+    let to = drag.targets(&job.grabs, &model.up().turned(&to), &mesh.triangles, &before);
     let grabbed = drag.start().to_vec();
     let begun = Instant::now();
     drag.go(&to, job.frames);

@@ -14,6 +14,8 @@ const MAX_SETTLING_FRAMES: u32 = 60;
 const STEPS_PER_FRAME: usize = 4;
 /// A target counts as changed if it moves by more than this, as a fraction of the model's size.
 const MIN_TARGET_MOVE: f64 = 1e-9;
+/// A point whose weights sum to less than this stays in place, so a shift of the whole cage cannot move it.
+const MIN_SHARE: f64 = 1e-3;
 /// Length of a drag, as a fraction of the model's size, at which relaxation is complete.
 const RELAX_LENGTH: f64 = 0.1;
 
@@ -33,9 +35,14 @@ impl Drag {
         }
         if self.is_shift {
             let row = self.handles.row(0).transpose();
+            // A shift of the cage moves the point by this share of the shift.
+            let share = row.sum();
+            if share < MIN_SHARE {
+                return;
+            }
             for (x, target) in to[0].to_array().into_iter().enumerate() {
                 let mut column = self.cage.rows_mut(x * self.n, self.n);
-                let shift = target - row.dot(&column);
+                let shift = (target - row.dot(&column)) / share;
                 column.add_scalar_mut(shift);
             }
             self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));
@@ -90,14 +97,28 @@ impl Drag {
         frames
     }
 
-    /// Computes the targets of the drag that bring the grabbed handles to `to`. A vertex outside the cage has a
-    /// constant offset from the position that its weights give, so its target is shifted by this offset. `deformed`:
-    /// the model at the start of the drag, `[n_vertices]`, object units.
+    /// Computes the targets of the drag that bring the grabbed handles to `to`. A point outside the cage has a constant
+    /// offset from the position that its weights give, so its target is shifted by this offset. `triangles`: those of
+    /// the model, `[n_triangles]`; `deformed`: the model at the start of the drag, `[n_vertices]`, object units.
+    ///
+    /// # Panics
+    /// If a handle refers to a triangle or vertex that does not exist.
     #[must_use]
-    pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
-        let beside = |(grab, start): (&Handle, &DVec3)| match grab {
-            Handle::Vertex(v) => deformed[*v as usize].as_dvec3() - *start,
-            Handle::Triangle(..) | Handle::Cage(_) => DVec3::ZERO,
+    pub fn targets(
+        &self,
+        grabs: &[Handle],
+        to: &[Vec3],
+        triangles: &[[u32; 3]],
+        deformed: &[Vec3],
+    ) -> Vec<DVec3> {
+        let at = |v: u32| deformed[v as usize].as_dvec3();
+        let beside = |(grab, start): (&Handle, &DVec3)| match *grab {
+            Handle::Vertex(v) => at(v) - *start,
+            Handle::Triangle(t, bary) => {
+                let corners = triangles[t as usize];
+                (0..3).map(|k| bary[k] * at(corners[k])).sum::<DVec3>() - *start
+            }
+            Handle::Cage(_) => DVec3::ZERO,
         };
         let beside = grabs.iter().zip(&self.start).map(beside);
         to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()

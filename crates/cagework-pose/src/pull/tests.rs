@@ -12,6 +12,7 @@ use super::*;
 use crate::symmetry::Symmetry;
 use cagework_cage::samples;
 use cagework_core::cage::Cage;
+use cagework_core::deform::deform_bound;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::progress::NoProgress;
 use cagework_core::{BindOptions, Weights, bind, subdivided_box};
@@ -357,4 +358,43 @@ fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
     }
     let none = Probes::new(&TriMesh::default(), &cage).unwrap_err();
     assert_eq!(none, PullError::Empty);
+}
+
+/// An octahedron whose corner at x = `reach` is outside the cube from -1 to 1. Between 5 % and 15 % of the cage's
+/// diagonal, 3.46, the corner follows the cage partly and keeps a constant offset.
+#[test]
+fn grabs_outside_the_cage_reach_their_targets() {
+    let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    let options = BindOptions { grid: 16, ..BindOptions::default() };
+    for reach in [1.1, 1.35] {
+        let near = [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z].map(|p| 0.9 * p);
+        let positions = [&[reach * Vec3::X], &near[..]].concat();
+        let triangles =
+            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let mesh = TriMesh { positions, triangles };
+        let bound = |points: &[Vec3]| bind(points, &cage, &options, &NoProgress).unwrap();
+        let probes = Probes::new(&mesh, &cage).unwrap();
+        let of_probes = bound(probes.points());
+        let pull = Pull::new(&mesh, &cage, probes, &of_probes.frames.folded(&of_probes.weights)).unwrap();
+        let of_mesh = bound(&mesh.positions);
+        let rows = of_mesh.frames.folded(&of_mesh.weights);
+        let deformed = |cage: &[Vec3]| deform_bound(&of_mesh.weights, &of_mesh.frames, cage);
+        let rest = cage.positions();
+        let before = deformed(rest);
+        let to = before[0] + Vec3::new(0.2, 0.0, 0.0);
+        for grab in
+            [Handle::Vertex(0), Handle::Triangle(0, [1.0, 0.0, 0.0]), Handle::Triangle(3, [0.0, 1.0, 0.0])]
+        {
+            let grip = Grip::new(grab, &pull, &mesh.triangles, &rows).unwrap();
+            let options = DragOptions { reach: Reach::Whole, ..DragOptions::default() };
+            let start: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();
+            let mut drag = Drag::new(&pull, &start, &[grip], &[], options).unwrap();
+            let target = drag.targets(&[grab], &[to], &mesh.triangles, &before);
+            drag.frame(&target);
+            let posed: Vec<Vec3> = drag.cage().iter().map(|p| p.as_vec3()).collect();
+            let reached = deformed(&posed)[0];
+            assert!(reached.distance(to) < 1e-5, "{grab:?} at {reach}: {reached} instead of {to}");
+        }
+    }
 }
