@@ -58,10 +58,10 @@ pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliErr
     let up = model.up();
     let from_origin = |p: [f64; 3]| (DVec3::from_array(p) - model.origin()).as_vec3();
     let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
-    let (mut importance, mut to, mut n_outside) = (Vec::new(), Vec::new(), 0);
-    let is_outside = |v: u32| bound.outside.iter().any(|o| o.vertex == v && o.share < 1.0);
+    let (mut importance, mut to, mut n_partly) = (Vec::new(), Vec::new(), 0);
+    let follows_partly = |v: u32| bound.outside.iter().any(|o| o.vertex == v && o.share < 1.0);
     let rows = bound.rows();
-    let n = rows.n_columns();
+    let (n, rest) = (rows.n_columns(), bound.cage.controls().rest());
     for (k, landmark) in all.iter().enumerate() {
         let wrong = |what: String| wrong(path, &format!("landmark {k} {what}"));
         let numbers = landmark.to.iter().chain(landmark.point.iter().flatten()).map(|&x| x as f32);
@@ -72,25 +72,33 @@ pub(super) fn landmarks(bound: &BoundModel, path: &Path) -> Result<Goals, CliErr
             return Err(wrong(format!("has the weight {}; it must be above 0", landmark.weight)));
         }
         let (corners, shares) = surface_point(bound, landmark).map_err(wrong)?;
-        n_outside += usize::from(corners.iter().zip(shares).any(|(&v, share)| share > 0.0 && is_outside(v)));
+        let used = || corners.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
+        n_partly += usize::from(used().any(|(v, _)| follows_partly(v)));
         let mut row = vec![0.0; n];
-        for (&v, share) in corners.iter().zip(shares).filter(|(_, share)| *share > 0.0) {
+        for (v, share) in used() {
             let (columns, weights) = rows.row(v as usize);
             columns.iter().zip(weights).for_each(|(&c, &w)| row[c as usize] += share * f64::from(w));
         }
+        // A point outside the cage has a constant offset from the position that its weights give.
+        let at = |v: u32| model.positions[v as usize].as_dvec3();
+        let point: DVec3 = used().map(|(v, share)| share * at(v)).sum();
+        let offset = point - row.iter().zip(rest).map(|(w, c)| *w * c.as_dvec3()).sum::<DVec3>();
         for (column, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
             indices.push(column as u32);
             data.push(*weight as f32);
         }
         indptr.push(indices.len() as u32);
         importance.push(landmark.weight);
-        to.push(up.turned(&[from_origin(landmark.to)])[0]);
+        to.push((up.turned(&[from_origin(landmark.to)])[0].as_dvec3() - offset).as_vec3());
     }
     let weights = Weights::new(n as u32, indptr, indices, data).map_err(|e| CliError::file(path, e))?;
-    let outside_notice = (n_outside > 0).then(|| {
-        let (landmarks, them) =
-            if n_outside == 1 { ("landmark is", "it") } else { ("landmarks are", "them") };
-        format!("{n_outside} {landmarks} outside the cage and not fully bound to it; the fit misses {them}")
+    let outside_notice = (n_partly > 0).then(|| {
+        let (landmarks, them) = if n_partly == 1 {
+            ("landmark is outside the cage and follows", "it")
+        } else {
+            ("landmarks are outside the cage and follow", "them")
+        };
+        format!("{n_partly} {landmarks} it only partly; the fit may miss {them}")
     });
     let affine_notice = (to.len() < N_AFFINE_LANDMARKS).then(|| {
         let plural = if to.len() == 1 { " does" } else { "s do" };

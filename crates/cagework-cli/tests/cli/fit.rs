@@ -1,6 +1,6 @@
 use predicates::str::contains;
 
-use crate::support::{CORNERS, Sandbox, box_obj, obj_positions};
+use crate::support::{CORNERS, Sandbox, box_obj, obj_positions, sphere_obj};
 
 /// A folder with a bound sphere, a bent cage, and as the target the sphere deformed by this cage.
 fn bound() -> Sandbox {
@@ -63,6 +63,28 @@ fn landmarks_recover_the_pose_and_a_single_one_translates_the_model() {
     let [pose, cage] = ["pose.obj", "cage.obj"].map(|name| obj_positions(&sandbox.read(name)));
     for (a, b) in pose.iter().zip(&cage) {
         assert!((0..3).all(|k| (a[k] - b[k] - 0.5).abs() < 1e-3), "{a:?} {b:?}");
+    }
+}
+
+/// Points at a distance of 0.35 from the cage, 10 % of its diagonal of 3.46, follow it by half.
+#[test]
+fn a_landmark_outside_the_cage_that_is_in_place_moves_nothing() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("mesh.obj", sphere_obj(1.35));
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
+    let rest = obj_positions(&sandbox.read("mesh.obj"));
+    let farthest = (0..rest.len()).max_by(|&a, &b| rest[a][0].total_cmp(&rest[b][0])).unwrap();
+    let [x, y, z] = rest[farthest];
+    assert!(x > 1.3, "{x}");
+    let triangle = format!("{{\"point\": [{x}, {y}, {z}], \"to\": [{x}, {y}, {z}]}}");
+    let vertex = format!("{{\"vertex\": {farthest}, \"to\": [{x}, {y}, {z}]}}");
+    for landmark in [vertex, triangle] {
+        sandbox.write("one.json", format!("[{landmark}]"));
+        let run = sandbox.run(&format!("{FIT} --landmarks one.json")).success();
+        run.stdout(contains(
+            "1 landmark is outside the cage and follows it only partly; the fit may miss it",
+        ));
+        assert!(max_distance(&sandbox, "pose.obj", "cage.obj") <= 1e-4);
     }
 }
 
