@@ -6,6 +6,10 @@ use cagework_pose::symmetry::{Symmetry, reflect};
 
 use super::selection::Selection;
 
+/// Relative difference below which the shares of a pair count as equal. It covers poses and cages that are not exactly
+/// symmetric, in which rounding would otherwise decide which vertex of the pair leads.
+const SHARE_TOLERANCE: f32 = 0.01;
+
 /// Options for the vertices that move together with the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPull<'a> {
@@ -20,10 +24,19 @@ pub struct SharedPull<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pull {
     share: Vec<f32>,
-    /// For each vertex, the vertex whose mirrored movement it makes, if any.
-    mirrors: Vec<Option<u32>>,
-    /// Whether each vertex lies on the mirror plane. Such vertices move only within the plane.
-    on_plane: Vec<bool>,
+    motions: Vec<Motion>,
+}
+
+/// The movement that a vertex makes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    /// Its own.
+    Own,
+    /// The mirror image of the movement of this vertex.
+    ImageOf(u32),
+    /// The mean of its own movement and the mirror image of the movement of this vertex, its partner. A vertex on the
+    /// mirror plane is its own partner, so it moves within the plane.
+    MeanWith(u32),
 }
 
 impl Pull {
@@ -47,18 +60,19 @@ impl Pull {
             }
         }
         let share: Vec<f32> = (0..n).map(|i| share(i, &leads, positions, shared.radius)).collect();
-        let mut pull = Self { mirrors: vec![None; n], on_plane: vec![false; n], share };
+        let mut pull = Self { motions: vec![Motion::Own; n], share };
         if let Some(symmetry) = shared.symmetry {
-            let own = pull.share.clone();
+            let all = pull.share.clone();
             for i in 0..n {
-                match symmetry.partner(i as u32) {
-                    Some(p) if p as usize == i => pull.on_plane[i] = true,
+                let Some(p) = symmetry.partner(i as u32) else { continue };
+                let (own, other) = (all[i], all[p as usize]);
+                if (own - other).abs() <= SHARE_TOLERANCE * own.max(other) {
+                    pull.share[i] = 0.5 * (own + other);
+                    pull.motions[i] = Motion::MeanWith(p);
+                } else if other > own {
                     // The vertex with the larger share leads, the other one mirrors it.
-                    Some(p) if own[p as usize] > own[i] => {
-                        pull.share[i] = own[p as usize];
-                        pull.mirrors[i] = Some(p);
-                    }
-                    _ => {}
+                    pull.share[i] = other;
+                    pull.motions[i] = Motion::ImageOf(p);
                 }
             }
         }
@@ -72,7 +86,8 @@ impl Pull {
     }
 
     /// Positions after the gesture. `moved(position, share)` is the position to which a vertex with this share moves;
-    /// mirror images make the reflected movement of their leading vertex.
+    /// mirror images make the reflected movement of their leading vertex. If neither vertex of a pair leads, both make
+    /// the mean of their movements.
     #[must_use]
     pub fn apply(&self, start: &[Vec3], moved: &dyn Fn(Vec3, f32) -> Vec3) -> Vec<Vec3> {
         (0..start.len())
@@ -81,15 +96,13 @@ impl Pull {
                 if share == 0.0 {
                     return start[i];
                 }
-                let movement = match self.mirrors[i] {
-                    Some(leader) => {
-                        let leader = start[leader as usize];
-                        reflect(moved(leader, share) - leader)
-                    }
-                    None => moved(start[i], share) - start[i],
+                let own = |i: usize| moved(start[i], share) - start[i];
+                let movement = match self.motions[i] {
+                    Motion::Own => own(i),
+                    Motion::ImageOf(leader) => reflect(own(leader as usize)),
+                    Motion::MeanWith(p) => 0.5 * (own(i) + reflect(own(p as usize))),
                 };
-                let within = if self.on_plane[i] { Vec3::new(0.0, 1.0, 1.0) } else { Vec3::ONE };
-                start[i] + movement * within
+                start[i] + movement
             })
             .collect()
     }
@@ -170,5 +183,22 @@ mod tests {
             assert!(moved[i ^ 1].abs_diff_eq(reflect(moved[i]), 1e-6), "{i}");
         }
         assert_ne!(moved[3], rest[3], "near enough to follow");
+    }
+
+    /// Vertex 2 is on the mirror plane, and the pair at its sides has the share 1/2 of smoothstep at half the radius.
+    /// The mean of the movement and its mirror image has no x.
+    #[test]
+    fn surroundings_of_a_vertex_on_the_plane_move_symmetrically() {
+        for off in [0.0, 1e-3] {
+            let rest = [Vec3::NEG_X, Vec3::new(1.0 + off, 0.0, 0.0), Vec3::ZERO];
+            let symmetry = Symmetry::new(&rest);
+            assert_eq!(symmetry.partner(0), Some(1));
+            let shared = SharedPull { radius: 2.0, symmetry: Some(&symmetry) };
+            let moved = Pull::new(&selection(3, &[2]), &rest, &rest, shared).apply(&rest, &shifted);
+            let half = Vec3::new(0.0, 1.0, 1.5);
+            assert!(moved[0].abs_diff_eq(rest[0] + half, 2.0 * off + 1e-6), "{moved:?}");
+            assert!((moved[1] - rest[1]).abs_diff_eq(reflect(moved[0] - rest[0]), 1e-6), "{moved:?}");
+            assert_eq!(moved[2], rest[2] + 2.0 * half);
+        }
     }
 }
