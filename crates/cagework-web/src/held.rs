@@ -120,21 +120,26 @@ impl State {
         Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
-    /// Returns the marks of grabs, pins and of an interior control that is being placed. Without weights, grabs and
-    /// pins are omitted.
-    pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
+    /// Returns the marks of grabs, pins and of an interior control that is being placed. `bound`: weights and their
+    /// frames; without them, grabs and pins are omitted.
+    pub(crate) fn held_marks(&self, bound: Option<(&Weights, &Frames)>) -> Marks {
+        let pins = &*self.editor.document().pins;
+        let is_held = !(self.held.points.is_empty() && pins.is_empty());
+        let columns_of = |(_, frames): (&Weights, &Frames)| {
+            frames.fits(self.pose().len()).then(|| frames.columns(self.pose()))
+        };
+        let posed = bound.filter(|_| is_held).and_then(columns_of);
         let place = |point: &SurfacePoint| {
             let corners = self.models().corners(point.triangle)?;
             let follow = |v: u32| {
-                let (columns, values) = weights?.row(v as usize);
-                let moved =
-                    columns.iter().zip(values).map(|(&c, &w)| Some(w * *self.pose().get(c as usize)?));
+                let ((weights, _), posed) = (bound?, posed.as_ref()?);
+                let (columns, values) = weights.row(v as usize);
+                let moved = columns.iter().zip(values).map(|(&c, &w)| Some(w * *posed.get(c as usize)?));
                 moved.sum::<Option<Vec3>>()
             };
             corners.iter().zip(point.bary).map(|(&v, share)| Some(share * follow(v)?)).sum::<Option<Vec3>>()
         };
-        let mut points: Vec<Vec3> =
-            self.held.points.iter().chain(&*self.editor.document().pins).filter_map(place).collect();
+        let mut points: Vec<Vec3> = self.held.points.iter().chain(pins).filter_map(place).collect();
         let line = self.held.target.zip(points.first()).map(|(to, from)| [*from, to]);
         let placed = self.held.placed.windows(2).map(|pair| [pair[0], pair[1]]);
         let segments = line.into_iter().chain(placed).collect();

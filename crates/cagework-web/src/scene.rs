@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use cagework_core::Weights;
 use cagework_core::field::bend_vertices;
+use cagework_core::{Frames, Weights};
 use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, Marks, MeshStyle, SceneOptions, Selection, SliceView, ViewOptions};
 use cagework_io::Joints;
@@ -29,8 +29,8 @@ impl State {
         }
     }
 
-    /// Creates the scene that the view shows. `weights`: the weights on the GPU.
-    pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
+    /// Creates the scene that the view shows. `bound`: the weights on the GPU and their frames.
+    pub(crate) fn scene(&self, bound: Option<(&Weights, &Frames)>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
             view: self.view.options,
@@ -51,7 +51,7 @@ impl State {
                 .as_ref()
                 .map(|(_, stays)| Arc::clone(stays))
                 .or_else(|| self.held.stays.clone()),
-            held: self.held_marks(weights),
+            held: self.held_marks(bound),
             joints: self.joint_marks(),
             draft: Marks { segments: self.draft.clone(), ..Marks::default() },
         }
@@ -84,9 +84,9 @@ impl State {
     }
 
     /// Creates the scene of an exported picture. `alone`: only the model, on a transparent background.
-    pub(crate) fn picture_scene(&self, alone: bool, weights: Option<&Weights>) -> SceneOptions {
+    pub(crate) fn picture_scene(&self, alone: bool, bound: Option<(&Weights, &Frames)>) -> SceneOptions {
         if !alone {
-            return self.scene(weights);
+            return self.scene(bound);
         }
         SceneOptions {
             view: ViewOptions { base_wireframe: false, floor: false, ..self.view.options },

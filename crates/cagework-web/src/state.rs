@@ -381,7 +381,7 @@ impl State {
 
     /// Writes the camera to the GPU sessions, and also playback, splats, pose and scene if they have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
-        let scene = self.is_changed.then(|| self.scene(main.weights()));
+        let scene = self.is_changed.then(|| self.scene(main.weights().zip(main.frames())));
         match &mut self.playing {
             Some(playing) if playing.is_new => {
                 main.play(&playing.palette(), playing.targets());
@@ -648,6 +648,22 @@ mod tests {
         let (row, seed) = state.grip_of(Grab::Vertex(1), bound).unwrap();
         assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], CAGE_SEED));
         assert!(state.grip_of(Grab::Vertex(8), bound).is_none());
+    }
+
+    /// Vertex 1 of the model is outside the cage, at a constant offset of 0.5 in x from the cage's first vertex.
+    /// The offset is an entry of the first of the six columns that follow those of the eight vertices.
+    #[test]
+    fn marks_of_grabs_follow_the_offsets_of_points_outside() {
+        let mut state = uploaded();
+        let at = state.pose()[0];
+        let frames = Frames::of_cage(state.pose());
+        let rows = Weights::new(14, vec![0, 1, 3, 4, 5], vec![0, 0, 8, 0, 0], vec![1.0, 1.0, 0.5, 1.0, 1.0]);
+        let weights = rows.unwrap();
+        let corners = state.models().triangles()[0];
+        let bary = corners.map(|v| f32::from(u8::from(v == 1)));
+        state.held.points = vec![SurfacePoint { triangle: state.models().number_of(0), bary }];
+        assert_eq!(state.held_marks(Some((&weights, &frames))).points, [at + Vec3::new(0.5, 0.0, 0.0)]);
+        assert!(state.held_marks(None).points.is_empty());
     }
 
     #[test]

@@ -129,7 +129,7 @@ impl Engine {
             if let Some(index) = pose {
                 state.write_saved_pose(index, &mut gpu.main)?;
             }
-            let scene = state.picture_scene(alone, gpu.main.weights());
+            let scene = state.picture_scene(alone, gpu.main.weights().zip(gpu.main.frames()));
             gpu.main.set_scene(scene);
             size[1] as f32 / state.size.y
         };
