@@ -3,7 +3,9 @@
 //! Interior controls are the corners of points, lines and sheets inside the cage. They are the last of the cage's
 //! positions and belong to no face. Selection, gestures, poses, undo and projects treat them like the cage's vertices.
 
-use cagework_core::{Cage, CageError, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh};
+use cagework_core::{
+    Cage, CageError, ControlError, ControlSet, Controls, InnerControls, InnerElement, PolygonMesh,
+};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -78,11 +80,12 @@ impl RestCage {
     /// Creates a cage from a mesh whose last positions are the interior controls.
     ///
     /// # Errors
-    /// If a position is not finite, or the controls do not fit into the cage.
+    /// If a position is not finite, an index does not exist, or the controls do not fit into the cage.
     pub fn new(mut mesh: PolygonMesh, controls: CageControls) -> Result<Self, EditError> {
         if !mesh.positions.iter().all(|p| p.is_finite()) {
             return Err(EditError::NotFinite { what: "positions of a cage" });
         }
+        check_indices(&mesh, &controls)?;
         let n_cage = mesh.positions.len().saturating_sub(controls.inner);
         let positions = mesh.positions.split_off(n_cage);
         let inner = if positions.is_empty() && controls.elements.is_empty() {
@@ -180,7 +183,10 @@ impl RestCage {
             .elements
             .into_iter()
             .filter_map(|element| {
-                let corners: Vec<u32> = element.corners().iter().copied().filter(|&i| !is_gone(i)).collect();
+                let mut corners: Vec<u32> =
+                    element.corners().iter().copied().filter(|&i| !is_gone(i)).collect();
+                // Without the points between them, two ends of a closed polyline become one.
+                corners.dedup();
                 match element {
                     InnerElement::Point(_) => corners.first().map(|&i| InnerElement::Point(i)),
                     InnerElement::Line(_) => (corners.len() >= 2).then_some(InnerElement::Line(corners)),
@@ -236,6 +242,31 @@ impl RestCage {
     }
 }
 
+/// Checks that faces and elements refer to positions that exist, and that sheets and lines have corners. Drafts need
+/// this too, because the selection follows their edges.
+fn check_indices(mesh: &PolygonMesh, controls: &CageControls) -> Result<(), EditError> {
+    let n = mesh.positions.len().min(controls.inner);
+    if n < controls.inner {
+        return Err(ControlError::Index { what: "control", element: n as u32, vertex: n as u32, n }.into());
+    }
+    let n_cage = mesh.positions.len() - n;
+    for (face, corners) in (0u32..).zip(&mesh.faces) {
+        if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= n_cage) {
+            return Err(CageError::Index { face, vertex, n: n_cage }.into());
+        }
+    }
+    for (number, element) in (0u32..).zip(&controls.elements) {
+        let (what, corners) = (element.name(), element.corners());
+        if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= n) {
+            return Err(ControlError::Index { what, element: number, vertex, n }.into());
+        }
+        if corners.is_empty() {
+            return Err(ControlError::Degenerate { what, element: number, why: "no corners" }.into());
+        }
+    }
+    Ok(())
+}
+
 fn dropped(what: &str, error: &EditError) -> String {
     format!("{what} gone: {error}. Undo brings it back")
 }
@@ -282,6 +313,33 @@ mod tests {
             (&[InnerElement::Point(0)][..], 1)
         );
         assert_eq!(point.without(&[8]).unwrap().controls, CageControls::default());
+    }
+
+    /// A line from A over B and C back to A, without B and C, is one point twice.
+    #[test]
+    fn a_closed_line_without_its_other_corners_is_removed() {
+        let corners = [at(-0.5), at(0.5), Vec3::new(0.0, 0.5, 0.0), at(-0.5)];
+        let closed = made().with(InnerKind::Line, &corners).unwrap();
+        assert_eq!(closed.controls.elements, [InnerElement::Line(vec![0, 1, 2, 0])]);
+        assert_eq!(closed.without(&[9, 10]).unwrap().controls, CageControls::default());
+    }
+
+    #[test]
+    fn drafts_with_indices_that_do_not_exist_are_refused() {
+        let cube = made().mesh;
+        let mut open = cube.clone();
+        open.faces.pop();
+        open.positions.push(Vec3::ZERO);
+        let draft = |faces: &[Vec<u32>], inner: usize, elements: Vec<InnerElement>| {
+            let mut mesh = open.clone();
+            mesh.faces.extend_from_slice(faces);
+            RestCage::new(mesh, CageControls { inner, elements, ..CageControls::default() })
+        };
+        assert!(draft(&[], 1, vec![InnerElement::Point(0)]).is_ok());
+        assert!(draft(&[], 1, vec![InnerElement::Face(Vec::new())]).is_err());
+        assert!(draft(&[], 1, vec![InnerElement::Line(vec![0, 1])]).is_err());
+        assert!(draft(&[], 10, Vec::new()).is_err(), "more controls than positions");
+        assert!(draft(&[vec![0, 1, 8]], 1, Vec::new()).is_err(), "a face at a control");
     }
 
     #[test]
