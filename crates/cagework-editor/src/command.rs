@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::{InnerElement, PolygonMesh};
 use cagework_io::{Interpolation, SECONDS_PER_POSE, check_times};
-use cagework_pose::blend::{PoseError, reblend};
+use cagework_pose::blend::reblend;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -124,10 +124,10 @@ pub enum Command {
         share: f32,
     },
     /// Sets poses that were transferred from another cage of the same models: the current pose, then each saved pose
-    /// with `from` controls.
+    /// of that cage.
     CarryPoses {
-        /// Number of controls of the other cage.
-        from: usize,
+        /// Identifier of the other cage, as the view of a document gives it.
+        from: u32,
         /// Positions of the controls of this cage, concatenated over the poses. `[n_poses, n_controls]`
         #[cfg_attr(feature = "typescript", ts(type = "readonly (readonly [number, number, number])[]"))]
         positions: Vec<Vec3>,
@@ -149,9 +149,10 @@ pub enum Command {
         /// Notices of the cage generator about the new cage.
         notices: Vec<String>,
     },
-    /// Makes the current positions of the cage its rest position.
+    /// Makes the current positions of the cage its rest position. Saved poses keep their displacements from it.
     MoveRest,
-    /// Edits the selected elements of the cage, and selects the result.
+    /// Edits the selected elements of the cage, and selects the result. Saved poses keep their displacements; those of
+    /// new vertices are the means of the displacements of the vertices that they were made from.
     EditRest {
         /// What to do with the selected elements.
         edit: RestEdit,
@@ -226,18 +227,20 @@ impl Editor {
                 let pose = self.document().pose.clone();
                 let pins = Some(self.document().pins.clone());
                 let document = self.document_mut();
+                let cage = Some(document.cage_id);
                 // The pose equals the new saved pose, so the share of the new one is 1 and all other shares are 0.
                 document.shares = std::iter::repeat_n(0.0, document.poses.len()).chain([1.0]).collect();
                 Arc::make_mut(&mut document.poses).push(NamedPose {
                     name: name.into(),
                     positions: pose,
+                    cage,
                     pins,
                     lead: SECONDS_PER_POSE,
                     interpolation: None,
                 });
             }
             Command::ApplyPose { index } => {
-                let NamedPose { positions, pins, .. } = self.pose(index)?.clone();
+                let NamedPose { positions, pins, .. } = self.fitting_pose(index)?.clone();
                 self.set_pose(positions.to_vec())?;
                 let document = self.document_mut();
                 document.shares = only(index, document.poses.len());
@@ -260,8 +263,9 @@ impl Editor {
                 self.pose(index)?;
                 let document = self.document_mut();
                 let (positions, pins) = (document.pose.clone(), Some(document.pins.clone()));
+                let cage = Some(document.cage_id);
                 let pose = &mut Arc::make_mut(&mut document.poses)[index];
-                (pose.positions, pose.pins) = (positions, pins);
+                (pose.positions, pose.cage, pose.pins) = (positions, cage, pins);
                 document.shares = only(index, document.poses.len());
             }
             Command::DuplicatePose { index, name } => {
@@ -318,7 +322,8 @@ impl Editor {
                     return Err(error.clone().into());
                 }
                 let selection = self.selection.clone();
-                self.set_cage(cage);
+                let from: Vec<Vec<u32>> = (0..document.pose.len() as u32).map(|v| vec![v]).collect();
+                self.set_reshaped(cage, &from);
                 self.selection = selection;
                 self.document_mut().has_sample_cage = false;
             }
@@ -370,6 +375,34 @@ impl Editor {
         poses.get(index).ok_or(missing)
     }
 
+    fn fitting_pose(&self, index: usize) -> Result<&NamedPose, EditError> {
+        let pose = self.pose(index)?;
+        if self.document().fits(pose) { Ok(pose) } else { Err(EditError::OtherCage { number: index + 1 }) }
+    }
+
+    /// Replaces the cage by one that was made from it, and keeps the displacements of the saved poses that fit. `from`:
+    /// the controls that each control of `cage` was made from; its displacement is the mean of theirs. `[n_controls]`
+    fn set_reshaped(&mut self, cage: RestCage, from: &[Vec<u32>]) {
+        let before = self.document().clone();
+        self.set_cage(cage);
+        let document = self.document_mut();
+        let rest = &document.cage.mesh.positions;
+        if from.len() != rest.len() || before.fitting_poses().next().is_none() {
+            return;
+        }
+        for pose in Arc::make_mut(&mut document.poses).iter_mut().filter(|pose| before.fits(pose)) {
+            let at = |(&p, from): (&Vec3, &Vec<u32>)| {
+                let moved = from
+                    .iter()
+                    .map(|&v| v as usize)
+                    .map(|v| pose.positions[v] + (p - before.cage.mesh.positions[v]));
+                if from.is_empty() { p } else { moved.sum::<Vec3>() / from.len() as f32 }
+            };
+            pose.positions = rest.iter().zip(from).map(at).collect();
+            pose.cage = Some(document.cage_id);
+        }
+    }
+
     /// Reorders the saved poses. `order`: old index of each pose; `leads`: time from the previous pose to each pose in
     /// the new order, seconds. `[n_poses]` each
     fn arrange(&mut self, order: &[usize], leads: &[f32]) {
@@ -381,15 +414,14 @@ impl Editor {
     }
 
     fn set_pose_time(&mut self, index: usize, seconds: f32) -> Result<(), EditError> {
-        self.pose(index)?;
+        self.fitting_pose(index)?;
         let document = self.document();
         let places: Vec<usize> =
             (0..document.poses.len()).filter(|&k| document.fits(&document.poses[k])).collect();
         let mut timed: Vec<(f32, usize)> =
             document.pose_seconds().into_iter().zip(places.iter().copied()).collect();
         let Some(own) = timed.iter_mut().find(|(_, k)| *k == index) else {
-            let given = document.poses[index].positions.len();
-            return Err(PoseError { given, expected: document.pose.len() }.into());
+            return Err(EditError::OtherCage { number: index + 1 });
         };
         own.0 = seconds;
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -427,23 +459,23 @@ impl Editor {
         let of = |all: &[f32]| -> Vec<f32> {
             fitting.iter().map(|&k| all.get(k).copied().unwrap_or_default()).collect()
         };
-        let from = if committed.pose.len() == rest.len() { &committed.pose } else { &document.pose };
+        let from = if committed.cage_id == document.cage_id { &committed.pose } else { &document.pose };
         let mixed = reblend(rest, &poses, from, &of(&committed.shares), &of(&shares))?;
         self.set_pose(mixed)?;
         self.document_mut().shares = shares.into();
         Ok(())
     }
 
-    fn take_carried(&mut self, from: usize, positions: &[Vec3], shares: &[f32]) -> Result<(), EditError> {
+    fn take_carried(&mut self, from: u32, positions: &[Vec3], shares: &[f32]) -> Result<(), EditError> {
         let n = self.document().cage.mesh.positions.len();
         let mut carried = positions.chunks_exact(n.max(1));
         let pose = carried.next().map(<[Vec3]>::to_vec).unwrap_or_default();
         self.set_pose(pose)?;
         let document = self.document_mut();
-        for pose in Arc::make_mut(&mut document.poses).iter_mut().filter(|pose| pose.positions.len() == from)
-        {
+        let cage = Some(document.cage_id);
+        for pose in Arc::make_mut(&mut document.poses).iter_mut().filter(|pose| pose.cage == Some(from)) {
             if let Some(carried) = carried.next() {
-                pose.positions = carried.into();
+                (pose.positions, pose.cage) = (carried.into(), cage);
             }
         }
         if shares.len() == document.poses.len() {
@@ -484,9 +516,21 @@ impl Editor {
             self.set_cage(without);
             return Ok(());
         }
-        let CageEdit { mesh, touched, .. } = self.edited(edit)?;
-        let replaced = self.document().cage.replaced(&mesh)?;
-        self.set_cage(replaced);
+        let n_cage = cage.n_cage() as u32;
+        let CageEdit { mesh, vertex_of, made_from, touched } = self.edited(edit)?;
+        let replaced = cage.replaced(&mesh)?;
+        let first_new = mesh.positions.len() - made_from.len();
+        let mut from = vec![Vec::new(); first_new];
+        for (old, new) in (0..n_cage).zip(vertex_of).filter_map(|(old, new)| Some((old, new?))) {
+            if let Some(from) = from.get_mut(new as usize) {
+                from.push(old);
+            }
+        }
+        from.extend(made_from.into_iter().map(Vec::from));
+        if replaced.controls.inner == cage.controls.inner {
+            from.extend((n_cage..cage.mesh.positions.len() as u32).map(|control| vec![control]));
+        }
+        self.set_reshaped(replaced, &from);
         self.document_mut().has_sample_cage = false;
         self.selection.change(&touched, SelectMode::Replace);
         Ok(())
@@ -529,8 +573,8 @@ fn only(index: usize, n_poses: usize) -> Arc<[f32]> {
     (0..n_poses).map(|k| f32::from(u8::from(k == index))).collect()
 }
 
-/// Applies an edit to one item after another; `None` if `items` is empty. The edit must keep the indices of later
-/// items.
+/// Applies an edit to one item after another; `None` if `items` is empty. The edit must keep the indices of all
+/// vertices and of later items.
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],
@@ -541,6 +585,7 @@ fn each<T, E>(
         let mut next = edit(all.as_ref().map_or(mesh, |e| &e.mesh), item)?;
         if let Some(before) = all {
             next.touched.splice(0..0, before.touched);
+            next.made_from.splice(0..0, before.made_from);
         }
         all = Some(next);
     }

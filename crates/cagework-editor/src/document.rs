@@ -1,7 +1,9 @@
 //! The document: all data that can be edited, undone and saved.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
+use cagework_core::PolygonMesh;
 use cagework_io::{Interpolation, MAX_SECONDS, MIN_GAP, SECONDS_PER_POSE, Timeline};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -17,6 +19,9 @@ pub struct NamedPose {
     pub name: Arc<str>,
     /// Positions of the vertices and interior controls of the cage that the pose was saved for. `[n_controls]`
     pub positions: Arc<[Vec3]>,
+    /// Identifies the cage that the pose was saved for, see [`DocumentView::cage_id`](crate::DocumentView::cage_id); `None` if
+    /// it is unknown.
+    pub cage: Option<u32>,
     /// Surface points that pulls keep in place; `None` if unknown.
     pub pins: Option<Arc<[SurfacePoint]>>,
     /// Time from the previous pose, or from the start of the animation, to this pose, seconds.
@@ -75,6 +80,8 @@ pub struct Document {
     pub(crate) mesh_key: u64,
     /// Identifies the cage at rest: documents with equal keys have equal cages.
     pub(crate) cage_key: u64,
+    /// The [`cage_id`] of the cage at rest.
+    pub(crate) cage_id: u32,
     /// Identifies the models with their options and [painted amounts](crate::Member::painted).
     pub(crate) models_key: u64,
 }
@@ -107,10 +114,11 @@ impl Document {
         *self.pose != *self.cage.mesh.positions
     }
 
-    /// Whether a saved pose has one position per vertex and interior control of the cage.
+    /// Whether a saved pose was saved for this cage. The number of its positions does not decide, because another cage
+    /// can have as many vertices in another order.
     #[must_use]
     pub fn fits(&self, pose: &NamedPose) -> bool {
-        pose.positions.len() == self.cage.mesh.positions.len()
+        pose.cage == Some(self.cage_id) && pose.positions.len() == self.cage.mesh.positions.len()
     }
 
     /// Saved poses that [fit](Self::fits) the cage.
@@ -195,4 +203,15 @@ pub struct Key {
     pub mesh: u64,
     /// Identifies the cage at rest.
     pub cage: u64,
+}
+
+/// Hash of a cage's faces and of its positions at rest, by which saved poses find their cage. Poses are absolute
+/// positions, so they also depend on the positions at rest.
+pub(crate) fn cage_id(mesh: &PolygonMesh) -> u32 {
+    let mut hasher = DefaultHasher::new();
+    mesh.faces.hash(&mut hasher);
+    for x in mesh.positions.iter().flat_map(Vec3::to_array) {
+        x.to_bits().hash(&mut hasher);
+    }
+    hasher.finish() as u32
 }

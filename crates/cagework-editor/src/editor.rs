@@ -10,7 +10,7 @@ use cagework_pose::symmetry::Symmetry;
 use glam::{Vec2, Vec3};
 
 use crate::controls::RestCage;
-use crate::document::{Document, Key, NamedPose, Transition};
+use crate::document::{Document, Key, NamedPose, Transition, cage_id};
 use crate::edit::{Constraint, Element, Gesture, GestureKind, Pull, Selection, SharedPull, Topology};
 use crate::error::EditError;
 use crate::history::History;
@@ -235,6 +235,7 @@ impl Editor {
     /// Replaces the cage at rest, resets the pose to it, and sets the shares of all saved poses to 0.
     pub(crate) fn set_cage(&mut self, cage: RestCage) {
         self.document.cage_key = self.next_key();
+        self.document.cage_id = cage_id(&cage.mesh);
         self.document.pose = cage.mesh.positions.as_slice().into();
         self.document.cage = Arc::new(cage);
         self.document.shares = vec![0.0; self.document.poses.len()].into();
@@ -484,6 +485,7 @@ impl Editor {
             has_sample_cage,
             models_key,
             cage_key,
+            cage_id,
             mesh_key,
             ..
         } = &self.document;
@@ -505,6 +507,7 @@ impl Editor {
             models: *models_key,
             mesh: *mesh_key,
             cage: *cage_key,
+            cage_id: *cage_id,
             poses: poses.iter().map(pose_view).collect(),
             shares: shares.to_vec(),
             transition: *transition,

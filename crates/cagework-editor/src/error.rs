@@ -56,7 +56,13 @@ pub enum EditError {
     /// An edit of the rest cage is not possible.
     #[error(transparent)]
     Rest(#[from] RestEditError),
-    /// The pose belongs to another cage.
+    /// The saved pose with this number belongs to another cage.
+    #[error("pose {number} belongs to another cage")]
+    OtherCage {
+        /// Number of the pose, from 1.
+        number: usize,
+    },
+    /// The positions belong to another cage.
     #[error(transparent)]
     Pose(#[from] PoseError),
     /// The animation cannot show a pose at this time.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::controls::{CageControls, RestCage};
-use crate::document::{Document, NamedPose, Transition};
+use crate::document::{Document, NamedPose, Transition, cage_id};
 use crate::models::MemberSettings;
 use crate::surface::SurfacePoint;
 
@@ -32,9 +32,13 @@ pub struct DocumentSettings {
     /// Pinned surface points, which stay in place when the user pulls others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<SurfacePoint>,
-    /// The pinned surface points of each saved pose.
+    /// The pinned surface points of each saved pose; null if unknown.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pose_pins: Vec<Vec<SurfacePoint>>,
+    pub pose_pins: Vec<Option<Vec<SurfacePoint>>>,
+    /// Whether each saved pose was saved for the cage of the project. If empty, all poses with one position per control
+    /// were.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pose_fits: Vec<bool>,
     /// Share of each saved pose in the current pose, 0 to 1.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose_shares: Vec<f32>,
@@ -60,8 +64,10 @@ impl DocumentSettings {
             document;
         let in_file = models.up().turned_back(&document.pose);
         let pose = document.is_posed().then(|| URL_SAFE_NO_PAD.encode(position_bytes(&in_file)));
-        let has_pins = poses.iter().any(|pose| pose.pins.as_ref().is_some_and(|pins| !pins.is_empty()));
-        let pins_of = |pose: &NamedPose| pose.pins.as_ref().map_or_else(Vec::new, |pins| pins.to_vec());
+        let has_pins = poses.iter().any(|pose| pose.pins.is_some());
+        let pins_of = |pose: &NamedPose| pose.pins.as_ref().map(|pins| pins.to_vec());
+        let n_controls = cage.mesh.positions.len();
+        let has_misfit = poses.iter().any(|pose| pose.positions.len() == n_controls && !document.fits(pose));
         let is_timed = poses.iter().any(|pose| pose.lead != SECONDS_PER_POSE);
         let has_own = poses.iter().any(|pose| pose.interpolation.is_some());
         let is_blended = pose.is_some() && shares.iter().any(|&share| share != 0.0);
@@ -71,6 +77,11 @@ impl DocumentSettings {
             pose,
             pins: pins.to_vec(),
             pose_pins: if has_pins { poses.iter().map(pins_of).collect() } else { Vec::new() },
+            pose_fits: if has_misfit {
+                poses.iter().map(|pose| document.fits(pose)).collect()
+            } else {
+                Vec::new()
+            },
             pose_shares: if is_blended { shares.to_vec() } else { Vec::new() },
             pose_leads: if is_timed { poses.iter().map(|pose| pose.lead).collect() } else { Vec::new() },
             pose_interpolations: if has_own {
@@ -123,18 +134,23 @@ impl DocumentSettings {
         }
     }
 
-    /// Saved poses with their pins and times.
+    /// Saved poses with their pins and times. `cage`: the cage of the project.
     #[must_use]
-    pub fn poses(&self, poses: impl IntoIterator<Item = (String, Vec<Vec3>)>) -> Vec<NamedPose> {
-        let pins = |k: usize| {
-            let all =
-                (!self.pose_pins.is_empty()).then(|| self.pose_pins.get(k).cloned().unwrap_or_default());
-            all.map(Into::into)
+    pub fn poses(
+        &self,
+        poses: impl IntoIterator<Item = (String, Vec<Vec3>)>,
+        cage: Option<&RestCage>,
+    ) -> Vec<NamedPose> {
+        let cage = cage.map(|cage| (cage.mesh.positions.len(), cage_id(&cage.mesh)));
+        let cage_of = |k: usize, n: usize| {
+            let fits = |own: &(usize, u32)| own.0 == n && self.pose_fits.get(k).copied().unwrap_or(true);
+            cage.filter(fits).map(|(_, id)| id)
         };
         let named = |(k, (name, positions)): (usize, (String, Vec<Vec3>))| NamedPose {
             name: name.into(),
+            cage: cage_of(k, positions.len()),
             positions: Arc::from(positions),
-            pins: pins(k),
+            pins: self.pose_pins.get(k).cloned().flatten().map(Into::into),
             lead: self.pose_leads.get(k).copied().unwrap_or(SECONDS_PER_POSE),
             interpolation: self.pose_interpolations.get(k).copied().flatten(),
         };
@@ -189,6 +205,23 @@ mod tests {
             DocumentSettings { pose: Some(URL_SAFE_NO_PAD.encode(bytes)), ..DocumentSettings::default() };
         let pose = old.pose_of(&one_vertex()).unwrap().unwrap();
         assert!(pose[0].distance(Vec3::new(3.0, 2.0, -1.0)) < 2.0 / 32_767.0, "{pose:?}");
+    }
+
+    #[test]
+    fn pins_of_poses_are_kept_or_unknown() {
+        let pin = SurfacePoint { triangle: 2, bary: [0.5, 0.5, 0.0] };
+        let some = |pins: &[SurfacePoint]| Some(Arc::from(pins));
+        for all in [vec![some(&[]), some(&[])], vec![None, some(&[pin])], vec![None, None]] {
+            let empty = || ("pose".to_owned(), vec![Vec3::ZERO]);
+            let mut poses = DocumentSettings::default().poses(all.iter().map(|_| empty()), None);
+            poses.iter_mut().zip(&all).for_each(|(pose, pins)| pose.pins.clone_from(pins));
+            let document = Document { poses: Arc::new(poses), ..one_vertex() };
+            let text = DocumentSettings::of(&document).beside("{}");
+            let read = DocumentSettings::read(&text).poses(all.iter().map(|_| empty()), None);
+            assert_eq!(read.into_iter().map(|pose| pose.pins).collect::<Vec<_>>(), all);
+        }
+        let old = DocumentSettings::read(&json!({ "pose_pins": [[], [pin]] }).to_string());
+        assert_eq!(old.pose_pins, [Some(vec![]), Some(vec![pin])]);
     }
 
     #[test]

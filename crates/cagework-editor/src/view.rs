@@ -18,6 +18,8 @@ pub struct DocumentView {
     pub mesh: u64,
     /// Key that changes whenever the cage at rest changes.
     pub cage: u64,
+    /// Identifies the content of the cage at rest; saved poses fit cages with equal identifiers.
+    pub cage_id: u32,
     /// Names and times of the saved poses, in the order of the list.
     pub poses: Vec<PoseView>,
     /// Share of each saved pose in the current pose.
@@ -58,7 +60,7 @@ pub struct DocumentView {
 pub struct PoseView {
     /// Name of the pose, as lists show it.
     pub name: String,
-    /// Whether the pose has one position per vertex and interior control of the current cage.
+    /// Whether the pose was saved for the current cage.
     pub fits: bool,
     /// Time in the animation, seconds; 0 if `fits` is false.
     pub seconds: f32,

@@ -148,9 +148,10 @@ fn session_can_be_undone_redone_saved_and_reopened() {
     let edge = editor.topology().edges[0];
     editor.selection.change(&edge, SelectMode::Replace);
     step(&mut editor, &mut documents, Command::EditRest { edit: RestEdit::SplitEdge });
-    assert!(editor.document().fitting_poses().next().is_none(), "the cage has one more vertex");
+    assert_eq!(editor.document().fitting_poses().count(), 2, "the poses follow the edits");
     let place = editor.bounds().unwrap().center();
     step(&mut editor, &mut documents, Command::AddControl { kind: InnerKind::Point, places: vec![place] });
+    assert!(editor.document().fitting_poses().next().is_none(), "the cage has one more control");
     editor.set_editing_rest(false);
     step(&mut editor, &mut documents, Command::RemoveModel { id: hat });
 
@@ -232,6 +233,7 @@ fn assert_survives_saving(editor: &Editor, k: usize) {
     assert_eq!((reopened.poses.len(), &reopened.pins), (document.poses.len(), &document.pins), "{k}");
     for (a, b) in reopened.poses.iter().zip(&*document.poses) {
         assert_eq!((&a.name, &a.positions, a.lead), (&b.name, &b.positions, b.lead), "{k}");
+        assert_eq!((reopened.fits(a), &a.pins), (document.fits(b), &b.pins), "{k}");
     }
     assert_eq!(reopened.transition, document.transition, "{k}");
     assert_eq!(reopened.pose, document.pose, "{k}");
@@ -250,8 +252,8 @@ fn saved_and_opened(saved: &Editor) -> Document {
     let (cage, notice) = settings.cage(&project.cage);
     assert_eq!(notice, None);
     let contents = Contents {
+        poses: settings.poses(project.poses, cage.as_ref()),
         cage,
-        poses: settings.poses(project.poses),
         shares: settings.pose_shares.clone(),
         transition: settings.transition.unwrap_or_default(),
         pins: settings.pins.clone(),
@@ -427,6 +429,7 @@ fn poses_are_carried_to_another_cage_by_one_step() {
     editor.apply(Command::SetPose { positions: moved }).unwrap();
     editor.apply(Command::SavePose { name: "there".to_owned() }).unwrap();
     assert!(editor.commit("Save"));
+    let other = editor.view().cage_id;
     let mesh = subdivided_box(editor.bounds().unwrap(), 0.1, [2; 3]);
     let n = mesh.positions.len();
     let there: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X).collect();
@@ -434,10 +437,88 @@ fn poses_are_carried_to_another_cage_by_one_step() {
     assert!(editor.commit("Make a cage"));
     assert_eq!((editor.view().poses[0].fits, editor.view().shares), (false, vec![0.0]));
     let carried = [there.clone(), there.clone()].concat();
-    editor.apply(Command::CarryPoses { from: 8, positions: carried, shares: vec![1.0] }).unwrap();
+    editor.apply(Command::CarryPoses { from: other, positions: carried, shares: vec![1.0] }).unwrap();
     assert!(editor.commit("Carry"));
     assert_eq!(*editor.document().pose, *there);
     assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, n));
     assert!(editor.undo() && editor.undo());
     assert_eq!((editor.view().poses[0].fits, *editor.document().shares == [1.0]), (true, true));
+}
+
+/// Displacements of the first saved pose from the cage at rest.
+fn displacements(editor: &Editor) -> Vec<Vec3> {
+    let document = editor.document();
+    let pairs = document.poses[0].positions.iter().zip(&document.cage.mesh.positions);
+    pairs.map(|(posed, rest)| *posed - *rest).collect()
+}
+
+/// Each vertex keeps its displacement; a new or merged one has the mean of those that it was made from.
+#[test]
+fn saved_poses_keep_their_displacements_when_the_cage_is_reshaped() {
+    let mut editor = opened_with_box();
+    let mut expected: Vec<Vec3> = (0..8).map(|k| Vec3::new(k as f32, 1.0, -0.5 * k as f32)).collect();
+    let rest = editor.document().cage.mesh.positions.clone();
+    let positions = rest.iter().zip(&expected).map(|(p, by)| *p + *by).collect();
+    editor.apply(Command::SetPose { positions }).unwrap();
+    editor.apply(Command::SavePose { name: "there".to_owned() }).unwrap();
+    editor.commit("Save");
+    editor.set_editing_rest(true);
+    let check = |editor: &Editor, expected: &[Vec3], what: &str| {
+        assert!(editor.view().poses[0].fits, "{what}");
+        let found = displacements(editor);
+        assert_eq!(found.len(), expected.len(), "{what}");
+        for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+            assert!(found.distance(*expected) < 1e-5, "{what}, vertex {k}: {found} instead of {expected}");
+        }
+    };
+
+    editor.selection.change(&[7], SelectMode::Replace);
+    assert!(editor.shift(Vec3::splat(0.2)));
+    editor.apply(Command::MoveRest).unwrap();
+    assert!(editor.document().cage.mesh.positions[7].distance(rest[7]) > 0.3);
+    check(&editor, &expected, "move");
+
+    let [a, b] = editor.topology().edges[0];
+    editor.selection.change(&[a, b], SelectMode::Replace);
+    editor.apply(Command::EditRest { edit: RestEdit::SplitEdge }).unwrap();
+    expected.push(0.5 * (expected[a as usize] + expected[b as usize]));
+    check(&editor, &expected, "split");
+
+    let apart = |edge: &&[u32; 2]| edge.iter().all(|v| ![a, b, 8].contains(v));
+    let [kept, gone] = *editor.topology().edges.iter().find(apart).unwrap();
+    editor.selection.change(&[kept, gone], SelectMode::Replace);
+    editor.apply(Command::EditRest { edit: RestEdit::CollapseEdge }).unwrap();
+    expected[kept as usize] = 0.5 * (expected[kept as usize] + expected[gone as usize]);
+    expected.remove(gone as usize);
+    check(&editor, &expected, "collapse");
+
+    let face = editor.topology().faces[0].clone();
+    editor.selection.change(&face, SelectMode::Replace);
+    editor.apply(Command::EditRest { edit: RestEdit::ExtrudeFace }).unwrap();
+    expected.extend(face.iter().map(|&v| expected[v as usize]).collect::<Vec<_>>());
+    check(&editor, &expected, "extrude");
+
+    editor.commit("Reshape");
+    assert!(editor.undo());
+    assert_eq!((editor.view().poses[0].fits, editor.document().poses[0].positions.len()), (true, 8));
+}
+
+#[test]
+fn a_pose_does_not_fit_another_cage_with_as_many_vertices() {
+    let mut editor = opened_with_box();
+    editor.apply(Command::SavePose { name: "one".to_owned() }).unwrap();
+    let first = editor.document().cage.mesh.clone();
+    let cage = |mesh| Command::ReplaceCage { mesh, controls: None, notices: Vec::new() };
+    let mesh = subdivided_box(editor.bounds().unwrap(), 0.2, [1; 3]);
+    assert_eq!(mesh.positions.len(), first.positions.len());
+    editor.apply(cage(mesh)).unwrap();
+    assert!(!editor.view().poses[0].fits);
+    let refused = editor.apply(Command::ApplyPose { index: 0 }).unwrap_err().to_string();
+    assert!(refused.contains("pose 1 belongs to another cage"), "{refused}");
+    let reopened = saved_and_opened(&editor);
+    assert!(!reopened.fits(&reopened.poses[0]));
+    editor.apply(cage(first)).unwrap();
+    assert!(editor.view().poses[0].fits, "the cage is the first one again");
+    let reopened = saved_and_opened(&editor);
+    assert!(reopened.fits(&reopened.poses[0]));
 }

@@ -66,7 +66,7 @@ fn command() -> impl Strategy<Value = Command> {
             Command::SetTransition { transition: Transition { interpolation, loops, back } }
         }),
         (index(), share).prop_map(|(index, share)| Command::Blend { index, share }),
-        (6..10_usize, prop::collection::vec(vector(), 0..30))
+        (prop_oneof![Just(opened().view().cage_id), any::<u32>()], prop::collection::vec(vector(), 0..30))
             .prop_map(|(from, positions)| Command::CarryPoses { from, positions, shares: vec![0.5] }),
         prop::collection::vec(pin, 0..3).prop_map(|pins| Command::SetPins { pins }),
         (1..3_u32, 0.0..0.4_f32).prop_map(|(n, margin)| Command::ReplaceCage {
@@ -328,9 +328,10 @@ fn damaged_projects_open_as_valid_documents() {
             let mut members = settings.models.iter().cloned();
             let models: Vec<_> = project.models.into_iter().map(|model| (model, members.next())).collect();
             let mut editor = Editor::default();
+            let cage = settings.cage(&project.cage).0;
             let contents = Contents {
-                cage: settings.cage(&project.cage).0,
-                poses: settings.poses(project.poses),
+                poses: settings.poses(project.poses, cage.as_ref()),
+                cage,
                 shares: settings.pose_shares.clone(),
                 transition: settings.transition.unwrap_or_default(),
                 pins: settings.pins.clone(),

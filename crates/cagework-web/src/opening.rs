@@ -66,8 +66,8 @@ impl OpenContents {
         };
         let is_known = |id: &String| samples::all().iter().any(|sample| sample.id == id);
         let contents = Contents {
+            poses: settings.poses(given, cage.as_ref()),
             cage,
-            poses: settings.poses(given),
             shares: settings.pose_shares.clone(),
             transition: settings.transition.unwrap_or_default(),
             pins: settings.pins.clone(),

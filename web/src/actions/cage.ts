@@ -31,7 +31,8 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     const before = snapshotCage(ctx);
     const work = typeof change === "function" ? change : () => engine().apply(change, label);
     if (!before || !edit.step(work, failed)) return false;
-    if (engine().restPositions().length !== before.cage.positions.length) void poses.carry(before);
+    const isOther = engine().restPositions().length !== before.cage.positions.length;
+    if (isOther || engine().carriable().length !== before.poses.length) void poses.carry(before);
     return true;
   };
 

@@ -11,6 +11,8 @@ import type { Edit } from "./edit";
 /** A cage and its poses, stored before the cage is replaced. */
 export interface CageSnapshot {
   readonly cage: CageArrays;
+  /** Identifies the cage; see `DocumentView.cageId`. */
+  readonly id: number;
   /** The current pose, then each saved pose that fits this cage. `[1 + n_poses, n_controls, 3]` */
   readonly poses: Float32Array;
   readonly shares: readonly number[];
@@ -18,9 +20,9 @@ export interface CageSnapshot {
 
 /** Copies the current cage and its poses; undefined without a cage. */
 export function snapshotCage(ctx: Context): CageSnapshot | undefined {
-  const { cage, shares } = ctx.store.get();
+  const { cage, cageId: id, shares } = ctx.store.get();
   const session = ctx.session();
-  return cage ? { cage: session.cageArrays(), poses: session.engine.carriable(), shares } : undefined;
+  return cage ? { cage: session.cageArrays(), id, poses: session.engine.carriable(), shares } : undefined;
 }
 
 /** Size of a pose's picture, pixels: twice the CSS pixels at which its card shows it, for high-density screens. */
@@ -40,7 +42,7 @@ export function createPoses(ctx: Context, edit: Edit) {
   // Undo steps must not contain an intermediate pose of the animation.
   edit.alsoSettles(stop);
 
-  const carry = ({ cage, poses, shares }: CageSnapshot, label?: string): Promise<boolean> => {
+  const carry = ({ cage, id, poses, shares }: CageSnapshot, label?: string): Promise<boolean> => {
     const n = cage.positions.length;
     const isAtRest = cage.positions.every((x, i) => x === poses[i]);
     return attempt(ctx, T.failed.carry, () =>
@@ -53,7 +55,7 @@ export function createPoses(ctx: Context, edit: Edit) {
         // current pose if the old cage was at rest or the cage is being reshaped.
         if (!label && (isAtRest || store.get().editingRest)) carried.set(engine().cagePositions());
         const positions = triples(carried);
-        engine().apply({ do: "carry_poses", from: n / 3, positions, shares: [...shares] }, label);
+        engine().apply({ do: "carry_poses", from: id, positions, shares: [...shares] }, label);
         if (!label) engine().amend();
       }),
     );

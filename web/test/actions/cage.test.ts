@@ -63,6 +63,11 @@ it("adding a control carries the poses over; smoothing does not need to", () => 
   });
   cage.change("Put a point inside", { do: "add_control", kind: "point", places: [[0, 0, 0]] });
   expect(carried.map(({ cage: { positions } }) => positions.length)).toEqual([12]);
+  // Other controls in the same number: the poses no longer fit.
+  const saved = [new Float32Array(30), new Float32Array(15)];
+  teach({ apply: () => undefined, carriable: () => saved.shift() ?? new Float32Array() });
+  cage.change("Other controls", { do: "replace_controls", positions: [], elements: [] });
+  expect(carried.map(({ cage: { positions } }) => positions.length)).toEqual([12, 15]);
 });
 
 it("of two requested cages only the second is used", async () => {

@@ -102,17 +102,18 @@ it("an animation that does not loop ends with the pose before it", () => {
 
 it("poses of a previous cage are carried over as one step", async () => {
   const { poses, ctx, show, showCage, asked, commands, did } = page();
+  show({ cageId: 77 });
   const before = snapshotCage(ctx);
   if (!before) throw new Error("no cage");
   showCage(cageOf(3));
-  show({ editingRest: true });
+  show({ editingRest: true, cageId: 78 });
   const done = poses.carry(before, "Carry poses over");
   await Promise.resolve();
   expect(asked.at(-1)).toMatchObject({ kind: "carry", input: { old: before.cage, poses: before.poses } });
   asked.at(-1)?.resolve(new Float32Array(9).fill(7));
   await done;
   const positions = Array(3).fill([7, 7, 7]);
-  expect(commands).toEqual([{ do: "carry_poses", from: 2, positions, shares: [1] }]);
+  expect(commands).toEqual([{ do: "carry_poses", from: 77, positions, shares: [1] }]);
   expect([did.at(-1), ctx.store.get().editingRest]).toEqual(["Carry poses over", false]);
 });
 

@@ -24,6 +24,9 @@ pub struct CageEdit {
     pub mesh: PolygonMesh,
     /// New index of every old vertex; `None` for removed vertices. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
+    /// For every new vertex, the two old vertices that it lies between, or twice the old vertex that it is a copy of. New
+    /// vertices are the last ones of the mesh. `[n_added]`
+    pub made_from: Vec<[u32; 2]>,
     /// New and moved vertices, and vertices around filled holes. The editor selects them after the edit.
     pub touched: Vec<u32>,
 }

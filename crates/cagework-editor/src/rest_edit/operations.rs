@@ -37,6 +37,7 @@ pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Cage
     let new = mesh.positions.len() as u32;
     edited.mesh.positions.push(p.lerp(q, share.clamp(0.05, 0.95)));
     edited.touched.push(new);
+    edited.made_from.push(edge);
     edited.mesh.faces.clear();
     for face in &mesh.faces {
         let Some(k) = side(face, edge) else {
@@ -107,6 +108,7 @@ pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Cage
     for (k, &i) in corners.iter().enumerate() {
         edited.mesh.positions.push(mesh.positions[i as usize] + offset);
         edited.touched.push(first + k as u32);
+        edited.made_from.push([i; 2]);
     }
     edited.mesh.faces[face as usize] = edited.touched.clone();
     for k in 0..n {
@@ -158,6 +160,7 @@ fn unchanged(mesh: &PolygonMesh) -> CageEdit {
     CageEdit {
         mesh: mesh.clone(),
         vertex_of: (0..mesh.positions.len() as u32).map(Some).collect(),
+        made_from: Vec::new(),
         touched: Vec::new(),
     }
 }
