@@ -14,7 +14,7 @@ use crate::edit::SelectMode;
 use crate::editor::Editor;
 use crate::error::EditError;
 use crate::models::PartOptions;
-use crate::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_face, split_edge};
+use crate::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_faces, split_edge};
 use crate::surface::SurfacePoint;
 
 /// Distance of an extrusion, as a fraction of the diagonal of model and cage.
@@ -549,11 +549,11 @@ impl Editor {
             }
             // A collapse moves vertices of adjacent edges, so only the first edge is collapsed.
             RestEdit::CollapseEdge => collapse_edge(&mesh, *edges.first().ok_or(edge)?, 0.5)?,
+            RestEdit::ExtrudeFace | RestEdit::DeleteFace if faces.is_empty() => return Err(face),
             RestEdit::ExtrudeFace => {
                 let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
-                each(&mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?.ok_or(face)?
+                extrude_faces(&mesh, &faces, distance)?
             }
-            RestEdit::DeleteFace if faces.is_empty() => return Err(face),
             RestEdit::DeleteFace => delete_faces(&mesh, &faces)?,
             RestEdit::DeleteVertex if self.selection.is_empty() => {
                 return Err(EditError::NothingSelected { what: "a vertex" });

@@ -15,7 +15,7 @@ use thiserror::Error;
 use cagework_core::contact::{Corners, meeting};
 use cagework_core::{Cage, CageError, CageNotice, PolygonMesh};
 
-pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
+pub use operations::{collapse_edge, delete_faces, extrude_faces, move_vertices, split_edge};
 
 /// Mesh after an edit, and its relation to the mesh before the edit.
 #[derive(Clone, Debug, PartialEq)]

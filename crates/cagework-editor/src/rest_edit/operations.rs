@@ -1,5 +1,7 @@
 //! The edit operations.
 
+use std::collections::{BTreeSet, HashMap, HashSet};
+
 use glam::{DVec3, Vec3};
 
 use super::{CageEdit, RestEditError, finish};
@@ -87,35 +89,89 @@ pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<C
     finish("collapsing", mesh, edited)
 }
 
-/// Moves a face along its normal by `distance` (object units, negative: into the cage) and connects it by quads to its
-/// old position. The corners of the moved face are new vertices, the last ones; the face keeps its index.
+/// Moves faces along their normals by `distance` (object units, negative: into the cage) and connects them by quads to
+/// their old positions. Faces with a common edge stay connected: their outline gets the quads, and a corner of several of
+/// them moves along the mean of their normals, weighted by area. Corners on an outline are copied, and the copies are
+/// the last vertices; other corners keep their index, and so do all faces.
 ///
 /// # Errors
-/// [`RestEditError`]: the face does not exist, `distance` is not finite, or the cage would become invalid.
-pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<CageEdit, RestEditError> {
-    let corners = mesh.faces.get(face as usize).ok_or_else(|| missing("face", &[face]))?.clone();
+/// [`RestEditError`]: a face does not exist, `distance` is not finite, or the cage would become invalid.
+pub fn extrude_faces(mesh: &PolygonMesh, faces: &[u32], distance: f32) -> Result<CageEdit, RestEditError> {
+    if let Some(&face) = faces.iter().find(|&&face| face as usize >= mesh.faces.len()) {
+        return Err(missing("face", &[face]));
+    }
     if !distance.is_finite() {
         return Err(RestEditError::NotFinite { what: "the distance" });
     }
-    let at: Vec<DVec3> = corners.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
-    let n = at.len();
-    let center = at.iter().sum::<DVec3>() / n as f64;
-    // Newell's normal, valid also for faces that are not planar or not convex.
-    let normal: DVec3 = (0..n).map(|k| (at[k] - center).cross(at[(k + 1) % n] - center)).sum();
-    let offset = (normal.normalize_or_zero() * f64::from(distance)).as_vec3();
     let mut edited = unchanged(mesh);
-    let first = mesh.positions.len() as u32;
-    for (k, &i) in corners.iter().enumerate() {
-        edited.mesh.positions.push(mesh.positions[i as usize] + offset);
-        edited.touched.push(first + k as u32);
-        edited.made_from.push([i; 2]);
-    }
-    edited.mesh.faces[face as usize] = edited.touched.clone();
-    for k in 0..n {
-        let next = (k + 1) % n;
-        edited.mesh.faces.push(vec![corners[k], corners[next], first + next as u32, first + k as u32]);
+    for region in regions(mesh, faces) {
+        let normals: Vec<DVec3> = region.iter().map(|&f| area_normal(mesh, f)).collect();
+        let all: HashSet<[u32; 2]> = region.iter().flat_map(|&f| sides(&mesh.faces[f])).collect();
+        let outline: Vec<[u32; 2]> = region
+            .iter()
+            .flat_map(|&f| sides(&mesh.faces[f]))
+            .filter(|&[a, b]| !all.contains(&[b, a]))
+            .collect();
+        let is_copied = |v: u32| outline.iter().any(|side| side.contains(&v));
+        let mut moved: HashMap<u32, u32> = HashMap::new();
+        for &v in region.iter().flat_map(|&f| &mesh.faces[f]) {
+            if moved.contains_key(&v) {
+                continue;
+            }
+            let around = region.iter().zip(&normals).filter(|(f, _)| mesh.faces[**f].contains(&v));
+            let normal: DVec3 = around.map(|(_, normal)| *normal).sum();
+            let at =
+                mesh.positions[v as usize] + (normal.normalize_or_zero() * f64::from(distance)).as_vec3();
+            let new = if is_copied(v) {
+                edited.mesh.positions.push(at);
+                edited.made_from.push([v; 2]);
+                edited.mesh.positions.len() as u32 - 1
+            } else {
+                edited.mesh.positions[v as usize] = at;
+                v
+            };
+            edited.touched.push(new);
+            moved.insert(v, new);
+        }
+        for &f in &region {
+            edited.mesh.faces[f].iter_mut().for_each(|v| *v = moved[v]);
+        }
+        edited.mesh.faces.extend(outline.iter().map(|[a, b]| vec![*a, *b, moved[b], moved[a]]));
     }
     finish("extruding", mesh, edited)
+}
+
+/// Groups faces that are connected by common edges. Faces are ascending in each group.
+fn regions(mesh: &PolygonMesh, faces: &[u32]) -> Vec<Vec<usize>> {
+    let mut left: BTreeSet<usize> = faces.iter().map(|&f| f as usize).collect();
+    let mut regions = Vec::new();
+    while let Some(first) = left.pop_first() {
+        let (mut region, mut next) = (vec![first], 0);
+        while let Some(&face) = region.get(next) {
+            let is_beside =
+                |f: &usize| sides(&mesh.faces[face]).any(|edge| side(&mesh.faces[*f], edge).is_some());
+            let (beside, others) = left.into_iter().partition(is_beside);
+            left = others;
+            region.extend(beside);
+            next += 1;
+        }
+        region.sort_unstable();
+        regions.push(region);
+    }
+    regions
+}
+
+/// Newell's normal, twice as long as the face's area; valid also for faces that are not planar or not convex.
+fn area_normal(mesh: &PolygonMesh, face: usize) -> DVec3 {
+    let at: Vec<DVec3> = mesh.faces[face].iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
+    let n = at.len();
+    let center = at.iter().sum::<DVec3>() / n as f64;
+    (0..n).map(|k| (at[k] - center).cross(at[(k + 1) % n] - center)).sum()
+}
+
+/// Sides of a face, as pairs of corners in its direction.
+fn sides(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
+    (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]])
 }
 
 /// Deletes faces, fills the holes by minimum-area triangulations, and drops vertices that lose their last face.
@@ -135,12 +191,9 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<CageEdit, RestE
     }
     // The boundary consists of the sides of deleted faces whose neighbouring face is not deleted. The filling has the
     // orientation of the deleted faces.
-    let sides = |f: usize| {
-        let face = &mesh.faces[f];
-        (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])
-    };
+    let sides = |f: usize| sides(&mesh.faces[f]);
     let deleted: Vec<usize> = (0..keep.len()).filter(|&f| !keep[f]).collect();
-    let inner: std::collections::HashSet<[u32; 2]> = deleted.iter().flat_map(|&f| sides(f)).collect();
+    let inner: HashSet<[u32; 2]> = deleted.iter().flat_map(|&f| sides(f)).collect();
     let rim: Vec<[u32; 2]> =
         deleted.iter().flat_map(|&f| sides(f)).filter(|&[a, b]| !inner.contains(&[b, a])).collect();
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();

@@ -1,7 +1,7 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{CageEdit, RestEditError, collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
+use super::{CageEdit, RestEditError, collapse_edge, delete_faces, extrude_faces, move_vertices, split_edge};
 use cagework_core::crossing::{crossings_of, notices};
 use cagework_core::{Bounds, Cage, PolygonMesh, subdivided_box};
 
@@ -100,7 +100,7 @@ fn collapsing_undoes_splitting() {
 fn extruding_a_face_adds_a_box() {
     let cube = cube();
     for (face, distance) in [(0, 1.0), (3, 0.5), (5, 0.25)] {
-        let edited = extrude_face(&cube, face, distance).unwrap();
+        let edited = extrude_faces(&cube, &[face], distance).unwrap();
         assert_eq!((edited.mesh.positions.len(), edited.mesh.faces.len()), (12, 10));
         let expected = 8.0 + 4.0 * f64::from(distance);
         assert!((volume(&edited.mesh) - expected).abs() < 1e-5, "face {face}");
@@ -114,17 +114,38 @@ fn extruding_a_face_adds_a_box() {
         center.distance(Vec3::X) < ROUNDING
     });
     let middle = middle.unwrap() as u32;
-    let edited = extrude_face(&fine, middle, -0.5).unwrap();
+    let edited = extrude_faces(&fine, &[middle], -0.5).unwrap();
     assert!((volume(&edited.mesh) - (8.0 - 0.5 * 4.0 / 9.0)).abs() < 1e-5);
-    assert!(extrude_face(&fine, middle, -2.5).is_err(), "through the opposite side");
-    assert!(extrude_face(&cube, 0, -0.5).is_err(), "the pit's walls would coincide with the sides");
-    assert!(extrude_face(&cube, 0, 0.0).is_err(), "side faces would have no area");
+    assert!(extrude_faces(&fine, &[middle], -2.5).is_err(), "through the opposite side");
+    assert!(extrude_faces(&cube, &[0], -0.5).is_err(), "the pit's walls would coincide with the sides");
+    assert!(extrude_faces(&cube, &[0], 0.0).is_err(), "side faces would have no area");
+}
+
+/// A side of this box has 9 faces of area 4/9 and 16 vertices, 4 of them inside the side.
+#[test]
+fn adjacent_faces_are_extruded_as_one() {
+    let fine = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [3; 3]);
+    let is_on_side =
+        |f: &u32| fine.faces[*f as usize].iter().all(|&i| fine.positions[i as usize].x > 1.0 - ROUNDING);
+    let side: Vec<u32> = (0..fine.faces.len() as u32).filter(is_on_side).collect();
+    let n_common =
+        |f: u32| fine.faces[side[0] as usize].iter().filter(|i| fine.faces[f as usize].contains(i)).count();
+    let beside = *side.iter().find(|f| n_common(**f) == 2).unwrap();
+    for (faces, n_new, n_walls) in [(side.as_slice(), 12, 12), (&[side[0], beside], 6, 6)] {
+        let edited = extrude_faces(&fine, faces, 0.5).unwrap();
+        let added =
+            (edited.mesh.positions.len() - fine.positions.len(), edited.mesh.faces.len() - fine.faces.len());
+        assert_eq!((added, edited.made_from.len()), ((n_new, n_walls), n_new));
+        let expected = 8.0 + 0.5 * faces.len() as f64 * 4.0 / 9.0;
+        assert!((volume(&edited.mesh) - expected).abs() < 1e-5, "{} faces", faces.len());
+    }
+    assert!(extrude_faces(&fine, &[side[0], 999], 0.5).is_err());
 }
 
 #[test]
 fn holes_of_deleted_faces_are_filled() {
     let cube = cube();
-    let tower = extrude_face(&cube, 0, 1.0).unwrap().mesh;
+    let tower = extrude_faces(&cube, &[0], 1.0).unwrap().mesh;
     // Delete the top and the four sides of the tower. Filling the hole restores the cube.
     let edited = delete_faces(&tower, &[0, 6, 7, 8, 9]).unwrap();
     assert_eq!(edited.mesh.positions, cube.positions);
@@ -178,7 +199,7 @@ proptest! {
                 }
                 1 => split_edge(&mesh, edge, number),
                 2 => collapse_edge(&mesh, edge, number),
-                3 => extrude_face(&mesh, f as u32, number),
+                3 => extrude_faces(&mesh, &[f as u32], number),
                 _ => delete_faces(&mesh, &[f as u32]),
             };
             if let Ok(edited) = edited {
