@@ -30,6 +30,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
+pub use orient::Solid;
 use polygon::Polygon;
 pub use subdivided_box::subdivided_box;
 use topology::Surface;

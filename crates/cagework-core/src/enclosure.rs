@@ -8,15 +8,16 @@ mod columns;
 use glam::{DVec3, Vec3};
 
 use self::columns::Columns;
-use crate::cage::Cage;
+use crate::cage::{CAGE_TOLERANCE, Cage};
 use crate::geometry::winding_number;
 use crate::mesh::Bounds;
+use crate::sample::FaceBoxes;
 
 /// Winding number above which a point is inside. Off the surface, winding numbers are integers; on it, they lie between
 /// the integers of both sides.
 const MIN_INSIDE_WINDING: f64 = 0.5;
 
-/// Winding numbers of points with respect to a cage.
+/// Winding numbers of points with respect to a cage; 1 for points on its surface.
 #[derive(Clone, Debug)]
 pub struct Enclosure {
     points: Vec<Vec3>,
@@ -25,7 +26,7 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// Computes the winding numbers of all points.
+    /// Computes the winding numbers of all points. Points on the surface, up to the tolerance of a bind, count as inside.
     #[must_use]
     pub fn new(cage: &Cage, points: &[Vec3]) -> Self {
         let corners: Vec<[DVec3; 3]> =
@@ -34,7 +35,15 @@ impl Enclosure {
         let winding = |p: DVec3| {
             columns.winding_number(p).unwrap_or_else(|| winding_number(p, corners.iter().copied()))
         };
-        let winding = points.iter().map(|p| winding(p.as_dvec3())).collect();
+        let (faces, reach) = (FaceBoxes::new(cage), CAGE_TOLERANCE * f64::from(cage.diagonal()));
+        let bounds = cage.bounds();
+        let [low, high] = [bounds.min.as_dvec3() - reach, bounds.max.as_dvec3() + reach];
+        let is_on_cage = |p: DVec3| p.clamp(low, high) == p && faces.find(p).distance <= reach;
+        let inside_or_on = |p: DVec3| {
+            let winding = winding(p);
+            if winding <= MIN_INSIDE_WINDING && is_on_cage(p) { 1.0 } else { winding }
+        };
+        let winding = points.iter().map(|p| inside_or_on(p.as_dvec3())).collect();
         Self { points: points.to_vec(), cage: cage.clone(), winding }
     }
 
@@ -126,6 +135,22 @@ mod tests {
             }
             assert!(inside > 100 && left >= cage.n_vertices() as u32 && left < 500, "{inside}, {left}");
         }
+    }
+
+    /// A bind follows points on the cage exactly, so they are inside, whatever rounding makes of their winding number.
+    #[test]
+    fn points_on_the_cage_are_inside() {
+        let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 0.2);
+        let cage = box_cage();
+        let turned = cage.positions().iter().map(|p| turn * *p).collect();
+        let turned = Cage::new(&PolygonMesh { positions: turned, ..cage.to_polygon_mesh() }).unwrap();
+        let on_top = (0..300u16)
+            .map(|k| Vec3::new(f32::from(k % 17) / 8.5 - 1.0, f32::from(k % 23) / 11.5 - 1.0, 1.0));
+        let mut points: Vec<Vec3> = on_top.map(|p| turn * p).collect();
+        points.extend_from_slice(turned.positions());
+        assert_eq!(Enclosure::new(&turned, &points).outside(), [0; 0]);
+        let above: Vec<Vec3> = points.iter().map(|p| *p + turn * (1e-4 * Vec3::Z)).collect();
+        assert!(Enclosure::new(&turned, &above).outside().len() >= 300);
     }
 
     #[test]

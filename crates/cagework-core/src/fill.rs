@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// Largest number of edges of a hole that is filled. Triangulation costs the cube of this number, and larger holes are
 /// usually intended.
-const MAX_EDGES: usize = 64;
+pub const MAX_EDGES: usize = 64;
 
 /// Finds the closed loops of edges. Each loop has the direction of the majority of its edges. Ignores edges that are in
 /// no loop.

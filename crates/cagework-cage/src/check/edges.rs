@@ -1,11 +1,15 @@
 //! Faults in connectivity: open and non-manifold edges; T-junctions; duplicate, unused and non-manifold vertices.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::mirror::Plane;
-use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
+use super::shape;
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use cagework_core::cage::{Side, sides_of};
 use cagework_core::crossing::{WELD_DISTANCE, same_places};
+use cagework_core::fill;
 use cagework_core::mesh::PolygonMesh;
 
 /// All sides of valid faces, sorted by edge.
@@ -40,7 +44,7 @@ impl Edges {
             let (first, joined) = same_places(mesh);
             let junctions = junctions(mesh, &open, &first);
             // Vertices split at a seam and T-junctions also leave open edges: welding closes these without new faces.
-            let fixes = if !junctions.is_empty() {
+            let mut fixes = if !junctions.is_empty() {
                 vec![Repair::Weld]
             } else if joined > 0 {
                 vec![Repair::Weld, Repair::FillHoles]
@@ -49,6 +53,11 @@ impl Edges {
             } else {
                 vec![Repair::FillHoles]
             };
+            let holes = fill::loops(&open);
+            let longest = holes.iter().map(Vec::len).max().unwrap_or(0);
+            if holes.iter().all(|hole| hole.len() > fill::MAX_EDGES) {
+                fixes.retain(|&repair| repair != Repair::FillHoles);
+            }
             if !junctions.is_empty() {
                 let mut vertices: Vec<u32> = junctions.iter().map(|j| j.vertex).collect();
                 vertices.sort_unstable();
@@ -66,6 +75,7 @@ impl Edges {
                     ..Places::default()
                 },
                 fixes: fixes.into_iter().map(|repair| Fix::Repair { repair }).collect(),
+                message: sentences::open(open.len(), longest),
                 ..problem(Code::OpenEdge, Severity::Error, open.len())
             });
         }
@@ -84,6 +94,31 @@ impl Edges {
             });
         }
     }
+}
+
+/// Like [`same_places`], without the vertices that must not be joined: where closed parts touch, joining would give edges
+/// more than two faces. If it would do so anywhere, only vertices of open edges are joined.
+pub(super) fn weldable(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
+    let (first, joined) = same_places(mesh);
+    let sound = shape::sound_faces(mesh, &mut Vec::new());
+    let crowded = |edges: &Edges| edges.groups().filter(|group| group.len() > 2).count();
+    let named = |face: &Vec<u32>| face.iter().map(|&v| first.get(v as usize).copied().unwrap_or(v)).collect();
+    let faces: Vec<Vec<u32>> = mesh.faces.iter().map(named).collect();
+    let before = Edges::of(mesh, &sound);
+    let after = Edges { sides: sides_of(&faces, sound.iter().copied()) };
+    if joined == 0 || crowded(&after) <= crowded(&before) {
+        return (first, joined);
+    }
+    let mut is_open = vec![false; mesh.positions.len()];
+    before.open().iter().flatten().for_each(|&v| is_open[v as usize] = true);
+    let mut first_open = HashMap::new();
+    let mut joined = 0;
+    let targets = (0u32..).zip(&first).map(|(v, &place)| {
+        let target = if is_open[v as usize] { *first_open.entry(place).or_insert(v) } else { v };
+        joined += usize::from(target != v);
+        target
+    });
+    (targets.collect(), joined)
 }
 
 /// A vertex of an open edge that lies on another open edge, between its ends.
@@ -132,9 +167,11 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
     let (first, joined) = same_places(mesh);
     if joined > 0 {
         let vertices = first.iter().enumerate().filter(|(v, f)| *v as u32 != **f).map(|(v, _)| v as u32);
+        let fixes =
+            if weldable(mesh).1 > 0 { vec![Fix::Repair { repair: Repair::Weld }] } else { Vec::new() };
         found.push(Problem {
             places: Places { vertices: vertices.collect(), ..Places::default() },
-            fixes: vec![Fix::Repair { repair: Repair::Weld }],
+            fixes,
             ..problem(Code::DuplicateVertex, Severity::Note, joined)
         });
     }

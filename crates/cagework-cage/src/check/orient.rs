@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::edges::Edges;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
-use cagework_core::geometry::winding_number;
+use cagework_core::cage::Solid;
 use cagework_core::mesh::PolygonMesh;
 
 #[derive(Clone, Debug)]
@@ -60,39 +60,23 @@ pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Ve
 /// Components with fewer triangles are not tested for enclosing other components: two triangles enclose no volume.
 const MIN_ENCLOSING_TRIANGLES: usize = 3;
 
-fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
-    let corners = || triangles.iter().flatten().copied();
-    [corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max)]
-}
-
 /// Flips whole components whose volume has the wrong sign. The volume must be positive, or negative for a cavity: a
 /// component that lies inside an odd number of other components.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
-    let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
     // A triangle soup may have as many components as faces. Therefore only components that can enclose another one are
     // searched for nested ones.
-    let around: Vec<(usize, [DVec3; 2])> = solids
+    let (solids, can_enclose): (Vec<Solid>, Vec<bool>) = components
         .iter()
-        .enumerate()
-        .filter(|(_, s)| s.len() >= MIN_ENCLOSING_TRIANGLES)
-        .map(|(j, s)| (j, corners_of_box(s)))
-        .collect();
+        .map(|component| triangles(mesh, component))
+        .map(|triangles| {
+            let can_enclose = triangles.len() >= MIN_ENCLOSING_TRIANGLES;
+            (Solid::new(triangles), can_enclose)
+        })
+        .unzip();
+    let around: Vec<usize> = (0..solids.len()).filter(|&j| can_enclose[j]).collect();
     for (k, component) in components.iter_mut().enumerate() {
-        let Some(first) = solids[k].first() else { continue };
-        let center = solids[k].iter().flatten().sum::<DVec3>() / (3 * solids[k].len()) as f64;
-        let volume: f64 =
-            solids[k].iter().map(|t| t.map(|p| p - center)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
-        let probe = (first[0] + first[1] + first[2]) / 3.0;
-        let depth = around
-            .iter()
-            .filter(|(j, [min, max])| {
-                *j != k
-                    && probe.cmpge(*min).all()
-                    && probe.cmple(*max).all()
-                    && winding_number(probe, solids[*j].iter().copied()).abs() > 0.5
-            })
-            .count();
-        if (volume < 0.0) != (depth % 2 == 1) {
+        let depth = around.iter().filter(|&&j| j != k && solids[k].is_inside(&solids[j])).count();
+        if (solids[k].volume < 0.0) != (depth % 2 == 1) {
             for turn in &mut component.turn {
                 *turn = !*turn;
             }

@@ -7,13 +7,12 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::edges::{Edges, Junction, junctions};
+use super::edges::{Edges, Junction, junctions, weldable};
 use super::grow;
 use super::mirror::Plane;
 use super::{orient, shape};
-use cagework_core::cage::CageError;
+use cagework_core::cage::{CageError, sides_of};
 use cagework_core::controls::ControlError;
-use cagework_core::crossing::same_places;
 use cagework_core::fill;
 use cagework_core::mesh::PolygonMesh;
 use cagework_core::options::{Choice, UnknownWord, choose};
@@ -163,14 +162,14 @@ impl RepairedMesh {
 }
 
 fn weld(repaired: &mut RepairedMesh) {
-    let (first, joined) = same_places(&repaired.mesh);
+    let (first, joined) = weldable(&repaired.mesh);
     if joined > 0 {
         join_places(repaired, &first, joined);
     }
     join_junctions(repaired);
 }
 
-/// Joins the vertices at the same position. `first`, `joined`: results of [`same_places`].
+/// Joins vertices at the same position. `first`, `joined`: results of [`weldable`].
 fn join_places(repaired: &mut RepairedMesh, first: &[u32], joined: usize) {
     let n = first.len() as u32;
     for i in repaired.mesh.faces.iter_mut().flatten().filter(|i| **i < n) {
@@ -223,7 +222,10 @@ fn drop_degenerate(repaired: &mut RepairedMesh) {
     }
     // Consecutive repeats of a corner are merged above; drop faces that are still invalid.
     let sound = shape::sound_faces(&repaired.mesh, &mut Vec::new());
-    let keep: HashSet<u32> = sound.into_iter().collect();
+    let mut keep: HashSet<u32> = sound.into_iter().collect();
+    for face in inner_walls(&repaired.mesh) {
+        keep.remove(&face);
+    }
     let mut number = 0..;
     repaired.mesh.faces.retain(|_| number.next().is_some_and(|f: u32| keep.contains(&f)));
     let mut used = vec![false; n as usize];
@@ -242,6 +244,29 @@ fn drop_degenerate(repaired: &mut RepairedMesh) {
             counted(dropped, "face", "faces")
         ));
     }
+}
+
+/// Finds the faces of inner walls between two parts whose vertices are joined: two faces with the same corners in
+/// opposite directions, all of whose edges have four faces. Without both, the parts are one.
+fn inner_walls(mesh: &PolygonMesh) -> Vec<u32> {
+    let n = mesh.positions.len();
+    let valid =
+        (0..mesh.faces.len() as u32).filter(|&f| mesh.faces[f as usize].iter().all(|&v| (v as usize) < n));
+    let mut n_sides: HashMap<[u32; 2], usize> = HashMap::new();
+    for side in sides_of(&mesh.faces, valid.clone()) {
+        *n_sides.entry([side.lo, side.hi]).or_default() += 1;
+    }
+    let mut twins: HashMap<Vec<u32>, Vec<u32>> = HashMap::new();
+    for f in valid {
+        let face = &mesh.faces[f as usize];
+        let mut sorted = face.clone();
+        sorted.sort_unstable();
+        let sides = || face.iter().zip(face.iter().cycle().skip(1)).map(|(&a, &b)| [a.min(b), a.max(b)]);
+        if sides().all(|side| n_sides.get(&side) == Some(&4)) {
+            twins.entry(sorted).or_default().push(f);
+        }
+    }
+    twins.into_values().filter(|faces| faces.len() == 2).flatten().collect()
 }
 
 fn fill_holes(repaired: &mut RepairedMesh) {

@@ -1,6 +1,7 @@
 //! English messages of the problems.
 
 use super::Code;
+use cagework_core::fill::MAX_EDGES;
 use cagework_core::words::counted;
 
 /// Returns the message of a problem that its code and count describe.
@@ -31,9 +32,6 @@ pub(super) fn of(code: Code, n: usize) -> String {
             "{} on an edge of a face without being a corner of it: the edge is open there.",
             with("vertex lies", "vertices lie")
         ),
-        Code::OpenEdge => {
-            format!("The cage is not closed: {} to one face only.", with("edge belongs", "edges belong"))
-        }
         Code::NonManifoldEdge => {
             format!(
                 "{} to more than two faces: remove inner faces there.",
@@ -47,13 +45,25 @@ pub(super) fn of(code: Code, n: usize) -> String {
             format!("{} to no face: moving it does nothing.", with("vertex belongs", "vertices belong"))
         }
         // These messages need more than a count. The functions below compose them.
-        Code::Flipped
+        Code::OpenEdge
+        | Code::Flipped
         | Code::OneSided
         | Code::SelfIntersection
         | Code::ModelOutside
         | Code::ThinPart
         | Code::NotACage => String::new(),
     }
+}
+
+/// Composes the message for `n` open edges. `longest`: number of edges of the largest hole.
+pub(super) fn open(n: usize, longest: usize) -> String {
+    let too_long = if longest > MAX_EDGES {
+        format!(" A hole has {longest} edges; only holes of up to {MAX_EDGES} edges are filled.")
+    } else {
+        String::new()
+    };
+    let belong = counted(n, "edge belongs", "edges belong");
+    format!("The cage is not closed: {belong} to one face only.{too_long}")
 }
 
 /// Composes the message for `n` model vertices of `all` outside the cage.

@@ -100,6 +100,68 @@ fn vertices_on_edges_are_reported_and_become_corners() {
     assert_eq!(Cage::new(&repaired.mesh).unwrap().notices(), []);
 }
 
+/// The two boxes share a face, an edge or part of their solid. None is inside the other.
+#[test]
+fn parts_that_touch_or_overlap_are_not_inside_out_and_not_welded() {
+    for (offset, duplicates) in [(vec3(2.0, 0.0, 0.0), 4), (vec3(2.0, 2.0, 0.0), 2), (vec3(1.0, 0.5, 0.5), 0)]
+    {
+        let one = box_mesh(1);
+        let mut both = one.clone();
+        both.positions.extend(one.positions.iter().map(|p| *p + offset));
+        both.faces.extend(one.faces.iter().map(|f| f.iter().map(|i| i + 8).collect::<Vec<_>>()));
+        let found = check(&both, None, None);
+        assert!(found.valid, "{:?}", found.problems);
+        assert!(found.problem(Code::Flipped).is_none(), "{offset}");
+        assert_eq!(found.problem(Code::DuplicateVertex).map_or(0, |p| p.count), duplicates);
+        assert!(found.problem(Code::DuplicateVertex).is_none_or(|p| p.fixes.is_empty()));
+        let repaired = repair(&both, &[Repair::Weld, Repair::Flip], None).unwrap();
+        assert_eq!((repaired.mesh, repaired.done), (both, vec![]), "{offset}");
+    }
+}
+
+/// Two cubes whose common face was welded by another program: its edges have four faces, and it is there twice.
+#[test]
+fn inner_walls_are_dropped() {
+    let one = box_mesh(1);
+    let mut both = one.clone();
+    let offset = vec3(2.0, 0.0, 0.0);
+    let place = |p: Vec3| one.positions.iter().position(|q| q.distance(p) < 1e-6).map(|v| v as u32);
+    let index: Vec<u32> = one
+        .positions
+        .iter()
+        .map(|p| {
+            place(*p + offset).unwrap_or_else(|| {
+                both.positions.push(*p + offset);
+                both.positions.len() as u32 - 1
+            })
+        })
+        .collect();
+    both.faces.extend(one.faces.iter().map(|f| f.iter().map(|&i| index[i as usize]).collect::<Vec<_>>()));
+    assert_eq!((both.positions.len(), both.faces.len()), (12, 12));
+    assert!(codes(&both).contains(&Code::NonManifoldEdge));
+    let whole = mended(&both, &[Repair::DropDegenerate]);
+    assert_eq!((whole.faces.len(), codes(&whole)), (10, vec![]));
+}
+
+#[test]
+fn holes_that_are_too_long_are_named_and_not_offered() {
+    let n = 100;
+    let ring = |z: f32| (0..n).map(move |k| (std::f32::consts::TAU * k as f32 / n as f32, z));
+    let mut tube = PolygonMesh {
+        positions: ring(0.0).chain(ring(1.0)).map(|(t, z)| vec3(t.cos(), t.sin(), z)).collect(),
+        faces: (0..n).map(|k| vec![k, (k + 1) % n, n + (k + 1) % n, n + k]).collect(),
+    };
+    tube.faces.push((0..n).rev().collect());
+    let found = check(&tube, None, None);
+    let open = found.problem(Code::OpenEdge).unwrap();
+    assert_eq!(
+        open.message,
+        "The cage is not closed: 100 edges belong to one face only. A hole has 100 edges; only holes of up to 64 edges \
+         are filled."
+    );
+    assert_eq!(open.fixes, []);
+}
+
 #[test]
 fn flipped_faces_are_reported_by_component_and_flipped_back() {
     let inner = box_mesh(1);

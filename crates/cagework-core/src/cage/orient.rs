@@ -66,18 +66,21 @@ pub(super) fn orient(
     Ok(polygons)
 }
 
-/// A component as a closed set of triangles.
-struct Solid {
+/// A component of a surface as a set of triangles.
+#[derive(Clone, Debug)]
+pub struct Solid {
     triangles: Vec<[DVec3; 3]>,
     min: DVec3,
     max: DVec3,
     /// Signed volume, positive if the triangles are counter-clockwise seen from outside.
-    volume: f64,
+    pub volume: f64,
     area: f64,
 }
 
 impl Solid {
-    fn new(triangles: Vec<[DVec3; 3]>) -> Self {
+    /// Computes bounds, volume and area. `triangles`: corners, all counter-clockwise or all clockwise seen from outside.
+    #[must_use]
+    pub fn new(triangles: Vec<[DVec3; 3]>) -> Self {
         let corners = || triangles.iter().flatten();
         let min = corners().fold(DVec3::INFINITY, |m, &p| m.min(p));
         let max = corners().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p));
@@ -93,12 +96,13 @@ impl Solid {
         Self { triangles, min, max, volume, area }
     }
 
-    /// Whether this component lies inside `other`; false if they overlap.
-    fn is_inside(&self, other: &Self) -> bool {
-        if self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
+    /// Whether this component lies inside `other`; false if they overlap, or without triangles.
+    #[must_use]
+    pub fn is_inside(&self, other: &Self) -> bool {
+        let n = self.triangles.len();
+        if n == 0 || self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
             return false;
         }
-        let n = self.triangles.len();
         let samples = NESTING_SAMPLES.min(if n.is_multiple_of(2) { n - 1 } else { n });
         let windings = (0..samples).map(|k| {
             let [a, b, c] = self.triangles[k * n / samples];
