@@ -171,4 +171,37 @@ fn mapped_points_are_mapped_back() {
     // Far from the cage, the field moves no point.
     let far = Vec3::splat(100.0);
     assert_eq!((field.map(far), inverse.find(far), field.gradient(far)), (far, Some(far), Mat3::IDENTITY));
+    let coarse = FieldWeights::bind(&cage, 8, &BindOptions::default(), &NoProgress).unwrap();
+    let coarse = coarse.pose(cage.positions(), &posed);
+    assert_eq!(
+        (coarse.map(far), coarse.map(-far)),
+        (far, -far),
+        "a lattice of 8 cells moves no point either"
+    );
+}
+
+/// A pose can move neighbouring nodes many cells apart. Then no node is near the target, but the inverse exists. Where a
+/// pose flattens the model, each point has many inverses, so none is returned.
+#[test]
+fn stretched_points_are_mapped_back_and_flattened_ones_are_not() {
+    let (cage, _) = bent_bar();
+    let weights = FieldWeights::bind(&cage, field::CELLS, &BindOptions::default(), &NoProgress).unwrap();
+    for scale in [6.0, 12.0] {
+        let posed: Vec<Vec3> = cage.positions().iter().map(|p| scale * *p).collect();
+        let field = weights.pose(cage.positions(), &posed);
+        let inverse = InverseField::new(&field);
+        for p in points_in_bar().into_iter().step_by(10) {
+            let back = inverse.find(field.map(p));
+            assert!(
+                back.is_some_and(|back| back.distance(p) <= 1e-4 * cage.diagonal()),
+                "{scale} {p} {back:?}"
+            );
+        }
+    }
+    let flat: Vec<Vec3> = cage.positions().iter().map(|p| p.with_z(0.0)).collect();
+    let field = weights.pose(cage.positions(), &flat);
+    let inverse = InverseField::new(&field);
+    for p in points_in_bar().into_iter().step_by(10) {
+        assert_eq!(inverse.find(field.map(p)), None, "{p}");
+    }
 }

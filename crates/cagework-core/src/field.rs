@@ -53,8 +53,13 @@ const RELAXED_CELLS: u8 = 4;
 const INVERSE_CELLS: f32 = 2.0;
 /// Limit on the index of a sorting cell along an axis, so that three indices fit into one key.
 const MAX_CELL_INDEX: f32 = 1e6;
+/// Absolute determinant of the Jacobian up to which the deformation collapses space, so that many points are inverses:
+/// above the rounding of differences of f32 values.
+const MIN_DETERMINANT: f64 = 1e-4;
 /// Limit on the Newton steps for one target point.
 const MAX_NEWTON_STEPS: usize = 8;
+/// Limit on the halvings of a Newton step.
+const MAX_HALVINGS: i32 = 6;
 /// Distance from the target at which Newton's method stops, as a fraction of the longest side of the cage's box.
 const INVERSE_TOLERANCE: f64 = 1e-7;
 /// Largest distance from the target at which an inverse is accepted, as a fraction of the longest side of the cage's
@@ -94,7 +99,8 @@ impl Lattice {
     fn size(cage: &Cage, cells: u32) -> (f32, f32, UVec3) {
         let size = cage.bounds().extent();
         let cell = size.max_element() / cells as f32;
-        let margin = (MARGIN * cells as f32).ceil();
+        // Nodes near the cage are bound. Beyond them is a layer of nodes that do not move.
+        let margin = (MARGIN * cells as f32).ceil().max((BOUND_CELLS + 1) as f32);
         // Round up to a multiple of the coarsest stride.
         let inner = (size / cell).ceil().as_uvec3() + 2 * margin as u32;
         (cell, margin, inner.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1)
@@ -472,13 +478,17 @@ pub struct InverseField<'a> {
     field: &'a Field,
     /// `(key of the cell that contains the node's deformed position, node)` for each bound node, ascending.
     nodes: Vec<(u64, u32)>,
+    /// Cells that contain the corners of the box around all deformed nodes.
+    bounds: [IVec3; 2],
 }
 
 impl<'a> InverseField<'a> {
     /// Sorts the bound nodes by deformed position.
     #[must_use]
     pub fn new(field: &'a Field) -> Self {
-        let mut inverse = Self { field, nodes: Vec::new() };
+        let mut inverse = Self { field, nodes: Vec::new(), bounds: [IVec3::MAX, IVec3::MIN] };
+        let cells = field.lattice.bound.iter().filter_map(|&node| inverse.cell_of(inverse.moved(node)));
+        inverse.bounds = cells.fold(inverse.bounds, |[low, high], cell| [low.min(cell), high.max(cell)]);
         let of_node = |&node: &u32| (inverse.cell_of(inverse.moved(node)).map_or(0, key), node);
         let mut nodes: Vec<(u64, u32)> = field.lattice.bound.iter().map(of_node).collect();
         nodes.sort_unstable();
@@ -494,37 +504,62 @@ impl<'a> InverseField<'a> {
         start.and_then(|start| self.newton(start, target)).or_else(|| self.newton(target, target))
     }
 
+    /// Newton's method from `start`. A step that would increase the error is halved, because the field is smooth only
+    /// within the cells of the lattice.
     fn newton(&self, start: Vec3, target: Vec3) -> Option<Vec3> {
         let size = f64::from(self.field.lattice.longest_side());
-        let (mut point, target) = (start.as_dvec3(), target.as_dvec3());
-        let mut best = (f64::INFINITY, point);
-        for _ in 0..=MAX_NEWTON_STEPS {
+        let target = target.as_dvec3();
+        let error_at = |point: DVec3| {
             let (by, gradient) = self.field.linearized(point);
-            let error = target - (point + by);
-            if error.length() < best.0 {
-                best = (error.length(), point);
+            (target - (point + by), DMat3::IDENTITY + gradient)
+        };
+        let mut point = start.as_dvec3();
+        let (mut error, mut jacobian) = error_at(point);
+        for _ in 0..MAX_NEWTON_STEPS {
+            if jacobian.determinant().abs() <= MIN_DETERMINANT {
+                return None;
             }
-            let jacobian = DMat3::IDENTITY + gradient;
-            if best.0 <= INVERSE_TOLERANCE * size || jacobian.determinant().abs() <= f64::EPSILON {
+            if error.length() <= INVERSE_TOLERANCE * size {
                 break;
             }
-            point += jacobian.inverse() * error;
+            let step = jacobian.inverse() * error;
+            let tries = (0..=MAX_HALVINGS).map(|k| point + 0.5_f64.powi(k) * step).map(|p| (p, error_at(p)));
+            let closer = tries.into_iter().find(|(_, (other, _))| other.length() < error.length());
+            let Some((to, found)) = closer else { break };
+            (point, (error, jacobian)) = (to, found);
         }
-        (best.0 <= MAX_INVERSE_ERROR * size).then(|| best.1.as_vec3())
+        let is_unique = jacobian.determinant().abs() > MIN_DETERMINANT;
+        (is_unique && error.length() <= MAX_INVERSE_ERROR * size).then(|| point.as_vec3())
     }
 
-    /// Finds the bound node whose deformed position is closest to the target, among those in the 27 cells around the
-    /// target.
+    /// Finds the bound node whose deformed position is closest to the target. Searches the 27 cells around the target
+    /// and, if the target is in the box around all deformed nodes, rings of cells around these until no closer node can
+    /// follow: a pose can move neighbouring nodes many cells apart.
     fn closest_node(&self, target: Vec3) -> Option<u32> {
         let cell = self.cell_of(target)?;
-        let steps = (0..27).map(|k| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
-        let nodes = steps.flat_map(|step| {
-            let key = key(cell + step);
-            let first = self.nodes.partition_point(|(other, _)| *other < key);
-            self.nodes[first..].iter().take_while(move |(other, _)| *other == key).map(|(_, node)| *node)
-        });
-        let distance = |&node: &u32| self.moved(node).distance_squared(target);
-        nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        let [low, high] = self.bounds;
+        let is_between = cell.cmpge(low).all() && cell.cmple(high).all();
+        let n_rings = if is_between { (cell - low).max(high - cell).max_element().max(1) } else { 1 };
+        let size = INVERSE_CELLS * self.field.lattice.cell;
+        let mut best: Option<(f32, u32)> = None;
+        for ring in 0..=n_rings {
+            // Nodes in this ring are at least this far away.
+            let least = (ring - 1).max(0) as f32 * size;
+            if ring > 1 && best.is_some_and(|(distance, _)| distance <= least * least) {
+                break;
+            }
+            for step in shell(ring) {
+                let key = key(cell + step);
+                let first = self.nodes.partition_point(|(other, _)| *other < key);
+                for &(_, node) in self.nodes[first..].iter().take_while(|(other, _)| *other == key) {
+                    let distance = self.moved(node).distance_squared(target);
+                    if best.is_none_or(|(least, _)| distance < least) {
+                        best = Some((distance, node));
+                    }
+                }
+            }
+        }
+        best.map(|(_, node)| node)
     }
 
     fn moved(&self, node: u32) -> Vec3 {
@@ -538,6 +573,16 @@ impl<'a> InverseField<'a> {
         let cell = ((position - lattice.origin) / (INVERSE_CELLS * lattice.cell)).floor();
         (cell.abs().max_element() < MAX_CELL_INDEX).then(|| cell.as_ivec3())
     }
+}
+
+/// Steps to the cells whose largest distance from a cell along an axis is `ring`.
+fn shell(ring: i32) -> impl Iterator<Item = IVec3> {
+    let all = move |x: i32, y: i32| {
+        // In the interior of a slice only its first and last cell belong to the shell.
+        let step = if x.abs() == ring || y.abs() == ring { 1 } else { 2 * ring };
+        (-ring..=ring).step_by(step.max(1) as usize).map(move |z| IVec3::new(x, y, z))
+    };
+    (-ring..=ring).flat_map(move |x| (-ring..=ring).flat_map(move |y| all(x, y)))
 }
 
 /// Packs the three indices of a cell into one sort key, 21 bits each.
