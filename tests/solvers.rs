@@ -195,6 +195,7 @@ mod any_cage {
         any_cage::sparsify_changes_weights_and_poses_little,
         any_cage::parts_that_share_a_face_do_not_leak,
         any_cage::overlapping_parts_are_bound_as_one,
+        any_cage::flush_walls_of_overlapping_parts_are_one,
         any_cage::weights_do_not_jump_at_re_entrant_edges,
         any_cage::weights_are_continuous_in_the_corners_of_a_cage,
         any_cage::unresolved_parts_are_reported_with_a_sufficient_grid,

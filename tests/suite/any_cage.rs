@@ -152,6 +152,28 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     }
 }
 
+/// Two bars of a cross, whose upper and lower faces are flush. Where they cross, rays and grid lines meet both faces at
+/// the same place up to rounding, so a wall must be chosen by more than its place. The weights of the first bar along a
+/// line just above the lower faces then change smoothly, and little with the grid.
+pub(crate) fn flush_walls_of_overlapping_parts_are_one(back_end: &BackEnd) {
+    let bars = [[[0.0, 0.3, 0.3], [1.0, 0.7, 0.7]], [[0.3, 0.0, 0.3], [0.7, 1.0, 0.7]]];
+    let [a, b] = bars.map(|[low, high]| cuboid(Vec3::from(low), Vec3::from(high)));
+    let both = cage(&together(&a, &b));
+    let points: Vec<Vec3> =
+        (0..=20u8).map(|k| Vec3::new(0.025 + 0.0475 * f32::from(k), 0.5, 0.301)).collect();
+    let first_bar = |grid| -> Vec<f32> {
+        let binding = back_end.bind_with(&points, &both, |o| o.grid = grid);
+        dense(&binding.weights).chunks(16).map(|row| row[..8].iter().sum()).collect()
+    };
+    let (coarse, fine) = (first_bar(64), first_bar(128));
+    for (k, (a, b)) in coarse.iter().zip(&fine).enumerate() {
+        assert!((a - b).abs() < 0.05, "{}: {a} at g = 64, {b} at 128", points[k]);
+    }
+    for pair in coarse.windows(3) {
+        assert!((pair[0] - 2.0 * pair[1] + pair[2]).abs() < 0.4, "{pair:?}");
+    }
+}
+
 /// Finds the re-entrant edges of a cage. An edge counts as re-entrant if more than 60 % of random points near it are
 /// inside.
 fn re_entrant_edges(cage: &Cage, near: f32) -> Vec<[Vec3; 2]> {

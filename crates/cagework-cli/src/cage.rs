@@ -1,6 +1,6 @@
 //! `cagework cage`: makes a cage for a model.
 
-use cagework_cage::generate::{BOX_DIVISIONS, CageReport};
+use cagework_cage::generate::{BOX_DIVISIONS, CageReport, MIN_VOXELS};
 use cagework_core::PolygonMesh;
 use cagework_core::words::three_digits;
 use cagework_io::{MemoryError, Model, shown};
@@ -166,9 +166,15 @@ fn text(summary: &CageSummary) -> String {
     }
     if report.vertices > report.target {
         text.push_str(&format!(
-            ".\nnote: the model's holes and gaps need {} vertices instead of {}; fewer --voxels than {} close more of them",
-            report.vertices, report.target, report.voxels
+            ".\nnote: the model's shape needs {} vertices instead of {}",
+            report.vertices, report.target
         ));
+        if report.voxels as usize > MIN_VOXELS {
+            text.push_str(&format!(
+                "; fewer --voxels than {} close more of its holes and gaps",
+                report.voxels
+            ));
+        }
     }
     for notice in &report.notices {
         text.push_str(&format!("\nnote: {notice}"));

@@ -196,7 +196,7 @@ it("reports a cage with more vertices than requested", async () => {
   await settled();
   asked[0]?.resolve(cageOf(100));
   await made;
-  expect(said).toEqual(["The model's holes and gaps need more vertices: 100 instead of 80."]);
+  expect(said).toEqual(["The model's shape needs more vertices: 100 instead of 80."]);
 });
 
 it("a generated cage lists the gaps that it closes", async () => {

@@ -35,9 +35,9 @@ const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 /// whether a vertex is outside. Rounding next to edges also causes such ends.
 const MAX_OUTSIDE_WEIGHT: f64 = 1e-6;
 
-/// A point of a facet lies inside another part of the cage if its winding number, computed without that facet, exceeds
-/// this threshold. That number is the mean of the winding numbers on both sides: 0.5 on an outer wall, 1 on a wall
-/// shared by two parts, and at least 1.5 inside another part. The threshold is halfway between 1 and 1.5.
+/// A point of a facet lies inside another part of the cage if the mean of the winding numbers on both sides exceeds this
+/// threshold. The mean is 0.5 on an outer wall, 1 on a wall shared by two parts or on flush walls of overlapping parts,
+/// and at least 1.5 inside another part. The threshold is halfway between 1 and 1.5.
 const MIN_INNER_WINDING: f64 = 1.25;
 
 /// Fraction of the way to the facet's centroid by which a point is moved before its winding number is computed, because
@@ -395,7 +395,8 @@ impl<'a> Sampler<'a> {
     }
 
     /// Ends of the two segments from `p` along `axis`, at most `reach` cells down and up, cut at the cage. If two faces
-    /// coincide, as they do where two parts touch, the segment ends at the face whose back it hits.
+    /// coincide, as they do where two parts touch, the segment ends at the face whose back it hits. If it hits the backs
+    /// or the fronts of both, as where flush parts overlap, it ends at the face of the first part.
     fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near.into_iter().flatten() {
@@ -405,8 +406,10 @@ impl<'a> Sampler<'a> {
                 let distance = c.distance.abs();
                 let nearer = match end.1 {
                     None => distance < end.0,
-                    Some((_, _, faces_up)) => {
-                        let prefers = f64::from(i8::from(c.faces_up == up) - i8::from(faces_up == up));
+                    Some((facet, _, faces_up)) => {
+                        let by_facing = i8::from(c.faces_up == up) - i8::from(faces_up == up);
+                        let by_part = self.part_of(facet).cmp(&self.part_of(number)) as i8;
+                        let prefers = f64::from(if by_facing == 0 { by_part } else { by_facing });
                         distance < end.0 + self.same * prefers
                     }
                 };
@@ -416,6 +419,12 @@ impl<'a> Sampler<'a> {
             }
         }
         ends
+    }
+
+    /// Part of the cage to which a facet belongs.
+    fn part_of(&self, facet: u32) -> u32 {
+        let surface = self.controls.surface();
+        surface.component_of_face()[surface.face_of_facet()[facet as usize] as usize]
     }
 
     /// Whether a point on a facet lies inside another part of the cage, so that the facet is not a wall there.
@@ -431,8 +440,11 @@ impl<'a> Sampler<'a> {
         }
         // Move the point off the facet's sides, where the winding number is ambiguous.
         let place = place.lerp(corners.iter().sum::<DVec3>() / 3.0, SIDE_OFFSET);
-        let others = self.lists.all().iter().enumerate().filter(|(k, _)| *k != facet as usize);
-        winding_number(place, others.map(|(_, t)| t.corners)) > MIN_INNER_WINDING
+        // Compute both winding numbers off the plane of the facet, with which facets of other parts may coincide.
+        let [a, b, c] = corners;
+        let off = 2.0 * self.same * (b - a).cross(c - a).normalize_or_zero();
+        let winding = |p: DVec3| winding_number(p, self.lists.all().iter().map(|t| t.corners));
+        0.5 * (winding(place + off) + winding(place - off)) > MIN_INNER_WINDING
     }
 }
 

@@ -120,7 +120,8 @@ impl Lines {
     }
 
     /// Keeps only the hits at which a line enters or leaves the union of all parts. Hits at most `same` cells
-    /// apart count as coincident: the line leaves one part before it enters another.
+    /// apart count as coincident: the line leaves one part before it enters another. Of the coincident walls of
+    /// overlapping parts, the one of the first part is kept on all lines, whatever rounding makes of their order.
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
@@ -137,6 +138,8 @@ impl Lines {
                 let n = self.hits[first..range.end].partition_point(|hit| hit.t - place <= same);
                 group.clear();
                 group.extend_from_slice(&self.hits[first..first + n]);
+                // The first of the walls at which the line enters is kept, and the last of those at which it leaves.
+                group.sort_by_key(|hit| if hit.faces_up { !part(hit) } else { part(hit) });
                 let leaves_first = depth > 0;
                 let ordered = [leaves_first, !leaves_first]
                     .into_iter()

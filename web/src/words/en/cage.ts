@@ -116,5 +116,5 @@ export const cage = {
   },
   bindFiner: (cells: number) => `Bind with ${cells} cells`,
   more: (made: number, wanted: number) =>
-    `The model's holes and gaps need more vertices: ${made} instead of ${wanted}.`,
+    `The model's shape needs more vertices: ${made} instead of ${wanted}.`,
 };
