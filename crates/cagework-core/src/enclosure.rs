@@ -9,9 +9,9 @@ use glam::{DVec3, Vec3};
 
 use self::columns::Columns;
 use crate::cage::{CAGE_TOLERANCE, Cage};
+use crate::closest::FaceBoxes;
 use crate::geometry::winding_number;
 use crate::mesh::Bounds;
-use crate::sample::FaceBoxes;
 
 /// Winding number above which a point is inside. Off the surface, winding numbers are integers; on it, they lie between
 /// the integers of both sides.

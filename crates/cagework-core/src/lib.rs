@@ -6,6 +6,7 @@
 pub mod assemble;
 pub mod bind;
 pub mod cage;
+pub mod closest;
 pub mod contact;
 pub mod controls;
 pub mod coordinates;

@@ -82,7 +82,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygo
     } else {
         Box::new(rows)
     };
-    // A vertex or face takes at least two bytes, since each is on its own line.
+    // A vertex or face takes at least two bytes: a digit, and a blank or the end of the line.
     for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
         if count > n_bytes / 2 {
             return Err(PolygonsError::Count { name: name.into(), count, bytes: n_bytes });

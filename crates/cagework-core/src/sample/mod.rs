@@ -5,7 +5,6 @@
 
 mod balls;
 pub mod classic;
-mod closest;
 mod edges;
 pub mod embedded;
 mod outside;
@@ -15,8 +14,6 @@ use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
-
-pub use closest::FaceBoxes;
 
 /// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,9 @@
 
 use glam::DVec3;
 
-use super::{FaceBoxes, OutsidePoint, Stencil};
+use super::{OutsidePoint, Stencil};
 use crate::cage::CAGE_TOLERANCE;
+use crate::closest::{ClosestPoint, FaceBoxes};
 use crate::controls::Controls;
 use crate::geometry::distance_along;
 use crate::options::OutsidePolicy;
@@ -40,12 +41,13 @@ impl<'a> OutsideSampler<'a> {
         inside: impl FnOnce(DVec3, &mut Stencil) -> bool,
     ) -> OutsidePoint {
         let surface = self.controls.surface();
-        let mut found = self.closest.find(point);
+        let ClosestPoint { facet, barycentric, distance } = self.closest.find(point);
+        let mut found = OutsidePoint { vertex: 0, triangle: facet, barycentric, distance, share: 1.0 };
         stencil.clear();
         self.controls.values_at(found.triangle, found.barycentric, &mut |column, value| {
             stencil.add_hat(column, value);
         });
-        let (distance, diagonal) = (found.distance, f64::from(surface.diagonal()));
+        let diagonal = f64::from(surface.diagonal());
         let of_cage = self.controls.cage_face(surface.face_of_facet()[found.triangle as usize]).is_some();
         if distance <= CAGE_TOLERANCE * diagonal {
             return found;

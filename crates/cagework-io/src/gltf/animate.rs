@@ -3,10 +3,11 @@
 use std::collections::HashSet;
 
 use glam::{DMat4, Vec3};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
+use super::channels::{ChannelTarget, channel_target};
 use super::pack::{Pack, push};
-use super::rig::{ChannelTarget, channel_target};
+use super::target_names::name_lists_of_primitives;
 use crate::timeline::Timeline;
 
 /// A pose of the model: its name and vertex positions.
@@ -26,20 +27,6 @@ pub(crate) struct MeshPlacement {
     pub(super) detached: bool,
     /// Transform from world space, relative to the origin, to mesh space.
     pub(super) mesh_from_world: DMat4,
-}
-
-/// Names of the morph targets of a mesh: in its extras or, as UniVRM writes them, in the extras of its first primitive.
-pub(super) fn target_names(mesh: &Value) -> &Value {
-    let own = &mesh["extras"]["targetNames"];
-    if own.is_array() { own } else { &mesh["primitives"][0]["extras"]["targetNames"] }
-}
-
-/// The lists of target names in the extras of the primitives of a mesh.
-pub(super) fn name_lists_of_primitives(mesh: &mut Value) -> impl Iterator<Item = &mut Map<String, Value>> {
-    let primitives = mesh.get_mut("primitives").and_then(Value::as_array_mut).into_iter().flatten();
-    primitives
-        .filter_map(|primitive| primitive.get_mut("extras")?.as_object_mut())
-        .filter(|extras| extras.contains_key("targetNames"))
 }
 
 /// Removes the weights, names and animation channels of the original morph targets.

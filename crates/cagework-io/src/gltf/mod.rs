@@ -9,6 +9,7 @@
 mod accessor;
 mod animate;
 mod build;
+mod channels;
 #[cfg(feature = "compress")]
 mod compact;
 mod container;
@@ -26,6 +27,7 @@ mod select;
 mod size;
 mod skin;
 mod splats;
+mod target_names;
 mod transfer;
 
 use std::collections::HashMap;

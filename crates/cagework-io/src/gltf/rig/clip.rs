@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use serde_json::Value;
 
-use super::tracks::{ChannelTarget, channel_target};
+use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::{GltfDocument, GltfError};
 use crate::timeline::{Interpolation, hermite};
 

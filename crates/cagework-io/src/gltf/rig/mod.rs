@@ -56,7 +56,6 @@ pub use reshape::ReshapeOptions;
 pub(crate) use reshape::{reshape, skeleton, write_moved, write_targets};
 pub use skeleton::Skeleton;
 pub(crate) use skeleton::joints_with_vertices;
-pub(super) use tracks::{ChannelTarget, channel_target};
 use vrm::VrmPoint;
 
 /// Step of the central differences for the deformation gradient at a node, as a fraction of the model's diagonal.

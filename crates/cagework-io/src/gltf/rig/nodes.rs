@@ -9,9 +9,10 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::surface::rotation;
-use super::tracks::{self, ChannelTarget, NodeChange};
+use super::tracks::NodeChange;
 use super::{GRADIENT_STEP, PROBE_DIRECTIONS, Rig};
 use crate::gltf::GltfDocument;
+use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::scene::{Worlds, local, name_of};
 
 cagework_core::choice! {
@@ -103,7 +104,7 @@ pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
     let json = &document.json;
     let animations = json["animations"].as_array().into_iter().flatten();
     let channels = animations.flat_map(|animation| animation["channels"].as_array().into_iter().flatten());
-    let animated = channels.filter_map(|channel| match tracks::channel_target(channel)? {
+    let animated = channels.filter_map(|channel| match channel_target(channel)? {
         ChannelTarget::Translation(node) | ChannelTarget::Rotation(node) | ChannelTarget::Scale(node) => {
             Some(node)
         }

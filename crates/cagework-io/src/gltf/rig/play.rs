@@ -8,10 +8,10 @@ use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::clip::{Clip, clips, quaternion, vector};
 use super::skeleton::bare;
-use super::tracks::ChannelTarget;
-use crate::gltf::animate::target_names;
+use crate::gltf::channels::ChannelTarget;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
+use crate::gltf::target_names::target_names;
 use crate::gltf::{GltfDocument, GltfError, Slot, skin};
 use crate::origin::relative;
 use ::gltf::json::mesh::Semantic;

@@ -9,11 +9,12 @@ use serde_json::{Value, json};
 use super::edit::Edit;
 use super::expressions::PoseTarget;
 use super::shape::SurfaceGradients;
-use super::tracks::{ChannelTarget, channel_target, output, own_sampler};
+use super::tracks::{output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
-use crate::gltf::animate::{name_lists_of_primitives, target_names};
+use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
+use crate::gltf::target_names::{name_lists_of_primitives, target_names};
 use crate::timeline::Timeline;
 
 /// A pose that becomes a morph target.

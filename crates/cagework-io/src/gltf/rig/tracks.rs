@@ -6,21 +6,11 @@ use serde_json::Value;
 use super::edit::Edit;
 use super::report::ReshapeReport;
 use crate::gltf::GltfDocument;
+use crate::gltf::channels::{ChannelTarget, channel_target};
 use crate::gltf::pack::push;
 
 /// A translation track whose range is below this fraction of the node's own translation counts as constant.
 const MIN_TRANSLATION_RANGE: f64 = 1e-3;
-
-/// Property that an animation channel animates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::gltf) enum ChannelTarget {
-    Translation(usize),
-    Rotation(usize),
-    Scale(usize),
-    /// Morph weights of a node.
-    Weights(usize),
-    MeshWeights(usize),
-}
 
 /// Change of a node's local transform, which its animation tracks must follow.
 pub(super) struct NodeChange {
@@ -32,32 +22,6 @@ pub(super) struct NodeChange {
     pub(super) moving: DMat3,
     /// Rotation by which rotation keys are multiplied from the left.
     pub(super) turn: Option<DQuat>,
-}
-
-/// Reads the target of a channel, by `path` and node or by KHR_animation_pointer. `None` if unsupported.
-pub(in crate::gltf) fn channel_target(channel: &Value) -> Option<ChannelTarget> {
-    let target = &channel["target"];
-    if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str)
-    {
-        let mut words = pointer.strip_prefix('/')?.split('/');
-        let (list, index, what) = (words.next()?, words.next()?.parse().ok()?, words.next()?);
-        return match (list, what, words.next()) {
-            ("nodes", "translation", None) => Some(ChannelTarget::Translation(index)),
-            ("nodes", "rotation", None) => Some(ChannelTarget::Rotation(index)),
-            ("nodes", "scale", None) => Some(ChannelTarget::Scale(index)),
-            ("nodes", "weights", None) => Some(ChannelTarget::Weights(index)),
-            ("meshes", "weights", None) => Some(ChannelTarget::MeshWeights(index)),
-            _ => None,
-        };
-    }
-    let node = target["node"].as_u64()? as usize;
-    match target["path"].as_str()? {
-        "translation" => Some(ChannelTarget::Translation(node)),
-        "rotation" => Some(ChannelTarget::Rotation(node)),
-        "scale" => Some(ChannelTarget::Scale(node)),
-        "weights" => Some(ChannelTarget::Weights(node)),
-        _ => None,
-    }
 }
 
 /// Output of a sampler. Cubic splines store in-tangent, value and out-tangent per key.

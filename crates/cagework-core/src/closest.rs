@@ -2,9 +2,19 @@
 
 use glam::DVec3;
 
-use super::OutsidePoint;
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
+
+/// A point of a cage's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPoint {
+    /// Facet that contains the point.
+    pub facet: u32,
+    /// Barycentric coordinates of the point in `facet`.
+    pub barycentric: [f64; 3],
+    /// Distance from the query point, object units.
+    pub distance: f64,
+}
 
 /// Bounding boxes of a cage's faces, by which closest-point queries skip most faces.
 #[derive(Clone, Debug)]
@@ -31,16 +41,10 @@ impl<'a> FaceBoxes<'a> {
         Self { cage, faces }
     }
 
-    /// Closest point to `point`; ties go to the lowest facet. Sets `vertex` to 0 and `share` to 1.
+    /// Closest point to `point`; ties go to the lowest facet.
     #[must_use]
-    pub fn find(&self, point: DVec3) -> OutsidePoint {
-        let mut best = OutsidePoint {
-            vertex: 0,
-            triangle: 0,
-            barycentric: [1.0, 0.0, 0.0],
-            distance: f64::INFINITY,
-            share: 1.0,
-        };
+    pub fn find(&self, point: DVec3) -> ClosestPoint {
+        let mut best = ClosestPoint { facet: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
         let to_box = |[low, high]: &[DVec3; 2]| point.distance(point.clamp(*low, *high));
         let mut distances: Vec<f64> = self.faces.iter().map(|(_, bounds)| to_box(bounds)).collect();
         loop {
@@ -50,17 +54,11 @@ impl<'a> FaceBoxes<'a> {
                 return best;
             }
             distances[face] = f64::INFINITY;
-            for triangle in self.faces[face].0.clone() {
-                let closest = closest_point_on_triangle(point, self.cage.facet_corners(triangle));
+            for facet in self.faces[face].0.clone() {
+                let closest = closest_point_on_triangle(point, self.cage.facet_corners(facet));
                 let distance = closest.point.distance(point);
-                if distance < best.distance || distance == best.distance && triangle < best.triangle {
-                    best = OutsidePoint {
-                        vertex: 0,
-                        triangle,
-                        barycentric: closest.barycentric,
-                        distance,
-                        share: 1.0,
-                    };
+                if distance < best.distance || distance == best.distance && facet < best.facet {
+                    best = ClosestPoint { facet, barycentric: closest.barycentric, distance };
                 }
             }
         }
