@@ -3,10 +3,10 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 
 use cagework_cage::samples;
+use cagework_core::closest::FaceBoxes;
 use cagework_core::deform::deform_bound;
 use cagework_core::field::{self, Field, FieldWeights, InverseField, bend_vertices};
 use cagework_core::progress::NoProgress;
-use cagework_core::sample::FaceBoxes;
 use cagework_core::{BindOptions, Bounds, Cage, bind, subdivided_box};
 use cagework_tests::random::RandomGenerator;
 use glam::{Mat3, Vec3};
