@@ -204,10 +204,8 @@ fn join_junctions(repaired: &mut RepairedMesh) {
         }
     }
     if !joined.is_empty() {
-        repaired.done.push(format!(
-            "Joined {} with the edges on which they lie.",
-            counted(joined.len(), "vertex", "vertices")
-        ));
+        let vertices = counted(joined.len(), "vertex", "vertices");
+        repaired.done.push(format!("Joined {vertices} with open edges."));
     }
 }
 

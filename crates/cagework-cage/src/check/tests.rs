@@ -95,7 +95,7 @@ fn vertices_on_edges_are_reported_and_become_corners() {
     assert_eq!(found.problem(Code::TJunction).unwrap().places.vertices, [8, 9, 10, 11]);
     assert_eq!(found.problem(Code::OpenEdge).unwrap().fixes, [Fix::Repair { repair: Repair::Weld }]);
     let repaired = repair(&mesh, &[Repair::Weld], None).unwrap();
-    assert_eq!(repaired.done, ["Joined 4 vertices with the edges on which they lie."]);
+    assert_eq!(repaired.done, ["Joined 4 vertices with open edges."]);
     assert_eq!(codes(&repaired.mesh), []);
     assert_eq!(Cage::new(&repaired.mesh).unwrap().notices(), []);
 }

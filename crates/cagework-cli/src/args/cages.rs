@@ -105,10 +105,10 @@ pub(crate) struct CheckArgs {
     /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side.
     #[arg(short, long, default_value_t = BindOptions::default().grid, value_parser = super::number::<u32>(GRID))]
     pub(crate) grid: u32,
-    /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and
-    /// makes vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces and unused vertices, mirror completes half a cage
-    /// across its planar open boundary, fill-holes closes holes, flip orients all faces outward, grow moves vertices
-    /// outward until the cage encloses the model.
+    /// Repairs to apply before the check, separated by commas: weld merges vertices at the same position and makes
+    /// vertices on open edges corners of the faces there, drop-degenerate removes faces without area, duplicate faces
+    /// and unused vertices, mirror completes half a cage across its planar open boundary, fill-holes closes holes, flip
+    /// orients all faces outward, grow moves vertices outward until the cage encloses the model.
     #[arg(long, value_parser = super::words::<Repair>(), value_delimiter = ',', value_name = "WHAT", requires = "output")]
     pub(crate) repair: Vec<Repair>,
     /// File for the repaired cage; the extension selects the format.
