@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Relative enlargement of the box in [`triangle_box_overlaps`]: above f64 rounding, far below a cell.
 const BOX_WIDENING: f64 = 1e-9;
@@ -109,34 +109,20 @@ pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -
 }
 
 /// Computes the winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1
-/// inside (also of a solid with cavities), 0 outside, in between on the surface.
+/// inside (also of a solid with cavities), 0 outside, in between on the surface. For other triangles: their share of it.
 ///
 /// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle". Each half solid angle is the argument
 /// of a complex number. The product of these numbers has the sum of the angles as its argument, apart from full turns,
 /// which are counted separately: a single arc tangent suffices.
 #[must_use]
 pub fn winding_number(point: DVec3, triangles: impl IntoIterator<Item = [DVec3; 3]>) -> f64 {
-    let seen = |p: DVec3| (p - point, (p - point).length());
-    winding_of(triangles.into_iter().map(|triangle| triangle.map(seen)))
-}
-
-/// The [`winding_number`] of a mesh. The distance of each vertex is computed once, not once per triangle.
-#[must_use]
-pub fn winding_number_of_mesh(point: DVec3, positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    let seen = |p: Vec3| p.as_dvec3() - point;
-    let distances: Vec<f64> = positions.iter().map(|&p| seen(p).length()).collect();
-    let corner = |i: u32| (seen(positions[i as usize]), distances[i as usize]);
-    winding_of(triangles.iter().map(|triangle| triangle.map(corner)))
-}
-
-/// Winding number of triangles whose corners are given relative to the point, with their distances from it.
-#[inline(always)]
-fn winding_of(triangles: impl Iterator<Item = [(DVec3, f64); 3]>) -> f64 {
     /// Magnitude of the product below which it is scaled up, far above underflow.
     const MIN_SIZE: f64 = 1e-100;
     let (mut re, mut im) = (1.0_f64, 0.0_f64);
     let mut turns = 0_i32;
-    for [(a, la), (b, lb), (c, lc)] in triangles {
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|p| p - point);
+        let [la, lb, lc] = [a, b, c].map(DVec3::length);
         let x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         let y = a.dot(b.cross(c));
         let per_size = (x.abs() + y.abs()).recip();

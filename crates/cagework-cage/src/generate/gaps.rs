@@ -4,10 +4,11 @@
 use glam::{DVec3, Vec3};
 
 use super::lattice::{Lattice, MARGIN_VOXELS};
+use super::soup::Soup;
 use super::voxels::Voxels;
 use super::{CageOptions, MAX_VOXELS};
 use cagework_core::cage::Cage;
-use cagework_core::geometry::{winding_number, winding_number_of_mesh};
+use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancellation;
 use cagework_core::words::decimals;
 
@@ -106,22 +107,21 @@ pub(super) struct NarrowGaps {
 /// # Errors
 /// If `go_on` cancels.
 pub(super) fn narrow_gaps(
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
+    soup: &Soup<'_>,
     bounds: [DVec3; 2],
     clearance: f64,
     [base, most]: [usize; 2],
     go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<NarrowGaps, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
-    let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
+    let solid = lattice.voxelize(soup.positions, soup.triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
     let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| {
         gap.area >= MIN_GAP_AREA * n * n
             && gap.width * lattice.cell > 2.0 * clearance
-            && !gap.is_hollow(&lattice, positions, triangles)
+            && !gap.is_hollow(&lattice, soup)
     });
     let of_model = |gap: Gap| ModelGap {
         points: gap
@@ -139,7 +139,7 @@ pub(super) fn narrow_gaps(
     let mut stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
     let mut voxels = base;
     if stretch != DVec3::ONE {
-        let resolution = resolution_of_narrows(positions, triangles, bounds, (clearance, stretch), go_on)?;
+        let resolution = resolution_of_narrows(soup, bounds, (clearance, stretch), go_on)?;
         if resolution > MAX_RESOLUTION {
             stretch = stretch.map(|times| if times > 1.0 { STRETCHES[1] } else { 1.0 });
         }
@@ -158,14 +158,13 @@ pub(super) fn narrow_gaps(
 /// # Errors
 /// If `go_on` cancels.
 fn resolution_of_narrows(
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
+    soup: &Soup<'_>,
     bounds: [DVec3; 2],
     (clearance, stretch): (f64, DVec3),
     go_on: &dyn Fn(f32) -> Result<(), Cancellation>,
 ) -> Result<f64, Cancellation> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, stretch, MARGIN_VOXELS);
-    let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
+    let solid = lattice.voxelize(soup.positions, soup.triangles, go_on)?.filled();
     let axis = stretch.max_position();
     let n = MAX_VOXELS as f64;
     let reach = (MIN_OPEN_NARROW_WIDTH * stretch.max_element()).ceil() as usize;
@@ -174,7 +173,7 @@ fn resolution_of_narrows(
         gap.area >= MIN_GAP_AREA * n * n
             && gap.across[axis] > MIN_ACROSS_COSINE_SQUARED
             && gap.narrow_width * lattice.shortest() > 2.0 * clearance
-            && !gap.is_hollow(&lattice, positions, triangles)
+            && !gap.is_hollow(&lattice, soup)
     });
     let narrowest = found.iter().map(|gap| gap.narrow_width).fold(f64::INFINITY, f64::min);
     Ok(n * stretch.max_element() * MIN_OPEN_NARROW_WIDTH / narrowest)
@@ -238,11 +237,11 @@ impl ModelGap {
 
 impl Gap {
     /// Whether the gap lies within a hollow part, such as an open sleeve, rather than between two parts.
-    pub(super) fn is_hollow(&self, lattice: &Lattice, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+    pub(super) fn is_hollow(&self, lattice: &Lattice, soup: &Soup<'_>) -> bool {
         let n = self.voxels.len();
         let is_inside = |k: usize| {
             let point = center(lattice, self.voxels[k * n / 4]).as_dvec3();
-            winding_number_of_mesh(point, positions, triangles).abs() > 0.5
+            soup.winding(point).abs() > 0.5
         };
         // Decide by the majority of three points of the sheet; the third is needed only if the first two differ.
         let [first, second] = [1, 2].map(is_inside);

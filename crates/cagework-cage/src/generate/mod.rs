@@ -23,6 +23,7 @@ mod quads;
 mod relax;
 mod shell;
 mod smooth;
+mod soup;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -45,6 +46,7 @@ pub use options::{
 };
 use quads::Faces;
 use shell::Shell;
+use soup::Soup;
 use verify::{verify_faces, verify_surface};
 
 /// Limit on the number of lattices that are tried to meet the target.
@@ -121,6 +123,7 @@ fn generate_plain(
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
     let bounds = options::check(positions, triangles, options)?;
+    let soup = Soup::new(positions, triangles);
     let began = progress.now_ms();
     let target = options.target as usize;
     let go_on = |_| {
@@ -136,7 +139,7 @@ fn generate_plain(
         // finer lattice would leave less space between the cage and the model.
         (Shape::Follow, 0) if affordable == MAX_VOXELS => {
             let clearance = options.distance(bounds);
-            gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &go_on)?
+            gaps::narrow_gaps(&soup, bounds, clearance, [base, most_gaps], &go_on)?
         }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
@@ -160,7 +163,7 @@ fn generate_plain(
             continue;
         }
         if gaps.len() <= most_gaps {
-            shell.find_gaps(positions, triangles, [voxels, most_gaps]);
+            shell.find_gaps(&soup, [voxels, most_gaps]);
         }
         let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
         let (cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {

@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 use super::gaps::{Gap, gaps};
 use super::guarded::{GuardedSurface, Obstacle};
 use super::lattice::{Lattice, MARGIN_VOXELS};
+use super::soup::Soup;
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
 use super::{CageOptions, Shape, Symmetry, first_voxels};
@@ -191,10 +192,10 @@ impl Shell {
 
 impl Shell {
     /// Finds at most `most` gaps that the hull leaves open. `n`: voxels along the model's longest side.
-    pub(super) fn find_gaps(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], [n, most]: [usize; 2]) {
+    pub(super) fn find_gaps(&mut self, soup: &Soup<'_>, [n, most]: [usize; 2]) {
         let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
         let found = gaps(&self.solid, &self.filled, reach).into_iter();
-        let found = found.filter(|gap| !gap.is_hollow(&self.lattice, positions, triangles));
+        let found = found.filter(|gap| !gap.is_hollow(&self.lattice, soup));
         self.gaps = found.take(most).collect();
     }
 

@@ -133,6 +133,22 @@ fn ring() -> Soup {
 }
 
 #[test]
+fn winding_numbers_with_dipoles_equal_the_sum_over_all_triangles() {
+    let PolygonMesh { positions, faces } =
+        subdivided_box(Bounds { min: Vec3::splat(-0.8), max: Vec3::splat(0.8) }, 0.0, [60; 3]);
+    let fine_box = (positions, faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect());
+    for (positions, triangles) in [trousers(), ring(), crate::samples::knot().shells(), fine_box] {
+        let soup = super::soup::Soup::new(&positions, &triangles);
+        let all = || triangles.iter().map(|t| t.map(|v| positions[v as usize].as_dvec3()));
+        for k in 0..216 {
+            let point = DVec3::new(f64::from(k % 6), f64::from(k / 6 % 6), f64::from(k / 36)) * 0.4 - 1.01;
+            let (found, exact) = (soup.winding(point), winding_number(point, all()));
+            assert!((found - exact).abs() < 0.01, "{point}: {found} instead of {exact}");
+        }
+    }
+}
+
+#[test]
 fn cage_goes_into_the_gap_between_legs() {
     for target in [40, 80, 200] {
         let made = make(&trousers(), &options(target));
