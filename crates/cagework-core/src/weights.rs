@@ -1,5 +1,7 @@
 //! Sparse weights: compressed sparse rows with one row per mesh vertex and one column per control.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 /// A matrix of weights in compressed sparse rows (CSR), dimensionless. The weights of a vertex for the controls sum to
@@ -125,6 +127,12 @@ impl Weights {
         Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
+    /// The matrix of a range of rows.
+    #[must_use]
+    pub fn row_range(&self, range: Range<usize>) -> Self {
+        self.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
+    }
+
     /// Creates a matrix without rows, with capacity for [`Self::append`].
     #[must_use]
     pub fn with_room(n_columns: u32, n_rows: usize, n_nonzeros: usize) -> Self {
@@ -135,7 +143,7 @@ impl Weights {
 
     /// A range of columns, renumbered from 0.
     #[must_use]
-    pub fn columns(&self, range: std::ops::Range<u32>) -> Self {
+    pub fn columns(&self, range: Range<u32>) -> Self {
         let mut made = Self::with_room(range.len() as u32, self.n_rows(), 0);
         for (indices, data) in self.rows() {
             let own = indices.iter().zip(data).filter(|(c, _)| range.contains(c));
@@ -242,7 +250,7 @@ mod tests {
         let whole = Weights::new(3, indptr, indices, data).unwrap();
         let mut made = Weights::with_room(3, 4, 5);
         for range in [0..1, 1..3, 3..4] {
-            made.append(&whole.with_rows(&range.collect::<Vec<u32>>()));
+            made.append(&whole.row_range(range));
         }
         assert_eq!(made, whole);
         assert_eq!(whole.columns(0..1).beside(&whole.columns(1..3)), whole);

@@ -95,7 +95,7 @@ impl SavedWeights {
     pub fn of_vertices(mut self) -> Self {
         let n = self.n_vertices() as u32;
         if !self.extra_points.is_empty() {
-            self.weights = self.weights.with_rows(&(0..n).collect::<Vec<_>>());
+            self.weights = self.weights.row_range(0..self.n_vertices());
             self.outside.retain(|o| o.vertex < n);
             self.extra_points.clear();
         }

@@ -81,7 +81,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 gpu.main.adopt(weights, frames).await?;
                 let mut state = state.borrow_mut();
                 if state.editor.key() == key {
-                    state.set_bound(bound);
+                    state.set_bound(bound, gpu.main.bound_parts());
                 }
             }
             Upload::Parts => {
@@ -92,7 +92,7 @@ pub(crate) async fn upload(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> 
                 }
                 let mut state = state.borrow_mut();
                 state.on_gpu.parts = Some(models_key);
-                state.held.posed_for.clear();
+                state.set_parts(gpu.main.bound_parts());
             }
         }
         let mut state = state.borrow_mut();

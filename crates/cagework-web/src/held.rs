@@ -1,15 +1,16 @@
 //! Grabs and pins on the models, and posed models for picking.
 
-use cagework_core::{Frames, Weights};
+use std::sync::Arc;
+
 use cagework_editor::SurfacePoint;
 use cagework_editor::edit::pick_surface;
-use cagework_gpu::Session;
 use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
 use serde::Deserialize;
 
+use crate::error::Answer;
 use crate::puller::CAGE_SEED;
-use crate::state::State;
+use crate::state::{BoundModels, State};
 
 /// Maximum distance of a vertex from the mirror image of a surface point, as a fraction of the diagonal of model and
 /// cage. Points nearer than this to their image count as lying on the mirror plane.
@@ -28,11 +29,16 @@ pub(crate) enum Grab {
 
 impl State {
     /// Recomputes the posed models if the cage's pose has changed.
-    pub(crate) fn pose_models(&mut self, session: &Session) {
+    ///
+    /// # Errors
+    /// Before a bind.
+    pub(crate) fn pose_models(&mut self) -> Answer<()> {
+        self.require_bound()?;
         if self.held.posed_for != self.pose() {
-            self.held.posed = session.deformed(self.pose()).unwrap_or_default();
+            self.held.posed = self.deformed(self.pose())?;
             self.held.posed_for = self.pose().to_vec();
         }
+        Ok(())
     }
 
     /// Finds the surface point under the pointer, on the posed models. During playback `None`, because other surfaces
@@ -73,12 +79,9 @@ impl State {
     }
 
     /// Returns the weights of the controls at a grab, `[n_controls]`, and the nearest corner of the grabbed triangle,
-    /// or [`CAGE_SEED`] for a grabbed cage vertex. `None` if the triangle or the vertex does not exist.
-    pub(crate) fn grip_of(
-        &self,
-        grab: Grab,
-        (weights, frames): (&Weights, &Frames),
-    ) -> Option<(Vec<f64>, u32)> {
+    /// or [`CAGE_SEED`] for a grabbed cage vertex. `None` before a bind, or if the triangle or the vertex does not exist.
+    pub(crate) fn grip_of(&self, grab: Grab) -> Option<(Vec<f64>, u32)> {
+        let bound = self.bound.as_ref()?;
         let point = match grab {
             Grab::Surface(point) => point,
             Grab::Vertex(vertex) => {
@@ -88,7 +91,7 @@ impl State {
             }
         };
         let corners = self.models().corners(point.triangle)?;
-        let rows = frames.folded(&weights.with_rows(&corners));
+        let rows = bound.frames.folded(&bound.weights.with_rows(&corners));
         let mut row = vec![0.0; rows.n_columns()];
         for (k, share) in point.bary.into_iter().enumerate() {
             let (columns, values) = rows.row(k);
@@ -120,20 +123,21 @@ impl State {
         Some(SurfacePoint { triangle: models.number_of(t), bary })
     }
 
-    /// Returns the marks of grabs, pins and of an interior control that is being placed. `bound`: weights and their
-    /// frames; without them, grabs and pins are omitted.
-    pub(crate) fn held_marks(&self, bound: Option<(&Weights, &Frames)>) -> Marks {
+    /// Returns the marks of grabs, pins and of an interior control that is being placed. Before a bind, grabs and pins
+    /// are omitted.
+    pub(crate) fn held_marks(&self) -> Marks {
+        let bound = self.bound.as_ref();
         let pins = &*self.editor.document().pins;
         let is_held = !(self.held.points.is_empty() && pins.is_empty());
-        let columns_of = |(_, frames): (&Weights, &Frames)| {
-            frames.fits(self.pose().len()).then(|| frames.columns(self.pose()))
+        let columns_of = |bound: &Arc<BoundModels>| {
+            bound.frames.fits(self.pose().len()).then(|| bound.frames.columns(self.pose()))
         };
         let posed = bound.filter(|_| is_held).and_then(columns_of);
         let place = |point: &SurfacePoint| {
             let corners = self.models().corners(point.triangle)?;
             let follow = |v: u32| {
-                let ((weights, _), posed) = (bound?, posed.as_ref()?);
-                let (columns, values) = weights.row(v as usize);
+                let (columns, values) = bound?.weights.row(v as usize);
+                let posed = posed.as_ref()?;
                 let moved = columns.iter().zip(values).map(|(&c, &w)| Some(w * *posed.get(c as usize)?));
                 moved.sum::<Option<Vec3>>()
             };

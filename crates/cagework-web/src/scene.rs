@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use cagework_core::field::bend_vertices;
-use cagework_core::{Frames, Weights};
 use cagework_editor::edit::Element;
 use cagework_gpu::render::{Gizmo, Marks, MeshStyle, SceneOptions, Selection, SliceView, ViewOptions};
 use cagework_io::Joints;
@@ -29,8 +28,8 @@ impl State {
         }
     }
 
-    /// Creates the scene that the view shows. `bound`: the weights on the GPU and their frames.
-    pub(crate) fn scene(&self, bound: Option<(&Weights, &Frames)>) -> SceneOptions {
+    /// Creates the scene that the view shows.
+    pub(crate) fn scene(&self) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view() && self.draft.is_empty();
         SceneOptions {
             view: self.view.options,
@@ -51,7 +50,7 @@ impl State {
                 .as_ref()
                 .map(|(_, stays)| Arc::clone(stays))
                 .or_else(|| self.held.stays.clone()),
-            held: self.held_marks(bound),
+            held: self.held_marks(),
             joints: self.joint_marks(),
             draft: Marks { segments: self.draft.clone(), ..Marks::default() },
         }
@@ -84,9 +83,9 @@ impl State {
     }
 
     /// Creates the scene of an exported picture. `alone`: only the model, on a transparent background.
-    pub(crate) fn picture_scene(&self, alone: bool, bound: Option<(&Weights, &Frames)>) -> SceneOptions {
+    pub(crate) fn picture_scene(&self, alone: bool) -> SceneOptions {
         if !alone {
-            return self.scene(bound);
+            return self.scene();
         }
         SceneOptions {
             view: ViewOptions { base_wireframe: false, floor: false, ..self.view.options },

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use cagework_core::deform::OutsideVertex;
+use cagework_core::deform::{OutsideVertex, deform_bound};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::field::{Field, FieldWeights};
 use cagework_core::slice::Slice;
@@ -13,6 +13,7 @@ use cagework_editor::{Cache, Editor, Key, Models, RestCage, SurfacePoint};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, CameraPlace, DrawModel, GizmoPart};
 use cagework_io::{Ground, UpAxis};
+use cagework_pose::parts::BoundParts;
 use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 
@@ -41,6 +42,8 @@ pub(crate) struct State {
     pub(crate) watched: Option<(ControlSet, Enclosure)>,
     /// Weights of the current models and cage; `None` before a bind.
     pub(crate) bound: Option<Arc<BoundModels>>,
+    /// Parts of the models that stay in place or are rigid, prepared for the current weights; `None` if there are none.
+    parts: Option<Arc<BoundParts>>,
     /// Cached weights for documents in the history.
     pub(crate) cache: Cache<Arc<BoundModels>>,
     /// Notices from the last export: changes of the rig, and data that the file format loses.
@@ -188,7 +191,7 @@ impl State {
             self.others.clear();
             self.faults = Faults::default();
             self.draft.clear();
-            self.bound = None;
+            (self.bound, self.parts) = (None, None);
             if key.mesh != before.mesh {
                 self.n_rig = None;
                 self.painting = None;
@@ -318,11 +321,45 @@ impl State {
         }
     }
 
-    /// Uses `bound` as the weights of the current document, and ends the playback of a clip.
-    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>) {
+    /// Uses `bound` as the weights of the current document, with the parts that are prepared for them, and ends the
+    /// playback of a clip.
+    pub(crate) fn set_bound(&mut self, bound: Arc<BoundModels>, parts: Option<Arc<BoundParts>>) {
         self.bound = Some(bound);
         self.playing = None;
+        self.set_parts(parts);
         (self.is_moved, self.is_changed) = (true, true);
+    }
+
+    /// Sets the parts of the models that stay in place or are rigid.
+    pub(crate) fn set_parts(&mut self, parts: Option<Arc<BoundParts>>) {
+        self.parts = parts;
+        self.held.posed_for.clear();
+    }
+
+    /// The weights of the current models and cage.
+    ///
+    /// # Errors
+    /// Before a bind.
+    pub(crate) fn require_bound(&self) -> Answer<&BoundModels> {
+        self.bound.as_deref().ok_or_else(|| Fault::missing("weights", "bind the model first"))
+    }
+
+    /// Computes the vertices of all models in a pose of the cage; their rest positions before a bind. `[n_vertices]`
+    ///
+    /// # Errors
+    /// If the pose belongs to another cage.
+    pub(crate) fn deformed(&self, pose: &[Vec3]) -> Answer<Vec<Vec3>> {
+        // At rest, return the vertices unchanged: weighted sums would add rounding errors.
+        let bound = self.bound.as_ref().filter(|_| *pose != self.rest().positions);
+        let Some(bound) = bound else { return Ok(self.models().positions().to_vec()) };
+        if pose.len() + bound.frames.n_columns() != bound.weights.n_columns() {
+            return Err(Fault::new(ErrorName::Error, "a pose belongs to another cage"));
+        }
+        let mut positions = deform_bound(&bound.weights, &bound.frames, pose);
+        if let Some(parts) = &self.parts {
+            parts.hold(pose, &mut positions);
+        }
+        Ok(positions)
     }
 
     /// Joins the draw data of all models.
@@ -370,7 +407,7 @@ impl State {
     /// Marks all data as not uploaded. Called when the sessions drop the mesh, which also drops their weights.
     pub(crate) fn forget_gpu(&mut self) {
         self.on_gpu = GpuKeys::default();
-        self.bound = None;
+        (self.bound, self.parts) = (None, None);
     }
 
     /// Marks the mesh of the current document as uploaded, and its weights and parts as not uploaded.
@@ -381,7 +418,7 @@ impl State {
 
     /// Writes the camera to the GPU sessions, and also playback, splats, pose and scene if they have changed.
     pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
-        let scene = self.is_changed.then(|| self.scene(main.weights().zip(main.frames())));
+        let scene = self.is_changed.then(|| self.scene());
         match &mut self.playing {
             Some(playing) if playing.is_new => {
                 main.play(&playing.palette(), playing.targets());
@@ -488,6 +525,7 @@ mod tests {
     use cagework_editor::edit::Element;
     use cagework_editor::{Command, Contents, Tools};
     use cagework_io::Model;
+    use cagework_pose::parts::Parts;
 
     use super::*;
     use crate::held::Grab;
@@ -522,7 +560,7 @@ mod tests {
                 Upload::Cage => state.on_gpu.cage = Some(key.cage),
                 Upload::Weights => {
                     let bound = Arc::clone(state.cache.get(key).unwrap());
-                    state.set_bound(bound);
+                    state.set_bound(bound, None);
                 }
                 Upload::Parts => state.on_gpu.parts = Some(models),
             }
@@ -536,17 +574,21 @@ mod tests {
         order
     }
 
-    fn bind(state: &mut State) {
-        let bound = Arc::new(BoundModels {
-            weights: Arc::new(Weights::with_room(8, 0, 0)),
-            frames: Arc::default(),
+    fn bound_by(weights: Weights, frames: Frames) -> Arc<BoundModels> {
+        Arc::new(BoundModels {
+            weights: Arc::new(weights),
+            frames: Arc::new(frames),
             rig: None,
             outside: Vec::new(),
             joints: None,
             report: JsValue::UNDEFINED,
-        });
+        })
+    }
+
+    fn bind(state: &mut State) {
+        let bound = bound_by(Weights::with_room(8, 0, 0), Frames::default());
         state.cache.insert(state.editor.key(), Arc::clone(&bound), 100);
-        state.set_bound(bound);
+        state.set_bound(bound, None);
     }
 
     #[test]
@@ -644,10 +686,11 @@ mod tests {
         state.editor.apply(Command::SetPins { pins: pins.clone() }).unwrap();
         assert_eq!((state.pins_beside(at), state.pins_after(at, true)), (vec![], Some(vec![])));
         assert_eq!(state.pins_beside(at + Vec2::new(15.0, 0.0)), pins);
-        let bound = (&Weights::with_room(8, 0, 0), &Frames::default());
-        let (row, seed) = state.grip_of(Grab::Vertex(1), bound).unwrap();
+        assert!(state.grip_of(Grab::Vertex(1)).is_none(), "before a bind");
+        bind(&mut state);
+        let (row, seed) = state.grip_of(Grab::Vertex(1)).unwrap();
         assert_eq!((row, seed), (vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], CAGE_SEED));
-        assert!(state.grip_of(Grab::Vertex(8), bound).is_none());
+        assert!(state.grip_of(Grab::Vertex(8)).is_none());
     }
 
     /// Vertex 1 of the model is outside the cage, at a constant offset of 0.5 in x from the cage's first vertex.
@@ -658,12 +701,29 @@ mod tests {
         let at = state.pose()[0];
         let frames = Frames::of_cage(state.pose());
         let rows = Weights::new(14, vec![0, 1, 3, 4, 5], vec![0, 0, 8, 0, 0], vec![1.0, 1.0, 0.5, 1.0, 1.0]);
-        let weights = rows.unwrap();
         let corners = state.models().triangles()[0];
         let bary = corners.map(|v| f32::from(u8::from(v == 1)));
         state.held.points = vec![SurfacePoint { triangle: state.models().number_of(0), bary }];
-        assert_eq!(state.held_marks(Some((&weights, &frames))).points, [at + Vec3::new(0.5, 0.0, 0.0)]);
-        assert!(state.held_marks(None).points.is_empty());
+        assert!(state.held_marks().points.is_empty(), "before a bind");
+        state.set_bound(bound_by(rows.unwrap(), frames), None);
+        assert_eq!(state.held_marks().points, [at + Vec3::new(0.5, 0.0, 0.0)]);
+    }
+
+    /// Each row has the weight 1 for the control of the same number, so the vertices follow the controls. Vertex 1 stays.
+    #[test]
+    fn deformed_vertices_follow_their_weights_except_parts_that_stay() {
+        let mut state = uploaded();
+        let rest = state.models().positions().to_vec();
+        let pose: Vec<Vec3> = state.pose().iter().map(|p| *p + Vec3::X).collect();
+        assert_eq!(state.deformed(&pose).unwrap(), rest, "before a bind");
+        let weights = Weights::new(8, (0..=4).collect(), (0..4).collect(), vec![1.0; 4]).unwrap();
+        let parts = Parts { stays: vec![0.0, 1.0, 0.0, 0.0], ..Parts::default() };
+        let held = BoundParts::new(&parts, &rest, &weights, &Frames::default(), &state.rest().positions);
+        state.set_bound(bound_by(weights, Frames::default()), Some(Arc::new(held)));
+        let moved = state.deformed(&pose).unwrap();
+        assert_eq!(moved, [pose[0], rest[1], pose[2], pose[3]]);
+        assert_eq!(state.deformed(&state.rest().positions).unwrap(), rest);
+        assert!(state.deformed(&pose[1..]).is_err());
     }
 
     #[test]

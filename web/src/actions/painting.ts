@@ -53,25 +53,18 @@ export function createPainting(ctx: Context, edit: Pick<Edit, "apply" | "settle"
       try {
         if (!dab(x, y)) return false;
       } catch (error) {
-        if (!store.get().bound) {
-          report(ctx, T.models.notPainted, error);
-          return false;
-        }
-        // The GPU is still busy with the previous stroke: the new stroke starts painting with its first movement.
+        report(ctx, T.models.notPainted, error);
+        return false;
       }
       stroke = { x, y };
       return true;
     },
     drag(x: number, y: number) {
-      if (!stroke) return;
+      if (!stroke || !store.get().bound) return;
       const { x: x0, y: y0 } = stroke;
       const n = Math.max(1, Math.ceil(Math.hypot(x - x0, y - y0) / DAB_PX));
-      try {
-        for (let k = 0; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
-        stroke = { x, y };
-      } catch {
-        // The GPU is busy: the next movement continues from the last painted point.
-      }
+      for (let k = 0; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
+      stroke = { x, y };
     },
     /** Keeps the stroke as an undo step, or reverts it. */
     end(keepIt: boolean) {
@@ -84,17 +77,10 @@ export function createPainting(ctx: Context, edit: Pick<Edit, "apply" | "settle"
       else engine().revert();
     },
     active: (): boolean => stroke !== undefined,
-    /**
-     * Radius of the brush at a position of the view, CSS pixels; null where the brush would not paint, undefined while
-     * the GPU is busy.
-     */
-    radiusAt(x: number, y: number): number | null | undefined {
+    /** Radius of the brush at a position of the view, CSS pixels; null where the brush would not paint. */
+    radiusAt(x: number, y: number): number | null {
       const { painting } = store.get();
-      try {
-        return (painting && engine().brushRadius(x, y, painting.radius)) ?? null;
-      } catch {
-        return store.get().bound ? undefined : null;
-      }
+      return (painting && engine().brushRadius(x, y, painting.radius)) ?? null;
     },
   };
   effect(() => {

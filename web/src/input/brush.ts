@@ -17,11 +17,6 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
     const { left, top } = viewport.getBoundingClientRect();
     const [x, y] = [event.clientX - left, event.clientY - top];
     const radius = app.painting.radiusAt(x, y);
-    if (radius === undefined) {
-      // The radius is not known yet: keep the current outline and ask again.
-      frame = requestAnimationFrame(() => show(event));
-      return;
-    }
     outline.hidden = radius === null;
     outline.style.translate = `${x}px ${y}px`;
     outline.style.width = `${2 * (radius ?? 0)}px`;

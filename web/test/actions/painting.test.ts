@@ -28,6 +28,7 @@ function page() {
     },
   });
   fake.showModel(modelOf([memberOf(0, "body.glb"), memberOf(1, "b")]));
+  fake.show({ bound: true });
   const painting = createPainting(fake.ctx, createEdit(fake.ctx), () => fake.calls.push("settle"));
   return { ...fake, painting, shown, dabs, amounts: () => [...amounts] };
 }
@@ -83,40 +84,23 @@ it("a cancelled stroke changes nothing; clearing is an undo step", () => {
   ]);
 });
 
-it("reports models that cannot be painted yet; a busy GPU leaves no gap", () => {
-  const { painting, problems, amounts, teach, engine, show } = page();
+it("reports models that cannot be painted yet", () => {
+  const { painting, problems, teach } = page();
   painting.on(0);
-  const real = engine.paint;
-  const busy = () => {
-    throw new Error("the model has no weights yet");
-  };
-  teach({ paint: busy });
-  expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
-  show({ bound: true });
-  expect([painting.begin(5, 150), problems.length], "busy").toEqual([true, 1]);
-  painting.end(true);
-  painting.begin(5, 150);
-  painting.drag(25, 150);
-  teach({ paint: real });
-  painting.drag(45, 150);
-  painting.end(true);
-  expect([amounts().slice(0, 5), problems.length]).toEqual([[255, 255, 255, 255, 255], 1]);
+  teach({
+    paint() {
+      throw new Error("the model has no weights yet");
+    },
+  });
+  expect([painting.begin(5, 150), painting.active(), problems.length]).toEqual([false, false, 1]);
 });
 
 it("the brush outline shows where it would paint", () => {
-  const { painting, store, teach } = page();
+  const { painting, teach } = page();
   teach({ brushRadius: (_x: number, y: number, radius: number) => (y < 100 ? undefined : 100 * radius) });
   expect(painting.radiusAt(5, 150), "not painting").toBeNull();
   painting.on(0);
   expect([painting.radiusAt(5, 150), painting.radiusAt(5, 50)]).toEqual([5, null]);
-  teach({
-    brushRadius() {
-      throw new Error("the model has no weights yet");
-    },
-  });
-  expect(painting.radiusAt(5, 150)).toBeNull();
-  store.set({ bound: true });
-  expect(painting.radiusAt(5, 150), "the GPU is busy").toBeUndefined();
 });
 
 it("removing the model or reshaping the cage ends painting", () => {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::Controls;
 use cagework_core::deform::deform_bound;
-use cagework_pose::parts::{BoundParts, Parts, hold_parts};
+use cagework_pose::parts::{BoundParts, Parts};
 use glam::Vec3;
 
 use super::Session;
@@ -59,8 +59,14 @@ impl Session {
         let columns = self.columns(bound.kind, pose);
         let mut positions = deform_bound(&bound.weights, &bound.frames, &columns);
         if let Some(parts) = &bound.parts {
-            hold_parts(&parts.rest, &parts.piece_of, &parts.motions(&columns), &mut positions);
+            parts.hold(&columns, &mut positions);
         }
         Some(positions)
+    }
+
+    /// The parts that stay in place or are rigid, prepared for the current weights; `None` if there are none.
+    #[must_use]
+    pub fn bound_parts(&self) -> Option<Arc<BoundParts>> {
+        self.bound.as_ref()?.parts.clone()
     }
 }

@@ -80,6 +80,15 @@ impl BoundParts {
         assert_eq!(posed.len(), self.columns.len(), "one position per control");
         self.pieces.iter().map(|piece| piece.motion(&self.columns, &posed)).collect()
     }
+
+    /// Holds deformed vertices in place or moves them rigidly. `posed`: positions of the controls; `positions`:
+    /// `[n_vertices]`, object units.
+    ///
+    /// # Panics
+    /// If there is not one position per control.
+    pub fn hold(&self, posed: &[Vec3], positions: &mut [Vec3]) {
+        hold_parts(&self.rest, &self.piece_of, &self.motions(posed), positions);
+    }
 }
 
 impl PieceSums {

@@ -1,12 +1,10 @@
 //! Methods that write files and return arrays of the models.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::deform::{OutsideVertex, displacements};
 use cagework_core::field::bend_vertices;
 use cagework_core::{Frames, InnerControls, PolygonMesh, Weights};
-use cagework_gpu::Session;
 use cagework_io::{
     Clip, Feet, Ground, Model, ModelFormat, ReshapeOptions, ReshapeReport, Skeleton, Timeline, compact,
     shown, write_cage_obj, write_inner_controls, write_weights_npz, write_zip,
@@ -21,7 +19,7 @@ use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{JsRigOptions, READ_LIMIT, decode};
 use crate::playing::SharedClip;
-use crate::state::State;
+use crate::state::{BoundModels, State};
 use crate::views::object;
 
 #[wasm_bindgen]
@@ -89,16 +87,14 @@ impl Engine {
         }
         let pose = self.read(|state| state.pose().to_vec());
         let options = self.of_rig(&pose, &request)?;
-        let skeleton = self.with_session(|session| {
-            self.read(|state| {
-                let bodies = state.models().iter().rev().filter(|member| member.model.is_rigged());
-                let body = bodies.max_by_key(|member| member.model.counts.joints);
-                let id = body.ok_or_else(|| Fault::missing("skeleton", "open a model that has one"))?.id;
-                let moved = MovedModel::new(state, id, session)?;
-                clips.set_up(state.up());
-                clips.see_from(state.models().origin());
-                Answer::Ok(moved.model.skeleton(&moved.by(state, &pose)?, &moved.outside, &options)?)
-            })
+        let skeleton = self.read(|state| {
+            let bodies = state.models().iter().rev().filter(|member| member.model.is_rigged());
+            let body = bodies.max_by_key(|member| member.model.counts.joints);
+            let id = body.ok_or_else(|| Fault::missing("skeleton", "open a model that has one"))?.id;
+            let moved = MovedModel::new(state, id)?;
+            clips.set_up(state.up());
+            clips.see_from(state.models().origin());
+            Answer::Ok(moved.model.skeleton(&moved.by(state, &pose)?, &moved.outside, &options)?)
         })?;
         let options = ReshapeOptions { skeleton: Some(Arc::new(skeleton)), ..options };
         let by = vec![DVec3::ZERO; clips.extra_points().map_err(Fault::from)?.len()];
@@ -135,10 +131,7 @@ impl Engine {
                 self.read(|state| state.playing.as_ref().map(|playing| current.show_as(playing)));
                 current.positions()
             }
-            None => {
-                let pose = self.read(|state| state.pose().to_vec());
-                self.deformed(&[pose])?.pop().unwrap_or_default()
-            }
+            None => self.read(|state| state.deformed(state.pose()))?,
         };
         let (bytes, lost) = self.read(|state| {
             let model = &state.models().get(id)?.model;
@@ -177,12 +170,12 @@ impl Engine {
         if let Some((bytes, _)) = self.reshaped(id, &rest, &named, &request)? {
             return Ok(compact(bytes, request.size).map_err(Fault::from)?);
         }
-        let (names, poses): (Vec<String>, Vec<Vec<Vec3>>) = named.into_iter().unzip();
-        let posed = self.deformed(&poses)?;
         Ok(self.read(|state| {
             let member = state.models().get(id)?;
-            let own = posed.iter().map(|posed| member.share(posed).to_vec());
-            let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(own).collect();
+            let own = |(name, pose): (String, Vec<Vec3>)| {
+                Ok((name, member.share(&state.deformed(&pose)?).to_vec()))
+            };
+            let named = named.into_iter().map(own).collect::<Answer<Vec<(String, Vec<Vec3>)>>>()?;
             let glb = member.model.write_glb_poses_at(&member.model.positions, &named, &timeline)?;
             Answer::Ok(compact(glb, request.size)?)
         })?)
@@ -229,17 +222,13 @@ impl Engine {
     #[wasm_bindgen(js_name = exportWeights)]
     pub fn export_weights(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         self.require_mesh()?;
-        Ok(self.with_session(|session| {
-            self.read(|state| {
-                let Some(ModelRows { mut weights, frames, outside, rig }) = state.own_rows(id, session)?
-                else {
-                    return Err(Fault::missing("weights", "bind the model first"));
-                };
-                let inner = state.cage().inner_positions();
-                weights.append(&rig);
-                let points = state.models().get(id)?.model.extra_points()?;
-                Ok(write_weights_npz(&weights, &frames, &outside, &points, inner))
-            })
+        Ok(self.read(|state| {
+            let ModelRows { mut weights, frames, outside, rig } =
+                state.own_rows(id, state.require_bound()?)?;
+            let inner = state.cage().inner_positions();
+            weights.append(&rig);
+            let points = state.models().get(id)?.model.extra_points()?;
+            Answer::Ok(write_weights_npz(&weights, frames, &outside, &points, inner))
         })?)
     }
 
@@ -354,10 +343,9 @@ impl Engine {
             return Ok((bytes, report.notices()));
         }
         let options = self.of_rig(&pose, request)?;
-        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
             let member = state.models().get(id)?;
-            let mut posed = member.share(&posed).to_vec();
+            let mut posed = member.share(&state.deformed(&pose)?).to_vec();
             member.model.stand(&mut posed, &options);
             Ok((member.model.write_glb(&posed)?, Vec::new()))
         })
@@ -412,20 +400,18 @@ impl Engine {
         if !self.read(is_rigged)? {
             return Ok(None);
         }
-        self.with_session(|session| {
-            self.read(|state| {
-                let moved = MovedModel::new(state, id, session)?;
-                let by_poses = poses
-                    .iter()
-                    .map(|(name, pose)| Ok((name.clone(), moved.by(state, pose)?)))
-                    .collect::<Answer<Vec<_>>>()?;
-                // `rigid` may name parts of other models.
-                let props = moved.model.props()?;
-                options.rigid.retain(|name| props.contains(name));
-                options.parts = state.models().get(id)?.parts()?;
-                let by = moved.by(state, pose)?;
-                Ok(Some(moved.model.write_reshaped(&by, &moved.outside, &by_poses, &options)?))
-            })
+        self.read(|state| {
+            let moved = MovedModel::new(state, id)?;
+            let by_poses = poses
+                .iter()
+                .map(|(name, pose)| Ok((name.clone(), moved.by(state, pose)?)))
+                .collect::<Answer<Vec<_>>>()?;
+            // `rigid` may name parts of other models.
+            let props = moved.model.props()?;
+            options.rigid.retain(|name| props.contains(name));
+            options.parts = state.models().get(id)?.parts()?;
+            let by = moved.by(state, pose)?;
+            Ok(Some(moved.model.write_reshaped(&by, &moved.outside, &by_poses, &options)?))
         })
     }
 
@@ -454,7 +440,7 @@ impl Engine {
         let ground = match known {
             Some(ground) => ground,
             None => {
-                let posed = self.deformed(&[pose.to_vec()])?.pop().unwrap_or_default();
+                let posed = self.read(|state| state.deformed(pose))?;
                 let mut all = Ground::default();
                 for (id, model) in &models {
                     let free = ReshapeOptions { feet: Feet::Free, ..options.clone() };
@@ -475,40 +461,20 @@ impl Engine {
         options.skeleton = Some(Arc::new(skeleton.with_ground(ground)));
         Ok(options)
     }
-
-    /// Computes the vertices of all models in each of the cage's `poses`; their rest positions if the models are not
-    /// bound.
-    pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
-        let (rest, controls) =
-            self.read(|state| (state.models().positions().to_vec(), state.rest().positions.clone()));
-        self.with_session(|session| {
-            let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
-            let n_frames = session.frames().map_or(0, Frames::n_columns);
-            let deformed = |pose: &Vec<Vec3>| {
-                // At rest, return the vertices unchanged: weighted sums would add rounding errors.
-                if *pose == controls {
-                    return Ok(rest.clone());
-                }
-                let fits = pose.len() + n_frames == weights.n_columns();
-                let other = || Fault::new(ErrorName::Error, "a pose belongs to another cage");
-                session.deformed(pose).filter(|_| fits).ok_or_else(other)
-            };
-            poses.iter().map(deformed).collect()
-        })
-    }
 }
 
 /// A model and its weights, from which its displacements in a pose of the cage are computed.
-struct MovedModel {
+struct MovedModel<'a> {
     model: Arc<Model>,
-    rows: Option<ModelRows>,
+    rows: Option<ModelRows<'a>>,
     /// Indices of the points outside the cage.
     outside: Vec<u32>,
 }
 
-impl MovedModel {
-    fn new(state: &State, id: u32, session: &Session) -> Answer<Self> {
-        let (model, rows) = (Arc::clone(&state.models().get(id)?.model), state.own_rows(id, session)?);
+impl<'a> MovedModel<'a> {
+    fn new(state: &'a State, id: u32) -> Answer<Self> {
+        let model = Arc::clone(&state.models().get(id)?.model);
+        let rows = state.bound.as_ref().map(|bound| state.own_rows(id, bound)).transpose()?;
         let outside = rows.iter().flat_map(|rows| &rows.outside).map(|o| o.vertex).collect();
         Ok(Self { model, rows, outside })
     }
@@ -530,23 +496,22 @@ impl MovedModel {
 
 /// Weights of one model: rows of its vertices, and rows of its rig's points. Indices of points are relative to the
 /// model.
-struct ModelRows {
+struct ModelRows<'a> {
     weights: Weights,
-    frames: Frames,
+    frames: &'a Frames,
     /// Points outside the cage. Indices of the rig's points follow the indices of the vertices.
     outside: Vec<OutsideVertex>,
     rig: Weights,
 }
 
 impl State {
-    /// Copies the weights of one model; `None` before a bind.
-    fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<ModelRows>> {
-        let Some(all) = session.weights() else { return Ok(None) };
+    /// Copies the weights of one model.
+    fn own_rows<'a>(&self, id: u32, bound: &'a BoundModels) -> Answer<ModelRows<'a>> {
+        let BoundModels { weights: all, frames, .. } = bound;
         let n = self.models().positions().len();
         let (own, of_rig) = (self.models().get(id)?.vertices.clone(), self.models().extra_of(id)?);
-        let bound = self.bound.as_ref();
-        let rig = match bound.and_then(|bound| bound.rig.as_ref()) {
-            Some(rows) => rows_of(rows, of_rig.clone()),
+        let rig = match &bound.rig {
+            Some(rows) => rows.row_range(of_rig.clone()),
             None => Weights::with_room(all.n_columns() as u32, 0, 0),
         };
         let numbered = |o: &OutsideVertex| {
@@ -556,14 +521,8 @@ impl State {
                 || v.checked_sub(n).filter(|v| of_rig.contains(v)).map(|v| v - of_rig.start + own.len());
             in_own.or_else(in_rig).map(|v| OutsideVertex { vertex: v as u32, ..*o })
         };
-        let outside = bound.iter().flat_map(|bound| &bound.outside).filter_map(numbered).collect();
-        let frames = session.frames().cloned().unwrap_or_default();
-        let weights = rows_of(all, own.clone());
-        Ok(Some(ModelRows { weights, frames, outside, rig }))
+        let outside = bound.outside.iter().filter_map(numbered).collect();
+        let weights = all.row_range(own.clone());
+        Ok(ModelRows { weights, frames, outside, rig })
     }
-}
-
-/// Copies a range of rows of the weights.
-fn rows_of(all: &Weights, range: Range<usize>) -> Weights {
-    all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
 }

@@ -32,7 +32,7 @@ use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
 use crate::binder::Offsets;
-use crate::error::{Answer, ErrorName, Fault};
+use crate::error::{ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu, upload};
 use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
@@ -192,7 +192,7 @@ impl Engine {
             if is_final {
                 state.cache.insert(key, Arc::clone(&bound), bytes);
             }
-            state.set_bound(bound);
+            state.set_bound(bound, gpu.main.bound_parts());
         });
         Ok(())
     }
@@ -378,18 +378,6 @@ impl Engine {
             engine.announce();
         });
     }
-
-    /// Reads the GPU session of harmonic coordinates.
-    ///
-    /// # Errors
-    /// If an upload in progress holds the lock, or the device is lost.
-    fn with_session<T>(&self, read: impl FnOnce(&Session) -> Answer<T>) -> Answer<T> {
-        let gpu = self
-            .gpu
-            .try_lock()
-            .ok_or_else(|| Fault::new(ErrorName::Error, "the GPU is busy: try again in a moment"))?;
-        read(&gpu.as_ref().ok_or_else(lost)?.main)
-    }
 }
 
 /// Splits weights into rows of the vertices and rows of the rigs' points; `None` for the latter if there are no such
@@ -399,9 +387,7 @@ fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     if n <= n_vertices {
         return (weights, None);
     }
-    let rows =
-        |range: std::ops::Range<usize>| weights.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>());
-    (rows(0..n_vertices), Some(rows(n_vertices..n)))
+    (weights.row_range(0..n_vertices), Some(weights.row_range(n_vertices..n)))
 }
 
 fn one_capture() -> Fault {

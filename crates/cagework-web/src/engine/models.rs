@@ -123,13 +123,13 @@ impl Engine {
     /// model. The posed vertices change only after a `set_painted` command or a commit.
     ///
     /// # Errors
-    /// Without weights, or while the GPU is busy.
+    /// Without weights.
     pub fn paint(&self, x: f32, y: f32, radius: f32, amount: u8) -> Result<bool, JsValue> {
         let Some(id) = self.read(|state| state.painting.as_ref().map(|(id, _)| *id)) else {
             return Ok(false);
         };
         // Update the posed models, which `dab` picks from.
-        self.posed(|_, _| Ok(()))?;
+        self.posed(|_| ())?;
         Ok(self.change(|state| {
             let is_painted = state.dab(id, [x, y], radius, amount);
             if is_painted {
@@ -141,17 +141,14 @@ impl Engine {
 
     /// Returns the brush radius of [`Engine::paint`] at the pointer, in CSS pixels; undefined if `paint` would have no
     /// effect there.
-    ///
-    /// # Errors
-    /// Without weights, or while the GPU is busy.
     #[wasm_bindgen(js_name = brushRadius)]
-    pub fn brush_radius(&self, x: f32, y: f32, radius: f32) -> Result<Option<f32>, JsValue> {
-        self.posed(|_, _| Ok(()))?;
-        Ok(self.read(|state| {
+    pub fn brush_radius(&self, x: f32, y: f32, radius: f32) -> Option<f32> {
+        let radius = |state: &State| {
             let (id, _) = state.painting.as_ref()?;
             let (center, reach) = state.touched(*id, [x, y], radius)?;
             Some(reach / state.camera.units_per_pixel(center))
-        }))
+        };
+        self.posed(radius).ok().flatten()
     }
 }
 

@@ -73,7 +73,7 @@ impl Engine {
         Ok(session.frame(&view, format, [SMALL_SIDE; 2], 1.0).map_err(Fault::from)?)
     }
 
-    /// Waits until uploads in progress have finished. During an upload, methods that read weights return an error.
+    /// Waits until uploads in progress have finished. During an upload, the weights of an undone step are missing.
     pub async fn ready(&self) {
         drop(self.gpu.lock().await);
     }
@@ -129,7 +129,7 @@ impl Engine {
             if let Some(index) = pose {
                 state.write_saved_pose(index, &mut gpu.main)?;
             }
-            let scene = state.picture_scene(alone, gpu.main.weights().zip(gpu.main.frames()));
+            let scene = state.picture_scene(alone);
             gpu.main.set_scene(scene);
             size[1] as f32 / state.size.y
         };

@@ -108,13 +108,13 @@ impl Engine {
     /// if the pointer is not on a capture.
     #[wasm_bindgen(js_name = outlinesAt)]
     pub fn outlines_at(&self, x: f32, y: f32) -> Vec<f32> {
-        let found = self.posed(|state, _| {
+        let found = self.posed(|state| {
             let models = state.models();
             let place =
                 state.surface_at(state.pointer(x, y)).and_then(|at| at.at(models, models.positions()));
             let across = [state.camera.right(), state.camera.up()];
             let of = |(splats, place)| outlines(splats, state.field().as_ref(), place, across);
-            Ok(models.splats().zip(place).and_then(of))
+            models.splats().zip(place).and_then(of)
         });
         let flat = |of: Outline| [of.half_axes.x, of.half_axes.y, of.angle];
         found.ok().flatten().map_or_else(Vec::new, |all| all.map(flat).concat())
@@ -230,10 +230,9 @@ impl Engine {
         }
         // A model whose format has no clips has one shape: that of the cage's pose or, for `dynamic`, the rest shape,
         // which the caller deforms.
-        let pose =
-            self.read(|state| if request.dynamic { &state.rest().positions } else { state.pose() }.to_vec());
-        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
         self.read(|state| {
+            let posed =
+                state.deformed(if request.dynamic { &state.rest().positions } else { state.pose() })?;
             let own = state.models().get(id)?.share(&posed);
             Ok(ModelMotion::Still(state.up().turned_back(own).into_owned()))
         })

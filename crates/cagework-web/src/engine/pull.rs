@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use cagework_core::view::View as _;
 use cagework_editor::SurfacePoint;
-use cagework_gpu::Session;
 use glam::{Vec2, Vec3};
 use js_sys::{Array, Float64Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::error::{Answer, Fault};
+use crate::error::Answer;
 use crate::held::Grab;
 use crate::options::decode;
 use crate::state::State;
@@ -19,25 +18,25 @@ use crate::views::optional;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Finds the surface point under the pointer; undefined if the pointer is not on a model, without weights, during
-    /// playback, or while the GPU is busy.
+    /// Finds the surface point under the pointer; undefined if the pointer is not on a model, without weights, or
+    /// during playback.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> JsValue {
-        let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
+        let found = self.posed(|state| state.surface_at(state.pointer(x, y))).ok().flatten();
         optional(found)
     }
 
     /// Returns the posed position of a surface point; empty if the point does not exist. `[3]`
     ///
     /// # Errors
-    /// If `point` is not a surface point. Without weights, or while the GPU is busy.
+    /// If `point` is not a surface point. Without weights.
     #[wasm_bindgen(js_name = placeOf)]
     pub fn place_of(
         &self,
         #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
     ) -> Result<Vec<f32>, JsValue> {
         let point = decode(point)?;
-        let place = self.posed(|state, _| Ok(state.place_of(point)))?;
+        let place = self.posed(|state| state.place_of(point))?;
         Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
     }
 
@@ -46,7 +45,7 @@ impl Engine {
     /// under the pointer.
     ///
     /// # Errors
-    /// If `grabs` are neither surface points nor vertices. Without weights, or while the GPU is busy.
+    /// If `grabs` are neither surface points nor vertices. Without weights.
     #[wasm_bindgen(js_name = gripsOf, unchecked_return_type = "[Float64Array, Uint32Array]")]
     pub fn grips_of(
         &self,
@@ -55,22 +54,19 @@ impl Engine {
         y: f32,
     ) -> Result<JsValue, JsValue> {
         let grabs: Vec<Grab> = decode(grabs)?;
-        let (rows, seeds): (Vec<Vec<f64>>, Vec<u32>) = self.posed(|state, session| {
+        let (rows, seeds): (Vec<Vec<f64>>, Vec<u32>) = self.posed(|state| {
             let pins = state.pins_beside(state.pointer(x, y)).into_iter().map(Grab::Surface);
-            let bound = session.weights().zip(session.frames());
-            let grip = |grab| state.grip_of(grab, bound?);
-            Ok(grabs.into_iter().chain(pins).filter_map(grip).unzip())
+            grabs.into_iter().chain(pins).filter_map(|grab| state.grip_of(grab)).unzip()
         })?;
         let rows = Float64Array::from(rows.concat().as_slice());
         Ok(Array::of2(&rows, &Uint32Array::from(seeds.as_slice())).into())
     }
 
     /// Returns the pins after a click. A pin under the pointer is removed. If no pin is there and `may_pin` is set, a
-    /// pin is added at the surface point under the pointer. Undefined if nothing changes, without weights, or while the
-    /// GPU is busy.
+    /// pin is added at the surface point under the pointer. Undefined if nothing changes, or without weights.
     #[wasm_bindgen(js_name = pinsAfter, unchecked_return_type = "SurfacePoint[] | undefined")]
     pub fn pins_after(&self, x: f32, y: f32, may_pin: bool) -> JsValue {
-        let pins = self.posed(|state, _| Ok(state.pins_after(state.pointer(x, y), may_pin)));
+        let pins = self.posed(|state| state.pins_after(state.pointer(x, y), may_pin));
         optional(pins.ok().flatten())
     }
 
@@ -132,12 +128,12 @@ impl Engine {
 
 impl Engine {
     /// Updates the posed models, then reads the state.
-    pub(super) fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
-        self.with_session(|session| {
-            session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            let mut state = self.state.borrow_mut();
-            state.pose_models(session);
-            read(&state, session)
-        })
+    ///
+    /// # Errors
+    /// Before a bind.
+    pub(super) fn posed<T>(&self, read: impl FnOnce(&State) -> T) -> Answer<T> {
+        let mut state = self.state.borrow_mut();
+        state.pose_models()?;
+        Ok(read(&state))
     }
 }

@@ -6,7 +6,6 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::error::Fault;
 use crate::options::{JsSceneOptions, SliceContent, decode};
 use crate::views::{ColorMap, LargestWeight, Legend, optional};
 
@@ -61,17 +60,12 @@ impl Engine {
 }
 
 impl Engine {
-    /// Finds the largest weight in a column. `None` while the GPU uploads weights; the page calls `legend` again
-    /// afterwards.
+    /// Finds the largest weight in a column. `None` before a bind.
     fn largest_weight(&self, column: u32) -> Option<LargestWeight> {
-        self.with_session(|session| {
-            let weights =
-                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            let numbered =
-                weights.column(column).zip(0..).map(|(value, vertex)| LargestWeight { value, vertex });
-            Ok(numbered.max_by(|a, b| a.value.total_cmp(&b.value)))
+        self.read(|state| {
+            let weights = state.bound.as_ref()?.weights.column(column);
+            let numbered = weights.zip(0..).map(|(value, vertex)| LargestWeight { value, vertex });
+            numbered.max_by(|a, b| a.value.total_cmp(&b.value))
         })
-        .ok()
-        .flatten()
     }
 }

@@ -133,11 +133,11 @@ impl Engine {
 
     /// Whether the posed model covers the vertex; false if the models are not bound.
     fn is_covered(&self, vertex: u32, [x, y]: [f32; 2], radius: f32) -> bool {
-        let covered = self.posed(|state, _| {
+        let covered = self.posed(|state| {
             let surface = state.surface_at(state.pointer(x, y)).and_then(|point| state.place_of(point));
             let topology = state.editor.topology();
             let covers = |surface| is_covered(vertex, state.pose(), topology, &state.camera, radius, surface);
-            Ok(surface.is_some_and(covers))
+            surface.is_some_and(covers)
         });
         covered.unwrap_or(false)
     }
