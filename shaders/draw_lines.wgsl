@@ -1,4 +1,4 @@
-// Draws anti-aliased segments with round ends and a constant width in pixels. One instance of six vertices per segment.
+// Draws anti-aliased segments with round ends and a constant width in pixels. Six vertices per segment.
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -10,8 +10,9 @@ struct Varying {
 }
 
 @vertex
-fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let item = item_at(instance);
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let item = item_at(index / 6u);
+    let k = index % 6u;
     let state = item.x >> STATE_SHIFT;
     var a = clip_of(item.x & INDEX_MASK);
     var b = clip_of(item.y & INDEX_MASK);
@@ -29,8 +30,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let half_width = 0.5 * state_width(state);
     // Extend the quad by half a pixel on each side for the anti-aliased edge.
     let reach = half_width + 0.5;
-    let is_b = index == 1u || index == 3u || index == 5u;
-    let up = select(-reach, reach, index == 2u || index == 3u || index == 4u);
+    let is_b = k == 1u || k == 3u || k == 5u;
+    let up = select(-reach, reach, k == 2u || k == 3u || k == 4u);
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
     let offset = (along * beyond + across * up) * camera.pixel;

@@ -1,4 +1,4 @@
-// Draws round points of constant size in pixels, with a rim. One instance of six vertices per point.
+// Draws round points of constant size in pixels, with a rim. Six vertices per point.
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -9,8 +9,9 @@ struct Varying {
 }
 
 @vertex
-fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let item = item_at(instance);
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let item = item_at(index / 6u);
+    let k = index % 6u;
     let state = item.x >> STATE_SHIFT;
     let clip = clip_of(item.x & INDEX_MASK);
     if state == HIDDEN_STATE || clip.z < 0.0 {
@@ -18,8 +19,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     }
     let radius = 0.5 * state_width(state);
     let corner = vec2f(
-        select(-1.0, 1.0, index == 1u || index == 3u || index == 5u),
-        select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
+        select(-1.0, 1.0, k == 1u || k == 3u || k == 5u),
+        select(-1.0, 1.0, k == 2u || k == 3u || k == 4u),
     );
     let place = corner * (radius + 0.5);
     let moved = vec4f(clip.xy + place * camera.pixel * clip.w, clip.zw);

@@ -1,5 +1,5 @@
 // Draws Gaussian splats (Kerbl et al. 2023) from back to front into a layer of their own. Colours are blended in sRGB,
-// because splats are trained that way. One instance of six vertices per splat.
+// because splats are trained that way. Six vertices per splat.
 
 /// Variance that is added to each splat on the screen, square pixels, so that no splat is smaller than about a pixel
 /// (Kerbl et al. 2023).
@@ -26,8 +26,9 @@ fn row_of_clip(k: u32) -> vec3f {
 }
 
 @vertex
-fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let entry = entry_at(instance);
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let entry = entry_at(index / 6u);
+    let k = index % 6u;
     let color = unpack4x8unorm(entry.y);
     let center = row_at(3u * entry.x).xyz;
     let clip = camera.clip_from_world * vec4f(center, 1.0);
@@ -53,8 +54,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
         axis = normalize(select(vec2f(b, spread + 0.5 * (c - a)), vec2f(spread + 0.5 * (a - c), b), a >= c));
     }
     let corner = vec2f(
-        select(-1.0, 1.0, index == 1u || index == 3u || index == 5u),
-        select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
+        select(-1.0, 1.0, k == 1u || k == 3u || k == 5u),
+        select(-1.0, 1.0, k == 2u || k == 3u || k == 4u),
     );
     // At this many standard deviations from the centre, alpha falls below MIN_ALPHA.
     let place = corner * sqrt(2.0 * log(color.a / MIN_ALPHA));

@@ -101,7 +101,8 @@ impl SplatLayer {
         pass.set_bind_group(0, camera_group, &[]);
         pass.set_bind_group(1, &self.group, &[]);
         pass.set_pipeline(pipeline);
-        pass.draw(0..6, 0..self.mover.len() as u32);
+        // One instance, as in `Overlay::draw`.
+        pass.draw(0..6 * self.mover.len() as u32, 0..1);
         self.drawn = Some((view, hides));
     }
 
