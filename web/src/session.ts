@@ -97,7 +97,7 @@ async function start(opened: OpenResult & Needs) {
   const client = createClient(module, openWorker);
   const samples = [...pkg.Binder.samples(), ...Object.keys(SAMPLE_FILES)];
   const buildSample = prepareSample(client, samples[0], fresh);
-  const frames = createFrames();
+  const frames = createFrames(window);
   /** Reports errors of `changed` here, because Rust ignores errors of its callbacks. */
   const report = (view: View) => {
     try {

@@ -20,12 +20,13 @@ afterEach(() => {
 /** Creates a frame loop on a simulated GPU. `drawn`: for each draw call, whether it requests full resolution. */
 function slow(answer: (sharp: boolean) => boolean | undefined, calm = () => true) {
   const drawn: boolean[] = [];
-  const frames = createFrames();
+  const pointers = new EventTarget();
+  const frames = createFrames(pointers);
   frames.start((sharp) => {
     drawn.push(sharp);
     return answer(sharp);
   }, calm);
-  return { frames, drawn };
+  return { frames, drawn, pointers };
 }
 
 describe("frames", () => {
@@ -48,6 +49,16 @@ describe("frames", () => {
     vi.advanceTimersByTime(IDLE_MS);
     expect(drawn.filter((sharp) => sharp)).toEqual([true]);
     expect(drawn.at(-1)).toBe(true);
+  });
+
+  it("nothing is sharpened while a pointer is pressed", () => {
+    const { drawn, pointers } = slow((sharp) => sharp);
+    pointers.dispatchEvent(new Event("pointerdown"));
+    vi.advanceTimersByTime(IDLE_MS);
+    expect(drawn).toEqual([false]);
+    pointers.dispatchEvent(new Event("pointerup"));
+    vi.advanceTimersByTime(IDLE_MS);
+    expect(drawn).toEqual([false, true]);
   });
 
   it("nothing is sharpened while a job uses the GPU", () => {

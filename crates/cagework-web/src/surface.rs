@@ -1,7 +1,7 @@
 //! The page's canvas as a wgpu surface.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use cagework_gpu::render::PartPainter;
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session, device};
@@ -18,12 +18,16 @@ const MAX_PENDING_FRAMES: u32 = 2;
 /// other GPU work such as binds.
 const SLOW_MS: f64 = 50.0;
 
-/// Divisor of width and height of a frame at reduced resolution, which then has a quarter of the pixels.
-const ROUGH_DIVISOR: u32 = 2;
+/// Time above which frames with half the width and height are replaced by frames with a quarter of both, ms.
+const VERY_SLOW_MS: f64 = 100.0;
 
-/// Assumed ratio of the time of a full-resolution frame to the time of a reduced one. A slow GPU counts as fast again
-/// once a reduced frame takes at most [`SLOW_MS`] divided by this ratio.
+/// Assumed ratio of the time of a full-resolution frame to the time of one with half the width and height. A slow GPU
+/// counts as fast again once such a frame takes at most [`SLOW_MS`] divided by this ratio.
 const SHARP_COST_RATIO: f64 = 2.0;
+
+/// Largest possible ratio of the time of a frame with half the width and height to the time of one with a quarter of
+/// both: the ratio of their pixels.
+const HALF_COST_RATIO: f64 = 4.0;
 
 /// Side of the offscreen texture that is drawn to compile pipelines, pixels.
 pub(crate) const SMALL_SIDE: u32 = 16;
@@ -43,28 +47,24 @@ pub(crate) struct CanvasSurface {
     painter: Option<PartPainter>,
     /// Number of submitted frames that the GPU has not finished.
     in_flight: Arc<AtomicU32>,
-    /// Whether a sharp frame takes longer than [`SLOW_MS`].
-    is_slow: Arc<AtomicBool>,
+    /// Divisor of width and height at which the GPU draws fast enough: 1, 2 or 4. The browser scales the canvas up.
+    divisor: Arc<AtomicU32>,
 }
 
-/// Requested resolution of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FrameQuality {
-    /// Reduced resolution on a slow GPU; the browser scales the canvas up.
-    Soon,
-    /// Full resolution, also on a slow GPU.
-    Sharp,
-}
-
-/// Result of drawing a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FrameOutcome {
-    /// Nothing was drawn: the canvas is unavailable, or too many frames are unfinished.
-    NotNow,
-    /// The frame was drawn at reduced resolution.
-    Roughly,
-    /// The frame was drawn at full resolution.
-    Sharply,
+/// Chooses the divisor of width and height from the time of a frame that was drawn with the divisor `drawn`, ms.
+fn divisor_after(ms: f64, drawn: u32) -> u32 {
+    let half_ms = match drawn {
+        1 => ms / SHARP_COST_RATIO,
+        2 => ms,
+        _ => ms * HALF_COST_RATIO,
+    };
+    if half_ms > VERY_SLOW_MS {
+        4
+    } else if half_ms * SHARP_COST_RATIO > SLOW_MS {
+        2
+    } else {
+        1
+    }
 }
 
 impl CanvasSurface {
@@ -101,8 +101,11 @@ impl CanvasSurface {
             config.usage |= wgpu::TextureUsages::COPY_DST;
         }
         surface.configure(&context.device, &config);
-        let (in_flight, is_slow) = (Arc::default(), Arc::new(AtomicBool::new(context.is_software())));
-        Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
+        let divisor = Arc::new(AtomicU32::new(if context.is_software() { 2 } else { 1 }));
+        Ok((
+            Self { surface, config, format, parts: Vec::new(), painter, in_flight: Arc::default(), divisor },
+            context,
+        ))
     }
 
     /// Resizes the canvas to a size in pixels.
@@ -117,8 +120,9 @@ impl CanvasSurface {
         self.surface.configure(&context.device, &self.config);
     }
 
-    /// Draws sessions side by side and presents the frame. `size`: pixels; `scale`: device pixels per CSS pixel. With
-    /// [`FrameQuality::Soon`], a slow GPU draws fewer pixels.
+    /// Draws sessions side by side and presents the frame. `size`: pixels; `scale`: device pixels per CSS pixel. Unless
+    /// `sharp` is set, a slow GPU draws fewer pixels. Returns whether the frame has full resolution; `None` if nothing
+    /// was drawn, because the canvas is unavailable or too many frames are unfinished.
     ///
     /// # Errors
     /// If the GPU device is lost or returned an error.
@@ -127,34 +131,30 @@ impl CanvasSurface {
         mut sessions: Vec<&mut Session>,
         size: [u32; 2],
         scale: f32,
-        wanted: FrameQuality,
-    ) -> Answer<FrameOutcome> {
+        sharp: bool,
+    ) -> Answer<Option<bool>> {
         let Some(context) = sessions.first().map(|session| session.context().clone()) else {
-            return Ok(FrameOutcome::NotNow);
+            return Ok(None);
         };
         context.check()?;
-        let is_slow = self.is_slow.load(Ordering::Relaxed);
-        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MAX_PENDING_FRAMES } {
-            return Ok(FrameOutcome::NotNow);
+        let fast = self.divisor.load(Ordering::Relaxed);
+        if self.in_flight.load(Ordering::Relaxed) >= if fast > 1 { 1 } else { MAX_PENDING_FRAMES } {
+            return Ok(None);
         }
-        let is_rough = is_slow && wanted == FrameQuality::Soon;
-        let (size, scale) = if is_rough {
-            (size.map(|n| n.div_ceil(ROUGH_DIVISOR)), scale / ROUGH_DIVISOR as f32)
-        } else {
-            (size, scale)
-        };
-        self.resize(&context, size);
+        let divisor = if sharp { 1 } else { fast };
+        let scale = scale / divisor as f32;
+        self.resize(&context, size.map(|n| n.div_ceil(divisor)));
         let frame = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(frame) | wgpu::CurrentSurfaceTexture::Suboptimal(frame) => {
                 frame
             }
             wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
                 self.surface.configure(&context.device, &self.config);
-                return Ok(FrameOutcome::NotNow);
+                return Ok(None);
             }
             wgpu::CurrentSurfaceTexture::Timeout
             | wgpu::CurrentSurfaceTexture::Occluded
-            | wgpu::CurrentSurfaceTexture::Validation => return Ok(FrameOutcome::NotNow),
+            | wgpu::CurrentSurfaceTexture::Validation => return Ok(None),
         };
         let [width, height] = [self.config.width, self.config.height];
         sessions.truncate(width as usize);
@@ -171,15 +171,14 @@ impl CanvasSurface {
         }
         self.put_together(&context, &frame.texture);
         self.in_flight.fetch_add(1, Ordering::Relaxed);
-        let (in_flight, is_slow) = (Arc::clone(&self.in_flight), Arc::clone(&self.is_slow));
+        let (in_flight, next) = (Arc::clone(&self.in_flight), Arc::clone(&self.divisor));
         let began = now_ms();
         context.queue.on_submitted_work_done(move || {
             in_flight.fetch_sub(1, Ordering::Relaxed);
-            let sharp_ms = (now_ms() - began) * if is_rough { SHARP_COST_RATIO } else { 1.0 };
-            is_slow.store(sharp_ms > SLOW_MS, Ordering::Relaxed);
+            next.store(divisor_after(now_ms() - began, divisor), Ordering::Relaxed);
         });
         context.queue.present(frame);
-        Ok(if is_rough { FrameOutcome::Roughly } else { FrameOutcome::Sharply })
+        Ok(Some(divisor == 1))
     }
 
     /// Copies the sessions' textures to the canvas, side by side.

@@ -11,7 +11,7 @@ use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
 use crate::options::decode;
-use crate::surface::{FrameOutcome, FrameQuality, SMALL_SIDE};
+use crate::surface::SMALL_SIDE;
 
 #[wasm_bindgen]
 impl Engine {
@@ -41,11 +41,17 @@ impl Engine {
     /// `DeviceLost`. `Gpu` if the GPU refuses a command or runs out of memory.
     #[wasm_bindgen(js_name = drawFrame)]
     pub fn draw_frame(&self, sharp: bool) -> Result<Option<bool>, JsValue> {
-        Ok(match self.try_frame(if sharp { FrameQuality::Sharp } else { FrameQuality::Soon })? {
-            FrameOutcome::NotNow => None,
-            FrameOutcome::Roughly => Some(false),
-            FrameOutcome::Sharply => Some(true),
-        })
+        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(None) };
+        let Some(gpu) = gpu.as_mut() else { return Ok(None) };
+        let mut state = self.state.borrow_mut();
+        if let Some(fault) = state.fault.take() {
+            return Err(fault.into());
+        }
+        gpu.take(&mut state);
+        let pixels = (state.size * state.scale).round();
+        let (size, scale) = ([pixels.x as u32, pixels.y as u32], state.scale);
+        let (surface, sessions) = gpu.shown(&state.shown());
+        Ok(surface.draw(sessions, size, scale, sharp)?)
     }
 
     /// Draws a small box mesh, bound to itself as its cage, into an offscreen texture. Drivers finish compiling a
@@ -137,19 +143,5 @@ impl Engine {
         // The picture has replaced the scene on the GPU, so the next frame must write the scene of the view again.
         self.change(|state| state.is_changed = true);
         picture
-    }
-
-    fn try_frame(&self, wanted: FrameQuality) -> Answer<FrameOutcome> {
-        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(FrameOutcome::NotNow) };
-        let Some(gpu) = gpu.as_mut() else { return Ok(FrameOutcome::NotNow) };
-        let mut state = self.state.borrow_mut();
-        if let Some(fault) = state.fault.take() {
-            return Err(fault);
-        }
-        gpu.take(&mut state);
-        let pixels = (state.size * state.scale).round();
-        let (size, scale) = ([pixels.x as u32, pixels.y as u32], state.scale);
-        let (surface, sessions) = gpu.shown(&state.shown());
-        surface.draw(sessions, size, scale, wanted)
     }
 }

@@ -49,7 +49,7 @@ export function openView(canvases: Canvases, lost: (error: unknown) => void): Pr
     const { artifact, module, canvas } = opened;
     await artifact.pkg.default({ module_or_path: module });
     const client = createClient(module, artifact.openWorker);
-    const frames = createFrames();
+    const frames = createFrames(window);
     const engine = await artifact.pkg.Engine.create(canvas, frames.ask, () => {}).catch((error: unknown) => {
       client.close();
       throw error;

@@ -6,29 +6,37 @@ const BUSY_PAUSE = 12;
 /** Idle time after which a frame drawn at low resolution is drawn again at full resolution, ms. */
 const SHARP_DELAY_MS = 250;
 
-export function createFrames() {
+/** `pointers`: target of pointer events. While a pointer is pressed, frames stay at low resolution. */
+export function createFrames(pointers: EventTarget) {
   const listeners = new Set<(ms: number) => void>();
   let draw: ((sharp: boolean) => boolean | undefined) | undefined;
   let calm = () => true;
   let asked: "soon" | "sharp" | undefined;
   let quiet: ReturnType<typeof setTimeout> | undefined;
-  let stopped = false;
+  const stop = new AbortController();
+  let pressed = false;
+  for (const type of ["pointerdown", "pointerup", "pointercancel"]) {
+    const follow = () => {
+      pressed = type === "pointerdown";
+    };
+    pointers.addEventListener(type, follow, { capture: true, passive: true, signal: stop.signal });
+  }
 
   const request = (how: "soon" | "sharp") => {
-    if (stopped) return;
+    if (stop.signal.aborted) return;
     clearTimeout(quiet);
     if (!asked) requestAnimationFrame(frame);
     // A requested frame takes precedence over drawing the previous frame again at full resolution.
     asked = asked === "soon" ? asked : how;
   };
   const sharpen = () => {
-    if (calm()) request("sharp");
+    if (calm() && !pressed) request("sharp");
     else quiet = setTimeout(sharpen, SHARP_DELAY_MS);
   };
   const frame = () => {
     const how = asked ?? "soon";
     asked = undefined;
-    if (!draw || stopped) return;
+    if (!draw || stop.signal.aborted) return;
     const began = performance.now();
     let isSharp: boolean | undefined;
     try {
@@ -62,7 +70,7 @@ export function createFrames() {
       return () => listeners.delete(listener);
     },
     stop() {
-      stopped = true;
+      stop.abort();
       clearTimeout(quiet);
       listeners.clear();
     },
