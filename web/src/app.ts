@@ -160,6 +160,11 @@ export function createApp({ store, session, tell, viewport }: Needs) {
     pointer: () => ({ x: 0, y: 0 }),
     /** Text of the shortcut of a command, for example "Ctrl+Z". */
     key: (command: Command) => shortcutText(command, mac),
+    /** Shortcut and action of a command, for its button. */
+    command: (command: Command) => ({
+      shortcut: shortcutText(command, mac),
+      onClick: () => app.run(command),
+    }),
   };
   const commands = createCommands(app);
   return app;

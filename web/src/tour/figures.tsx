@@ -5,7 +5,7 @@ import type { App } from "../app";
 import type { BindReport } from "../contract";
 import { scientific } from "../format";
 import type { TourState } from "../state";
-import { Button, choicesOf, Facts, Segments } from "../ui/controls";
+import { Button, Facts, Segments } from "../ui/controls";
 import { curvesOf } from "../ui/curves";
 import { Plot } from "../ui/plot";
 import { CompareTable, solverName } from "../ui/report";
@@ -52,7 +52,8 @@ function Grid({ app }: Figure) {
     <>
       <Segments
         label={T.see.slice}
-        choices={choicesOf(["value", "kinds"] as const, T.see.slices)}
+        values={["value", "kinds"]}
+        labels={T.see.slices}
         value={scene.slice === "kinds" ? "kinds" : "value"}
         onChange={(kind) => app.view.slice({}, kind)}
       />
@@ -78,11 +79,12 @@ function ByGrid({ app, guide, reports }: Figure) {
   const { bindOptions } = app.store.get();
   return (
     <>
-      <Choice
+      <Segments<number>
         label={TOUR.cells}
         values={GRIDS}
-        now={bindOptions.grid}
-        choose={(grid) => void guide.show(ofPaper(grid, 1e-5)[0] ?? {})}
+        labels={scientific}
+        value={bindOptions.grid}
+        onChange={(grid) => void guide.show(ofPaper(grid, 1e-5)[0] ?? {})}
       />
       <RestErrors reports={reports} name={({ grid }) => TOUR.errorOf(TOUR.ofCells(grid))} />
     </>
@@ -93,35 +95,15 @@ function ByTau({ app, guide, reports }: Figure) {
   const { bindOptions } = app.store.get();
   return (
     <>
-      <Choice
+      <Segments<number>
         label={TOUR.tau}
         values={TAUS}
-        now={bindOptions.tau}
-        choose={(tau) => void guide.show(ofPaper(32, tau)[0] ?? {})}
+        labels={scientific}
+        value={bindOptions.tau}
+        onChange={(tau) => void guide.show(ofPaper(32, tau)[0] ?? {})}
       />
       <RestErrors reports={reports} name={({ tau }) => TOUR.errorOf(TOUR.ofTau(tau))} />
     </>
-  );
-}
-
-function Choice({
-  label,
-  values,
-  now,
-  choose,
-}: {
-  label: string;
-  values: readonly number[];
-  now: number;
-  choose: (value: number) => void;
-}) {
-  return (
-    <Segments
-      label={label}
-      choices={values.map((value) => ({ value: String(value), label: scientific(value) }))}
-      value={String(now)}
-      onChange={(value) => choose(Number(value))}
-    />
   );
 }
 
@@ -132,11 +114,12 @@ function Delta({ app, guide, reports }: Figure) {
   const iterations = (name: string) => reports.find((one) => solverName(one) === name)?.iterations ?? 0;
   return (
     <>
-      <Choice
+      <Segments<number>
         label={TOUR.cells}
         values={GRIDS}
-        now={bindOptions.grid}
-        choose={(grid) => void guide.measure(solvers(grid))}
+        labels={scientific}
+        value={bindOptions.grid}
+        onChange={(grid) => void guide.measure(solvers(grid))}
       />
       {report && <Plot curves={curves} tau={report.tau} />}
       <ul class="curves">
@@ -262,11 +245,12 @@ function Smooth({ app }: Figure) {
   const { smooth, inner } = cage.controls;
   return (
     <>
-      <Choice
+      <Segments<number>
         label={T.cage.steps}
         values={STEPS}
-        now={smooth}
-        choose={(steps) => void app.cage.setSmooth(steps)}
+        labels={scientific}
+        value={smooth}
+        onChange={app.cage.setSmooth}
       />
       <Button
         label={TOUR.bone}

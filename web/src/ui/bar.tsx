@@ -33,25 +33,18 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
           icon="undo"
           label={T.bar.undo}
           tip={T.bar.undoOf(undo)}
-          shortcut={app.key("undo")}
+          {...app.command("undo")}
           disabled={undo === null}
-          onClick={() => app.run("undo")}
         />
         <IconButton
           icon="redo"
           label={T.bar.redo}
           tip={T.bar.redoOf(redo)}
-          shortcut={app.key("redo")}
+          {...app.command("redo")}
           disabled={redo === null}
-          onClick={() => app.run("redo")}
         />
         <span class="gap" />
-        <IconButton
-          icon="tour"
-          label={T.tour.begin}
-          shortcut={app.key("tour")}
-          onClick={() => app.run("tour")}
-        />
+        <IconButton icon="tour" label={T.tour.begin} {...app.command("tour")} />
         <IconButton icon="share" label={T.bar.share} onClick={() => void app.exports.share()} />
         <IconButton
           icon={THEME_ICON[theme]}

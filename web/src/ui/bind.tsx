@@ -10,14 +10,15 @@ import type { BindRun } from "../state";
 import { T } from "../words";
 import {
   Button,
-  choicesOf,
   Fold,
+  fieldsOf,
   Head,
   NumberField,
   Say,
   Section,
   Segments,
   Slider,
+  switchOf,
   Toggle,
 } from "./controls";
 import { curvesOf } from "./curves";
@@ -25,8 +26,8 @@ import { Icon } from "./icons";
 import { Plot } from "./plot";
 import { CompareTable, ReportCard } from "./report";
 
-const GRIDS = ["32", "64", "128", "256"] as const;
-const SPARSIFY = ["0", "0.00001", "0.001"] as const;
+const GRIDS = [32, 64, 128, 256];
+const SPARSIFY = [0, 0.00001, 0.001] as const;
 
 export function BindPanel({ app }: { app: App }) {
   const { bindRun, report, earlier, bound } = app.store.get();
@@ -103,8 +104,8 @@ function Figure({ app }: { app: App }) {
 
 function Ways({ app }: { app: App }) {
   const { bindOptions: options } = app.store.get();
-  const set = app.bind.setOptions;
-  const preset = ({ grid: _, backend: __, ...way }: BindOptions) => set(way);
+  const option = fieldsOf(options, app.bind.setOptions);
+  const preset = ({ grid: _, backend: __, ...way }: BindOptions) => app.bind.setOptions(way);
   return (
     <>
       <div class="row even">
@@ -118,28 +119,27 @@ function Ways({ app }: { app: App }) {
       </div>
       <Segments
         label={options.method === "classic" && options.cell_shape === "box" ? T.bind.gridEach : T.bind.grid}
-        choices={GRIDS.map((value) => ({ value, label: value }))}
-        value={String(options.grid) as (typeof GRIDS)[number]}
-        onChange={(value) => set({ grid: Number(value) })}
+        values={GRIDS}
+        labels={String}
+        {...option("grid")}
       />
-      <Segments<BindOptions["method"]>
+      <Segments
         label={T.bind.method}
-        choices={choicesOf(["embedded", "classic"], T.bind.methods, T.bind.methodTips)}
-        value={options.method}
-        onChange={(method) => set({ method })}
+        labels={T.bind.methods}
+        tips={T.bind.methodTips}
+        {...option("method")}
       />
-      <Segments<BindOptions["solver"]>
+      <Segments
         label={T.bind.solver}
-        choices={choicesOf(["multigrid", "jacobi", "cg"], T.bind.solvers, { cg: T.bind.cgTip })}
-        value={options.solver}
-        onChange={(solver) => set({ solver })}
+        labels={T.bind.solvers}
+        tips={{ cg: T.bind.cgTip }}
+        {...option("solver")}
       />
       {options.solver === "cg" && (
         <Toggle
           label={T.bind.preconditioned}
           sentence={T.bind.preconditionedSentence}
-          on={options.preconditioner === "v_cycle"}
-          onChange={(on) => set({ preconditioner: on ? "v_cycle" : "none" })}
+          {...switchOf(option("preconditioner"), "v_cycle", "none")}
         />
       )}
       <p class="hint">{sayOptions(options)}</p>
@@ -156,12 +156,10 @@ function Place({ app }: { app: App }) {
     <>
       <Segments<BindOptions["backend"]>
         label={T.bind.place}
-        choices={[
-          { value: "gpu", label: T.bind.places.gpu, disabled: lack !== null },
-          { value: "cpu", label: T.bind.places.cpu },
-        ]}
+        labels={T.bind.places}
+        disabled={lack ? ["gpu"] : []}
         value={lack ? "cpu" : backend}
-        onChange={(value) => app.bind.setOptions({ backend: value })}
+        onChange={(backend) => app.bind.setOptions({ backend })}
       />
       {lack && <p class="hint">{T.bind.noGpu}</p>}
       {!lack && adapter !== "" && backend !== "cpu" && <p class="hint">{card}</p>}
@@ -189,7 +187,7 @@ function Memory({ app }: { app: App }) {
 
 function Advanced({ app }: { app: App }) {
   const { bindOptions: options } = app.store.get();
-  const set = app.bind.setOptions;
+  const option = fieldsOf(options, app.bind.setOptions);
   return (
     <Fold title={T.bind.advanced}>
       <Slider
@@ -197,43 +195,33 @@ function Advanced({ app }: { app: App }) {
         {...SLIDERS.tau}
         format={(power) => `1e${power}`}
         value={Math.round(Math.log10(options.tau))}
-        onInput={(power) => set({ tau: 10 ** power })}
+        onChange={(power) => option("tau").onChange(10 ** power)}
       />
       <NumberField
         label={T.bind.limit}
         min={SLIDERS.max_iterations.min}
         max={SLIDERS.max_iterations.max}
         step="1"
-        value={options.max_iterations}
-        onCommit={(value) => set({ max_iterations: value })}
+        {...option("max_iterations")}
       />
       <Segments
         label={T.bind.sparsify}
-        choices={SPARSIFY.map((value, k) => ({ value, label: T.bind.sparsifies[k] ?? value }))}
-        value={options.sparsify === 0 ? "0" : options.sparsify < 1e-4 ? "0.00001" : "0.001"}
-        onChange={(value) => set({ sparsify: Number(value) })}
+        values={SPARSIFY}
+        labels={T.bind.sparsifies}
+        value={options.sparsify === 0 ? 0 : options.sparsify < 1e-4 ? 0.00001 : 0.001}
+        onChange={option("sparsify").onChange}
       />
       {options.method === "classic" && (
         <div class="stack">
-          <Segments<BindOptions["cell_shape"]>
-            label={T.bind.cells}
-            choices={choicesOf(["box", "cubic"], T.bind.cellShapes)}
-            value={options.cell_shape}
-            onChange={(cell_shape) => set({ cell_shape })}
-          />
-          <Segments<BindOptions["delta_norm"]>
-            label={T.bind.norm}
-            choices={choicesOf(["euclidean", "literal"], T.bind.norms)}
-            value={options.delta_norm}
-            onChange={(delta_norm) => set({ delta_norm })}
-          />
+          <Segments label={T.bind.cells} labels={T.bind.cellShapes} {...option("cell_shape")} />
+          <Segments label={T.bind.norm} labels={T.bind.norms} {...option("delta_norm")} />
         </div>
       )}
-      <Segments<BindOptions["outside"]>
+      <Segments
         label={T.bind.outside}
-        choices={choicesOf(["extend", "stay", "refuse"], T.bind.outsides, T.bind.outsideTips)}
-        value={options.outside}
-        onChange={(outside) => set({ outside })}
+        labels={T.bind.outsides}
+        tips={T.bind.outsideTips}
+        {...option("outside")}
       />
     </Fold>
   );

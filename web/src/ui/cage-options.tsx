@@ -1,11 +1,10 @@
 /** Options of the automatic cage. */
 
 import type { App } from "../app";
-import type { CageOptions } from "../contract";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
-import { choicesOf, Segments, Slider, Toggle } from "./controls";
+import { fieldsOf, Segments, Slider, Toggle } from "./controls";
 
 /**
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
@@ -24,44 +23,29 @@ const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Mat
 export function Automatic({ app }: { app: App }) {
   const { cageOptions: options, cageClip, model } = app.store.get();
   const named = [...new Set(model?.clips.map((clip) => clip.name))];
-  const change = (patch: Partial<CageOptions>) =>
-    app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } });
+  const option = fieldsOf(options, (patch) =>
+    app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } }),
+  );
+  const [detail, voxels] = [option("detail"), option("voxels")];
   return (
     <div class="stack">
-      <Slider
-        label={T.cage.wanted}
-        {...SLIDERS.target}
-        format={count}
-        value={options.target}
-        onInput={(target) => change({ target })}
-      />
+      <Slider label={T.cage.wanted} {...SLIDERS.target} format={count} {...option("target")} />
       <Slider
         label={T.cage.closeness}
         min={0}
         max={1}
         step={SLIDERS.detail.step}
-        format={() => T.cage.within(percent(options.detail, 1))}
-        value={closenessOf(options.detail)}
-        onInput={(closeness) => change({ detail: detailOf(closeness) })}
+        format={() => T.cage.within(percent(detail.value, 1))}
+        value={closenessOf(detail.value)}
+        onChange={(closeness) => detail.onChange(detailOf(closeness))}
       />
-      <Toggle
-        label={T.cage.quads}
-        sentence={T.cage.quadsSentence}
-        on={options.quads}
-        onChange={(on) => change({ quads: on })}
-      />
-      <Segments<CageOptions["symmetry"]>
-        label={T.cage.symmetry}
-        choices={choicesOf(["auto", "x", "none"], T.cage.symmetries)}
-        value={options.symmetry}
-        onChange={(symmetry) => change({ symmetry })}
-      />
+      <Toggle label={T.cage.quads} sentence={T.cage.quadsSentence} {...option("quads")} />
+      <Segments label={T.cage.symmetry} labels={T.cage.symmetries} {...option("symmetry")} />
       <Slider
         label={T.cage.margin}
         {...SLIDERS.clearance}
         format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
-        value={options.clearance}
-        onInput={(clearance) => change({ clearance })}
+        {...option("clearance")}
       />
       <Slider
         label={T.cage.gaps}
@@ -69,8 +53,8 @@ export function Automatic({ app }: { app: App }) {
         format={(value) =>
           value === MIN_VOXELS ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
         }
-        value={options.voxels || MIN_VOXELS}
-        onInput={(voxels) => change({ voxels: voxels === MIN_VOXELS ? 0 : voxels })}
+        value={voxels.value || MIN_VOXELS}
+        onChange={(value) => voxels.onChange(value === MIN_VOXELS ? 0 : value)}
       />
       {named.length > 0 && (
         <label class="stack tight">
@@ -88,12 +72,7 @@ export function Automatic({ app }: { app: App }) {
           </select>
         </label>
       )}
-      <Toggle
-        label={T.cage.perPart}
-        sentence={T.cage.perPartSentence}
-        on={options.per_component}
-        onChange={(on) => change({ per_component: on })}
-      />
+      <Toggle label={T.cage.perPart} sentence={T.cage.perPartSentence} {...option("per_component")} />
     </div>
   );
 }

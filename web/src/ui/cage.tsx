@@ -5,39 +5,25 @@ import type { CageOptions, CageState, Check, Mend, Problem } from "../contract";
 import { SLIDERS } from "../defaults";
 import { isCageSparse } from "../derived";
 import { count, percent } from "../format";
-import type { CageSource } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Automatic } from "./cage-options";
-import { Badge, Button, choicesOf, Facts, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
+import { Badge, Button, Facts, fieldsOf, Head, Say, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon } from "./icons";
 import { Inside, Smooth } from "./inside";
 
-const SOURCES = ["auto", "hull", "box", "file"] as const satisfies readonly CageSource[];
-
 export function CagePanel({ app }: { app: App }) {
-  const { cageSource, boxDivisions, cagePreview, cageProgress, cage, check } = app.store.get();
-  const { set } = app.store;
+  const { cageSource, cagePreview, cageProgress, cage, check } = app.store.get();
+  const option = fieldsOf(app.store.get(), app.store.set);
   return (
     <div class="stack loose">
       <Head title={T.cage.title} sentence={T.cage.sentence} />
       <div class="stack">
-        <Segments<CageSource>
-          label={T.cage.how}
-          hideLabel
-          choices={choicesOf(SOURCES, T.cage.sources)}
-          value={cageSource}
-          onChange={(value) => set({ cageSource: value })}
-        />
+        <Segments label={T.cage.how} hideLabel labels={T.cage.sources} {...option("cageSource")} />
         <p class="hint">{T.cage.about[cageSource]}</p>
         {cageSource === "auto" && <Automatic app={app} />}
         {cageSource === "box" && (
-          <Slider
-            label={T.cage.divisions}
-            {...SLIDERS.divisions}
-            value={boxDivisions}
-            onInput={(value) => set({ boxDivisions: value })}
-          />
+          <Slider label={T.cage.divisions} {...SLIDERS.divisions} {...option("boxDivisions")} />
         )}
         {cagePreview !== null && <p class="hint">{T.cage.preview(cagePreview)}</p>}
         {cageProgress !== null && (
@@ -79,8 +65,8 @@ function Reshape({ app }: { app: App }) {
       <Toggle
         label={T.cage.reshape}
         sentence={T.cage.reshapeSentence(app.key("restMode"))}
-        on={editingRest}
-        onChange={(on) => app.edit.setEditingRest(on)}
+        value={editingRest}
+        onChange={app.edit.setEditingRest}
       />
       {editingRest && <p class="hint">{T.cage.hints[tools.element]}</p>}
     </div>

@@ -3,15 +3,16 @@
 import type { App } from "../app";
 import { duration, percent } from "../format";
 import { T } from "../words";
-import { Fold, IconButton, Segments, SHARES, Slider, Toggle } from "./controls";
+import { Fold, fieldsOf, IconButton, Segments, SHARES, Slider, switchOf, Toggle } from "./controls";
 
-const SPEEDS = ["0.25", "0.5", "1"] as const;
+const SPEEDS = [0.25, 0.5, 1];
 
 export function Clips({ app }: { app: App }) {
   const { model, clip, bound, rigOptions, scene } = app.store.get();
   if (!model) return null;
   const { clips } = model;
   const length = clips[clip.clip ?? -1]?.seconds ?? 0;
+  const joints = fieldsOf(scene, app.view.scene)("joints");
   return (
     <div class="stack">
       {clips.length > 0 && (
@@ -40,8 +41,7 @@ export function Clips({ app }: { app: App }) {
             <IconButton
               icon={clip.playing ? "pause" : "play"}
               label={clip.playing ? T.clips.pause : T.clips.play}
-              tip={`${clip.playing ? T.clips.pause : T.clips.play} (${app.key("playClip")})`}
-              onClick={() => void app.clips.toggle()}
+              {...app.command("playClip")}
             />
             <div class="grow">
               <Slider
@@ -51,25 +51,25 @@ export function Clips({ app }: { app: App }) {
                 step={length / 200}
                 format={(seconds) => T.clips.seconds(seconds)}
                 value={clip.seconds}
-                onInput={(seconds) => void app.clips.scrub(seconds)}
+                onChange={(seconds) => void app.clips.scrub(seconds)}
               />
             </div>
           </div>
           <Segments
             label={T.clips.speed}
-            choices={SPEEDS.map((value) => ({ value, label: percent(Number(value)) }))}
-            value={String(clip.speed)}
-            onChange={(value) => app.clips.speed(Number(value))}
+            values={SPEEDS}
+            labels={percent}
+            value={clip.speed}
+            onChange={app.clips.speed}
           />
-          <Toggle label={T.clips.loop} on={clip.loop} onChange={app.clips.loop} />
+          <Toggle label={T.clips.loop} value={clip.loop} onChange={app.clips.loop} />
         </>
       )}
       {clips.length > 0 && (
         <Toggle
           label={T.clips.dynamic}
           sentence={T.clips.dynamicSentence}
-          on={rigOptions.dynamic}
-          onChange={(dynamic) => app.clips.rig({ dynamic })}
+          {...fieldsOf(rigOptions, app.clips.rig)("dynamic")}
         />
       )}
       {model.targets.length > 0 && (
@@ -81,7 +81,7 @@ export function Clips({ app }: { app: App }) {
                 label={name}
                 {...SHARES}
                 value={clip.targets[k] ?? atRest}
-                onInput={(weight) => void app.clips.target(k, weight)}
+                onChange={(weight) => void app.clips.target(k, weight)}
               />
             ))}
           </div>
@@ -91,8 +91,7 @@ export function Clips({ app }: { app: App }) {
         <Toggle
           label={T.clips.joints}
           sentence={T.clips.jointsSentence}
-          on={scene.joints !== null}
-          onChange={(on) => app.view.scene({ joints: on ? "follow" : null })}
+          {...switchOf(joints, "follow", null)}
         />
       )}
       {model.rigged && !rigOptions.dynamic && <RigChoices app={app} />}
@@ -103,29 +102,18 @@ export function Clips({ app }: { app: App }) {
 export function RigChoices({ app }: { app: App }) {
   const { rigOptions, model } = app.store.get();
   if (!model?.joints) return null;
-  const { joints, keep_travel, ground, feet, rigid } = rigOptions;
+  const { joints, rigid } = rigOptions;
+  const option = fieldsOf(rigOptions, app.clips.rig);
+  const follow = switchOf(option("joints"), "follow", "stay");
+  const feet = switchOf(option("feet"), "lock", "free");
+  const turn = switchOf(option("joints"), "turn", "follow");
   return (
     <>
-      <Toggle
-        label={T.clips.follow}
-        sentence={T.clips.followSentence}
-        on={joints !== "stay"}
-        onChange={(on) => app.clips.rig({ joints: on ? "follow" : "stay" })}
-      />
+      <Toggle label={T.clips.follow} sentence={T.clips.followSentence} {...follow} />
       {joints !== "stay" && (
         <>
-          <Toggle
-            label={T.clips.ground}
-            sentence={T.clips.groundSentence}
-            on={ground}
-            onChange={(on) => app.clips.rig({ ground: on })}
-          />
-          <Toggle
-            label={T.clips.feet}
-            sentence={T.clips.feetSentence}
-            on={feet === "lock"}
-            onChange={(on) => app.clips.rig({ feet: on ? "lock" : "free" })}
-          />
+          <Toggle label={T.clips.ground} sentence={T.clips.groundSentence} {...option("ground")} />
+          <Toggle label={T.clips.feet} sentence={T.clips.feetSentence} {...feet} />
         </>
       )}
       {joints !== "stay" && model.props.length > 0 && (
@@ -136,7 +124,7 @@ export function RigChoices({ app }: { app: App }) {
               <Toggle
                 key={name}
                 label={name}
-                on={rigid.includes(name)}
+                value={rigid.includes(name)}
                 onChange={(on) =>
                   app.clips.rig({ rigid: on ? [...rigid, name] : rigid.filter((other) => other !== name) })
                 }
@@ -148,18 +136,8 @@ export function RigChoices({ app }: { app: App }) {
       {joints !== "stay" && (
         <Fold title={T.clips.advanced}>
           <div class="stack">
-            <Toggle
-              label={T.clips.turn}
-              sentence={T.clips.turnSentence}
-              on={joints === "turn"}
-              onChange={(on) => app.clips.rig({ joints: on ? "turn" : "follow" })}
-            />
-            <Toggle
-              label={T.clips.travel}
-              sentence={T.clips.travelSentence}
-              on={keep_travel}
-              onChange={(on) => app.clips.rig({ keep_travel: on })}
-            />
+            <Toggle label={T.clips.turn} sentence={T.clips.turnSentence} {...turn} />
+            <Toggle label={T.clips.travel} sentence={T.clips.travelSentence} {...option("keep_travel")} />
           </div>
         </Fold>
       )}

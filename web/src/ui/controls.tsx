@@ -75,48 +75,55 @@ export function useUid(): string {
   return useState(() => `control-${++next}`)[0];
 }
 
-export interface Choice<T extends string> {
-  value: T;
-  label: string;
-  tip?: string | undefined;
-  disabled?: boolean;
-}
-
-/** Choices for `values`, with the label and tool tip of each value. */
-export function choicesOf<T extends string>(
-  values: readonly T[],
-  labels: Readonly<Record<T, string>>,
-  tips?: Readonly<Partial<Record<T, string>>>,
-): Choice<T>[] {
-  return values.map((value) => ({ value, label: labels[value], tip: tips?.[value] }));
-}
-
-interface SegmentsProps<T extends string> {
-  label: string;
-  choices: readonly Choice<T>[];
+/** The value that a control shows, and what happens when the user changes it. */
+interface Field<T> {
   value: T;
   onChange: (value: T) => void;
+}
+
+/** Connects controls to the keys of an object: `{...field("grid")}` shows `object.grid` and passes changes to `set`. */
+export function fieldsOf<T extends object>(object: T, set: (patch: Partial<T>) => unknown) {
+  return <K extends keyof T>(key: K): Field<T[K]> => ({
+    value: object[key],
+    onChange: (value) => void set({ [key]: value } as unknown as Partial<T>),
+  });
+}
+
+/** Connects a switch to a field: `on` and `off` are the values that it chooses between. */
+export function switchOf<T>({ value, onChange }: Field<T>, on: T, off: T): Field<boolean> {
+  return { value: value !== off, onChange: (isOn) => onChange(isOn ? on : off) };
+}
+
+interface SegmentsProps<T extends string | number> extends Field<T> {
+  label: string;
   hideLabel?: boolean;
+  /** The label of each value. A record also determines which values are offered, and their order. */
+  labels: Readonly<Partial<Record<T, string>>> | ((value: T) => string);
+  values?: readonly T[];
+  tips?: Readonly<Partial<Record<T, string>>>;
+  /** Values that cannot be chosen now. */
+  disabled?: readonly T[];
 }
 
 /** A choice of one of a few values: radio buttons drawn as segments of a bar. */
-export function Segments<T extends string>({ label, choices, value, onChange, hideLabel }: SegmentsProps<T>) {
+export function Segments<T extends string | number>(props: SegmentsProps<T>) {
+  const { label, hideLabel, labels, values = Object.keys(labels) as T[], tips, disabled, ...field } = props;
   const name = useUid();
   return (
     <fieldset class="field">
       <legend class={hideLabel ? "visually-hidden" : "legend-text"}>{label}</legend>
       <div class="segments">
-        {choices.map((choice) => (
-          <label key={choice.value} data-tip={choice.tip}>
+        {values.map((value) => (
+          <label key={value} data-tip={tips?.[value]}>
             <input
               type="radio"
               name={name}
-              value={choice.value}
-              checked={choice.value === value}
-              disabled={choice.disabled}
-              onChange={() => onChange(choice.value)}
+              value={value}
+              checked={value === field.value}
+              disabled={disabled?.includes(value)}
+              onChange={() => field.onChange(value)}
             />
-            <span>{choice.label}</span>
+            <span>{typeof labels === "function" ? labels(value) : labels[value]}</span>
           </label>
         ))}
       </div>
@@ -125,14 +132,9 @@ export function Segments<T extends string>({ label, choices, value, onChange, hi
 }
 
 /** A switch with a label and an explanation. */
-export function Toggle(props: {
-  label: string;
-  sentence?: string;
-  on: boolean;
-  onChange: (on: boolean) => void;
-}) {
+export function Toggle(props: Field<boolean> & { label: string; sentence?: string }) {
   const id = useUid();
-  const { label, sentence, on, onChange } = props;
+  const { label, sentence, value, onChange } = props;
   return (
     <label class="switch" for={id}>
       <span class="text">
@@ -143,23 +145,21 @@ export function Toggle(props: {
         type="checkbox"
         role="switch"
         id={id}
-        aria-checked={on}
+        aria-checked={value}
         aria-describedby={sentence ? `${id}-s` : undefined}
-        checked={on}
+        checked={value}
         onChange={(event) => onChange(event.currentTarget.checked)}
       />
     </label>
   );
 }
 
-interface SliderProps {
+interface SliderProps extends Field<number> {
   label: string;
   min: number;
   max: number;
   step: number;
-  value: number;
-  onInput: (value: number) => void;
-  /** Called on release, after the last `onInput`. */
+  /** Called on release, after the last `onChange`. */
   onCommit?: (value: number) => void;
   /** Formats the value for the display and for screen readers. */
   format?: (value: number) => string;
@@ -171,7 +171,7 @@ export const SHARES = { min: 0, max: 1, step: 0.01, format: percent } as const;
 
 /** A slider with its value next to the label. */
 export function Slider(props: SliderProps) {
-  const { label, value, onInput, onCommit, format = String, name, ...range } = props;
+  const { label, value, onChange, onCommit, format = String, name, ...range } = props;
   const id = useUid();
   return (
     <div class="field">
@@ -186,7 +186,7 @@ export function Slider(props: SliderProps) {
         value={value}
         aria-label={name}
         aria-valuetext={format(value)}
-        onInput={(event) => onInput(event.currentTarget.valueAsNumber)}
+        onInput={(event) => onChange(event.currentTarget.valueAsNumber)}
         onChange={(event) => onCommit?.(event.currentTarget.valueAsNumber)}
       />
     </div>
@@ -197,14 +197,14 @@ interface NumberInputProps {
   id?: string;
   name?: string;
   value: number | string;
-  onCommit: (value: number) => void;
+  onChange: (value: number) => void;
   min?: number;
   max?: number;
   step?: string;
 }
 
-/** Number field. Calls `onCommit` when the user presses Enter or leaves the field, if the number is valid. */
-export function NumberInput({ name, value, onCommit, ...rest }: NumberInputProps) {
+/** Number field. Calls `onChange` when the user presses Enter or leaves the field, if the number is valid. */
+export function NumberInput({ name, value, onChange, ...rest }: NumberInputProps) {
   const input = useRef<HTMLInputElement>(null);
   /** Whether the user has typed something that is not committed. The field is not overwritten then. */
   const isTyping = useRef(false);
@@ -230,7 +230,7 @@ export function NumberInput({ name, value, onCommit, ...rest }: NumberInputProps
         const { currentTarget: field } = event;
         const isValid = field.value !== "" && field.validity.valid;
         field.setAttribute("aria-invalid", String(!isValid));
-        if (isValid) onCommit(field.valueAsNumber);
+        if (isValid) onChange(field.valueAsNumber);
       }}
     />
   );

@@ -9,7 +9,7 @@ import { fittingPoses, isCapture, rigOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
-import { Head, Segments, Toggle } from "./controls";
+import { fieldsOf, Head, Segments, switchOf, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Privacy } from "./model";
 
@@ -87,8 +87,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
           <Toggle
             label={T.exports.expressions}
             sentence={T.exports.expressionsSentence}
-            on={state.rigOptions.expressions}
-            onChange={(expressions) => app.clips.rig({ expressions })}
+            {...fieldsOf(state.rigOptions, app.clips.rig)("expressions")}
           />
         </div>
       )}
@@ -134,8 +133,7 @@ function RigExport({ app }: { app: App }) {
       <Toggle
         label={T.clips.keep}
         sentence={T.clips.keepSentence(model.joints, model.targets.length, model.clips.length)}
-        on={!rigOptions.plain}
-        onChange={(on) => app.clips.rig({ plain: !on })}
+        {...switchOf(fieldsOf(rigOptions, app.clips.rig)("plain"), false, true)}
       />
       {!rigOptions.plain && <RigChoices app={app} />}
     </div>
@@ -154,13 +152,13 @@ type FileSizeName = keyof typeof FILE_SIZES;
 function FileSize({ app }: { app: App }) {
   const { quantize, compress } = app.store.get().rigOptions;
   const value: FileSizeName = compress === "meshopt" ? "smallest" : quantize ? "small" : "plain";
-  const names = Object.keys(FILE_SIZES) as FileSizeName[];
   const [, sentence] = T.exports.fileSizes[value];
   return (
     <div class="export-option stack tight">
       <Segments
         label={T.exports.fileSize}
-        choices={names.map((value) => ({ value, label: T.exports.fileSizes[value][0] ?? value }))}
+        values={Object.keys(FILE_SIZES) as FileSizeName[]}
+        labels={(name) => T.exports.fileSizes[name][0] ?? name}
         value={value}
         onChange={(value) => app.clips.rig(FILE_SIZES[value])}
       />
@@ -190,19 +188,17 @@ function ShapeFormat({ app }: { app: App }) {
   return (
     <div class="export-option stack tight">
       {isClipShown && (
-        <Segments
+        <Segments<"frame" | "rest">
           label={T.exports.moment}
-          choices={[
-            { value: "frame", label: T.exports.frame },
-            { value: "rest", label: T.exports.restShape },
-          ]}
+          labels={{ frame: T.exports.frame, rest: T.exports.restShape }}
           value={moment}
           onChange={setMoment}
         />
       )}
-      <Segments
+      <Segments<ShapeFormatName>
         label={T.exports.format}
-        choices={formats.map((value) => ({ value, label: value.toUpperCase() }))}
+        values={formats}
+        labels={(value) => value.toUpperCase()}
         value={format}
         onChange={setFormat}
       />
@@ -211,18 +207,19 @@ function ShapeFormat({ app }: { app: App }) {
 }
 
 function PictureOptions({ app }: { app: App }) {
-  const [size, setSize] = useState("2");
+  const [size, setSize] = useState<1 | 2 | 4>(2);
   const [alone, setAlone] = useState(false);
-  useEffect(() => app.exports.pictureOf(Number(size), alone), [app, size, alone]);
+  useEffect(() => app.exports.pictureOf(size, alone), [app, size, alone]);
   return (
     <div class="export-option stack tight">
-      <Segments
+      <Segments<1 | 2 | 4>
         label={T.exports.size}
-        choices={["1", "2", "4"].map((value, k) => ({ value, label: T.exports.sizes[k] ?? value }))}
+        values={[1, 2, 4]}
+        labels={T.exports.sizes}
         value={size}
         onChange={setSize}
       />
-      <Toggle label={T.exports.alone} sentence={T.exports.aloneSentence} on={alone} onChange={setAlone} />
+      <Toggle label={T.exports.alone} sentence={T.exports.aloneSentence} value={alone} onChange={setAlone} />
     </div>
   );
 }

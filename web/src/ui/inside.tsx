@@ -11,7 +11,7 @@ import type { IconName } from "./icons";
 
 /** Default number of subdivision steps. More steps change the surface little. */
 const DEFAULT_STEPS = 2;
-const STEPS = ["1", "2", "3"] as const;
+const STEPS = [1, 2, 3];
 const KINDS: readonly (readonly [InnerKind, IconName])[] = [
   ["point", "vertex"],
   ["line", "bone"],
@@ -25,15 +25,16 @@ export function Smooth({ app, cage }: { app: App; cage: CageState }) {
       <Toggle
         label={T.cage.smoothOn}
         sentence={T.cage.smoothSentence}
-        on={smooth > 0}
+        value={smooth > 0}
         onChange={(on) => app.cage.setSmooth(on ? DEFAULT_STEPS : 0)}
       />
       {smooth > 0 && (
         <Segments
           label={T.cage.steps}
-          choices={STEPS.map((value) => ({ value, label: value }))}
-          value={STEPS[smooth - 1] ?? "1"}
-          onChange={(steps) => app.cage.setSmooth(Number(steps))}
+          values={STEPS}
+          labels={String}
+          value={smooth}
+          onChange={app.cage.setSmooth}
         />
       )}
     </div>
@@ -98,7 +99,7 @@ function Radius({ app, cage }: { app: App; cage: CageState }) {
       {...SLIDERS.radius}
       format={(share) => T.pose.ofCage(percent(share, 1))}
       value={held ?? cage.radius / longest}
-      onInput={setHeld}
+      onChange={setHeld}
       onCommit={(share) => {
         app.controls.setRadius(share * longest);
         setHeld(null);

@@ -80,11 +80,9 @@ function Up({ app, model }: { app: App; model: ModelInfo }) {
   return (
     <Segments<UpAxis>
       label={T.model.up}
-      choices={[
-        { value: "y", label: "Y", tip: T.model.upY },
-        { value: "z", label: "Z", tip: T.model.upZ },
-        ...(isCapture(model) ? [{ value: "y_down", label: "−Y", tip: T.model.upYDown } as const] : []),
-      ]}
+      values={isCapture(model) ? ["y", "z", "y_down"] : ["y", "z"]}
+      labels={{ y: "Y", z: "Z", y_down: "−Y" }}
+      tips={{ y: T.model.upY, z: T.model.upZ, y_down: T.model.upYDown }}
       value={model.up}
       onChange={(axis) => void app.files.turn(axis)}
     />

@@ -6,7 +6,7 @@ import type { MemberInfo, ModelInfo } from "../contract";
 import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
-import { Button, choicesOf, Fold, IconButton, Section, Segments, Slider } from "./controls";
+import { Button, Fold, fieldsOf, IconButton, Section, Segments, Slider } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { useTouch } from "./touch";
 
@@ -188,7 +188,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
       <p class="hint">{T.models.paintSentence}</p>
       <Segments
         label={T.models.brush}
-        choices={choicesOf(["paint", "erase"], T.models.brushes)}
+        labels={T.models.brushes}
         value={painting.erase ? "erase" : "paint"}
         onChange={(value) => app.painting.brush({ erase: value === "erase" })}
       />
@@ -196,8 +196,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
         label={T.models.size}
         {...SLIDERS.brush}
         format={(share) => T.cage.ofSize(percent(share))}
-        value={painting.radius}
-        onInput={(radius) => app.painting.brush({ radius })}
+        {...fieldsOf(painting, app.painting.brush)("radius")}
       />
       <div class="row wrap">
         <Button label={T.models.done} icon="check" kind="small" onClick={() => app.painting.on(null)} />

@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
-import type { Interpolation, Pivot } from "../contract";
+import type { Interpolation } from "../contract";
 import { SLIDERS } from "../defaults";
 import { fittingPoses } from "../derived";
 import { coordinate, percent } from "../format";
@@ -10,7 +10,7 @@ import { T } from "../words";
 import { Clips } from "./clips";
 import {
   Button,
-  choicesOf,
+  fieldsOf,
   Head,
   IconButton,
   NumberField,
@@ -25,7 +25,6 @@ import { Icon } from "./icons";
 import { useTouch } from "./touch";
 
 const INTERPOLATIONS = ["step", "linear", "cubic"] as const satisfies readonly Interpolation[];
-const PIVOTS = ["middle", "border", "last"] as const satisfies readonly Pivot[];
 
 export function PosePanel({ app }: { app: App }) {
   const { model } = app.store.get();
@@ -60,7 +59,12 @@ function PullOptions({ app }: { app: App }) {
   return (
     <div class="stack">
       <p class="hint">{sentence}</p>
-      <Toggle label={T.pull.whole} sentence={T.pull.wholeSentence} on={pullWhole} onChange={app.pull.whole} />
+      <Toggle
+        label={T.pull.whole}
+        sentence={T.pull.wholeSentence}
+        value={pullWhole}
+        onChange={app.pull.whole}
+      />
       {pins.length > 0 && (
         <div class="row">
           <span class="grow">{T.pull.pins(pins.length)}</span>
@@ -96,11 +100,11 @@ function Selection({ app }: { app: App }) {
             : T.pose.middle(count)}
       </p>
       {count > 1 && (
-        <Segments<Pivot>
+        <Segments
           label={T.pose.pivot}
-          choices={choicesOf(PIVOTS, T.pose.pivots, T.pose.pivotTips)}
-          value={tools.pivot}
-          onChange={(pivot) => app.view.tools({ pivot })}
+          labels={T.pose.pivots}
+          tips={T.pose.pivotTips}
+          {...fieldsOf(tools, app.view.tools)("pivot")}
         />
       )}
       {count > 0 && (
@@ -111,7 +115,7 @@ function Selection({ app }: { app: App }) {
               <NumberInput
                 name={T.pose.axis(axis)}
                 value={coordinate(center?.[index] ?? 0, size)}
-                onCommit={(value) => move(index, value)}
+                onChange={(value) => move(index, value)}
               />
             </div>
           ))}
@@ -123,30 +127,23 @@ function Selection({ app }: { app: App }) {
 
 function Help({ app }: { app: App }) {
   const { tools, unmatched } = app.store.get();
-  const { symmetry, proportionalOn, proportional } = tools;
+  const option = fieldsOf(tools, app.view.tools);
   const isTouch = useTouch();
   return (
     <>
-      <Toggle
-        label={T.pose.mirror}
-        sentence={T.pose.mirrorSentence}
-        on={symmetry}
-        onChange={(on) => app.view.tools({ symmetry: on })}
-      />
-      {symmetry && unmatched > 0 && <p class="hint warn-text">{T.pose.unmatched(unmatched)}</p>}
+      <Toggle label={T.pose.mirror} sentence={T.pose.mirrorSentence} {...option("symmetry")} />
+      {tools.symmetry && unmatched > 0 && <p class="hint warn-text">{T.pose.unmatched(unmatched)}</p>}
       <Toggle
         label={T.pose.proportional}
         sentence={isTouch ? T.pose.proportionalTouch : T.pose.proportionalSentence}
-        on={proportionalOn}
-        onChange={(on) => app.view.tools({ proportionalOn: on })}
+        {...option("proportionalOn")}
       />
-      {proportionalOn && (
+      {tools.proportionalOn && (
         <Slider
           label={T.pose.far}
           {...SLIDERS.proportional}
           format={(value) => T.pose.ofCage(percent(value))}
-          value={proportional}
-          onInput={(value) => app.view.tools({ proportional: value })}
+          {...option("proportional")}
         />
       )}
     </>
@@ -239,26 +236,22 @@ function Timing({ app }: { app: App }) {
   const state = app.store.get();
   const { transition, animationSeconds } = state;
   const last = fittingPoses(state).at(-1)?.seconds ?? 0;
+  const option = fieldsOf(transition, (patch) => app.poses.transition({ ...transition, ...patch }));
   return (
     <>
-      <Segments<Interpolation>
+      <Segments
         label={T.pose.between}
-        choices={choicesOf(INTERPOLATIONS, T.pose.interpolations, T.pose.interpolationTips)}
-        value={transition.interpolation}
-        onChange={(interpolation) => app.poses.transition({ ...transition, interpolation })}
+        labels={T.pose.interpolations}
+        tips={T.pose.interpolationTips}
+        {...option("interpolation")}
       />
-      <Toggle
-        label={T.pose.loop}
-        sentence={T.pose.loopSentence}
-        on={transition.loops}
-        onChange={(loops) => app.poses.transition({ ...transition, loops })}
-      />
+      <Toggle label={T.pose.loop} sentence={T.pose.loopSentence} {...option("loops")} />
       {transition.loops && (
         <NumberField
           label={T.pose.length}
           value={thousandths(animationSeconds)}
           min={last}
-          onCommit={(seconds) => app.poses.transition({ ...transition, back: seconds - last })}
+          onChange={(seconds) => option("back").onChange(seconds - last)}
         />
       )}
     </>
@@ -355,7 +348,7 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
             name={T.pose.timeOf(name)}
             value={thousandths(seconds)}
             min={0}
-            onCommit={(value) => {
+            onChange={(value) => {
               if (!app.poses.time(index, value)) setRefused(refused + 1);
             }}
           />
@@ -396,7 +389,7 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
         name={T.pose.blendOf(name)}
         {...SHARES}
         value={share}
-        onInput={(value) => app.poses.blend(index, value, false)}
+        onChange={(value) => app.poses.blend(index, value, false)}
         onCommit={(value) => app.poses.blend(index, value, true)}
       />
     </li>

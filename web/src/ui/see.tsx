@@ -5,12 +5,9 @@ import type { App } from "../app";
 import type { Coordinates, SceneOptions } from "../contract";
 import { COORDINATES } from "../defaults";
 import { isCapture } from "../derived";
-import type { Slice } from "../state";
 import { T } from "../words";
-import { choicesOf, IconButton, Section, Segments, SHARES, Slider, Toggle } from "./controls";
+import { fieldsOf, IconButton, Section, Segments, SHARES, Slider, Toggle } from "./controls";
 
-const COLOURS = ["material", "clay", "weight", "error"] as const satisfies SceneOptions["colour"][];
-const SLICES = ["off", "kinds", "value"] as const satisfies SceneOptions["slice"][];
 const PARTS = [
   "model",
   "cage",
@@ -25,13 +22,7 @@ export function See({ app }: { app: App }) {
     <aside class="see" id="see" aria-label={T.see.title}>
       <div class="row see-head">
         <h2 class="grow">{T.see.title}</h2>
-        <IconButton
-          icon="close"
-          label={T.see.close}
-          shortcut={app.key("see")}
-          kind="small"
-          onClick={() => app.store.set({ seeOpen: false })}
-        />
+        <IconButton icon="close" label={T.see.close} kind="small" {...app.command("see")} />
       </div>
       <div class="see-body stack loose">
         <Colours app={app} />
@@ -49,25 +40,18 @@ export function See({ app }: { app: App }) {
 function Colours({ app }: { app: App }) {
   const { scene, selected, bound, model } = app.store.get();
   const needsVertex = scene.colour === "weight" && selected.last === null;
+  const option = fieldsOf(scene, app.view.scene);
   return (
     <div class="stack">
-      <Segments<SceneOptions["colour"]>
+      <Segments
         label={T.see.colour}
-        choices={choicesOf(COLOURS, T.see.colours).map((choice) => ({
-          ...choice,
-          disabled: !bound && (choice.value === "weight" || choice.value === "error"),
-        }))}
-        value={scene.colour}
-        onChange={(colour) => app.view.scene({ colour })}
+        labels={T.see.colours}
+        disabled={bound ? [] : ["weight", "error"]}
+        {...option("colour")}
       />
       <p class="hint">{needsVertex ? T.see.selectForWeights : T.see.about[scene.colour]}</p>
       {scene.colour === "weight" && (
-        <Toggle
-          label={T.see.toOne}
-          sentence={T.see.toOneSentence}
-          on={scene.weights_to_one}
-          onChange={(on) => app.view.scene({ weights_to_one: on })}
-        />
+        <Toggle label={T.see.toOne} sentence={T.see.toOneSentence} {...option("weights_to_one")} />
       )}
       {!isCapture(model) && <Comparison app={app} />}
     </div>
@@ -115,9 +99,9 @@ function Grid({ app }: { app: App }) {
         : coordinate(selected.last);
   return (
     <>
-      <Segments<SceneOptions["slice"]>
+      <Segments
         label={T.see.slice}
-        choices={choicesOf(SLICES, T.see.slices)}
+        labels={T.see.slices}
         value={scene.slice}
         onChange={(kind) => app.view.slice({}, kind)}
       />
@@ -125,9 +109,9 @@ function Grid({ app }: { app: App }) {
         <div class="stack" data-busy={slice.busy ? "" : undefined}>
           <Segments
             label={T.see.across}
-            choices={T.axes.map((label, i) => ({ value: String(i), label }))}
-            value={String(slice.axis)}
-            onChange={(value) => app.view.slice({ axis: Number(value) as Slice["axis"] })}
+            values={[0, 1, 2]}
+            labels={(axis) => T.axes[axis] ?? ""}
+            {...fieldsOf(slice, app.view.slice)("axis")}
           />
           <SlicePosition app={app} />
           <p class="hint">{about}</p>
@@ -138,32 +122,17 @@ function Grid({ app }: { app: App }) {
 }
 
 export function SlicePosition({ app }: { app: App }) {
-  return (
-    <Slider
-      label={T.see.where}
-      {...SHARES}
-      step={0.005}
-      value={app.store.get().slice.position}
-      onInput={(position) => app.view.slice({ position })}
-    />
-  );
+  const field = fieldsOf(app.store.get().slice, app.view.slice);
+  return <Slider label={T.see.where} {...SHARES} step={0.005} {...field("position")} />;
 }
 
 function Parts({ app }: { app: App }) {
-  const { scene } = app.store.get();
+  const option = fieldsOf(app.store.get().scene, app.view.scene);
   return (
     <div class="stack tight">
       {PARTS.map((part) => {
         const [label = "", sentence = ""] = T.see.parts[part];
-        return (
-          <Toggle
-            key={part}
-            label={label}
-            sentence={sentence}
-            on={scene[part]}
-            onChange={(on) => app.view.scene({ [part]: on })}
-          />
-        );
+        return <Toggle key={part} label={label} sentence={sentence} {...option(part)} />;
       })}
       <Floaters app={app} />
     </div>
@@ -175,12 +144,5 @@ function Floaters({ app }: { app: App }) {
   const { scene, floaters } = app.store.get();
   if (floaters === 0) return null;
   const [label, sentence] = T.see.floaters(floaters);
-  return (
-    <Toggle
-      label={label}
-      sentence={sentence}
-      on={scene.floaters}
-      onChange={(on) => app.view.scene({ floaters: on })}
-    />
-  );
+  return <Toggle label={label} sentence={sentence} {...fieldsOf(scene, app.view.scene)("floaters")} />;
 }

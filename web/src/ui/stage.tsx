@@ -9,7 +9,7 @@ import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { Axes } from "./axes";
-import { Button, choicesOf, IconButton, Say, Segments } from "./controls";
+import { Button, IconButton, Say, Segments } from "./controls";
 import { useFrames } from "./frame";
 import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
@@ -66,7 +66,7 @@ function Mode({ app }: { app: App }) {
       <Segments
         label={T.view.mode}
         hideLabel
-        choices={choicesOf(["pose", "rest"], T.view.modes)}
+        labels={T.view.modes}
         value={app.store.get().editingRest ? "rest" : "pose"}
         onChange={(value) => {
           app.edit.setEditingRest(value === "rest");
@@ -110,10 +110,10 @@ function Encloses({ app }: { app: App }) {
   );
 }
 
-const GIZMOS: readonly (readonly [GizmoMode, IconName, Command])[] = [
-  ["move", "move", "gizmoMove"],
-  ["rotate", "rotate", "gizmoRotate"],
-  ["scale", "scale", "gizmoScale"],
+const GIZMOS: readonly (readonly [GizmoMode, Command])[] = [
+  ["move", "gizmoMove"],
+  ["rotate", "gizmoRotate"],
+  ["scale", "gizmoScale"],
 ];
 const ELEMENTS: readonly CageElement[] = ["vertex", "edge", "face"];
 
@@ -121,28 +121,13 @@ function Tools({ app }: { app: App }) {
   const { scene, boxArmed, additive, tools } = app.store.get();
   const element = elementInUse(app.store.get());
   const command = (icon: IconName, label: string, run: Command, pressed: boolean) => (
-    <IconButton
-      icon={icon}
-      label={label}
-      onClick={() => app.run(run)}
-      shortcut={app.key(run)}
-      pressed={pressed}
-    />
+    <IconButton icon={icon} label={label} {...app.command(run)} pressed={pressed} />
   );
   return (
     <Toolbar label={T.view.tools} kind="tools">
       {command("pull", T.pull.tool, "toolPull", scene.pull)}
       {command("select", T.view.gizmos.none, "toolSelect", !scene.pull && scene.gizmo === null)}
-      {GIZMOS.map(([gizmo, icon, key]) => (
-        <IconButton
-          key={gizmo}
-          icon={icon}
-          label={T.view.gizmos[gizmo]}
-          onClick={() => app.view.gizmo(gizmo)}
-          shortcut={app.key(key)}
-          pressed={scene.gizmo === gizmo}
-        />
-      ))}
+      {GIZMOS.map(([gizmo, run]) => command(gizmo, T.view.gizmos[gizmo], run, scene.gizmo === gizmo))}
       <span class="line" />
       {ELEMENTS.map((one) => (
         <IconButton
@@ -173,26 +158,9 @@ function Looks({ app }: { app: App }) {
   const { seeOpen, ortho } = app.store.get();
   return (
     <Toolbar label={T.view.looks} kind="looks">
-      <IconButton
-        icon="eye"
-        label={T.view.see}
-        onClick={() => app.run("see")}
-        shortcut={app.key("see")}
-        pressed={seeOpen}
-      />
-      <IconButton
-        icon="frame"
-        label={T.view.frame}
-        onClick={app.view.frameAll}
-        shortcut={app.key("frameAll")}
-      />
-      <IconButton
-        icon="perspective"
-        label={T.see.parallel}
-        onClick={app.view.ortho}
-        shortcut={app.key("ortho")}
-        pressed={ortho}
-      />
+      <IconButton icon="eye" label={T.view.see} {...app.command("see")} pressed={seeOpen} />
+      <IconButton icon="frame" label={T.view.frame} {...app.command("frameAll")} />
+      <IconButton icon="perspective" label={T.see.parallel} {...app.command("ortho")} pressed={ortho} />
     </Toolbar>
   );
 }

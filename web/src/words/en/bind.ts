@@ -41,7 +41,7 @@ export const bind = {
   tau: "Stop below this change (tau)",
   limit: "Iteration limit",
   sparsify: "Drop small weights, in total up to",
-  sparsifies: ["Keep all", "1e-5 per vertex", "1e-3 per vertex"],
+  sparsifies: { 0: "Keep all", 0.00001: "1e-5 per vertex", 0.001: "1e-3 per vertex" },
   cells: "Cells of the classic method",
   cellShapes: { box: "Fit the cage's box", cubic: "Cubes" },
   norm: "Change of a cell (equation 2 of K. Smith)",

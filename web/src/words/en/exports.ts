@@ -34,7 +34,7 @@ export const exports = {
   poses: (n: number, sentence: string) => `${plural(n, "pose")}. ${sentence}`,
   format: "Format of the shape",
   size: "Size of the picture",
-  sizes: ["As shown", "Twice", "Four times"],
+  sizes: { 1: "As shown", 2: "Twice", 4: "Four times" },
   fileSize: "Size of the GLB",
   fileSizes: {
     plain: ["Plain", ""],
