@@ -1,5 +1,6 @@
+import { createEta } from "@cagework/core/eta";
 import { describe, expect, it } from "vitest";
-import { createEta, timeLeft } from "../src/eta";
+import { timeLeft } from "../src/ui/bind";
 
 describe("time left", () => {
   it("is unknown at the start", () => {

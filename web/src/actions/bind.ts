@@ -3,7 +3,6 @@
 import { effect } from "@preact/signals";
 import type { BindEvent, BindOptions, BindReport, Coordinates } from "../contract";
 import { cageBroken, drawn } from "../derived";
-import { createEta, type Eta } from "../eta";
 import { follow } from "../queue";
 import type { BindRun } from "../state";
 import { messageOf, sentence } from "../strings";
@@ -44,27 +43,13 @@ export function createBind(ctx: Context) {
   const bind = async (revision: number, signal: AbortSignal, options: BindOptions) => {
     const session = ctx.session();
     session.engine.requireCurrent(revision);
-    let eta: Eta = createEta(performance.now());
     let run: BindRun = start("coarse", revision, options);
     const hear = (event: BindEvent) => {
       switch (event.kind) {
         case "progress": {
-          if (event.pass !== run.pass) {
-            run = start(event.pass, revision, options);
-            eta = createEta(performance.now());
-          }
-          const own = eta.update(event.fraction, performance.now());
-          run = {
-            pass: event.pass,
-            revision,
-            options,
-            stage: event.stage,
-            fraction: event.fraction,
-            etaMs: event.etaMs ?? own ?? null,
-            iteration: event.iteration,
-            delta: event.delta,
-            curve: grown(run.curve, event.iteration, event.delta),
-          };
+          const { kind: _, ...progress } = event;
+          const curve = progress.pass === run.pass ? run.curve : [];
+          run = { ...run, ...progress, curve: grown(curve, progress.iteration, progress.delta) };
           store.set({ bindRun: run });
           break;
         }
@@ -81,9 +66,7 @@ export function createBind(ctx: Context) {
     const report = await follow(signal, session.bind(options, hear));
     adopted(report, "fine");
     store.set({ appliedOptions: options });
-    if (!report.converged) {
-      ctx.tell.say(T.bind.stopped);
-    }
+    if (!report.converged) ctx.tell.say(T.bind.stopped);
   };
 
   const actions = {

@@ -4,8 +4,7 @@ import type { App } from "../app";
 import type { BindOptions } from "../contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS, SLIDERS } from "../defaults";
 import { cageBroken, hasUnappliedOptions } from "../derived";
-import { timeLeft } from "../eta";
-import { percent } from "../format";
+import { inUnit, percent } from "../format";
 import type { BindRun } from "../state";
 import { T } from "../words";
 import {
@@ -76,6 +75,13 @@ function Running({ run }: { run: BindRun }) {
       <p class="hint">{run.etaMs === null ? T.bind.working : timeLeft(run.etaMs)}</p>
     </section>
   );
+}
+
+/** The remaining time in words, rounded to seconds or, from one minute on, to minutes. */
+export function timeLeft(ms: number): string {
+  if (ms < 1500) return T.eta.second;
+  const isShort = ms < 60_000;
+  return T.eta.left(inUnit(Math.round(ms / (isShort ? 1000 : 60_000)), isShort ? "second" : "minute"));
 }
 
 /** Plot of the weights' change per iteration, for this bind and earlier ones by other solvers. */
