@@ -5,35 +5,31 @@ import type { Crash } from "./crash";
 const THEME = "cagework.theme";
 const SEEN_PREFIX = "cagework.seen.";
 const TOUR = "cagework.tour";
-
 const CRASH = "cagework.crash";
 
-/** Stores a crash in this tab, so that the restarted page can report it. Returns false if storage is unavailable. */
-export function keepCrash(crash: Crash): boolean {
+/** Returns the result of `work`; undefined if it throws, because storage is forbidden or full. */
+export function tryStorage<T>(work: () => T): T | undefined {
   try {
-    sessionStorage.setItem(CRASH, JSON.stringify(crash));
-    return true;
-  } catch {
-    return false;
-  }
-}
-
-/** Reads the crash that this tab stored before it restarted the page. */
-export function lastCrash(): Crash | undefined {
-  try {
-    const { during, report } = JSON.parse(sessionStorage.getItem(CRASH) ?? "{}");
-    return typeof during === "string" && typeof report === "string" ? { during, report } : undefined;
+    return work();
   } catch {
     return undefined;
   }
 }
 
+/** Stores a crash in this tab, so that the restarted page can report it. Returns false if storage is unavailable. */
+export function keepCrash(crash: Crash): boolean {
+  tryStorage(() => sessionStorage.setItem(CRASH, JSON.stringify(crash)));
+  return lastCrash()?.report === crash.report;
+}
+
+/** Reads the crash that this tab stored before it restarted the page. */
+export function lastCrash(): Crash | undefined {
+  const { during, report } = tryStorage(() => JSON.parse(sessionStorage.getItem(CRASH) ?? "{}")) ?? {};
+  return typeof during === "string" && typeof report === "string" ? { during, report } : undefined;
+}
+
 export function forgetCrash(): void {
-  try {
-    sessionStorage.removeItem(CRASH);
-  } catch {
-    // Storage is forbidden, so nothing was stored.
-  }
+  tryStorage(() => sessionStorage.removeItem(CRASH));
 }
 
 export type Theme = "auto" | "light" | "dark";
@@ -67,17 +63,9 @@ export function saveStop(stop: number): void {
 }
 
 function writeItem(key: string, value: string): void {
-  try {
-    localStorage.setItem(key, value);
-  } catch {
-    // Storage is forbidden or full: the value is lost when the page closes.
-  }
+  tryStorage(() => localStorage.setItem(key, value));
 }
 
 function readItem(key: string): string | null {
-  try {
-    return localStorage.getItem(key);
-  } catch {
-    return null;
-  }
+  return tryStorage(() => localStorage.getItem(key)) ?? null;
 }

@@ -3,6 +3,8 @@
  * crashes.
  */
 
+import { tryStorage } from "../store";
+
 const PREFIX = "cagework.work.";
 const OWN_KEY = "cagework.work";
 /** Time to wait for a lock, ms. After a reload, the previous page may still hold it. */
@@ -29,19 +31,13 @@ export async function heldIds(): Promise<ReadonlySet<string>> {
 
 /** Remembers, across reloads, which work this tab has open. */
 export function rememberOwn(id: string | null): void {
-  try {
+  tryStorage(() => {
     if (id === null) sessionStorage.removeItem(OWN_KEY);
     else sessionStorage.setItem(OWN_KEY, id);
-  } catch {
-    // Storage is forbidden, so no work is saved either.
-  }
+  });
 }
 
 /** Reads the id stored by `rememberOwn`. */
 export function ownId(): string | null {
-  try {
-    return sessionStorage.getItem(OWN_KEY);
-  } catch {
-    return null;
-  }
+  return tryStorage(() => sessionStorage.getItem(OWN_KEY)) ?? null;
 }
