@@ -4,7 +4,7 @@ import type { App } from "../app";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
-import { fieldsOf, Segments, Slider, Toggle } from "./controls";
+import { fieldsOf, Segments, Select, Slider, Toggle } from "./controls";
 
 /**
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
@@ -21,7 +21,7 @@ const detailOf = (closeness: number) => COARSEST_DETAIL * DETAIL_RATIO ** -close
 const closenessOf = (detail: number) => Math.log(COARSEST_DETAIL / detail) / Math.log(DETAIL_RATIO);
 
 export function Automatic({ app }: { app: App }) {
-  const { cageOptions: options, cageClip, model } = app.store.get();
+  const { cageOptions: options, model } = app.store.get();
   const named = [...new Set(model?.clips.map((clip) => clip.name))];
   const option = fieldsOf(options, (patch) =>
     app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } }),
@@ -57,20 +57,12 @@ export function Automatic({ app }: { app: App }) {
         onChange={(value) => voxels.onChange(value === MIN_VOXELS ? 0 : value)}
       />
       {named.length > 0 && (
-        <label class="stack tight">
-          <span>{T.cage.around}</span>
-          <select
-            value={cageClip ?? ""}
-            onChange={({ currentTarget: { value } }) => app.store.set({ cageClip: value || null })}
-          >
-            <option value="">{T.cage.aroundRest}</option>
-            {named.map((name) => (
-              <option key={name} value={name}>
-                {name}
-              </option>
-            ))}
-          </select>
-        </label>
+        <Select
+          label={T.cage.around}
+          none={T.cage.aroundRest}
+          options={named.map((name) => [name, name])}
+          {...fieldsOf(app.store.get(), app.store.set)("cageClip")}
+        />
       )}
       <Toggle label={T.cage.perPart} sentence={T.cage.perPartSentence} {...option("per_component")} />
     </div>

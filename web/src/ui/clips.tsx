@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import { duration, percent } from "../format";
 import { T } from "../words";
-import { Fold, fieldsOf, IconButton, Segments, SHARES, Slider, switchOf, Toggle } from "./controls";
+import { Fold, fieldsOf, IconButton, Segments, Select, SHARES, Slider, switchOf, Toggle } from "./controls";
 
 const SPEEDS = [0.25, 0.5, 1];
 
@@ -16,23 +16,14 @@ export function Clips({ app }: { app: App }) {
   return (
     <div class="stack">
       {clips.length > 0 && (
-        <label class="stack tight">
-          <span class="legend-text">{T.clips.clip}</span>
-          <select
-            value={clip.clip ?? ""}
-            disabled={!bound}
-            onChange={({ currentTarget: { value } }) =>
-              void app.clips.choose(value === "" ? null : Number(value))
-            }
-          >
-            <option value="">{T.clips.rest}</option>
-            {clips.map(({ name, seconds }, k) => (
-              <option key={k} value={k}>
-                {T.clips.named(name, duration(1000 * seconds))}
-              </option>
-            ))}
-          </select>
-        </label>
+        <Select
+          label={T.clips.clip}
+          none={T.clips.rest}
+          options={clips.map(({ name, seconds }, k) => [k, T.clips.named(name, duration(1000 * seconds))])}
+          disabled={!bound}
+          value={clip.clip}
+          onChange={(k) => void app.clips.choose(k)}
+        />
       )}
       {clip.clip !== null && (
         <>
@@ -74,17 +65,15 @@ export function Clips({ app }: { app: App }) {
       )}
       {model.targets.length > 0 && (
         <Fold title={T.clips.targets(model.targets.length)}>
-          <div class="stack">
-            {model.targets.map(({ name, default: atRest }, k) => (
-              <Slider
-                key={k}
-                label={name}
-                {...SHARES}
-                value={clip.targets[k] ?? atRest}
-                onChange={(weight) => void app.clips.target(k, weight)}
-              />
-            ))}
-          </div>
+          {model.targets.map(({ name, default: atRest }, k) => (
+            <Slider
+              key={k}
+              label={name}
+              {...SHARES}
+              value={clip.targets[k] ?? atRest}
+              onChange={(weight) => void app.clips.target(k, weight)}
+            />
+          ))}
         </Fold>
       )}
       {model.joints > 0 && (
@@ -118,27 +107,23 @@ export function RigChoices({ app }: { app: App }) {
       )}
       {joints !== "stay" && model.props.length > 0 && (
         <Fold title={T.clips.rigid(rigid.length, model.props.length)}>
-          <div class="stack">
-            <p class="hint">{T.clips.rigidSentence}</p>
-            {[...new Set(model.props)].map((name) => (
-              <Toggle
-                key={name}
-                label={name}
-                value={rigid.includes(name)}
-                onChange={(on) =>
-                  app.clips.rig({ rigid: on ? [...rigid, name] : rigid.filter((other) => other !== name) })
-                }
-              />
-            ))}
-          </div>
+          <p class="hint">{T.clips.rigidSentence}</p>
+          {[...new Set(model.props)].map((name) => (
+            <Toggle
+              key={name}
+              label={name}
+              value={rigid.includes(name)}
+              onChange={(on) =>
+                app.clips.rig({ rigid: on ? [...rigid, name] : rigid.filter((other) => other !== name) })
+              }
+            />
+          ))}
         </Fold>
       )}
       {joints !== "stay" && (
         <Fold title={T.clips.advanced}>
-          <div class="stack">
-            <Toggle label={T.clips.turn} sentence={T.clips.turnSentence} {...turn} />
-            <Toggle label={T.clips.travel} sentence={T.clips.travelSentence} {...option("keep_travel")} />
-          </div>
+          <Toggle label={T.clips.turn} sentence={T.clips.turnSentence} {...turn} />
+          <Toggle label={T.clips.travel} sentence={T.clips.travelSentence} {...option("keep_travel")} />
         </Fold>
       )}
     </>

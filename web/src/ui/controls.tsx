@@ -131,6 +131,41 @@ export function Segments<T extends string | number>(props: SegmentsProps<T>) {
   );
 }
 
+interface SelectProps<T extends string | number> extends Field<T | null> {
+  label: string;
+  /** Label of the choice that stands for null. */
+  none: string;
+  options: readonly (readonly [value: T, label: string])[];
+  /** Accessible name, where the label alone is ambiguous. */
+  name?: string;
+  disabled?: boolean;
+  /** Class names from controls.css. */
+  kind?: string;
+}
+
+/** A list from which the user chooses one value or none. */
+export function Select<T extends string | number>(props: SelectProps<T>) {
+  const { label, none, options, name, disabled, kind = "stack tight", value, onChange } = props;
+  return (
+    <label class={kind}>
+      <span class="legend-text">{label}</span>
+      <select
+        aria-label={name}
+        disabled={disabled}
+        value={options.find(([one]) => one === value)?.[0] ?? ""}
+        onChange={(event) => onChange(options[event.currentTarget.selectedIndex - 1]?.[0] ?? null)}
+      >
+        <option value="">{none}</option>
+        {options.map(([value, label]) => (
+          <option key={value} value={value}>
+            {label}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
 /** A switch with a label and an explanation. */
 export function Toggle(props: Field<boolean> & { label: string; sentence?: string }) {
   const id = useUid();

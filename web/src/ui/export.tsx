@@ -9,7 +9,7 @@ import { fittingPoses, isCapture, rigOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
-import { fieldsOf, Head, Segments, switchOf, Toggle } from "./controls";
+import { fieldsOf, Head, Segments, Select, switchOf, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Privacy } from "./model";
 
@@ -98,27 +98,18 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
 
 /** Selection of the models to export: one of them, all as separate files, or all in an archive. */
 function Which({ app }: { app: App }) {
-  const { model, exportOnly } = app.store.get();
-  const members = model?.members ?? [];
+  const members = app.store.get().model?.members ?? [];
   if (members.length < 2) return null;
-  const which = exportOnly === "zip" ? "zip" : (members.find(({ id }) => id === exportOnly)?.id ?? "");
-  const choose = (chosen: string) => {
-    const exportOnly = chosen === "zip" ? "zip" : chosen === "" ? null : Number(chosen);
-    app.store.set({ exportOnly });
-  };
   return (
-    <label class="stack tight">
-      <span class="legend-text">{T.exports.which}</span>
-      <select value={which} onChange={({ currentTarget: { value } }) => choose(value)}>
-        <option value="">{T.exports.all(members.length)}</option>
-        <option value="zip">{T.exports.zip(members.length)}</option>
-        {members.map(({ id, name }) => (
-          <option key={id} value={id}>
-            {name}
-          </option>
-        ))}
-      </select>
-    </label>
+    <Select<number | "zip">
+      label={T.exports.which}
+      none={T.exports.all(members.length)}
+      options={[
+        ["zip", T.exports.zip(members.length)],
+        ...members.map(({ id, name }) => [id, name] as const),
+      ]}
+      {...fieldsOf(app.store.get(), app.store.set)("exportOnly")}
+    />
   );
 }
 

@@ -17,6 +17,7 @@ import {
   NumberInput,
   Section,
   Segments,
+  Select,
   SHARES,
   Slider,
   Toggle,
@@ -367,23 +368,15 @@ function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowP
           kind="small"
         />
       </div>
-      <label class="row">
-        <span class="legend-text">{T.pose.motion}</span>
-        <select
-          aria-label={T.pose.motionOf(name)}
-          value={interpolation ?? ""}
-          onChange={({ currentTarget: { value } }) =>
-            app.poses.interpolation(index, INTERPOLATIONS.find((known) => known === value) ?? null)
-          }
-        >
-          <option value="">{T.pose.motionOfAll}</option>
-          {INTERPOLATIONS.map((known) => (
-            <option key={known} value={known}>
-              {T.pose.interpolations[known]}
-            </option>
-          ))}
-        </select>
-      </label>
+      <Select
+        label={T.pose.motion}
+        name={T.pose.motionOf(name)}
+        kind="row"
+        none={T.pose.motionOfAll}
+        options={INTERPOLATIONS.map((known) => [known, T.pose.interpolations[known]])}
+        value={interpolation}
+        onChange={(chosen) => app.poses.interpolation(index, chosen)}
+      />
       <Slider
         label={T.pose.blend}
         name={T.pose.blendOf(name)}
