@@ -57,7 +57,7 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
           </p>
           {doing && doing[0] > 0 && <p class="hint">{TOUR.doing(...doing)}</p>}
         </div>
-        <TourFigure app={app} name={name} tour={tour} guide={guide} />
+        <TourFigure app={app} name={name} reports={reports} guide={guide} />
       </div>
     </section>
   );

@@ -4,7 +4,6 @@ import { useEffect, useState } from "preact/hooks";
 import type { App } from "../app";
 import type { BindReport } from "../contract";
 import { scientific } from "../format";
-import type { TourState } from "../state";
 import { Button, Facts, Segments } from "../ui/controls";
 import { curvesOf } from "../ui/curves";
 import { Plot } from "../ui/plot";
@@ -12,7 +11,7 @@ import { CompareTable, solverName } from "../ui/report";
 import { Comparison, SlicePosition } from "../ui/see";
 import { T, TOUR } from "../words";
 import type { Guide } from "./guide";
-import { BONE, GRIDS, isOf, ofPaper, STEPS, type StopName, solvers, stopsOf, TAUS } from "./stops";
+import { BONE, GRIDS, isOf, paper, STEPS, type StopName, solvers, stopsOf, TAUS } from "./stops";
 
 interface Figure {
   app: App;
@@ -20,24 +19,19 @@ interface Figure {
   reports: readonly BindReport[];
 }
 
-export function TourFigure({
-  app,
-  guide,
-  name,
-  tour,
-}: Pick<Figure, "app" | "guide"> & { name: StopName; tour: TourState }) {
+export function TourFigure({ name, ...figure }: Figure & { name: StopName }) {
   const One = FIGURES[name];
   return One ? (
     <div class="tour-figure">
-      <One app={app} guide={guide} reports={tour.reports} />
+      <One {...figure} />
     </div>
   ) : null;
 }
 
 const FIGURES: Partial<Record<StopName, (figure: Figure) => preact.JSX.Element | null>> = {
   grid: Grid,
-  paper: ByGrid,
-  smoothing: ByTau,
+  paper: (figure) => <ErrorsBy option="grid" {...figure} />,
+  smoothing: (figure) => <ErrorsBy option="tau" {...figure} />,
   delta: Delta,
   times: Times,
   error: Errors,
@@ -62,47 +56,24 @@ function Grid({ app }: Figure) {
   );
 }
 
-/** Lists the mean rest errors of binds. */
-function RestErrors({
-  reports,
-  name,
-}: {
-  reports: readonly BindReport[];
-  name: (report: BindReport) => string;
-}) {
-  return (
-    <Facts rows={reports.map((report) => [name(report), scientific(report.rest_error.mean_rel)] as const)} />
-  );
-}
-
-function ByGrid({ app, guide, reports }: Figure) {
-  const { bindOptions } = app.store.get();
+/** Mean rest errors of binds with the classic method, which differ in one option. */
+function ErrorsBy({ app, guide, reports, option }: Figure & { option: "grid" | "tau" }) {
+  const { label, values, say } = {
+    grid: { label: TOUR.cells, values: GRIDS, say: TOUR.ofCells },
+    tau: { label: TOUR.tau, values: TAUS, say: TOUR.ofTau },
+  }[option];
+  const row = ({ [option]: value, rest_error }: BindReport) =>
+    [TOUR.errorOf(say(value)), scientific(rest_error.mean_rel)] as const;
   return (
     <>
       <Segments<number>
-        label={TOUR.cells}
-        values={GRIDS}
+        label={label}
+        values={values}
         labels={scientific}
-        value={bindOptions.grid}
-        onChange={(grid) => void guide.show(ofPaper(grid, 1e-5)[0] ?? {})}
+        value={app.store.get().bindOptions[option]}
+        onChange={(value) => void guide.show({ ...paper(32, 1e-5), [option]: value })}
       />
-      <RestErrors reports={reports} name={({ grid }) => TOUR.errorOf(TOUR.ofCells(grid))} />
-    </>
-  );
-}
-
-function ByTau({ app, guide, reports }: Figure) {
-  const { bindOptions } = app.store.get();
-  return (
-    <>
-      <Segments<number>
-        label={TOUR.tau}
-        values={TAUS}
-        labels={scientific}
-        value={bindOptions.tau}
-        onChange={(tau) => void guide.show(ofPaper(32, tau)[0] ?? {})}
-      />
-      <RestErrors reports={reports} name={({ tau }) => TOUR.errorOf(TOUR.ofTau(tau))} />
+      <Facts rows={reports.map(row)} />
     </>
   );
 }
@@ -180,7 +151,7 @@ function Errors({ app, guide, reports }: Figure) {
                       name={TOUR.showError(grid, tau, report.rest_error.mean_rel)}
                       pressed={grid === gridNow && tau === tauNow}
                       kind="small"
-                      onClick={() => void guide.show(ofPaper(grid, tau)[0] ?? {})}
+                      onClick={() => void guide.show(paper(grid, tau))}
                     />
                   )}
                 </td>

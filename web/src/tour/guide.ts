@@ -101,6 +101,13 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
     }
   };
 
+  const runNow = async (binds: readonly Partial<BindOptions>[]) => {
+    turn += 1;
+    const mine = turn;
+    await run(binds, mine);
+    if (mine === turn) set({ doing: null });
+  };
+
   const visit = async (stop: Stop, mine: number) => {
     const ours = optionsOf(stop.binds[0] ?? {});
     store.set({ bindOptions: ours });
@@ -169,20 +176,12 @@ export function createGuide(ctx: Context, { bind, edit, view, files, works }: Gu
       if (mine === turn) set({ doing: null });
     },
     /** Runs other binds, whose reports replace the reports of this stop. */
-    async measure(binds: readonly Partial<BindOptions>[]) {
-      turn += 1;
-      const mine = turn;
+    measure(binds: readonly Partial<BindOptions>[]) {
       set({ reports: [] });
-      await run(binds, mine);
-      if (mine === turn) set({ doing: null });
+      return runNow(binds);
     },
     /** Runs one more bind to show its result, and adds its report to the reports of this stop. */
-    async show(way: Partial<BindOptions>) {
-      turn += 1;
-      const mine = turn;
-      await run([way], mine);
-      if (mine === turn) set({ doing: null });
-    },
+    show: (way: Partial<BindOptions>) => runNow([way]),
     /** Ends the tour and restores the previous work and settings. */
     async end() {
       const was = before;

@@ -4,21 +4,6 @@ import type { BindOptions, BindReport, Coordinates, SceneOptions } from "../cont
 import { PAPER_DEFAULTS } from "../defaults";
 import type { Slice, StepName } from "../state";
 
-export const STOPS = [
-  "cage",
-  "weight",
-  "grid",
-  "paper",
-  "smoothing",
-  "delta",
-  "times",
-  "error",
-  "coordinates",
-  "smooth",
-  "splat",
-] as const;
-export type StopName = (typeof STOPS)[number];
-
 export interface Stop {
   readonly sample: string;
   /** Index of the sample's pose; the rest pose if undefined. */
@@ -43,7 +28,8 @@ export const GRIDS = [16, 32] as const;
 /** Values of `tau`, the threshold at which the solver stops, in the error table. */
 export const TAUS = [1e-3, 1e-4, 1e-5] as const;
 
-const paper = (grid: number, tau: number): Partial<BindOptions> => {
+/** Bind options of the classic method. */
+export const paper = (grid: number, tau: number): Partial<BindOptions> => {
   const { backend: _, memory_limit: __, ...way } = PAPER_DEFAULTS;
   return { ...way, grid, tau };
 };
@@ -56,10 +42,8 @@ const FIGURE: Partial<SceneOptions> = { base_wireframe: true, cage: false, colou
 /** Bind options of the classic method with each solver. */
 export const solvers = (grid: number): Partial<BindOptions>[] =>
   (["jacobi", "cg", "multigrid"] as const).map((solver) => ({ ...paper(grid, 1e-5), solver }));
-export const ofPaper = (grid: number, tau: number) => [paper(grid, tau)];
 
-/** Returns all stops. `gpu`: whether binds can run on the graphics card. */
-export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
+function allStops(gpu: boolean) {
   const rat = { sample: "rat", turn: [90, 30] } as const;
   return {
     cage: { ...rat, step: "pose", binds: [{}] },
@@ -72,8 +56,8 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
       slice: { axis: 0, position: 0.5 },
       vertex: 57,
     },
-    paper: { ...rat, step: "bind", binds: ofPaper(16, 1e-5), scene: FIGURE },
-    smoothing: { ...rat, step: "bind", binds: ofPaper(32, 1e-3), scene: FIGURE },
+    paper: { ...rat, step: "bind", binds: [paper(16, 1e-5)], scene: FIGURE },
+    smoothing: { ...rat, step: "bind", binds: [paper(32, 1e-3)], scene: FIGURE },
     delta: { ...rat, step: "bind", binds: solvers(32) },
     times: {
       ...rat,
@@ -109,8 +93,14 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
     },
     // `binds` is empty, because opening a capture makes its cage and binds it.
     splat: { sample: "spot", step: "pose", binds: [], scene: { cage: false }, turn: [60, 20] },
-  };
+  } satisfies Record<string, Stop>;
 }
+
+export type StopName = keyof ReturnType<typeof allStops>;
+/** Returns all stops. `gpu`: whether binds can run on the graphics card. */
+export const stopsOf: (gpu: boolean) => Readonly<Record<StopName, Stop>> = allStops;
+/** The names of the stops, in order. */
+export const STOPS = Object.keys(allStops(false)) as StopName[];
 
 /** Numbers of subdivision steps that stop "smooth" offers. */
 export const STEPS = [0, 1, 2] as const;
