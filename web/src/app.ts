@@ -3,7 +3,7 @@
 import { createBind } from "./actions/bind";
 import { createCage } from "./actions/cage";
 import { createClips } from "./actions/clips";
-import type { Context, Messages } from "./actions/context";
+import type { Context } from "./actions/context";
 import { createControls } from "./actions/controls";
 import { createEdit } from "./actions/edit";
 import { createExports } from "./actions/exports";
@@ -17,14 +17,13 @@ import { createPulling } from "./actions/pull";
 import { createTour } from "./actions/tour";
 import { createView } from "./actions/view";
 import { createWorks } from "./actions/works";
-import type { NamedFile, Session } from "./contract";
+import type { NamedFile } from "./contract";
 import { COMPANION_ENDINGS, MODEL_ENDINGS, MODEL_TYPES, SLIDERS } from "./defaults";
 import { followDocument } from "./document";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
 import { createQueue } from "./queue";
-import type { Store } from "./signals";
 import type { StepName } from "./state";
 import type { Explanation } from "./strings";
 import { T } from "./words";
@@ -37,19 +36,11 @@ const MODELS = `${CAGES},${COMPANION_ENDINGS.map((ending) => `.${ending}`)},${MO
 /** Media query for windows in which the See panel covers the panel of the step; stage.css has the same query. */
 const NARROW_WINDOW = "(max-width: 1279.98px)";
 
-export interface Needs {
-  store: Store;
-  /** Returns the session. Throws until it is open. */
-  session: () => Session;
-  tell: Messages;
-  /** Rectangle of the view in the window. */
-  viewport: () => DOMRect;
-}
-
-export function createApp({ store, session, tell, viewport }: Needs) {
+export function createApp(needs: Pick<Context, "store" | "session" | "tell" | "viewport">) {
+  const { store, session } = needs;
   const fixFor = (fix: NonNullable<Explanation["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
   const engine = () => session().engine;
-  const ctx: Context = { session, engine, store, queue: createQueue(), tell, fixFor, viewport };
+  const ctx: Context = { ...needs, engine, queue: createQueue(), fixFor };
   const bind = createBind(ctx);
   const { take, know, made, checked } = followDocument(ctx);
   const edit = createEdit(ctx);

@@ -1,6 +1,7 @@
 /** Queue of asynchronous jobs. Jobs of the same kind run in sequence, jobs of different kinds in parallel. */
 
 import type { Job } from "./contract";
+import { cancelled } from "./strings";
 
 export type Kind =
   | "open"
@@ -39,7 +40,7 @@ export function createQueue(): Queue {
       const stop = new AbortController();
       line.stops.add(stop);
       const start = () => {
-        if (stop.signal.aborted) throw Object.assign(new Error("cancelled"), { name: "Cancelled" });
+        if (stop.signal.aborted) throw cancelled();
         return work(stop.signal);
       };
       const done = line.last.then(start, start).finally(() => line.stops.delete(stop));

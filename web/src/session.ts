@@ -1,7 +1,7 @@
 /** The page's interface to Rust: the engine on this thread, workers for binds and files, and frames. */
 
 import { startBind } from "@cagework/core/session/bind";
-import { type Client, createClient, named } from "@cagework/core/session/client";
+import { type Client, createClient } from "@cagework/core/session/client";
 import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
@@ -30,6 +30,7 @@ import type {
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { once, prepareSample } from "./session/opening";
+import { cancelled } from "./strings";
 import { T } from "./words";
 
 declare global {
@@ -131,7 +132,7 @@ async function start(opened: OpenResult & Needs) {
     canvas.addEventListener("webglcontextlost", () => guarded === canvas && engine.lose());
   };
   guard(canvas);
-  const losses = new Set<(reason: string) => void>();
+  const losses: ((reason: string) => void)[] = [];
   const watch = async () => {
     const reason = await engine.lost();
     for (const listener of losses) listener(reason);
@@ -224,7 +225,7 @@ async function start(opened: OpenResult & Needs) {
         const all: ReturnType<typeof load>[number][] = [];
         try {
           for (const read of reads) {
-            if (isGivenUp) throw named("Cancelled", "cancelled");
+            if (isGivenUp) throw cancelled();
             // If the file is a project, add its models and ignore its cage.
             all.push(...load(pkg, read as ReadModel));
           }
@@ -334,11 +335,6 @@ async function start(opened: OpenResult & Needs) {
     bind: (options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> =>
       startBind({ client, engine, adapter, options, listener, cage }),
     /**
-     * Estimates the number of bytes that a bind with these options needs. Throws the error that the bind would end
-     * with. Fast enough to be called on every change.
-     */
-    estimateMemory: (options: BindOptions) => engine.estimateMemory(options),
-    /**
      * Computes closed-form coordinates for comparison, in the worker. Needed once per cage before `scene.compare` shows
      * them.
      */
@@ -408,14 +404,8 @@ async function start(opened: OpenResult & Needs) {
     },
     /** For tests: reads the posed positions as drawn, by default with harmonic coordinates. */
     readPositions: (kind: Coordinates = "harmonic") => engine.readPositions(kind),
-    /**
-     * Calls `listener` when the GPU device is lost, after which the page calls `recover()`. Returns a function that
-     * removes the listener.
-     */
-    onLost(listener: (reason: string) => void): () => void {
-      losses.add(listener);
-      return () => losses.delete(listener);
-    },
+    /** Calls `listener` when the GPU device is lost, after which the page calls `recover()`. */
+    onLost: (listener: (reason: string) => void) => void losses.push(listener),
     /**
      * Restores the view on a new device. `canvas` must be new, because one with a lost context cannot be used again.
      */
@@ -430,12 +420,6 @@ async function start(opened: OpenResult & Needs) {
     rest: client.rest,
     /** Size of the wasm module's memory on this thread, bytes. */
     memory: () => memory.buffer.byteLength,
-    close() {
-      frames.stop();
-      client.close();
-      puller?.close();
-      engine.free();
-    },
   };
   globalThis.cagework = session;
   return session;

@@ -40,6 +40,11 @@ export function loadTheme(): Theme {
   return theme === "light" || theme === "dark" ? theme : "auto";
 }
 
+/** The theme that is shown; "auto" follows the operating system. */
+export function shownTheme(theme: Theme, dark: MediaQueryList): "light" | "dark" {
+  return theme === "auto" ? (dark.matches ? "dark" : "light") : theme;
+}
+
 export function saveTheme(theme: Theme): void {
   writeItem(THEME, theme);
 }

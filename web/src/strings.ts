@@ -59,6 +59,9 @@ export function explain(error: unknown, title: string): Explanation {
   return fix ? { title, message, fix } : { title, message };
 }
 
+/** Creates an error which means that work was cancelled, and which is not shown. */
+export const cancelled = (message = "cancelled") => Object.assign(new Error(message), { name: "Cancelled" });
+
 /** Whether an error only means that the user cancelled. */
 export function isCancelled(error: unknown): boolean {
   return error instanceof Error && error.name === "Cancelled";

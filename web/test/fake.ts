@@ -221,6 +221,7 @@ export function createFake(): Fake {
     show({ steps: view.steps + 1, undo: label });
   };
   const known: Partial<Engine> = {
+    estimateMemory: () => 1000,
     get revision() {
       return revision;
     },
@@ -306,7 +307,6 @@ export function createFake(): Fake {
       engine.setCage(positions, corners, controls, [...notices], label),
     cageArrays: () => rest,
     bind: (options, listener) => job("bind", { options, listener }),
-    estimateMemory: () => 1000,
     bindByFormula: (kind) => job("formula", kind),
     loadSlice: (axis, position) => job("slice", { axis, position }),
     loadLattice: (grid) => job("lattice", { grid }),

@@ -18,7 +18,7 @@ export function createBind(ctx: Context) {
     const { model, cage, bindOptions } = store.get();
     if (!model || !cage?.usable) return;
     try {
-      store.set({ memory: ctx.session().estimateMemory(bindOptions) });
+      store.set({ memory: ctx.engine().estimateMemory(bindOptions) });
     } catch (error) {
       store.set({ memory: messageOf(error) });
     }

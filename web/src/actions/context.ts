@@ -4,7 +4,7 @@ import type { Engine, Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import { onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
-import { type Explanation, explain, isCancelled, type Message } from "../strings";
+import { cancelled, type Explanation, explain, isCancelled, type Message } from "../strings";
 import { T } from "../words";
 
 export interface Fix {
@@ -22,6 +22,7 @@ export interface Messages {
 }
 
 export interface Context {
+  /** Returns the session. Throws until it is open. */
   readonly session: () => Session;
   readonly engine: () => Engine;
   readonly store: Store;
@@ -73,7 +74,7 @@ export async function waitFor<T extends object>(
     const { vertices = 0 } = read as Partial<ReadFile>;
     if (vertices > MAX_UNASKED_VERTICES) {
       await new Promise<void>((goOn, giveUp) => {
-        cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
+        cancelBusy = () => giveUp(cancelled());
         const busyStep = T.opening.large(vertices);
         store.set({ busyStep, goOn, cancelBusy });
       });

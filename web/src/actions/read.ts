@@ -2,11 +2,9 @@
 
 import type { Job, NamedFile, ReadFile, Reading } from "../contract";
 import type { DropPlan } from "../drop";
-import { isCancelled } from "../strings";
+import { cancelled, isCancelled } from "../strings";
 import { T } from "../words";
 import { type Context, report, waitFor } from "./context";
-
-const cancelled = (message: string) => Object.assign(new Error(message), { name: "Cancelled" });
 
 /** A model that was read, and the name of its file. */
 export interface ReadResult {

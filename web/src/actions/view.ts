@@ -6,7 +6,7 @@ import { drawn, elementInUse } from "../derived";
 import { follow } from "../queue";
 import type { SharedView } from "../share";
 import type { Slice } from "../state";
-import { saveTheme, type Theme } from "../store";
+import { saveTheme, shownTheme, type Theme } from "../store";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import { attempt, type Context } from "./context";
@@ -38,18 +38,15 @@ export function createView(
     store.set({ legend: engine().legend() ?? null });
   };
 
-  const shown = (theme: Theme): "light" | "dark" =>
-    theme === "auto" ? (dark.matches ? "dark" : "light") : theme;
-
   const theme = (choice: Theme) => {
     if (choice === "auto") delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = choice;
     saveTheme(choice);
     store.set({ theme: choice });
-    scene({ theme: shown(choice) });
+    scene({ theme: shownTheme(choice, dark) });
   };
   dark.addEventListener("change", () => {
-    if (store.get().theme === "auto") scene({ theme: shown("auto") });
+    if (store.get().theme === "auto") scene({ theme: shownTheme("auto", dark) });
   });
 
   const tools = (patch: Partial<Tools>) => engine().setTools({ ...store.get().tools, ...patch });

@@ -3,7 +3,7 @@
 import { render } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { decodeShare } from "../share";
-import { loadTheme } from "../store";
+import { loadTheme, shownTheme } from "../store";
 import { type Message, messageOf, sentence } from "../strings";
 import { Button, Say } from "../ui/controls";
 import { GALLERY, loadGallery, T } from "../words";
@@ -28,10 +28,7 @@ function inTurn(work: () => Promise<void>): void {
   last = last.then(work);
 }
 
-function theme(): "light" | "dark" {
-  const chosen = loadTheme();
-  return chosen === "auto" ? (dark.matches ? "dark" : "light") : chosen;
-}
+const theme = () => shownTheme(loadTheme(), dark);
 
 function Example({ id }: { id: Id }) {
   const { title, text } = GALLERY.examples[id];

@@ -59,9 +59,9 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
 
 function Step({ app, name, number }: { app: App; name: StepName; number: number }) {
   const state = app.store.get();
-  const turn = busyShare(name, state);
+  const { done, turn = null } = PROGRESS[name](state);
   const isHere = state.step === name;
-  const isDone = turn === null && done(name, state);
+  const isDone = turn === null && done;
   return (
     <button
       type="button"
@@ -81,25 +81,11 @@ function Step({ app, name, number }: { app: App; name: StepName; number: number 
   );
 }
 
-function busyShare(name: StepName, state: AppState): number | null {
-  if (name === "cage") return state.cageProgress;
-  if (name === "bind") return state.bindRun ? state.bindRun.fraction : null;
-  return null;
-}
-
-function done(name: StepName, state: AppState): boolean {
-  switch (name) {
-    case "model":
-      return state.model !== null;
-    case "cage":
-      return state.cage?.usable === true;
-    case "bind":
-      return state.bound;
-    case "pose":
-      return state.poses.length > 0;
-    case "export":
-      return false;
-    default:
-      return name satisfies never;
-  }
-}
+/** Whether a step is done, and the finished fraction of its operation in progress. */
+const PROGRESS: Record<StepName, (state: AppState) => { done: boolean; turn?: number | null | undefined }> = {
+  model: ({ model }) => ({ done: model !== null }),
+  cage: ({ cage, cageProgress }) => ({ done: cage?.usable === true, turn: cageProgress }),
+  bind: ({ bound, bindRun }) => ({ done: bound, turn: bindRun?.fraction }),
+  pose: ({ poses }) => ({ done: poses.length > 0 }),
+  export: () => ({ done: false }),
+};
