@@ -8,7 +8,8 @@ import type {
   RigOptions,
   SceneOptions,
 } from "./contract";
-import type { AppState, CageSettings } from "./state";
+import { SHAPE_FORMATS, SPLAT_FORMATS } from "./defaults";
+import type { AppState, CageSettings, ShapeFormat } from "./state";
 
 /** The rig options that apply to the open model. */
 export function rigOf({ model, rigOptions }: AppState): RigOptions {
@@ -42,6 +43,19 @@ export function drawn(state: AppState): SceneOptions {
 /** Whether the model has no faces: a capture of splats, or a point cloud. */
 export function isCapture(model: ModelInfo | null): boolean {
   return model !== null && model.splats + model.points > 0;
+}
+
+/** The formats in which the shape of a model can be exported. */
+export function shapeFormatsOf(model: ModelInfo | null): readonly ShapeFormat[] {
+  if (model?.splats) return SPLAT_FORMATS;
+  // STL stores only faces, which a point cloud does not have.
+  return model?.points ? SHAPE_FORMATS.filter((format) => format !== "stl") : SHAPE_FORMATS;
+}
+
+/** The format in which the shape of the open model is exported. */
+export function shapeFormatOf({ model, shapeFormat }: AppState): ShapeFormat {
+  const formats = shapeFormatsOf(model);
+  return formats.includes(shapeFormat) ? shapeFormat : (formats[0] ?? shapeFormat);
 }
 
 /** Number of vertices and interior controls of the cage. */

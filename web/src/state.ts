@@ -17,6 +17,8 @@ import {
   CAGE_DEFAULTS,
   RIG_DEFAULTS,
   SCENE_DEFAULTS,
+  SHAPE_FORMATS,
+  type SPLAT_FORMATS,
   VIEW_DEFAULTS,
 } from "./defaults";
 import { cageKey } from "./derived";
@@ -51,6 +53,8 @@ export interface Slice {
 
 /** Targets for dropped files: the page, the Cage panel, or the list of models in the cage. */
 export type DropPlace = "page" | "cage" | "list";
+
+export type ShapeFormat = (typeof SHAPE_FORMATS | typeof SPLAT_FORMATS)[number];
 
 export type CageSource = "auto" | "hull" | "box" | "file";
 
@@ -129,6 +133,14 @@ export const MODEL_STATE = {
    * Identifier of the only model to export; "zip" to export all in one archive, null to export all as separate files.
    */
   exportOnly: null as number | "zip" | null,
+  /** Format of exported shapes, if the model can have it; see `shapeFormatOf`. */
+  shapeFormat: SHAPE_FORMATS[0] as ShapeFormat,
+  /** Whether an exported shape is the shown frame of a clip or the rest shape. */
+  shapeMoment: "frame" as "frame" | "rest",
+  /** Picture pixels per CSS pixel of the view. */
+  pictureScale: 2 as 1 | 2 | 4,
+  /** Whether a picture shows only the model. */
+  pictureAlone: false,
   /** Options that determine how the model's skeleton follows the cage. */
   rigOptions: RIG_DEFAULTS,
   /** Name of the pose that the animation approaches; null for the rest pose. */

@@ -2,8 +2,8 @@
 
 import { extension } from "@cagework/core/names";
 import type { ModelInfo, NamedFile } from "../contract";
-import { EXPORT_TYPES, SHAPE_FORMATS, type SPLAT_FORMATS } from "../defaults";
-import { isCapture, rigOf } from "../derived";
+import { EXPORT_TYPES } from "../defaults";
+import { isCapture, rigOf, shapeFormatOf } from "../derived";
 import { exportStem } from "../format";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -23,8 +23,6 @@ export type ExportKind =
   | "picture"
   | "project";
 
-export type ShapeFormatName = (typeof SHAPE_FORMATS | typeof SPLAT_FORMATS)[number];
-
 /** A file to download. */
 interface ExportedFile {
   readonly name: string;
@@ -41,18 +39,14 @@ const OCTETS = "application/octet-stream";
 const MAX_PICTURE_SIDE = 8192;
 
 export function createExports(ctx: Context, project: Project, pull: Pick<Pulling, "released">) {
-  let scale = 2;
-  let alone = false;
-  let format: ShapeFormatName = SHAPE_FORMATS[0];
-  let frame = true;
-
   const { engine } = ctx;
   const rig = () => rigOf(ctx.store.get());
+  const format = () => shapeFormatOf(ctx.store.get());
 
   /** Exports that write one file for each model. */
   const own = {
     glb: (id: number) => engine().exportGlb(id, rig(), ctx.store.get().clip.clip ?? 0),
-    shape: (id: number) => engine().exportShape(id, format, frame),
+    shape: (id: number) => engine().exportShape(id, format(), ctx.store.get().shapeMoment === "frame"),
     poses: (id: number) => engine().exportPoses(id, rig()),
     weights: (id: number) => engine().exportWeights(id),
   };
@@ -64,7 +58,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
   };
 
   const suffix = (kind: Exclude<ExportKind, "project" | "clips">): string =>
-    kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
+    kind === "shape" ? `-posed.${format()}` : SUFFIX[kind];
 
   /** Downloads one file for each model to export, or all of them in a zip archive. */
   const saveOwn = async (kind: keyof typeof own, model: ModelInfo) => {
@@ -113,8 +107,9 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
 
   const picture = () => {
     const { width, height } = ctx.viewport();
-    const fit = Math.min(scale, MAX_PICTURE_SIDE / Math.max(width, height, 1));
-    return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), alone);
+    const { pictureScale, pictureAlone } = ctx.store.get();
+    const fit = Math.min(pictureScale, MAX_PICTURE_SIDE / Math.max(width, height, 1));
+    return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), pictureAlone);
   };
 
   const exports = {
@@ -164,14 +159,6 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
         return;
       }
       await copyLink(ctx, link, T.exports.copied);
-    },
-    /** Sets the number of picture pixels per CSS pixel of the view, and whether the picture shows only the model. */
-    pictureOf(size: number, isAlone: boolean) {
-      [scale, alone] = [size, isAlone];
-    },
-    /** Sets the format of exported shapes, and whether they show the current frame of a clip. */
-    shapeIn(chosen: ShapeFormatName, isFrame: boolean) {
-      [format, frame] = [chosen, isFrame];
     },
   };
   return exports;

@@ -1,11 +1,9 @@
 /** Step 5: files to download. */
 
-import { useEffect, useState } from "preact/hooks";
-import type { ExportKind, ShapeFormatName } from "../actions/exports";
+import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
 import type { ModelInfo, RigOptions } from "../contract";
-import { SHAPE_FORMATS, SPLAT_FORMATS } from "../defaults";
-import { fittingPoses, isCapture, rigOf } from "../derived";
+import { fittingPoses, isCapture, rigOf, shapeFormatOf, shapeFormatsOf } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
@@ -163,54 +161,40 @@ function wordsOf(kind: ExportKind, model: ModelInfo | null): readonly string[] {
   return kind === "shape" && model?.points ? T.exports.points : T.exports.items[kind];
 }
 
-function formatsOf(model: ModelInfo | null): readonly ShapeFormatName[] {
-  if (model?.splats) return SPLAT_FORMATS;
-  // STL stores only faces, which a point cloud does not have.
-  return model?.points ? SHAPE_FORMATS.filter((format) => format !== "stl") : SHAPE_FORMATS;
-}
-
 function ShapeFormat({ app }: { app: App }) {
-  const formats = formatsOf(app.store.get().model);
-  const [chosen, setFormat] = useState<ShapeFormatName>(SHAPE_FORMATS[0]);
-  const format = formats.find((one) => one === chosen) ?? formats[0] ?? chosen;
-  const [moment, setMoment] = useState<"frame" | "rest">("frame");
-  useEffect(() => app.exports.shapeIn(format, moment === "frame"), [app, format, moment]);
-  const isClipShown = app.store.get().clip.clip !== null;
+  const state = app.store.get();
+  const { onChange } = fieldsOf(state, app.store.set)("shapeFormat");
   return (
     <div class="export-option stack tight">
-      {isClipShown && (
-        <Segments<"frame" | "rest">
+      {state.clip.clip !== null && (
+        <Segments
           label={T.exports.moment}
           labels={{ frame: T.exports.frame, rest: T.exports.restShape }}
-          value={moment}
-          onChange={setMoment}
+          {...fieldsOf(state, app.store.set)("shapeMoment")}
         />
       )}
-      <Segments<ShapeFormatName>
+      <Segments
         label={T.exports.format}
-        values={formats}
-        labels={(value) => value.toUpperCase()}
-        value={format}
-        onChange={setFormat}
+        values={shapeFormatsOf(state.model)}
+        labels={(format) => format.toUpperCase()}
+        value={shapeFormatOf(state)}
+        onChange={onChange}
       />
     </div>
   );
 }
 
 function PictureOptions({ app }: { app: App }) {
-  const [size, setSize] = useState<1 | 2 | 4>(2);
-  const [alone, setAlone] = useState(false);
-  useEffect(() => app.exports.pictureOf(size, alone), [app, size, alone]);
+  const option = fieldsOf(app.store.get(), app.store.set);
   return (
     <div class="export-option stack tight">
-      <Segments<1 | 2 | 4>
+      <Segments
         label={T.exports.size}
         values={[1, 2, 4]}
         labels={T.exports.sizes}
-        value={size}
-        onChange={setSize}
+        {...option("pictureScale")}
       />
-      <Toggle label={T.exports.alone} sentence={T.exports.aloneSentence} value={alone} onChange={setAlone} />
+      <Toggle label={T.exports.alone} sentence={T.exports.aloneSentence} {...option("pictureAlone")} />
     </div>
   );
 }

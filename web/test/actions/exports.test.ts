@@ -94,11 +94,11 @@ it("files are named after the model and their size is shown", async () => {
   store.set({ model: { ...MODEL, name: "someone.vrm" } });
   await exports.save("glb");
   expect(downloads.at(-1), "a VRM keeps its extension").toBe("someone-posed.vrm");
-  exports.shapeIn("stl", false);
+  store.set({ shapeFormat: "stl", shapeMoment: "rest" });
   await exports.save("shape");
   expect(downloads.at(-1), "a shape has its own format").toBe("someone-posed.stl");
   expect(said.at(-2)).toContain("(3 byte)");
-  exports.shapeIn("ply", true);
+  store.set({ shapeFormat: "ply", shapeMoment: "frame" });
   await exports.save("shape");
   expect(said.at(-2), "the shown frame of a clip").toContain("(4 byte)");
   const glb = "model/gltf-binary";
