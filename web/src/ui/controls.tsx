@@ -29,20 +29,30 @@ interface ButtonProps {
   pressed?: boolean;
 }
 
-/** Button with text and an optional icon. */
-export function Button({ label, icon, kind = "", tip, name, pressed, ...rest }: ButtonProps) {
+type PlainProps = Omit<ButtonProps, "label"> & { children?: ComponentChildren };
+
+function PlainButton({ icon, kind = "", tip, name, pressed, children, ...rest }: PlainProps) {
   return (
     <button
       {...rest}
       type="button"
-      class={`button ${kind}`.trim()}
+      class={kind.trim()}
       aria-label={name}
       aria-pressed={pressed}
       data-tip={tip}
     >
       {icon && <Icon name={icon} />}
-      <span>{label}</span>
+      {children}
     </button>
+  );
+}
+
+/** Button with text and an optional icon. */
+export function Button({ label, kind = "", ...rest }: ButtonProps) {
+  return (
+    <PlainButton {...rest} kind={`button ${kind}`}>
+      <span>{label}</span>
+    </PlainButton>
   );
 }
 
@@ -52,20 +62,9 @@ interface IconButtonProps extends Omit<ButtonProps, "icon" | "name"> {
 }
 
 /** Button with only an icon. `label` is its accessible name and, with the shortcut, its tool tip. */
-export function IconButton(props: IconButtonProps) {
-  const { icon, label, shortcut, kind = "", tip = label, pressed, ...rest } = props;
-  return (
-    <button
-      {...rest}
-      type="button"
-      class={`icon-button ${kind}`.trim()}
-      aria-label={label}
-      aria-pressed={pressed}
-      data-tip={shortcut ? `${tip} (${shortcut})` : tip}
-    >
-      <Icon name={icon} />
-    </button>
-  );
+export function IconButton({ label, shortcut, kind = "", tip = label, ...rest }: IconButtonProps) {
+  const whole = shortcut ? `${tip} (${shortcut})` : tip;
+  return <PlainButton {...rest} kind={`icon-button ${kind}`} name={label} tip={whole} />;
 }
 
 let next = 0;

@@ -3,7 +3,7 @@
  * announce both.
  */
 
-import { signal } from "@preact/signals";
+import { type Signal, signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import type { Fix, Messages } from "../actions/context";
 import { type Message, textOf } from "../strings";
@@ -25,6 +25,7 @@ const MAX_TOASTS = 3;
 
 interface Toast {
   readonly id: number;
+  /** Headline of a problem, which stays until it is closed. */
   readonly title?: string;
   readonly text: Message;
   readonly fixes: readonly Fix[];
@@ -36,6 +37,12 @@ interface Toast {
 
 /** A message with several buttons is a question, which stays until it is answered or something new starts. */
 const isQuestion = (fixes: readonly Fix[]) => fixes.length > 1;
+
+type List = Signal<readonly Toast[]>;
+
+const close = (list: List, id: number) => {
+  list.value = list.value.filter((toast) => toast.id !== id);
+};
 
 let next = 0;
 
@@ -51,7 +58,7 @@ export function createToasts(): ToastParts {
   const problems = signal<readonly Toast[]>([]);
 
   /** Adds a message. If the same message is already shown, replaces it. */
-  const add = (list: typeof said, toast: Omit<Toast, "id" | "since">) => {
+  const add = (list: List, toast: Omit<Toast, "id" | "since">) => {
     const isSame = ({ title, text }: Toast) => title === toast.title && textOf(text) === textOf(toast.text);
     const others = list.value.filter((other) => !isSame(other));
     next += 1;
@@ -59,19 +66,9 @@ export function createToasts(): ToastParts {
     const latest = all.filter(({ stays }) => !stays).slice(-MAX_TOASTS);
     list.value = all.filter((one) => one.stays || latest.includes(one));
   };
-  const closing = (list: typeof said) => (id: number) => {
-    list.value = list.value.filter((toast) => toast.id !== id);
-  };
 
   return {
-    Toasts: () => (
-      <Stack
-        said={said.value}
-        problems={problems.value}
-        closeSaid={closing(said)}
-        closeProblem={closing(problems)}
-      />
-    ),
+    Toasts: () => <Stack said={said} problems={problems} />,
     tell: {
       say: (text, ...fixes) => add(said, { text, fixes }),
       problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),
@@ -84,42 +81,36 @@ export function createToasts(): ToastParts {
   };
 }
 
-interface StackProps {
-  said: readonly Toast[];
-  problems: readonly Toast[];
-  closeSaid: (id: number) => void;
-  closeProblem: (id: number) => void;
-}
-
-function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
+function Stack({ said, problems }: { said: List; problems: List }) {
   const element = useRef<HTMLDivElement>(null);
-  const isEmpty = said.length + problems.length === 0;
+  const isEmpty = said.value.length + problems.value.length === 0;
   useLayoutEffect(() => {
     const { current } = element;
     const isOpen = current?.matches(":popover-open");
     // Reopen the popover, so that it is above a dialog opened in the meantime.
     if (isOpen && (isEmpty || document.querySelector("dialog[open]"))) current?.hidePopover();
     if (!isEmpty && !current?.matches(":popover-open")) current?.showPopover();
-  }, [said, problems, isEmpty]);
+  }, [said.value, problems.value]);
   useEffect(() => {
     // A touch beside the messages closes them, because they cover much of the model on a small screen.
     const press = ({ pointerType, target, timeStamp }: PointerEvent) => {
       if (pointerType !== "touch" || element.current?.contains(target as Node)) return;
-      for (const { id, stays, since } of said) if (!stays && timeStamp - since > LINGER_MS) closeSaid(id);
+      for (const { id, stays, since } of said.value)
+        if (!stays && timeStamp - since > LINGER_MS) close(said, id);
     };
     document.addEventListener("pointerdown", press, true);
     return () => document.removeEventListener("pointerdown", press, true);
-  }, [said]);
+  }, []);
   return (
     <div class="toasts" id="toasts" popover="manual" ref={element}>
       <div class="toast-list" role="alert">
-        {problems.map((toast) => (
-          <Problem key={toast.id} toast={toast} close={() => closeProblem(toast.id)} />
+        {problems.value.map((toast) => (
+          <Item key={toast.id} toast={toast} close={() => close(problems, toast.id)} />
         ))}
       </div>
       <div class="toast-list" role="status" aria-live="polite">
-        {said.map((toast) => (
-          <Said key={toast.id} toast={toast} close={() => closeSaid(toast.id)} />
+        {said.value.map((toast) => (
+          <Item key={toast.id} toast={toast} close={() => close(said, toast.id)} />
         ))}
       </div>
     </div>
@@ -145,11 +136,11 @@ function Fixes({ fixes, close }: { fixes: readonly Fix[]; close: () => void }) {
   );
 }
 
-function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: () => void }) {
+function Item({ toast: { title, text, fixes, stays }, close }: { toast: Toast; close: () => void }) {
   const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
   const leaveIn = (ms: number) => {
     clearTimeout(timer.current);
-    if (!stays && !isQuestion(fixes)) timer.current = setTimeout(close, ms);
+    if (!title && !stays && !isQuestion(fixes)) timer.current = setTimeout(close, ms);
   };
   // Do not close a message that is hovered or focused.
   const stay = () => clearTimeout(timer.current);
@@ -158,21 +149,15 @@ function Said({ toast: { text, fixes, stays }, close }: { toast: Toast; close: (
     return stay;
   }, []);
   return (
-    <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(TOAST_MS)} onFocusIn={stay}>
-      <Icon name="info" />
-      <Say text={text} />
-      <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
-      <Fixes fixes={fixes} close={close} />
-    </div>
-  );
-}
-
-function Problem({ toast: { title, text, fixes }, close }: { toast: Toast; close: () => void }) {
-  return (
-    <div class="toast problem">
-      <Icon name="warning" />
+    <div
+      class={title ? "toast problem" : "toast"}
+      onPointerEnter={stay}
+      onPointerLeave={() => leaveIn(TOAST_MS)}
+      onFocusIn={stay}
+    >
+      <Icon name={title ? "warning" : "info"} />
       <div class="grow">
-        <strong>{title}</strong>
+        {title && <strong>{title}</strong>}
         <Say text={text} />
       </div>
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
