@@ -1,32 +1,34 @@
 /** Tools in the view while the cage is reshaped. */
 
 import type { App } from "../app";
-import type { Element as CageElement, RestEdit } from "../contract";
+import type { Element as CageElement } from "../contract";
+import type { Command } from "../input/shortcuts";
 import { T } from "../words";
 import { IconButton } from "./controls";
 import type { IconName } from "./icons";
 import { Toolbar } from "./toolbar";
 
-const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "extrude" | "remove"])[] = [
-  ["split_edge", "split", "split"],
-  ["collapse_edge", "merge", "collapse"],
-  ["extrude_face", "extrude", "extrude"],
-  ["delete_vertex", "trash", "remove"],
+type Vertices = Partial<Record<CageElement, number>>;
+
+/** Each edit, and how many vertices must be selected for it, by the kind of element that is selected. */
+const EDITS: readonly (readonly [keyof typeof T.cage.edits, IconName, Command, Vertices])[] = [
+  ["split_edge", "split", "split", { edge: 2 }],
+  ["collapse_edge", "merge", "collapse", { edge: 2 }],
+  ["extrude_face", "extrude", "extrude", { face: 3 }],
+  ["delete_vertex", "trash", "remove", { vertex: 1, face: 3 }],
 ];
 
 export function ReshapeTools({ app }: { app: App }) {
   const { tools, selected } = app.store.get();
-  const { element } = tools;
   return (
     <Toolbar label={T.cage.tools} kind="reshape">
-      {EDITS.map(([edit, icon, command]) => (
+      {EDITS.map(([edit, icon, command, { [tools.element]: needed = Infinity }]) => (
         <IconButton
           key={edit}
           icon={icon}
           label={T.cage.edits[edit]}
-          shortcut={app.key(command)}
-          disabled={selected.count < need(edit, element) || !suits(edit, element)}
-          onClick={() => app.edit.restEdit(deletion(edit, element))}
+          {...app.command(command)}
+          disabled={selected.count < needed}
         />
       ))}
       <IconButton
@@ -37,20 +39,4 @@ export function ReshapeTools({ app }: { app: App }) {
       />
     </Toolbar>
   );
-}
-
-function suits(edit: RestEdit, element: CageElement): boolean {
-  if (edit === "split_edge" || edit === "collapse_edge") return element === "edge";
-  if (edit === "extrude_face") return element === "face";
-  return element !== "edge";
-}
-
-function need(edit: RestEdit, element: CageElement): number {
-  if (edit === "extrude_face") return 3;
-  if (edit === "delete_vertex") return element === "face" ? 3 : 1;
-  return 2;
-}
-
-function deletion(edit: RestEdit, element: CageElement): RestEdit {
-  return edit === "delete_vertex" && element === "face" ? "delete_face" : edit;
 }
