@@ -117,25 +117,6 @@ function Stack({ said, problems }: { said: List; problems: List }) {
   );
 }
 
-function Fixes({ fixes, close }: { fixes: readonly Fix[]; close: () => void }) {
-  if (fixes.length === 0) return null;
-  return (
-    <div class="row wrap toast-fix">
-      {fixes.map(({ label, run }) => (
-        <Button
-          key={label}
-          label={label}
-          kind="small"
-          onClick={() => {
-            close();
-            run();
-          }}
-        />
-      ))}
-    </div>
-  );
-}
-
 function Item({ toast: { title, text, fixes, stays }, close }: { toast: Toast; close: () => void }) {
   const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
   const leaveIn = (ms: number) => {
@@ -161,7 +142,17 @@ function Item({ toast: { title, text, fixes, stays }, close }: { toast: Toast; c
         <Say text={text} />
       </div>
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
-      <Fixes fixes={fixes} close={close} />
+      {fixes.length > 0 && (
+        <div class="row wrap toast-fix">
+          {fixes.map(({ label, run }) => {
+            const take = () => {
+              close();
+              run();
+            };
+            return <Button key={label} label={label} kind="small" onClick={take} />;
+          })}
+        </div>
+      )}
     </div>
   );
 }
