@@ -92,7 +92,7 @@ async function main(): Promise<void> {
   }
   attachPointer(stage, app);
   attachBrush(stage.viewport, app);
-  attachKeyboard({ viewport: stage.viewport, app, run: app.run, original: (on) => app.view.original(on) });
+  attachKeyboard(stage.viewport, app);
   attachDrop(byId("panel"), app);
   lost.watch(session);
   startUp({ app, stage, crashes, offline });

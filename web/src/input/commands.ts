@@ -124,7 +124,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     viewLeft: () => view.axis(0, true),
     viewBottom: () => view.axis(1, true),
     ortho: () => view.ortho(),
-    // The keyboard handler calls `original` directly, on key down and key up.
+    // The keyboard handler calls `view.original` directly, on key down and key up.
     original: () => undefined,
     toggleCage: () => view.scene({ cage: !store.get().scene.cage }),
     toggleWire: () => view.scene({ base_wireframe: !store.get().scene.base_wireframe }),

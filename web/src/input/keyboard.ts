@@ -1,7 +1,7 @@
 /** Keyboard handler: finds the command of a key press in the shortcut table and runs it. */
 
 import type { App } from "../app";
-import { type Command, commandOf } from "./shortcuts";
+import { commandOf } from "./shortcuts";
 
 /** Whether the element with the focus handles typed keys itself. */
 function isTyping(target: EventTarget | null): boolean {
@@ -22,15 +22,7 @@ function isControlKey(target: EventTarget | null, key: string): boolean {
   return pressable && (key === " " || key === "Enter");
 }
 
-export interface KeyboardOptions {
-  viewport: HTMLElement;
-  app: App;
-  run: (command: Command) => void;
-  /** Called with true when Space is pressed and with false when it is released. */
-  original: (on: boolean) => void;
-}
-
-export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions): void {
+export function attachKeyboard(viewport: HTMLElement, app: App): void {
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
     const gesture = app.edit.active();
@@ -61,17 +53,17 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
       if (!clicked || event.shiftKey) return;
     }
     if (command === "original") {
-      if (!event.repeat) original(true);
+      if (!event.repeat) app.view.original(true);
       event.preventDefault();
       return;
     }
     const always = command === "sheet" || command === "open";
     if (!always && (busy !== null || model === null)) return;
     event.preventDefault();
-    run(command);
+    app.run(command);
   });
   document.addEventListener("keyup", (event) => {
-    if (event.key === " ") original(false);
+    if (event.key === " ") app.view.original(false);
   });
-  window.addEventListener("blur", () => original(false));
+  window.addEventListener("blur", () => app.view.original(false));
 }

@@ -137,10 +137,10 @@ export function keyOf(event: KeyPress): string {
   return `${event.shiftKey && !sign ? "shift+" : ""}${mod ? "mod+" : ""}${event.altKey ? "alt+" : ""}${key}`;
 }
 
-/**
- * Finds the command of a key press. During a gesture, only commands with the scope "gesture" apply, and those that
- * cancel the gesture, start another one or toggle proportional editing.
- */
+/** Commands that also apply during a gesture: they cancel it, start another one, or change how far it reaches. */
+const DURING_GESTURE: readonly Command[] = ["cancel", "grab", "rotate", "scale", "proportional"];
+
+/** Finds the command of a key press. During a gesture, all others need the scope "gesture". */
 export function commandOf(
   event: KeyPress,
   scopes: Partial<Record<Exclude<Scope, "page">, boolean>>,
@@ -150,13 +150,7 @@ export function commandOf(
   const of = (scope: Scope) => matches.find((shortcut) => (shortcut.scope ?? "page") === scope)?.command;
   if (scopes.gesture) {
     const page = of("page");
-    const allowed =
-      page === "cancel" ||
-      page === "grab" ||
-      page === "rotate" ||
-      page === "scale" ||
-      page === "proportional";
-    return of("gesture") ?? (allowed ? page : undefined);
+    return of("gesture") ?? (page && DURING_GESTURE.includes(page) ? page : undefined);
   }
   return (scopes.rest ? of("rest") : undefined) ?? (scopes.tour ? of("tour") : undefined) ?? of("page");
 }
