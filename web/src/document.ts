@@ -1,6 +1,6 @@
 /** Mirrors the document, which Rust stores: updates the keys of the state that show it. */
 
-import { attempt, type Context } from "./actions/context";
+import { attemptLatest, type Context } from "./actions/context";
 import type { Check, View } from "./contract";
 import { SCENE_DEFAULTS } from "./defaults";
 import { cageKey, cageSettings } from "./derived";
@@ -30,13 +30,11 @@ export function followDocument(ctx: Context) {
   };
 
   const startCheck = () =>
-    attempt(ctx, T.failed.check, () =>
-      ctx.queue.replace("check", async (signal) => {
-        // Wait for the current task to end: an opened cage may already have a check, and `know` then cancels this job.
-        await new Promise((resolve) => setTimeout(resolve));
-        if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
-      }),
-    );
+    attemptLatest(ctx, T.failed.check, "check", async (signal) => {
+      // Wait for the current task to end: an opened cage may already have a check, and `know` then cancels this job.
+      await new Promise((resolve) => setTimeout(resolve));
+      if (!signal.aborted) know(await follow(signal, ctx.session().checkCage()));
+    });
 
   const modelPatch = (): Partial<AppState> => {
     const { model, cageClip } = store.get();

@@ -7,7 +7,7 @@ import { follow } from "../queue";
 import type { BindRun } from "../state";
 import { messageOf, sentence } from "../strings";
 import { T } from "../words";
-import { attempt, type Context } from "./context";
+import { attempt, attemptLatest, type Context } from "./context";
 
 /** Number of earlier reports kept for comparing methods. */
 const MAX_EARLIER_REPORTS = 4;
@@ -79,9 +79,7 @@ export function createBind(ctx: Context) {
       if (!unasked) ctx.tell.clear();
       const { revision } = ctx.engine();
       store.set({ bindRun: start("coarse", revision, options) });
-      const ok = await attempt(ctx, T.failed.bind, () =>
-        ctx.queue.replace("bind", (signal) => bind(revision, signal, options)),
-      );
+      const ok = await attemptLatest(ctx, T.failed.bind, "bind", (signal) => bind(revision, signal, options));
       // In the meantime, a bind of another cage may have been queued. It has another revision.
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;

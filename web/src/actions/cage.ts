@@ -8,7 +8,7 @@ import { follow } from "../queue";
 import type { CageSettings } from "../state";
 import { T } from "../words";
 import type { BindActions } from "./bind";
-import { attempt, type Context, waitFor } from "./context";
+import { attemptLatest, type Context, waitFor } from "./context";
 import type { Edit } from "./edit";
 import { type PoseActions, snapshotCage } from "./poses";
 
@@ -90,9 +90,7 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
           ? previewed.cage
           : await follow(signal, ctx.session().generateCage(options, hear, cageClip ?? undefined));
       const vertices = made.positions.length / 3;
-      if (vertices > options.target) {
-        ctx.tell.say(T.cage.more(vertices, options.target));
-      }
+      if (vertices > options.target) ctx.tell.say(T.cage.more(vertices, options.target));
       if (made.bridged) {
         const each = { label: T.cage.perPart, run: () => makeForEachPart() };
         ctx.tell.say(T.cage.bridged(made.bridged, ctx.store.get().model?.members.length ?? 1), each);
@@ -123,14 +121,12 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
      */
     make(unasked = false): Promise<boolean> {
       if (!unasked) ctx.tell.clear();
-      return attempt(ctx, T.failed.noCage, () =>
-        ctx.queue.replace("cage", async (signal) => {
-          const settings = cageSettings(ctx.store.get());
-          const isBox = settings.cageSource === "box";
-          take(T.did.makeCage, isBox ? box(settings.boxDivisions) : await generate(settings, signal));
-          made(settings);
-        }),
-      );
+      return attemptLatest(ctx, T.failed.noCage, "cage", async (signal) => {
+        const settings = cageSettings(ctx.store.get());
+        const isBox = settings.cageSource === "box";
+        take(T.did.makeCage, isBox ? box(settings.boxDivisions) : await generate(settings, signal));
+        made(settings);
+      });
     },
     cancel: () => ctx.queue.cancel("cage"),
     /**
@@ -169,23 +165,19 @@ export function createCage(ctx: Context, { bind, edit, know, made, poses }: Cage
     },
     load(files: readonly NamedFile[], unasked = false): Promise<boolean> {
       if (!unasked) ctx.tell.clear();
-      return attempt(ctx, T.failed.cageFile, () =>
-        ctx.queue.replace("open", async (signal) => {
-          const name = files[0]?.name ?? "the cage";
-          const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
-          const cage = await waitFor(ctx, signal, T.opening.file(name), read);
-          ctx.store.set({ cageSource: "file", cageMade: "file" });
-          take(T.did.loadCage, cage);
-        }),
-      );
+      return attemptLatest(ctx, T.failed.cageFile, "open", async (signal) => {
+        const name = files[0]?.name ?? "the cage";
+        const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
+        const cage = await waitFor(ctx, signal, T.opening.file(name), read);
+        ctx.store.set({ cageSource: "file", cageMade: "file" });
+        take(T.did.loadCage, cage);
+      });
     },
     repair(kind: Repair): Promise<boolean> {
-      return attempt(ctx, T.failed.repair, () =>
-        ctx.queue.replace("open", async (signal) => {
-          const repair = () => ctx.session().repair(kind);
-          take(T.did.repairCage, await waitFor(ctx, signal, T.opening.repairing, repair));
-        }),
-      );
+      return attemptLatest(ctx, T.failed.repair, "open", async (signal) => {
+        const repair = () => ctx.session().repair(kind);
+        take(T.did.repairCage, await waitFor(ctx, signal, T.opening.repairing, repair));
+      });
     },
     /** Selects generated cages in the panel and generates one. */
     regenerate(): Promise<boolean> {

@@ -2,7 +2,7 @@
 
 import type { Engine, Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
-import { onAbort, type Queue } from "../queue";
+import { type Kind, onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
 import { cancelled, type Explanation, explain, isCancelled, type Message } from "../strings";
 import { T } from "../words";
@@ -47,6 +47,16 @@ export async function attempt(
     report(ctx, title, error);
     return false;
   }
+}
+
+/** Like `attempt`, in the queue. Cancels earlier work of the same kind. */
+export function attemptLatest(
+  ctx: Context,
+  title: string,
+  kind: Kind,
+  work: (signal: AbortSignal) => Promise<void>,
+): Promise<boolean> {
+  return attempt(ctx, title, () => ctx.queue.replace(kind, work));
 }
 
 /** Number of vertices above which opening a file asks the user first, because the browser may run out of memory. */

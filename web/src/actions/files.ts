@@ -9,7 +9,7 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import type { CageActions } from "./cage";
-import { attempt, type Context } from "./context";
+import { attemptLatest, type Context } from "./context";
 import type { ControlActions } from "./controls";
 import type { Models } from "./models";
 import type { Project } from "./project";
@@ -141,14 +141,13 @@ export function createFiles(ctx: Context, needs: FileNeeds) {
   };
 
   /** Runs `work` while the page is blocked. A new call cancels the previous one. */
-  const busy = (what: string, title: string, work: (signal: AbortSignal) => Promise<void>) =>
-    attempt(ctx, title, () => {
-      ctx.tell.clear();
-      return ctx.queue.replace("open", async (signal) => {
-        store.set({ busy: what });
-        await work(signal).finally(() => store.set({ busy: null }));
-      });
+  const busy = (what: string, title: string, work: (signal: AbortSignal) => Promise<void>) => {
+    ctx.tell.clear();
+    return attemptLatest(ctx, title, "open", async (signal) => {
+      store.set({ busy: what });
+      await work(signal).finally(() => store.set({ busy: null }));
     });
+  };
 
   /** Saves the open work, then opens another model. */
   const replace = async (

@@ -6,7 +6,7 @@ import { follow } from "../queue";
 import { T } from "../words";
 import type { BindActions } from "./bind";
 import type { CageActions } from "./cage";
-import { attempt, type Context } from "./context";
+import { attemptLatest, type Context } from "./context";
 import type { Edit } from "./edit";
 import type { Pulling } from "./pull";
 import type { View } from "./view";
@@ -77,7 +77,6 @@ export function followCage(ctx: Context, { bind, edit, view, pull }: Followers):
 /** Computes the lattice by which the splats follow the cage. */
 async function followSplats(ctx: Context): Promise<void> {
   const { grid } = ctx.store.get().bindOptions;
-  await attempt(ctx, T.failed.bind, () =>
-    ctx.queue.replace("lattice", (signal) => follow(signal, ctx.session().loadLattice(grid))),
-  );
+  const load = (signal: AbortSignal) => follow(signal, ctx.session().loadLattice(grid));
+  await attemptLatest(ctx, T.failed.bind, "lattice", load);
 }

@@ -5,7 +5,7 @@ import { planDrop } from "../drop";
 import { sentence } from "../strings";
 import { T } from "../words";
 import type { CageActions } from "./cage";
-import { attempt, type Context, waitFor } from "./context";
+import { attempt, attemptLatest, type Context, waitFor } from "./context";
 import type { Edit } from "./edit";
 import { modelsOf, type ReadResult, readModels } from "./read";
 
@@ -42,22 +42,20 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
         ctx.tell.problem({ title: T.models.notAdded, message });
         return false;
       }
-      const went = await attempt(ctx, T.models.notAdded, () => {
-        ctx.tell.clear();
-        return ctx.queue.replace("open", async (signal) => {
-          const used = ctx.engine().texturePixels();
-          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", used);
-          settle();
-          const n = members().length;
-          await models.join(reads, signal, T.did.addModels);
-          store.set({ busy: null });
-          if (members().length === n) return;
-          remakeCage();
-          void checked().then(() => {
-            const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
-            const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
-            if (isOut) ctx.tell.say(T.models.outside, around);
-          });
+      ctx.tell.clear();
+      const went = await attemptLatest(ctx, T.models.notAdded, "open", async (signal) => {
+        const used = ctx.engine().texturePixels();
+        const reads = await readModels(ctx, signal, modelsOf(files, plan), "add", used);
+        settle();
+        const n = members().length;
+        await models.join(reads, signal, T.did.addModels);
+        store.set({ busy: null });
+        if (members().length === n) return;
+        remakeCage();
+        void checked().then(() => {
+          const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
+          const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
+          if (isOut) ctx.tell.say(T.models.outside, around);
         });
       });
       const second = files[plan.second ?? -1];
@@ -86,15 +84,13 @@ export function createModels(ctx: Context, { cage, edit, checked, openFiles, set
     /** Gives a model the joints, joint weights and morph targets of another one. */
     dress(id: number, body: number): Promise<boolean> {
       const name = memberOf(id)?.name ?? "";
-      return attempt(ctx, T.models.notDressed(name), () => {
-        ctx.tell.clear();
+      ctx.tell.clear();
+      return attemptLatest(ctx, T.models.notDressed(name), "open", async (signal) => {
         settle();
-        return ctx.queue.replace("open", async (signal) => {
-          const { report } = await waitFor(ctx, signal, T.models.dressing(name), (hear) =>
-            ctx.session().dress(id, body, T.did.dress(name), hear),
-          );
-          ctx.tell.say(sentence(report));
-        });
+        const { report } = await waitFor(ctx, signal, T.models.dressing(name), (hear) =>
+          ctx.session().dress(id, body, T.did.dress(name), hear),
+        );
+        ctx.tell.say(sentence(report));
       });
     },
     /** Removes a model, and remakes the cage. */

@@ -4,7 +4,7 @@ import type { SurfacePoint } from "../contract";
 import { clamped, SLIDERS } from "../defaults";
 import { follow } from "../queue";
 import { T } from "../words";
-import { attempt, type Context } from "./context";
+import { attempt, attemptLatest, type Context } from "./context";
 import type { Edit } from "./edit";
 
 /** Distance of a grabbed point from its target above which the target is shown, as a fraction of the model's size. */
@@ -174,20 +174,18 @@ export function createPulling(ctx: Context, edit: Pick<Edit, "alsoSettles" | "ap
     /** Prepares pulls of the bound model and cage. */
     prepare() {
       store.set({ pullReady: false });
-      void attempt(ctx, T.failed.pull, () =>
-        ctx.queue.replace("pull", async (signal) => {
-          const job = ctx.session().preparePull();
-          // Allow pulling right away: a grab waits until the worker is ready.
-          store.set({ pullReady: true });
-          try {
-            await follow(signal, job);
-          } catch (error) {
-            store.set({ pullReady: false });
-            throw error;
-          }
-          show();
-        }),
-      );
+      void attemptLatest(ctx, T.failed.pull, "pull", async (signal) => {
+        const job = ctx.session().preparePull();
+        // Allow pulling right away: a grab waits until the worker is ready.
+        store.set({ pullReady: true });
+        try {
+          await follow(signal, job);
+        } catch (error) {
+          store.set({ pullReady: false });
+          throw error;
+        }
+        show();
+      });
     },
     /** Marks the point of the model that a press at this position would grab. Returns whether there is one. */
     hover(x: number, y: number): boolean {

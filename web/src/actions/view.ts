@@ -9,7 +9,7 @@ import type { Slice } from "../state";
 import { saveTheme, shownTheme, type Theme } from "../store";
 import { T } from "../words";
 import type { BindActions } from "./bind";
-import { attempt, type Context } from "./context";
+import { attemptLatest, type Context } from "./context";
 import { ofLink } from "./project";
 
 /** Pause after the last movement of a slice before it is computed, ms. A slider sends many positions. */
@@ -68,7 +68,7 @@ export function createView(
     if (kind !== undefined) scene({ slice: kind });
     clearTimeout(sliceTimer);
   };
-  const showSlice = () => attempt(ctx, T.failed.slice, () => ctx.queue.replace("slice", loadSlice));
+  const showSlice = () => attemptLatest(ctx, T.failed.slice, "slice", loadSlice);
 
   return {
     scene,
