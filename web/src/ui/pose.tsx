@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { App } from "../app";
-import type { Interpolation } from "../contract";
+import type { Interpolation, PoseView } from "../contract";
 import { SLIDERS } from "../defaults";
 import { fittingPoses } from "../derived";
 import { coordinate, percent } from "../format";
@@ -154,7 +154,7 @@ function Help({ app }: { app: App }) {
 function Poses({ app }: { app: App }) {
   const state = app.store.get();
   const { poses, shares, playing, posed } = state;
-  const places = poses.flatMap(({ fits }, index) => (fits ? [index] : []));
+  const places = poses.flatMap((pose, index) => (pose.fits ? [{ pose, index }] : []));
   const others = poses.length - places.length;
   const list = useRef<HTMLUListElement>(null);
   /** Index in `places` to which a card is being dragged; null without a drag. */
@@ -167,7 +167,7 @@ function Poses({ app }: { app: App }) {
     if (isSaved) list.current?.lastElementChild?.scrollIntoView({ block: "nearest" });
   });
   const move = (from: number, to: number) => {
-    const [index, target] = [places[from], places[to]];
+    const [index, target] = [places[from]?.index, places[to]?.index];
     if (index === undefined || target === undefined || index === target) return;
     app.poses.move(index, target);
     list.current?.children[to]?.querySelector<HTMLElement>(".grip")?.focus();
@@ -210,10 +210,11 @@ function Poses({ app }: { app: App }) {
         onPointerEnter={() => void app.poses.portray()}
         onFocusIn={() => void app.poses.portray()}
       >
-        {places.map((index, place) => (
+        {places.map(({ pose, index }, place) => (
           <PoseRow
             key={index}
             app={app}
+            pose={pose}
             index={index}
             isOver={over === place}
             share={shares[index] ?? 0}
@@ -261,6 +262,7 @@ function Timing({ app }: { app: App }) {
 
 interface PoseRowProps {
   app: App;
+  pose: PoseView;
   index: number;
   /** Whether the card that is being dragged would be dropped at this row. */
   isOver: boolean;
@@ -271,14 +273,9 @@ interface PoseRowProps {
   onStep: (by: 1 | -1) => void;
 }
 
-function PoseRow({ app, index, isOver, share, onDrag, onDrop, onStep }: PoseRowProps) {
-  const { poses, playingPose, pictures } = app.store.get();
-  const { name, seconds, interpolation, hash } = poses[index] ?? {
-    name: "",
-    seconds: 0,
-    interpolation: null,
-    hash: 0,
-  };
+function PoseRow({ app, pose, index, isOver, share, onDrag, onDrop, onStep }: PoseRowProps) {
+  const { playingPose, pictures } = app.store.get();
+  const { name, seconds, interpolation, hash } = pose;
   const picture = pictures[hash];
   /**
    * Number of rejected inputs in the time field. It is the key of the field, so that a new field with the pose's time
