@@ -41,28 +41,18 @@ export function planDrop(names: readonly string[]): DropPlan {
   const models = oneFormatEach(plain.length > 0 ? plain : all);
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
   if (!model) {
-    const companions = names.every((name) =>
-      (COMPANION_ENDINGS as readonly string[]).includes(extension(name)),
-    );
-    return companions
-      ? {
-          kind: "textures",
-          sentence: T.opening.companions,
-        }
-      : { kind: "unknown", sentence: T.opening.kinds };
+    const endings: readonly string[] = COMPANION_ENDINGS;
+    const isCompanions = names.every((name) => endings.includes(extension(name)));
+    if (isCompanions) return { kind: "textures", sentence: T.opening.companions };
+    return { kind: "unknown", sentence: T.opening.kinds };
   }
   const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
   const more = models.filter((other) => other !== model && !CAGE_NAME.test(base(other.name)));
   const companions = names.length - all.length;
   const what = T.models.several(base(model.name), more.length);
   const sentence = T.opening.plan(what, companions, more.length > 0, second && base(second.name));
-  return {
-    kind: "model",
-    main: model.index,
-    sentence,
-    ...(more.length > 0 ? { more: more.map(({ index }) => index) } : {}),
-    ...(second ? { second: second.index } : {}),
-  };
+  const indices = more.length > 0 ? more.map(({ index }) => index) : undefined;
+  return { kind: "model", main: model.index, sentence, more: indices, second: second?.index };
 }
 
 /** If files differ only in their extension, as in many downloads, keeps the format that stores most information. */
@@ -77,9 +67,7 @@ function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]
  * While files are dragged, says what dropping them will do. Until the drop, browsers reveal only the number of files.
  */
 export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
-  if (files > 1) {
-    return T.opening.together;
-  }
+  if (files > 1) return T.opening.together;
   if (hasModel && onCagePanel) return T.opening.onCageStep;
   return hasModel ? T.opening.replaces : T.opening.getsCage;
 }

@@ -34,7 +34,7 @@ export interface Explanation {
   title: string;
   message: Message;
   /** The remedy that the message offers as a button. */
-  fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
+  fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload" | undefined;
 }
 
 const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullable<Explanation["fix"]>>>> = {
@@ -54,9 +54,7 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty" | "Unloaded", NonNullab
 /** Finds headline (`title`), message and remedy for an error. The error's name determines the remedy. */
 export function explain(error: unknown, title: string): Explanation {
   const name = error instanceof Error ? error.name : "";
-  const message = messageOf(error);
-  const fix = FIXES[name as ErrorName];
-  return fix ? { title, message, fix } : { title, message };
+  return { title, message: messageOf(error), fix: FIXES[name as ErrorName] };
 }
 
 /** Creates an error which means that work was cancelled, and which is not shown. */

@@ -13,12 +13,8 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]) {
   const write = (): Uint8Array<ArrayBuffer> => {
     const state = store.get();
     const { cageOptions: cage, tools, rigOptions: rig, model } = state;
-    const settings = {
-      bind: optionsInUse(state),
-      cage,
-      symmetry: tools.symmetry,
-      ...(model?.rigged ? { rig } : {}),
-    };
+    const { symmetry } = tools;
+    const settings = { bind: optionsInUse(state), cage, symmetry, rig: model?.rigged ? rig : undefined };
     // wasm-bindgen copies the bytes out of the wasm memory, so their buffer is an ArrayBuffer of its own.
     return ctx.engine().writeProject(JSON.stringify(settings)) as Uint8Array<ArrayBuffer>;
   };
@@ -32,17 +28,13 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]) {
       const { sample, sampleCage, posed, scene, model, clip: shown } = store.get();
       const engine = ctx.engine();
       if (!sample || !sampleCage || model?.members.some(hasChoices)) return undefined;
-      const pose = posed ? engine.encodePose() : undefined;
-      const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
-      const controls = shared();
-      const link = {
+      const fragment = await encodeShare({
         sample,
-        seen,
-        ...(pose ? { pose } : {}),
-        ...(controls ? { controls } : {}),
-        ...(shown.clip === null ? {} : { clip: shown.clip }),
-      };
-      const fragment = await encodeShare(link);
+        pose: posed ? engine.encodePose() : undefined,
+        seen: { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) },
+        controls: shared(),
+        clip: shown.clip ?? undefined,
+      });
       return `${location.origin}${location.pathname}${fragment}`;
     },
   };

@@ -8,8 +8,7 @@ import { Dialog } from "./dialog";
 
 /** Shows the text of a crash report, so that the user can read and copy it. */
 export function showReport(crash: Crash): void {
-  const place = document.createElement("div");
-  document.body.append(place);
+  const place = document.body.appendChild(document.createElement("div"));
   const close = () => {
     render(null, place);
     place.remove();
@@ -26,8 +25,7 @@ export function showReport(crash: Crash): void {
 
 /** Asks what to do after a second crash. The dialog cannot be closed, because the page behind it is not usable. */
 export function askAfterCrash(crash: Crash, startFresh: () => void): void {
-  const place = document.createElement("div");
-  document.body.append(place);
+  const place = document.body.appendChild(document.createElement("div"));
   render(
     <Dialog title={T.crash.again} isOpen kind="ways">
       <div class="sheet-body">
