@@ -203,13 +203,7 @@ function Advanced({ app }: { app: App }) {
         value={Math.round(Math.log10(options.tau))}
         onChange={(power) => option("tau").onChange(10 ** power)}
       />
-      <NumberField
-        label={T.bind.limit}
-        min={SLIDERS.max_iterations.min}
-        max={SLIDERS.max_iterations.max}
-        step="1"
-        {...option("max_iterations")}
-      />
+      <NumberField label={T.bind.limit} {...SLIDERS.max_iterations} {...option("max_iterations")} />
       <Segments
         label={T.bind.sparsify}
         values={SPARSIFY}

@@ -4,7 +4,7 @@ import type { App } from "../app";
 import { SLIDERS } from "../defaults";
 import { count, percent } from "../format";
 import { T } from "../words";
-import { fieldsOf, Segments, Select, Slider, Toggle } from "./controls";
+import { fieldsOf, Segments, Select, SHARES, Slider, Toggle } from "./controls";
 
 /**
  * Lowest value of the slider for voxels. It stands for `voxels: 0`, with which the number of vertices determines the
@@ -32,8 +32,7 @@ export function Automatic({ app }: { app: App }) {
       <Slider label={T.cage.wanted} {...SLIDERS.target} format={count} {...option("target")} />
       <Slider
         label={T.cage.closeness}
-        min={0}
-        max={1}
+        {...SHARES}
         step={SLIDERS.detail.step}
         format={() => T.cage.within(percent(detail.value, 1))}
         value={closenessOf(detail.value)}

@@ -234,7 +234,7 @@ interface NumberInputProps {
   onChange: (value: number) => void;
   min?: number;
   max?: number;
-  step?: string;
+  step?: number;
 }
 
 /** Number field. Calls `onChange` when the user presses Enter or leaves the field, if the number is valid. */
@@ -280,10 +280,12 @@ export function NumberField({ label, ...props }: Omit<NumberInputProps, "id" | "
   );
 }
 
-export function Facts({ rows }: { rows: readonly (readonly [name: string, value: string])[] }) {
+/** A table of names and values. Rows without a value are left out. */
+export function Facts({ rows }: { rows: readonly (readonly [name: string, value: string | false])[] }) {
+  const shown = rows.filter(([, value]) => value);
   return (
     <dl class="facts">
-      {rows.flatMap(([name, value]) => [<dt key={name}>{name}</dt>, <dd key={`${name} is`}>{value}</dd>])}
+      {shown.flatMap(([name, value]) => [<dt key={name}>{name}</dt>, <dd key={`${name} is`}>{value}</dd>])}
     </dl>
   );
 }

@@ -135,25 +135,25 @@ function SampleCard({ app, id, isOpen }: { app: App; id: string; isOpen: boolean
 function ModelCard({ app, model }: { app: App; model: ModelInfo }) {
   const { min, max } = model.bounds;
   const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
-  const some = (...counts: [string, number][]) =>
-    counts.filter(([, n]) => n > 0).map(([name, n]) => [name, count(n)] as [string, string]);
-  const rows = [
-    ...some([T.model.splats, model.splats], [T.model.points, model.points]),
-    ...(isCapture(model)
-      ? []
-      : some([T.model.vertices, model.vertices], [T.model.triangles, model.triangles])),
-    [T.model.size, size] as [string, string],
-    ...some([T.model.materials, model.materials], [T.model.textures, model.textures]),
-  ];
-  const also = alsoThere(model);
-  if (also !== "") rows.push([T.model.also, also]);
+  const some = (n: number) => n > 0 && count(n);
   return (
     <section class="card stack tight" aria-label={T.model.isOpen}>
       <div class="row">
         <strong class="grow clip">{model.name}</strong>
         <Up app={app} model={model} />
       </div>
-      <Facts rows={rows} />
+      <Facts
+        rows={[
+          [T.model.splats, some(model.splats)],
+          [T.model.points, some(model.points)],
+          [T.model.vertices, !isCapture(model) && some(model.vertices)],
+          [T.model.triangles, !isCapture(model) && some(model.triangles)],
+          [T.model.size, size],
+          [T.model.materials, some(model.materials)],
+          [T.model.textures, some(model.textures)],
+          [T.model.also, alsoThere(model)],
+        ]}
+      />
     </section>
   );
 }

@@ -61,13 +61,9 @@ export function ReportCard({ report }: { report: BindReport }) {
             ...rawFacts(T.report.sums, report.raw_error.sum),
             [T.report.row, scientific(report.weights.max_sum_error)],
             [T.report.stored, `${count(report.weights.nonzeros)} (${percent(density(report))})`],
-            ...(report.smooth > 0 ? [[T.report.smooth, count(report.smooth)] as const] : []),
-            ...(report.inner_controls > 0
-              ? [
-                  [T.report.innerControls, count(report.inner_controls)] as const,
-                  [T.report.held, T.report.vertices(report.held_vertices)] as const,
-                ]
-              : []),
+            [T.report.smooth, report.smooth > 0 && count(report.smooth)],
+            [T.report.innerControls, report.inner_controls > 0 && count(report.inner_controls)],
+            [T.report.held, report.inner_controls > 0 && T.report.vertices(report.held_vertices)],
             [T.report.outside, T.report.vertices(report.outside_vertices)],
             [T.report.ambiguous, count(report.ambiguous_cells)],
           ]}
