@@ -10,7 +10,7 @@ import { rectangle } from "../src/input/pointer";
 import { type AppState, INITIAL_STATE, type StepName } from "../src/state";
 import { explain, isCancelled, sentence, textOf } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
-import { historyPoints, type Place, placeLabel, scaleOf } from "../src/ui/plot";
+import { historyPoints, scaleOf } from "../src/ui/plot";
 import { verdict } from "../src/ui/report";
 import { hintOf } from "../src/ui/status";
 import { placeTip } from "../src/ui/tips";
@@ -112,32 +112,6 @@ describe("a toolbar", () => {
 });
 
 describe("the plot", () => {
-  it("writes the threshold where no curve crosses the words", () => {
-    const width = 100;
-    const crosses = (lines: readonly (readonly Place[])[], at: number) => {
-      const { x, y } = placeLabel(lines, at, width);
-      return lines.some((line) =>
-        line.slice(1).some(([x1, y1], k) => {
-          const [x0, y0] = line[k] ?? [x1, y1];
-          return Array.from({ length: 101 }, (_, s) => s / 100).some((s) => {
-            const [px, py] = [x0 + s * (x1 - x0), y0 + s * (y1 - y0)];
-            return px >= x && px <= x + width && py <= y && py >= y - 9;
-          });
-        }),
-      );
-    };
-    const steep: Place[] = [
-      [38, 10],
-      [60, 130],
-    ];
-    const flat: Place[] = [
-      [38, 10],
-      [320, 125],
-    ];
-    for (const lines of [[steep], [flat], [steep, flat]]) {
-      for (const at of [60, 100, 120, 136]) expect(crosses(lines, at), `${lines.length}, ${at}`).toBe(false);
-    }
-  });
   it("spans powers of ten and includes the threshold", () => {
     const scale = scaleOf(
       [

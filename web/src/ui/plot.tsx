@@ -29,9 +29,6 @@ const LEFT_MARGIN = 38;
 const RIGHT_MARGIN = 8;
 const TOP_MARGIN = 8;
 const BOTTOM_MARGIN = 26;
-/** Height of a text line, and width reserved for a letter, with or without accents, in units of the `viewBox`. */
-const LABEL = 11;
-const LETTER_WIDTH = 5.8;
 
 export interface Scale {
   lowest: number;
@@ -62,39 +59,6 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   };
 }
 
-/** A point of the plot, in units of its `viewBox`. */
-export type Place = readonly [x: number, y: number];
-
-/**
- * Finds a position for the label of the threshold: the left end of its baseline. Tries positions below and above the
- * threshold's line, which is at height `at`, and returns the first that no curve crosses, or else the first of all.
- */
-export function placeLabel(lines: readonly (readonly Place[])[], at: number, width: number) {
-  const right = WIDTH - RIGHT_MARGIN - 4 - width;
-  const places = [LEFT_MARGIN + 4, right, (LEFT_MARGIN + right) / 2].flatMap((x) =>
-    [at + LABEL, at - 4]
-      .filter((y) => y <= HEIGHT - BOTTOM_MARGIN && y >= TOP_MARGIN + LABEL)
-      .map((y) => ({ x, y })),
-  );
-  const isFree = ({ x, y }: { x: number; y: number }) =>
-    lines.every((line) => {
-      const heights = heightsBetween(line, x - 3, x + width + 3);
-      return heights.every((one) => one > y + 4) || heights.every((one) => one < y - LABEL);
-    });
-  return places.find(isFree) ?? places[0] ?? { x: LEFT_MARGIN + 4, y: at - 4 };
-}
-
-/** Finds the heights of a polyline between two horizontal positions: at its corners and at both positions. */
-function heightsBetween(line: readonly Place[], from: number, to: number): number[] {
-  const heights = line.filter(([x]) => x >= from && x <= to).map(([, y]) => y);
-  for (const at of [from, to]) {
-    const next = line.findIndex(([x]) => x >= at);
-    const [a, b] = [line[next - 1], line[next]];
-    if (a && b) heights.push(a[1] + ((b[1] - a[1]) * (at - a[0])) / (b[0] - a[0]));
-  }
-  return heights;
-}
-
 export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number }) {
   const { lowest, highest, last, logarithmic } = scaleOf(curves, tau);
   const along = (iteration: number) =>
@@ -111,9 +75,7 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   );
   const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
   const bottom = HEIGHT - 8;
-  const middle = (LEFT_MARGIN + WIDTH - RIGHT_MARGIN) / 2;
-  const lines = curves.map(({ points }) => points.map(([i, delta]): Place => [x(i), y(delta)]));
-  const label = placeLabel(lines, y(tau), T.bind.doneBelow.length * LETTER_WIDTH);
+  const right = WIDTH - RIGHT_MARGIN;
   return (
     <svg
       viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
@@ -123,32 +85,21 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
     >
       {powers.map((power) => (
         <g key={power}>
-          <line
-            x1={LEFT_MARGIN}
-            x2={WIDTH - RIGHT_MARGIN}
-            y1={y(10 ** power)}
-            y2={y(10 ** power)}
-            class="grid"
-          />
+          <line x1={LEFT_MARGIN} x2={right} y1={y(10 ** power)} y2={y(10 ** power)} class="grid" />
           <Label x={LEFT_MARGIN - 6} y={y(10 ** power) + 3.5} text={`1e${power}`} anchor="end" />
         </g>
       ))}
       <Label x={LEFT_MARGIN} y={bottom} text={logarithmic ? "1" : "0"} anchor="middle" />
-      <Label x={WIDTH - RIGHT_MARGIN} y={bottom} text={count(last)} anchor="end" />
+      <Label x={right} y={bottom} text={count(last)} anchor="end" />
       <Label
-        x={middle}
+        x={(LEFT_MARGIN + right) / 2}
         y={bottom}
         text={logarithmic ? T.bind.iterationsLogarithmic : T.bind.iterations}
         anchor="middle"
       />
-      {tau > 0 && (
-        <>
-          <line x1={LEFT_MARGIN} x2={WIDTH - RIGHT_MARGIN} y1={y(tau)} y2={y(tau)} class="tau" />
-          <Label x={label.x} y={label.y} text={T.bind.doneBelow} anchor="start" />
-        </>
-      )}
-      {curves.map(({ kind }, k) => {
-        const line = lines[k] ?? [];
+      {tau > 0 && <line x1={LEFT_MARGIN} x2={right} y1={y(tau)} y2={y(tau)} class="tau" />}
+      {curves.map(({ kind, points }) => {
+        const line = points.map(([i, delta]) => [x(i), y(delta)] as const);
         const end = line.at(-1);
         if (!end) return null;
         return (
@@ -161,21 +112,19 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
           </g>
         );
       })}
+      {/* The key of the threshold's line is in the upper right corner, because curves fall. */}
+      {tau > 0 && (
+        <>
+          <line x1={right - 20} x2={right} y1={TOP_MARGIN + 8} y2={TOP_MARGIN + 8} class="tau" />
+          <Label x={right - 24} y={TOP_MARGIN + 11.5} text={T.bind.doneBelow} anchor="end" />
+        </>
+      )}
     </svg>
   );
 }
 
-function Label({
-  x,
-  y,
-  text,
-  anchor,
-}: {
-  x: number;
-  y: number;
-  text: string;
-  anchor: "start" | "middle" | "end";
-}) {
+function Label(props: { x: number; y: number; text: string; anchor: "middle" | "end" }) {
+  const { x, y, text, anchor } = props;
   return (
     <text x={x} y={y} text-anchor={anchor}>
       {text}
