@@ -31,6 +31,12 @@ type Drag =
   | { kind: "gizmo" }
   | { kind: "box"; mode: SelectMode };
 
+/** A position in the view, CSS pixels. */
+interface Point {
+  readonly x: number;
+  readonly y: number;
+}
+
 export function attachPointer(stage: Stage, app: App): void {
   const { viewport } = stage;
   const { store, edit, pull, controls, painting } = app;
@@ -40,7 +46,7 @@ export function attachPointer(stage: Stage, app: App): void {
   let start = { x: 0, y: 0 };
   let last = { x: 0, y: 0 };
   let moved = false;
-  let pointer: { x: number; y: number } = { x: 0, y: 0 };
+  let pointer: Point = { x: 0, y: 0 };
   let hoverFrame = 0;
   let longPress: ReturnType<typeof setTimeout> | undefined;
 
@@ -50,50 +56,45 @@ export function attachPointer(stage: Stage, app: App): void {
   };
   const radiusOf = (event: PointerEvent) => (event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS);
 
-  const takeGizmo = (part: GizmoPart, at: { x: number; y: number }) => {
+  const takeGizmo = (part: GizmoPart, at: Point) => {
     app.clips.pause();
     return edit.beginGizmo(part, at.x, at.y);
   };
 
-  const press = (event: PointerEvent, at: { x: number; y: number }): Drag => {
+  const press = (event: PointerEvent, at: Point): Drag => {
+    const { altKey, button, shiftKey } = event;
+    const { placing, painting: painted, boxArmed, cage, scene } = store.get();
     const mod = event.ctrlKey || event.metaKey;
-    if (event.altKey && event.button !== 0) return { kind: event.button === 1 ? "pan" : "zoom" };
-    if (event.button !== 0) return { kind: "pan" };
-    if (store.get().placing) return { kind: "place" };
-    if (store.get().painting) {
-      const kind = !event.altKey && painting.begin(at.x, at.y) ? "paint" : event.shiftKey ? "pan" : "orbit";
-      return { kind };
+    const adds = shiftKey || store.get().additive;
+    if (altKey && button !== 0) return { kind: button === 1 ? "pan" : "zoom" };
+    if (button !== 0) return { kind: "pan" };
+    if (placing) return { kind: "place" };
+    if (painted) {
+      const isOnModel = !altKey && painting.begin(at.x, at.y);
+      return { kind: isOnModel ? "paint" : shiftKey ? "pan" : "orbit" };
     }
-    if (event.altKey) {
-      const vertices =
-        store.get().cage && store.get().scene.cage ? engine().pick(at.x, at.y, MOUSE_RADIUS) : [];
-      if (vertices.length === 0) return { kind: "orbit" };
-    }
-    if (store.get().boxArmed)
-      return {
-        kind: "box",
-        mode: event.shiftKey || store.get().additive ? "add" : mod ? "remove" : "replace",
-      };
-    if (store.get().cage && store.get().scene.cage) {
+    const hasHandles = cage !== null && scene.cage;
+    const isOnHandle = () => hasHandles && engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
+    if (altKey && !isOnHandle()) return { kind: "orbit" };
+    if (boxArmed) return { kind: "box", mode: adds ? "add" : mod ? "remove" : "replace" };
+    if (hasHandles) {
       // A vertex under the finger takes precedence over a nearby gizmo.
-      const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
-      const part = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
+      const part = engine().gizmoAt(at.x, at.y, isOnHandle() ? MOUSE_RADIUS : radiusOf(event));
       if (part !== undefined && takeGizmo(part, at)) return { kind: "gizmo" };
       // A finger on the model pulls the model, unless a handle is closer to the finger than MOUSE_RADIUS. While the page
       // asks the user to pull, a handle beside the indicated point must not be taken instead.
-      const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
+      const isOnModel = scene.pull && pull.hover(at.x, at.y);
       const isAsked = isOnModel && event.pointerType === "touch" && asksToPull(store.get());
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
       if (vertices.length > 0 && !isAsked) {
         const selected = new Set(engine().selection());
         const was = vertices.every((vertex) => selected.has(vertex));
-        const mode: SelectMode =
-          event.shiftKey || store.get().additive ? "toggle" : mod ? "remove" : "replace";
-        return { kind: "handle", started: false, vertices, mode, was, bare: event.altKey };
+        const mode = adds ? "toggle" : mod ? "remove" : "replace";
+        return { kind: "handle", started: false, vertices, mode, was, bare: altKey };
       }
     }
-    if (!mod && store.get().scene.pull && pull.hover(at.x, at.y)) {
-      if (event.shiftKey) return { kind: "pin" };
+    if (!mod && scene.pull && pull.hover(at.x, at.y)) {
+      if (shiftKey) return { kind: "pin" };
       if (event.pointerType === "touch") {
         longPress = setTimeout(() => {
           if (drag?.kind !== "pull" || moved) return;
@@ -103,11 +104,11 @@ export function attachPointer(stage: Stage, app: App): void {
       }
       return { kind: "pull", started: false };
     }
-    if (mod) return { kind: "box", mode: event.shiftKey ? "add" : "replace" };
-    return { kind: event.shiftKey ? "pan" : "orbit" };
+    if (mod) return { kind: "box", mode: shiftKey ? "add" : "replace" };
+    return { kind: shiftKey ? "pan" : "orbit" };
   };
 
-  const move = (at: { x: number; y: number }) => {
+  const move = (at: Point) => {
     const dx = at.x - last.x;
     const dy = at.y - last.y;
     last = at;
@@ -171,7 +172,7 @@ export function attachPointer(stage: Stage, app: App): void {
     if (store.get().cage) engine().select(new Uint32Array(), "replace");
   };
 
-  const release = (at: { x: number; y: number }, keep: boolean) => {
+  const release = (at: Point, keep: boolean) => {
     const ended = drag;
     drag = undefined;
     if (!ended) return;
@@ -311,7 +312,7 @@ export function attachPointer(stage: Stage, app: App): void {
 }
 
 /** Returns the rectangle with these opposite corners. */
-export function rectangle(a: { x: number; y: number }, b: { x: number; y: number }) {
+export function rectangle(a: Point, b: Point) {
   return {
     x: Math.min(a.x, b.x),
     y: Math.min(a.y, b.y),
