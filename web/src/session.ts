@@ -163,6 +163,12 @@ async function start(opened: OpenResult & Needs) {
     });
   };
 
+  /** Reads a model from one file in a worker of its own. */
+  const readOne = (name: string, content: Uint8Array | Blob, up?: UpAxis) => {
+    const file = new Blob([content as BlobPart]);
+    return reading("read", { files: [{ name, path: name, file }], up, used: 0 }).done;
+  };
+
   async function openRead(
     read: ReadModel,
     sample: string | null,
@@ -261,9 +267,7 @@ async function start(opened: OpenResult & Needs) {
       if (name) {
         const content =
           id === "knot" ? pkg.Binder.knotCapture() : await download(`./samples/${name}`, signal);
-        const file = new File([content as BlobPart], name);
-        const read = await reading("read", { files: [{ name, path: name, file }], up: undefined, used: 0 })
-          .done;
+        const read = await readOne(name, content);
         signal?.throwIfAborted();
         return openRead(read, id).finally(begin);
       }
@@ -275,9 +279,7 @@ async function start(opened: OpenResult & Needs) {
     },
     /** Opens a project again with another up axis: rotates model, cage and poses. */
     async turn(bytes: Uint8Array, up: UpAxis) {
-      const name = "turned.glb";
-      const file = new Blob([new Uint8Array(bytes)]);
-      return openRead(await reading("read", { files: [{ name, path: name, file }], up, used: 0 }).done, null);
+      return openRead(await readOne("turned.glb", bytes, up), null);
     },
     /** Reads the page's settings of a project. Defaults replace invalid values; `notices` name the invalid values. */
     readSettings: pkg.readSettings,

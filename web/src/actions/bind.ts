@@ -142,13 +142,8 @@ function start(pass: BindRun["pass"], revision: number, options: BindOptions): B
  * replaces the report of the older bind.
  */
 export function sameWay(a: BindReport, b: BindReport): boolean {
-  return (
-    a.method === b.method &&
-    a.solver === b.solver &&
-    a.preconditioner === b.preconditioner &&
-    a.grid === b.grid &&
-    a.backend === b.backend
-  );
+  const keys = ["method", "solver", "preconditioner", "grid", "backend"] as const;
+  return keys.every((key) => a[key] === b[key]);
 }
 
 /** Maximum number of points of a curve. A longer curve loses every second point; the plot is only 328 pixels wide. */

@@ -12,16 +12,7 @@ import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 import type { Pulling } from "./pull";
 
-export type ExportKind =
-  | "glb"
-  | "shape"
-  | "poses"
-  | "clips"
-  | "cage"
-  | "controls"
-  | "weights"
-  | "picture"
-  | "project";
+export type ExportKind = keyof typeof T.exports.items;
 
 /** A file to download. */
 interface ExportedFile {
@@ -74,10 +65,7 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
       const full = `${exportStem(source)}${suffix(kind)}`;
       // A VRM is a GLB with its own extension.
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
-      const name = other(
-        isVrm ? full.replace(/glb$/, "vrm") : full,
-        files.map((file) => file.name),
-      );
+      const name = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
       files.push({ name, bytes: own[kind](member.id) as Uint8Array<ArrayBuffer> });
       if (kind === "glb" || kind === "shape") for (const notice of engine().rigNotices()) notices.add(notice);
     }
@@ -96,12 +84,8 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
       download(blobOf(name, bytes), name);
     }
     const size = files.reduce((sum, { bytes }) => sum + bytes.length, 0);
-    ctx.tell.say(
-      T.exports.saved(
-        files.map(({ name }) => name),
-        size,
-      ),
-    );
+    const names = files.map(({ name }) => name);
+    ctx.tell.say(T.exports.saved(names, size));
     for (const notice of notices) ctx.tell.say(sentence(notice));
   };
 
@@ -137,9 +121,8 @@ export function createExports(ctx: Context, project: Project, pull: Pick<Pulling
         const files: ExportedFile[] = [];
         for (const { name, file } of chosen) {
           const bytes = new Uint8Array(await file.arrayBuffer());
-          const taken = files.map((file) => file.name);
           files.push({
-            name: other(`${exportStem(name)}-posed.glb`, taken),
+            name: other(`${exportStem(name)}-posed.glb`, files),
             bytes: engine().exportClips(name, bytes, rig()) as Uint8Array<ArrayBuffer>,
           });
           for (const notice of engine().rigNotices()) notices.add(notice);
@@ -193,12 +176,13 @@ function blobOf(name: string, bytes: Uint8Array<ArrayBuffer>): Blob {
   return new Blob([bytes], { type });
 }
 
-/** Appends a number to a file name that is in `taken`: models from different folders may have the same name. */
-function other(name: string, taken: readonly string[]): string {
+/** Appends a number to the name of another file: models from different folders may have the same name. */
+function other(name: string, files: readonly ExportedFile[]): string {
+  const isTaken = (name: string) => files.some((file) => file.name === name);
   const again = (n: number) => name.replace(/(?=\.\w+$)/, `-${n}`);
   let n = 2;
-  while (taken.includes(again(n))) n += 1;
-  return taken.includes(name) ? again(n) : name;
+  while (isTaken(again(n))) n += 1;
+  return isTaken(name) ? again(n) : name;
 }
 
 /** Downloads a blob as a file called `name`. */

@@ -2,19 +2,11 @@
 
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
-import type { Coordinates, SceneOptions } from "../contract";
+import type { Coordinates } from "../contract";
 import { COORDINATES } from "../defaults";
 import { isCapture } from "../derived";
 import { T } from "../words";
 import { fieldsOf, IconButton, Section, Segments, SHARES, Slider, Toggle } from "./controls";
-
-const PARTS = [
-  "model",
-  "cage",
-  "base_wireframe",
-  "floor",
-  "problems",
-] as const satisfies (keyof SceneOptions)[];
 
 export function See({ app }: { app: App }) {
   if (!app.store.get().seeOpen) return null;
@@ -128,9 +120,10 @@ export function SlicePosition({ app }: { app: App }) {
 
 function Parts({ app }: { app: App }) {
   const option = fieldsOf(app.store.get().scene, app.view.scene);
+  const parts = Object.keys(T.see.parts) as (keyof typeof T.see.parts)[];
   return (
     <div class="stack tight">
-      {PARTS.map((part) => {
+      {parts.map((part) => {
         const [label = "", sentence = ""] = T.see.parts[part];
         return <Toggle key={part} label={label} sentence={sentence} {...option(part)} />;
       })}

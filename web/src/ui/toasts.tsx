@@ -46,14 +46,7 @@ const close = (list: List, id: number) => {
 
 let next = 0;
 
-export interface ToastParts {
-  readonly Toasts: () => preact.JSX.Element;
-  readonly tell: Messages;
-  /** Shows an offer that stays until it is taken or closed. */
-  offer(text: string, fix: Fix): void;
-}
-
-export function createToasts(): ToastParts {
+export function createToasts() {
   const said = signal<readonly Toast[]>([]);
   const problems = signal<readonly Toast[]>([]);
 
@@ -66,18 +59,20 @@ export function createToasts(): ToastParts {
     const latest = all.filter(({ stays }) => !stays).slice(-MAX_TOASTS);
     list.value = all.filter((one) => one.stays || latest.includes(one));
   };
+  const tell: Messages = {
+    say: (text, ...fixes) => add(said, { text, fixes }),
+    problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),
+    clear() {
+      problems.value = [];
+      said.value = said.value.filter(({ fixes }) => !isQuestion(fixes));
+    },
+  };
 
   return {
     Toasts: () => <Stack said={said} problems={problems} />,
-    tell: {
-      say: (text, ...fixes) => add(said, { text, fixes }),
-      problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),
-      clear: () => {
-        problems.value = [];
-        said.value = said.value.filter(({ fixes }) => !isQuestion(fixes));
-      },
-    },
-    offer: (text, fix) => add(said, { text, fixes: [fix], stays: true }),
+    tell,
+    /** Shows an offer that stays until it is taken or closed. */
+    offer: (text: string, fix: Fix) => add(said, { text, fixes: [fix], stays: true }),
   };
 }
 
