@@ -130,9 +130,7 @@ async function openShared(app: App): Promise<Link> {
     const link = await decodeShare(location.hash);
     if (!link) return { opened };
     const { sample, pose, seen, controls, clip } = link;
-    if (!app.store.get().samples.includes(sample)) {
-      throw new PageError(T.link.unknown(sample.slice(0, 40)));
-    }
+    if (!app.store.get().samples.includes(sample)) throw new PageError(T.link.unknown(sample.slice(0, 40)));
     opened = await app.files.openSample(sample);
     if (!opened) return { opened };
     app.store.set({ step: "pose" });

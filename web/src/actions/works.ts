@@ -141,9 +141,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     if (!isOpen) {
       release?.();
       if (isFirst) rememberOwn(null);
-      if (isFirst && file) {
-        ctx.tell.say(T.works.notOpened(work.name), showList);
-      }
+      if (isFirst && file) ctx.tell.say(T.works.notOpened(work.name), showList);
     }
     if (isOpen && release) {
       current = { id: work.id, name: work.name, release };

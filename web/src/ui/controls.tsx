@@ -80,7 +80,7 @@ interface Field<T> {
   onChange: (value: T) => void;
 }
 
-/** Connects controls to the keys of an object: `{...field("grid")}` shows `object.grid` and passes changes to `set`. */
+/** Connects controls to the keys of an object: `{...option("grid")}` shows `object.grid` and passes changes to `set`. */
 export function fieldsOf<T extends object>(object: T, set: (patch: Partial<T>) => unknown) {
   return <K extends keyof T>(key: K): Field<T[K]> => ({
     value: object[key],
@@ -88,7 +88,7 @@ export function fieldsOf<T extends object>(object: T, set: (patch: Partial<T>) =
   });
 }
 
-/** Connects a switch to a field: `on` and `off` are the values that it chooses between. */
+/** Connects a switch to a field. The switch sets it to `on` or `off`, and is off only if the value is `off`. */
 export function switchOf<T>({ value, onChange }: Field<T>, on: T, off: T): Field<boolean> {
   return { value: value !== off, onChange: (isOn) => onChange(isOn ? on : off) };
 }

@@ -26,8 +26,5 @@ export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
 export type CurveState = Pick<AppState, "bindRun" | "report" | "earlier">;
 
 function pointsOf(report: BindReport) {
-  return {
-    name: solverName(report),
-    points: historyPoints(report.delta_history, report.delta_interval),
-  };
+  return { name: solverName(report), points: historyPoints(report.delta_history, report.delta_interval) };
 }

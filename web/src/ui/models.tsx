@@ -7,14 +7,12 @@ import { SLIDERS } from "../defaults";
 import { percent } from "../format";
 import { T } from "../words";
 import { Button, Fold, fieldsOf, IconButton, Section, Segments, Slider } from "./controls";
-import { Icon, type IconName } from "./icons";
+import { Icon } from "./icons";
 import { useTouch } from "./touch";
 
 const ALL = "all";
-const WAYS: readonly (readonly [Treatment, IconName])[] = [
-  ["rigid", "rigid"],
-  ["stays", "stays"],
-];
+/** The treatments that a part can have. Their icons have the same names. */
+const WAYS = ["rigid", "stays"] as const satisfies readonly Treatment[];
 
 export function Models({ app, model }: { app: App; model: ModelInfo }) {
   const [only, ...others] = model.members;
@@ -116,10 +114,10 @@ function about({ vertices, options, painted }: MemberInfo): string {
 /** Two toggle buttons for a part, of which at most one is pressed: "keeps its shape" and "stays as it is". */
 function Ways(props: { app: App; member: MemberInfo; part: string; label: string; disabled?: boolean }) {
   const { app, member, part, label, disabled } = props;
-  return WAYS.map(([how, icon]) => (
+  return WAYS.map((how) => (
     <IconButton
       key={how}
-      icon={icon}
+      icon={how}
       label={T.models[how](label)}
       tip={T.models.tips[how]}
       kind="small"

@@ -29,9 +29,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
   switch (state.step) {
     case "model":
       if (!state.model) return { primary: open };
-      return {
-        primary: state.bound ? pose : { label: T.panel.next, run: () => app.go("cage") },
-      };
+      return { primary: state.bound ? pose : { label: T.panel.next, run: () => app.go("cage") } };
     case "cage": {
       const needed = cageAction(state, app);
       if (needed) return { primary: needed };
