@@ -2,23 +2,7 @@
 
 import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generated";
 
-export {
-  BIND_DEFAULTS,
-  BOX_DIVISIONS,
-  CAGE_DEFAULTS,
-  COMPANION_ENDINGS,
-  COORDINATES,
-  EXPORT_TYPES,
-  HULL_TARGET,
-  MODEL_ENDINGS,
-  MODEL_TYPES,
-  RIG_DEFAULTS,
-  SCENE_DEFAULTS,
-  SHAPE_FORMATS,
-  SLIDERS,
-  SPLAT_FORMATS,
-  VIEW_DEFAULTS,
-} from "@cagework/core/contract/generated";
+export * from "@cagework/core/contract/generated";
 
 /** The nearest value within the range of a slider. */
 export const clamped = (

@@ -68,7 +68,7 @@ export async function decodeShare(fragment: string): Promise<ShareLink | undefin
 
 async function read(what: "pose" | "view" | "controls", text: string): Promise<Uint8Array> {
   try {
-    return await unpack(fromBase64Url(text));
+    return await through(fromBase64Url(text), new DecompressionStream("deflate-raw"));
   } catch {
     throw new PageError(T.link.unreadable[what]);
   }
@@ -103,10 +103,6 @@ async function through(
 
 function pack(data: Uint8Array): Promise<Uint8Array> {
   return through(data, new CompressionStream("deflate-raw"));
-}
-
-function unpack(data: Uint8Array): Promise<Uint8Array> {
-  return through(data, new DecompressionStream("deflate-raw"));
 }
 
 /** Encodes bytes as URL-safe Base64 without padding. */

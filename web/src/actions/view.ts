@@ -97,9 +97,6 @@ export function createView(
       const next = isComparison(kinds) && (await prepareCompare(kinds)) ? kinds : SCENE_DEFAULTS.compare;
       if (String(store.get().scene.compare) !== String(next)) scene({ compare: [...next] });
     },
-    frameAll: () => engine().frameAll(),
-    frameSelection: () => engine().frameSelection(),
-    axis: (axis: 0 | 1 | 2, negative: boolean) => engine().axisView(axis, negative),
     ortho: () => store.set({ ortho: engine().toggleOrtho() }),
     /** Changes how clicks and gestures act on the cage. */
     tools,

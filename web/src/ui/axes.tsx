@@ -32,7 +32,7 @@ export function Axes({ app }: { app: App }) {
             data-negative={negative ? "" : undefined}
             aria-label={T.view.from[k]}
             data-tip={T.view.from[k]}
-            onClick={() => app.view.axis(axis, negative)}
+            onClick={() => app.ctx.engine().axisView(axis, negative)}
           >
             {negative ? "" : T.axes[axis]}
           </button>
