@@ -17,22 +17,22 @@ export function createCommands(app: App): Record<Command, () => void> {
   const { engine } = app.ctx;
   const hasCage = () => store.get().cage !== null;
 
-  const gesture = (kind: Gesture) => () => {
-    if (!hasCage()) return;
-    if (edit.active()) edit.end(false);
-    poses.stop();
-    const { x, y } = app.pointer();
-    if (!edit.begin(kind, x, y)) app.ctx.tell.say(T.pose.selectFirst);
-  };
-  const select = (work: () => void) => () => {
+  const withCage = (work: () => void) => () => {
     if (hasCage()) work();
   };
+  const gesture = (kind: Gesture) =>
+    withCage(() => {
+      if (edit.active()) edit.end(false);
+      poses.stop();
+      const { x, y } = app.pointer();
+      if (!edit.begin(kind, x, y)) app.ctx.tell.say(T.pose.selectFirst);
+    });
   const axis = (index: 0 | 1 | 2, plane: boolean) => () => edit.constrain(index, plane);
-  const nudge = (right: number, up: number) => () => {
-    if (!hasCage()) return;
-    if (store.get().selected.count === 0 && store.get().scene.pull) pull.nudge(right, up);
-    else edit.nudge(right, up);
-  };
+  const nudge = (right: number, up: number) =>
+    withCage(() => {
+      if (store.get().selected.count === 0 && store.get().scene.pull) pull.nudge(right, up);
+      else edit.nudge(right, up);
+    });
   const turn = (way: "undo" | "redo") => () => {
     if (edit.active() || pull.active() || painting.active()) {
       edit.end(false);
@@ -44,7 +44,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     engine()[way]();
   };
   const neighbour = (step: 1 | -1) =>
-    select(() => {
+    withCage(() => {
       const n = controlCount(store.get());
       if (n === 0) return;
       const { last } = store.get().selected;
@@ -101,16 +101,14 @@ export function createCommands(app: App): Record<Command, () => void> {
     undo: turn("undo"),
     redo: turn("redo"),
 
-    selectAll: select(() => engine().selectAll()),
-    selectNone: select(() => engine().select(new Uint32Array(), "replace")),
-    selectLinked: select(() => engine().selectLinked()),
-    selectInvert: select(() => {
+    selectAll: withCage(() => engine().selectAll()),
+    selectNone: withCage(() => engine().select(new Uint32Array(), "replace")),
+    selectLinked: withCage(() => engine().selectLinked()),
+    selectInvert: withCage(() => {
       const all = Uint32Array.from({ length: controlCount(store.get()) }, (_, i) => i);
       engine().select(all, "toggle");
     }),
-    boxSelect: () => {
-      if (hasCage()) store.set({ boxArmed: !store.get().boxArmed });
-    },
+    boxSelect: withCage(() => store.set({ boxArmed: !store.get().boxArmed })),
     elementMode: () => view.element(NEXT_ELEMENT[elementInUse(store.get())]),
     previousVertex: neighbour(-1),
     nextVertex: neighbour(1),
@@ -131,9 +129,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     heatMap: () => view.scene({ colour: store.get().scene.colour === "weight" ? "material" : "weight" }),
     see: () => store.set({ seeOpen: !store.get().seeOpen }),
 
-    restMode: () => {
-      if (hasCage()) edit.setEditingRest(!store.get().editingRest);
-    },
+    restMode: withCage(() => edit.setEditingRest(!store.get().editingRest)),
     split: () => edit.restEdit("split_edge"),
     collapse: () => edit.restEdit("collapse_edge"),
     extrude: () => edit.restEdit("extrude_face"),
@@ -145,9 +141,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     resetPose: () => poses.reset(),
 
     open: () => app.chooseModel(),
-    saveProject: () => {
-      if (hasCage()) void exports.save("project");
-    },
+    saveProject: withCage(() => void exports.save("project")),
     bind: () => {
       if (!hasCage()) void cage.make().then((made) => made && bind.start());
       else void bind.start();

@@ -11,7 +11,8 @@ const NEXT_THEME: Record<Theme, Theme> = { auto: "dark", dark: "light", light: "
 const THEME_ICON = { auto: "auto", dark: "moon", light: "sun" } as const;
 
 export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
-  const { model, undo, redo, theme } = app.store.get();
+  const state = app.store.get();
+  const { model, theme } = state;
   return (
     <>
       <div class="brand">
@@ -29,20 +30,16 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
         </ol>
       </nav>
       <div class="bar-actions">
-        <IconButton
-          icon="undo"
-          label={T.bar.undo}
-          tip={T.bar.undoOf(undo)}
-          {...app.command("undo")}
-          disabled={undo === null}
-        />
-        <IconButton
-          icon="redo"
-          label={T.bar.redo}
-          tip={T.bar.redoOf(redo)}
-          {...app.command("redo")}
-          disabled={redo === null}
-        />
+        {(["undo", "redo"] as const).map((way) => (
+          <IconButton
+            key={way}
+            icon={way}
+            label={T.bar[way]}
+            tip={T.bar[`${way}Of`](state[way])}
+            {...app.command(way)}
+            disabled={state[way] === null}
+          />
+        ))}
         <span class="gap" />
         <IconButton icon="tour" label={T.tour.begin} {...app.command("tour")} />
         <IconButton icon="share" label={T.bar.share} onClick={() => void app.exports.share()} />

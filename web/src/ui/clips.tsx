@@ -103,28 +103,23 @@ export function RigChoices({ app }: { app: App }) {
         <>
           <Toggle label={T.clips.ground} sentence={T.clips.groundSentence} {...option("ground")} />
           <Toggle label={T.clips.feet} sentence={T.clips.feetSentence} {...feet} />
+          {model.props.length > 0 && (
+            <Fold title={T.clips.rigid(rigid.length, model.props.length)}>
+              <p class="hint">{T.clips.rigidSentence}</p>
+              {[...new Set(model.props)].map((name) => {
+                const setRigid = (on: boolean) => {
+                  const others = rigid.filter((other) => other !== name);
+                  void app.clips.rig({ rigid: on ? [...others, name] : others });
+                };
+                return <Toggle key={name} label={name} value={rigid.includes(name)} onChange={setRigid} />;
+              })}
+            </Fold>
+          )}
+          <Fold title={T.clips.advanced}>
+            <Toggle label={T.clips.turn} sentence={T.clips.turnSentence} {...turn} />
+            <Toggle label={T.clips.travel} sentence={T.clips.travelSentence} {...option("keep_travel")} />
+          </Fold>
         </>
-      )}
-      {joints !== "stay" && model.props.length > 0 && (
-        <Fold title={T.clips.rigid(rigid.length, model.props.length)}>
-          <p class="hint">{T.clips.rigidSentence}</p>
-          {[...new Set(model.props)].map((name) => (
-            <Toggle
-              key={name}
-              label={name}
-              value={rigid.includes(name)}
-              onChange={(on) =>
-                app.clips.rig({ rigid: on ? [...rigid, name] : rigid.filter((other) => other !== name) })
-              }
-            />
-          ))}
-        </Fold>
-      )}
-      {joints !== "stay" && (
-        <Fold title={T.clips.advanced}>
-          <Toggle label={T.clips.turn} sentence={T.clips.turnSentence} {...turn} />
-          <Toggle label={T.clips.travel} sentence={T.clips.travelSentence} {...option("keep_travel")} />
-        </Fold>
       )}
     </>
   );
